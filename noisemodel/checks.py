@@ -1,0 +1,102 @@
+"""What makes a run valid."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from noisemodel.block import Block
+from noisemodel.errors import RunError
+from noisemodel.types import Array, Mask, Real
+
+UNIFORM = 1e-3
+"""How far a time step may lie from the median step, as a share of it (run file, version 1)."""
+
+
+def check_time(time: Array) -> None:
+    """Refuse a time that is not finite, not rising or not uniform, naming the row."""
+    if time.ndim != 1 or len(time) < 2:
+        raise RunError(f"time: shape {time.shape}, expected (samples,) with at least 2 samples")
+    finite = np.isfinite(time)
+    if not finite.all():
+        raise RunError(f"time: {time[~finite][0]} in row {int(np.argmin(finite))}")
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0)) + 1
+        how = "stands still" if steps[row - 1] == 0 else "runs backwards"
+        raise RunError(f"time: {how} in row {row} ({time[row - 1]:.9g} s, then {time[row]:.9g} s)")
+    step = np.median(steps)
+    # Stamps far from zero cannot be finer than their own spacing.
+    tolerance = max(UNIFORM * step, 2 * np.spacing(np.abs(time).max()))
+    uneven = np.abs(steps - step) > tolerance
+    if uneven.any():
+        row = int(np.argmax(uneven)) + 1
+        raise RunError(
+            f"time: not uniform, the step to row {row} is {steps[row - 1]:.6g} s where the median"
+            f" is {step:.6g} s; `inspector import` resamples such logs (and float32 is too coarse)"
+        )
+
+
+def check_names(array: str, names: Sequence[str]) -> None:
+    """Refuse names that repeat."""
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise RunError(f"{array}: {', '.join(twice)} named twice")
+
+
+def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
+    """Refuse a signal of another kind or shape, or with values that are not finite."""
+    if signal.dtype.kind != "f":
+        raise RunError(f"{name}: holds {signal.dtype}, expected floating-point numbers")
+    if signal.shape != shape:
+        raise RunError(f"{name}: shape {signal.shape}, expected {shape}")
+    finite = np.isfinite(signal)
+    if not finite.all():
+        row, column = np.argwhere(~finite)[0]
+        raise RunError(
+            f"{name}: {signal[row, column]} in row {row}, column {column};"
+            " mark gaps with valid = false and zeros"
+        )
+
+
+def check_valid(valid: Mask, samples: int) -> None:
+    """Refuse a mask that is not one boolean per sample, or that leaves nothing."""
+    if valid.dtype != np.bool_ or valid.shape != (samples,):
+        raise RunError(
+            f"valid: shape {valid.shape} of {valid.dtype}, expected {(samples,)} of bool"
+        )
+    if not valid.any():
+        raise RunError("valid: false in every sample, nothing is left to look at")
+
+
+def check_blocks(blocks: Sequence[Block], time: Array) -> None:
+    """Refuse blocks that are empty, lie outside of the run or overlap."""
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    for block in blocks:
+        if not block.start < block.stop:
+            raise RunError(
+                f"block {block.label!r}: starts at {block.start:.6g} s, stops at {block.stop:.6g} s"
+            )
+        if block.start < time[0] - step or block.stop > time[-1] + 2 * step:
+            raise RunError(
+                f"block {block.label!r}: {block.start:.6g} s to {block.stop:.6g} s lies outside of"
+                f" the run, {time[0]:.6g} s to {time[-1]:.6g} s"
+            )
+    for before, after in pairwise(blocks):
+        if after.start < before.stop - step:
+            raise RunError(
+                f"blocks overlap: {before.label!r} until {before.stop:.6g} s"
+                f" and {after.label!r} from {after.start:.6g} s"
+            )
+
+
+def check_quaternions(quaternions: Real, valid: Mask) -> None:
+    """Refuse quaternions that are not of length 1 (in valid samples)."""
+    norm = np.linalg.norm(quaternions, axis=1)
+    wrong = (np.abs(norm - 1) > 0.01) & valid
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        raise RunError(
+            f"base_pose: the quaternion in row {row} has norm {norm[row]:.3g},"
+            " expected 1 (order x, y, z, w)"
+        )

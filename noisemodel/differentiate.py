@@ -1,0 +1,119 @@
+"""Velocities from positions, where a log holds none."""
+
+from collections.abc import Iterator, Mapping
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel import checks
+from noisemodel.types import Array, Mask, Real
+
+WINDOW, ORDER = 7, 3
+METHOD = f"Savitzky-Golay, window {WINDOW}, order {ORDER}"
+SOURCES = {
+    "velocity": "position",
+    "velocity_desired": "position_desired",
+    "base_velocity": "base_pose",
+}
+"""Each velocity and the position that it can be had from."""
+
+
+def fill_in(
+    signals: Mapping[str, NDArray[Any]],
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Add the velocities that are missing and can be differentiated.
+
+    Args:
+        signals: Arrays of a run file by name, ``time`` among them.
+
+    Returns:
+        The signals with velocities added, and by the name of each added one how it was made.
+
+    Raises:
+        RunError: If positions do not fit the time, or are not finite.
+    """
+    time, valid = signals["time"], signals.get("valid")
+    filled, how = dict(signals), {}
+    for velocity, position in SOURCES.items():
+        source = signals.get(position)
+        if velocity not in signals and source is not None:
+            checks.check_signal(position, source, (len(time), source.shape[-1]))
+            differentiator = base_velocity if velocity == "base_velocity" else joint_velocity
+            filled[velocity] = differentiator(time, source, valid)
+            how[velocity] = METHOD
+    return filled, how
+
+
+def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Array:
+    """Differentiate joint positions; angles that wrap are made continuous first.
+
+    Args:
+        time: Uniform, shape (samples,), in [s].
+        position: Shape (samples, joints), in [rad] or [m].
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        Velocities, shape (samples, joints), in [rad/s] or [m/s]; 0 in gaps and in stretches
+        of a single sample.
+    """
+    step = float(np.median(np.diff(time)))
+    velocity = np.zeros(position.shape)
+    for stretch in stretches(valid, len(time)):
+        angles = np.unwrap(position[stretch].astype(np.float64), axis=0)
+        velocity[stretch] = _slope(angles, step)
+    return velocity
+
+
+def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
+    """Differentiate the pose of a floating base.
+
+    Args:
+        time: Uniform, shape (samples,), in [s].
+        pose: x, y, z and quaternion x, y, z, w, shape (samples, 7), in [m].
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        Linear, then angular velocity in the base's own axes, shape (samples, 6),
+        in [m/s] and [rad/s].
+    """
+    step = float(np.median(np.diff(time)))
+    velocity = np.zeros((len(time), 6))
+    for stretch in stretches(valid, len(time)):
+        velocity[stretch] = _body_twist(pose[stretch].astype(np.float64), step)
+    return velocity
+
+
+def stretches(valid: Mask | None, samples: int) -> Iterator[slice]:
+    """Go through the stretches between gaps that hold two samples or more."""
+    if valid is None:
+        valid = np.ones(samples, dtype=bool)
+    edges = [0, *(np.flatnonzero(np.diff(valid)) + 1), samples]
+    for start, stop in pairwise(edges):
+        if valid[start] and stop - start > 1:
+            yield slice(start, stop)
+
+
+def _body_twist(pose: Array, step: float) -> Array:
+    quaternion = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
+    # q and -q are one rotation: keep the sign that lies nearer to the sample before.
+    turns = np.sign(np.einsum("si,si->s", quaternion[1:], quaternion[:-1]))
+    quaternion = quaternion * np.concatenate(([1.0], np.cumprod(turns)))[:, None]
+    vector, scalar = quaternion[:, :3], quaternion[:, 3:]
+    rate = _slope(quaternion, step)
+    # omega = 2 vec(conj(q) q_dot), v = R(q)^T p_dot
+    angular = 2 * (scalar * rate[:, :3] - vector * rate[:, 3:] - np.cross(vector, rate[:, :3]))
+    world = _slope(pose[:, :3], step)
+    across = 2 * np.cross(-vector, world)
+    linear = world + scalar * across + np.cross(-vector, across)
+    return np.hstack((linear, angular))
+
+
+def _slope(values: Array, step: float) -> Array:
+    """Differentiate by Savitzky and Golay; short stretches by differences."""
+    if len(values) < WINDOW:
+        return np.asarray(np.gradient(values, step, axis=0))
+    from scipy.signal import savgol_filter
+
+    return np.asarray(savgol_filter(values, WINDOW, ORDER, deriv=1, delta=step, axis=0))

@@ -1,0 +1,213 @@
+"""The robot: read once by Pinocchio, then a table of joints."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from noisemodel import catalog, urdf
+from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRobotError
+from noisemodel.joints import Joint, table_of
+from noisemodel.run import Run
+from noisemodel.types import Array
+from noisemodel.urdf import Mimic
+
+ROOT = "root_joint"
+"""Pinocchio's name for the joint that makes a base float."""
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A robot with its kinematics.
+
+    Attributes:
+        name: Its name in the list, or that of its URDF file.
+        path: The URDF that it was read from.
+        package_roots: Folders in which ``package://`` addresses are looked up.
+        model: Pinocchio's model; mimic joints are joints of their own in it.
+        joints: All joints after the universe, in Pinocchio's order.
+        nq: Length of a configuration.
+        nv: Length of a velocity.
+        floating_base: Whether the base moves freely.
+        mimics: The joints that follow another one; empty where they are independent.
+    """
+
+    name: str
+    path: Path
+    package_roots: tuple[Path, ...]
+    model: Any
+    joints: tuple[Joint, ...]
+    nq: int
+    nv: int
+    floating_base: bool
+    mimics: Mapping[str, Mimic]
+
+    @classmethod
+    def load(
+        cls, name: str | Path, *, floating_base: bool | None = None, mimic: bool = False
+    ) -> Self:
+        """Read a robot.
+
+        Args:
+            name: A listed name (see ``noisemodel.ROBOTS``), or the path of a URDF.
+            floating_base: Whether the base moves freely; unless given, as the list says, and
+                False for a URDF of one's own.
+            mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
+
+        Returns:
+            The robot.
+
+        Raises:
+            UnknownRobotError: If there is neither such a name nor such a file.
+            RobotError: If the URDF cannot be read.
+        """
+        listed = catalog.ROBOTS.get(str(name))
+        path = locate(name)
+        roots = catalog.package_roots() if listed else (path.parent, *path.parent.parents[:2])
+        if floating_base is None:
+            floating_base = listed is not None and listed.floating_base
+        description = urdf.read(path)
+        model = _model(path, floating_base)
+        table = table_of(model)
+        mimics = description.mimics if mimic else {}
+        if mimic:
+            table = _coupled(table, mimics, path)
+        independent = [joint for joint in table if joint.name not in mimics]
+        return cls(
+            name=str(name) if listed else path.stem,
+            path=path,
+            package_roots=roots,
+            model=model,
+            joints=table,
+            nq=sum(joint.nq for joint in independent),
+            nv=sum(joint.nv for joint in independent),
+            floating_base=floating_base,
+            mimics=mimics,
+        )
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """The joints that a run can name: all of one degree of freedom that follow no other."""
+        return tuple(
+            joint.name for joint in self.joints if joint.nv == 1 and joint.name not in self.mimics
+        )
+
+    def configuration(self, run: Run) -> tuple[Array, Array]:
+        """Order a run's motion as Pinocchio does, joint by joint, by name.
+
+        Joints that the run does not name rest in their neutral position, and so does a base of
+        which the run says nothing. Columns of joints that follow another one are passed over.
+
+        Args:
+            run: A run with positions.
+
+        Returns:
+            Configurations q, shape (samples, nq), and velocities v, shape (samples, nv).
+
+        Raises:
+            UnknownJointError: If the run names a joint that the robot does not have.
+            RunError: If the run has no positions.
+        """
+        if run.position is None:
+            raise RunError(f"the run has no 'position'; {self.name!r} cannot be moved without")
+        by_name = {joint.name: joint for joint in self.joints if joint.nv == 1}
+        q = np.tile(self.neutral, (len(run.time), 1))
+        v = np.zeros((len(run.time), self.nv))
+        for column, name in enumerate(run.joint_names):
+            if name not in by_name:
+                raise UnknownJointError(name, self.name, self.joint_names)
+            joint, position = by_name[name], run.position[:, column]
+            if name in self.mimics:
+                continue
+            if joint.kind == "continuous":
+                q[:, joint.first_q] = np.cos(position)
+                q[:, joint.first_q + 1] = np.sin(position)
+            else:
+                q[:, joint.first_q] = position
+            v[:, joint.first_v] = run.velocity[:, column]
+        if self.floating_base:
+            if run.base_pose is not None:
+                q[run.mask, :7] = run.base_pose[run.mask]
+            if run.base_velocity is not None:
+                v[:, :6] = run.base_velocity
+        return q, v
+
+    @property
+    def neutral(self) -> Array:
+        """The configuration in which every joint is at 0, shape (nq,)."""
+        q = np.zeros(self.nq)
+        for joint in self.joints:
+            if joint.name not in self.mimics:
+                if joint.kind == "floating":
+                    q[joint.first_q + 6] = 1.0
+                elif joint.kind == "continuous":
+                    q[joint.first_q] = 1.0
+                elif joint.kind == "planar":
+                    q[joint.first_q + 2] = 1.0
+        return q
+
+
+def locate(name: str | Path) -> Path:
+    """Find the URDF of a listed robot, or of one given by its path.
+
+    Raises:
+        UnknownRobotError: If there is neither such a name nor such a file.
+    """
+    if str(name) in catalog.ROBOTS:
+        return catalog.urdf_path(str(name))
+    path = Path(name)
+    if path.suffix.lower() == ".urdf" or path.is_file():
+        if not path.is_file():
+            raise RobotError(f"{path}: there is no such URDF file")
+        return path
+    raise UnknownRobotError(str(name), catalog.ROBOTS)
+
+
+def _model(path: Path, floating_base: bool) -> Any:
+    import pinocchio
+
+    root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
+    try:
+        return pinocchio.buildModelFromUrdf(str(path), *root)
+    except (ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise RobotError(f"{path}: Pinocchio cannot read the URDF ({reason})") from error
+
+
+def _coupled(
+    table: tuple[Joint, ...], mimics: Mapping[str, Mimic], path: Path
+) -> tuple[Joint, ...]:
+    """Let mimic joints follow, and close the gaps that they leave in q and v."""
+    placed: dict[str, Joint] = {}
+    first_q = first_v = 0
+    for joint in table:
+        if joint.name not in mimics:
+            placed[joint.name] = replace(joint, first_q=first_q, first_v=first_v)
+            first_q, first_v = first_q + joint.nq, first_v + joint.nv
+    for joint in table:
+        if joint.name in mimics:
+            leader, multiplier, offset = _leader(joint.name, mimics, path)
+            if leader not in placed or "continuous" in (joint.kind, placed[leader].kind):
+                raise RobotError(f"{path}: joint {joint.name!r} cannot mimic {leader!r}")
+            placed[joint.name] = replace(
+                joint,
+                first_q=placed[leader].first_q,
+                first_v=placed[leader].first_v,
+                multiplier=multiplier,
+                offset=offset,
+            )
+    return tuple(placed[joint.name] for joint in table)
+
+
+def _leader(name: str, mimics: Mapping[str, Mimic], path: Path) -> tuple[str, float, float]:
+    """Follow a chain of mimic joints to the joint that moves by itself."""
+    multiplier, offset = 1.0, 0.0
+    for _ in range(len(mimics) + 1):
+        if name not in mimics:
+            return name, multiplier, offset
+        mimic = mimics[name]
+        multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
+        name = mimic.joint
+    raise RobotError(f"{path}: joint {name!r} mimics itself")

@@ -1,0 +1,251 @@
+"""The run: one recording of one robot, checked when it is made."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel import checks, differentiate, runfile
+from noisemodel.block import Block
+from noisemodel.errors import RunError, RunFileError
+from noisemodel.types import Array, Mask, Real
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """One recording of one robot, in SI units; optional signals are None or empty.
+
+    Attributes:
+        time: Uniform to 1e-3 of its step, shape (samples,), in [s].
+        velocity: Joint velocities, shape (samples, joints), in [rad/s] or [m/s].
+        joint_names: Names of the joints, in any order.
+        position: Joint positions, shape (samples, joints), in [rad] or [m].
+        velocity_desired: Desired joint velocities, shape (samples, desired).
+        position_desired: Desired joint positions, shape (samples, desired).
+        desired_joint_names: Names of the desired joints; ``joint_names`` unless given.
+        stages: Velocities at named stages of the control flow, each (samples, joints).
+        effort: Joint torques or forces, shape (samples, joints), in [N m] or [N].
+        valid: False in gaps, where all values are 0, shape (samples,); all true unless given.
+        base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
+        base_velocity: Linear, then angular velocity of the base in its own axes,
+            shape (samples, 6), in [m/s] and [rad/s].
+        robot: Name of a listed robot, or path of a URDF.
+        blocks: Annotated stretches, sorted, not overlapping.
+        meta: What else is known: scenario, seed, software version, source…
+
+    Raises:
+        RunError: If shapes do not fit, a value is not finite, time is not uniform,
+            names repeat, or blocks overlap.
+    """
+
+    time: Array
+    velocity: Real
+    joint_names: tuple[str, ...]
+    position: Real | None = None
+    velocity_desired: Real | None = None
+    position_desired: Real | None = None
+    desired_joint_names: tuple[str, ...] = ()
+    stages: Mapping[str, Real] = field(default_factory=dict)
+    effort: Real | None = None
+    valid: Mask | None = None
+    base_pose: Real | None = None
+    base_velocity: Real | None = None
+    robot: str | None = None
+    blocks: tuple[Block, ...] = ()
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Fill in defaults and check everything once."""
+        settle = object.__setattr__
+        settle(self, "time", np.asarray(self.time, dtype=np.float64))
+        settle(self, "desired_joint_names", self.desired_joint_names or self.joint_names)
+        settle(self, "blocks", tuple(sorted(self.blocks)))
+        settle(self, "stages", MappingProxyType(dict(self.stages)))
+        settle(self, "meta", MappingProxyType(dict(self.meta)))
+        checks.check_time(self.time)
+        if self.valid is None:
+            settle(self, "valid", np.ones(len(self.time), dtype=bool))
+        checks.check_valid(self.mask, len(self.time))
+        checks.check_names("joint_names", self.joint_names)
+        checks.check_names("desired_joint_names", self.desired_joint_names)
+        for name, signal, width in self._signals():
+            checks.check_signal(name, signal, (len(self.time), width))
+        if self.base_pose is not None:
+            checks.check_quaternions(self.base_pose[:, 3:], self.mask)
+        checks.check_blocks(self.blocks, self.time)
+
+    def _signals(self) -> list[tuple[str, Real, int]]:
+        """List name, array and expected width of each signal that is there."""
+        joints, desired = len(self.joint_names), len(self.desired_joint_names)
+        signals = [
+            ("velocity", self.velocity, joints),
+            ("position", self.position, joints),
+            ("velocity_desired", self.velocity_desired, desired),
+            ("position_desired", self.position_desired, desired),
+            *((runfile.STAGE + name, stage, joints) for name, stage in self.stages.items()),
+            ("effort", self.effort, joints),
+            ("base_pose", self.base_pose, 7),
+            ("base_velocity", self.base_velocity, 6),
+        ]
+        return [(name, signal, width) for name, signal, width in signals if signal is not None]
+
+    @property
+    def mask(self) -> Mask:
+        """The samples that are not in a gap, shape (samples,)."""
+        assert self.valid is not None
+        return self.valid
+
+    @property
+    def rate(self) -> float:
+        """Nominal sample rate: the inverse of the median step, in [Hz]."""
+        return float(f"{1.0 / np.median(np.diff(self.time)):.9g}")
+
+    @property
+    def duration(self) -> float:
+        """Time that the samples cover, in [s]."""
+        return len(self.time) / self.rate
+
+    @property
+    def motion(self) -> Real:
+        """All measured velocities, those of a floating base first, shape (samples, n).
+
+        The simplified noise counts the base's six velocities too (paper, Sec. II-A: n = 30).
+        """
+        if self.base_velocity is None:
+            return self.velocity
+        return np.hstack((self.base_velocity, self.velocity))
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the run as a run file, whole or not at all.
+
+        Args:
+            path: The file to write, by convention ``*.npz``.
+            overwrite: Whether a file that exists may be replaced.
+
+        Raises:
+            OutputError: If the file exists or cannot be written.
+        """
+        runfile.write(Path(path), _arrays(self), overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a run file; velocities that are missing are differentiated from positions.
+
+        Args:
+            path: A ``run.npz``, version 1. A robot that it names by a relative URDF path is
+                looked for beside the file.
+
+        Returns:
+            The run; what was differentiated is said under ``differentiated`` in its ``meta``.
+
+        Raises:
+            RunFileError: If the file is no run file, or holds a run that is wrong.
+        """
+        path = Path(path)
+        arrays = runfile.read(path)
+        try:
+            return cls(**_fields(arrays, folder=path.parent))
+        except RunError as error:
+            raise RunFileError(path, str(error)) from error
+
+
+def _arrays(run: Run) -> dict[str, Any]:
+    """Turn a run into the arrays of a run file."""
+    signals = {name: signal for name, signal, _ in run._signals()}
+    arrays = {
+        "format": runfile.FORMAT,
+        "time": run.time,
+        "joint_names": np.array(run.joint_names, dtype=str),
+        **signals,
+        "meta": json.dumps(dict(run.meta), sort_keys=True),
+    }
+    if run.desired_joint_names != run.joint_names:
+        arrays["desired_joint_names"] = np.array(run.desired_joint_names, dtype=str)
+    if not run.mask.all():
+        arrays["valid"] = run.mask
+    if run.robot is not None:
+        arrays["robot"] = run.robot
+    if run.blocks:
+        arrays["block_start"] = np.array([block.start for block in run.blocks])
+        arrays["block_stop"] = np.array([block.stop for block in run.blocks])
+        arrays["block_label"] = np.array([block.label for block in run.blocks])
+    return arrays
+
+
+def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, Any]:
+    """Turn the arrays of a run file into the fields of a run."""
+    signals = {
+        name: array
+        for name, array in arrays.items()
+        if runfile.KINDS.get(name) in ("f", "b") and not name.startswith("block_")
+    }
+    if "time" not in signals:
+        raise RunError(f"array 'time' is missing; the file has {', '.join(arrays) or 'nothing'}")
+    if "velocity" not in signals and "position" not in signals:
+        raise RunError(
+            "array 'velocity' is missing, and 'position' to differentiate too;"
+            f" the file has {', '.join(arrays)}"
+        )
+    checks.check_time(signals["time"])
+    if "valid" in signals:
+        checks.check_valid(signals["valid"], len(signals["time"]))
+    signals, differentiated = differentiate.fill_in(signals)
+    meta = _meta(arrays)
+    if differentiated:
+        meta["differentiated"] = differentiated
+    joints = signals["velocity"].shape[-1]
+    return {
+        **signals,
+        "joint_names": _names(arrays, "joint_names", [f"joint{i + 1}" for i in range(joints)]),
+        "desired_joint_names": _names(arrays, "desired_joint_names", []),
+        "stages": {
+            name.removeprefix(runfile.STAGE): array
+            for name, array in arrays.items()
+            if name.startswith(runfile.STAGE)
+        },
+        "robot": _robot(arrays, folder),
+        "blocks": _blocks(arrays),
+        "meta": meta,
+    }
+
+
+def _names(arrays: Mapping[str, NDArray[Any]], name: str, default: list[str]) -> tuple[str, ...]:
+    names = arrays.get(name, np.array(default, dtype=str))
+    if names.ndim != 1:
+        raise RunError(f"{name}: shape {names.shape}, expected (joints,)")
+    return tuple(str(joint) for joint in names)
+
+
+def _robot(arrays: Mapping[str, NDArray[Any]], folder: Path) -> str | None:
+    robot = str(arrays.get("robot", ""))
+    if robot and robot.lower().endswith(".urdf"):
+        return str(folder / robot)
+    return robot or None
+
+
+def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:
+    columns = [arrays.get(f"block_{name}", np.empty(0)) for name in ("start", "stop", "label")]
+    if len({column.shape for column in columns}) > 1 or columns[0].ndim != 1:
+        raise RunError(
+            "block_start, block_stop and block_label have shapes "
+            + ", ".join(str(column.shape) for column in columns)
+        )
+    return tuple(
+        Block(float(start), float(stop), str(label))
+        for start, stop, label in zip(*columns, strict=True)
+    )
+
+
+def _meta(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    try:
+        meta = json.loads(str(arrays.get("meta", "{}")))
+    except json.JSONDecodeError as error:
+        raise RunError(f"meta: not JSON ({error})") from error
+    if not isinstance(meta, dict):
+        raise RunError("meta: expected a JSON object")
+    return meta

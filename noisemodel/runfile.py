@@ -1,0 +1,116 @@
+"""The run file, version 1: which arrays it has, read without trusting it."""
+
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel.atomic import replacing
+from noisemodel.errors import OutputError, RunFileError, hint
+
+FORMAT = "noise-run/1"
+STAGE = "stage_"
+MAX_BYTES = 16 * 2**30
+"""An archive that would unpack to more than this is refused."""
+
+KINDS = {
+    "time": "f",
+    "velocity": "f",
+    "position": "f",
+    "velocity_desired": "f",
+    "position_desired": "f",
+    "effort": "f",
+    "valid": "b",
+    "joint_names": "U",
+    "desired_joint_names": "U",
+    "base_pose": "f",
+    "base_velocity": "f",
+    "robot": "U",
+    "block_start": "f",
+    "block_stop": "f",
+    "block_label": "U",
+    "format": "U",
+    "meta": "U",
+}
+"""The arrays of a run file and the kind of number or text that each holds."""
+
+KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
+
+
+def read(path: Path) -> dict[str, NDArray[Any]]:
+    """Read the arrays of a run file.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Its arrays by name; integers that stand for numbers become floating-point.
+
+    Raises:
+        RunFileError: If the file cannot be read, is no archive of plain arrays, names an
+            array that is not known, holds another kind of array, or is of another version.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+            if unpacked > MAX_BYTES:
+                raise RunFileError(path, f"unpacks to {unpacked} bytes; the limit is {MAX_BYTES}")
+            names = [member.removesuffix(".npy") for member in archive.namelist()]
+        for name in names:
+            if name not in KINDS and not name.startswith(STAGE):
+                raise RunFileError(
+                    path,
+                    f"unknown array {name!r}{hint(name, KINDS)}; a run file has"
+                    f" {', '.join(KINDS)} and {STAGE}<name>; anything else belongs into meta",
+                )
+        with np.load(path, allow_pickle=False) as arrays:
+            found = {name: _plain(path, name, arrays[name]) for name in names}
+    except RunFileError:
+        raise
+    except OSError as error:
+        raise RunFileError(path, f"cannot be read ({error.strerror or error})") from error
+    except (ValueError, zipfile.BadZipFile, KeyError, EOFError, NotImplementedError) as error:
+        raise RunFileError(path, f"not a run file: {_one_line(error)}") from error
+    except (MemoryError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        raise RunFileError(path, f"damaged: {_one_line(error)}") from error
+    version = str(found.get("format", FORMAT))
+    if version != FORMAT:
+        raise RunFileError(path, f"format {version!r}, expected {FORMAT!r}")
+    return found
+
+
+def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
+    """Write the arrays of a run file, compressed, whole or not at all.
+
+    Args:
+        path: The file to write.
+        arrays: Arrays by name.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    with replacing(path, overwrite=overwrite) as temporary:
+        try:
+            with temporary.open("wb") as stream:
+                np.savez_compressed(stream, allow_pickle=False, **arrays)
+        except ValueError as error:
+            raise OutputError(f"{path}: cannot be written ({_one_line(error)})") from error
+
+
+def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
+    wanted = KINDS.get(name, "f")
+    if wanted == "f" and array.dtype.kind in "iu":
+        return array.astype(np.float64)
+    if wanted == "U" and array.size == 0:
+        return array.astype(str)
+    if array.dtype.kind != wanted:
+        raise RunFileError(path, f"{name} holds {array.dtype}, expected {KIND_WORDS[wanted]}")
+    return array
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
