@@ -17,6 +17,7 @@ from noisemodel.errors import (
     UnknownRobotError,
 )
 from noisemodel.kinematics import link_twists
+from noisemodel.lowering import lowered
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.simplified import simplified
@@ -34,5 +35,6 @@ __all__ = [
     "UnknownJointError",
     "UnknownRobotError",
     "link_twists",
+    "lowered",
     "simplified",
 ]

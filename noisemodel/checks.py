@@ -1,6 +1,6 @@
 """What makes a run valid."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -37,8 +37,16 @@ def check_time(time: Array) -> None:
         )
 
 
+def check_words(array: str, words: Iterable[str]) -> None:
+    """Refuse words that are empty or hold what cannot be printed on one line."""
+    for word in words:
+        if not word or not word.isprintable():
+            raise RunError(f"{array}: {word!r} is no name; it is empty or cannot be printed")
+
+
 def check_names(array: str, names: Sequence[str]) -> None:
-    """Refuse names that repeat."""
+    """Refuse names that are no words or repeat."""
+    check_words(array, names)
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise RunError(f"{array}: {', '.join(twice)} named twice")
@@ -71,6 +79,7 @@ def check_valid(valid: Mask, samples: int) -> None:
 
 def check_blocks(blocks: Sequence[Block], time: Array) -> None:
     """Refuse blocks that are empty, lie outside of the run or overlap."""
+    check_words("block_label", (block.label for block in blocks))
     step = (time[-1] - time[0]) / (len(time) - 1)
     for block in blocks:
         if not block.start < block.stop:

@@ -12,12 +12,8 @@ from noisemodel.types import Array, Mask, Real
 
 WINDOW, ORDER = 7, 3
 METHOD = f"Savitzky-Golay, window {WINDOW}, order {ORDER}"
-SOURCES = {
-    "velocity": "position",
-    "velocity_desired": "position_desired",
-    "base_velocity": "base_pose",
-}
-"""Each velocity and the position that it can be had from."""
+SOURCES = {"velocity": "position", "velocity_desired": "position_desired"}
+"""The joint velocities and the positions that each can be had from."""
 
 
 def fill_in(
@@ -34,15 +30,19 @@ def fill_in(
     Raises:
         RunError: If positions do not fit the time, or are not finite.
     """
-    time, valid = signals["time"], signals.get("valid")
-    filled, how = dict(signals), {}
+    time, filled = signals["time"], dict(signals)
+    valid = signals.get("valid", np.ones(len(time), dtype=bool))
     for velocity, position in SOURCES.items():
-        source = signals.get(position)
-        if velocity not in signals and source is not None:
-            checks.check_signal(position, source, (len(time), source.shape[-1]))
-            differentiator = base_velocity if velocity == "base_velocity" else joint_velocity
-            filled[velocity] = differentiator(time, source, valid)
-            how[velocity] = METHOD
+        if velocity not in signals and position in signals:
+            source = signals[position]
+            checks.check_signal(position, source, (len(time), source.shape[1]))
+            filled[velocity] = joint_velocity(time, source, valid)
+    if "base_velocity" not in signals and "base_pose" in signals:
+        pose = signals["base_pose"]
+        checks.check_signal("base_pose", pose, (len(time), 7))
+        checks.check_quaternions(pose[:, 3:], valid)
+        filled["base_velocity"] = base_velocity(time, pose, valid)
+    how = {name: METHOD for name in filled if name not in signals}
     return filled, how
 
 
@@ -98,8 +98,9 @@ def stretches(valid: Mask | None, samples: int) -> Iterator[slice]:
 def _body_twist(pose: Array, step: float) -> Array:
     quaternion = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
     # q and -q are one rotation: keep the sign that lies nearer to the sample before.
-    turns = np.sign(np.einsum("si,si->s", quaternion[1:], quaternion[:-1]))
-    quaternion = quaternion * np.concatenate(([1.0], np.cumprod(turns)))[:, None]
+    flips = np.einsum("si,si->s", quaternion[1:], quaternion[:-1]) < 0
+    signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
+    quaternion = quaternion * signs[:, None]
     vector, scalar = quaternion[:, :3], quaternion[:, 3:]
     rate = _slope(quaternion, step)
     # omega = 2 vec(conj(q) q_dot), v = R(q)^T p_dot

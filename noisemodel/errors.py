@@ -66,5 +66,5 @@ class UnknownJointError(RobotError):
 
 def hint(name: str, known: Iterable[str]) -> str:
     """Say which known name was probably meant, or nothing."""
-    close = get_close_matches(name, list(known), n=1)
+    close = get_close_matches(name, list(known), n=1, cutoff=0.7)
     return f" (did you mean {close[0]!r}?)" if close else ""

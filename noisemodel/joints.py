@@ -56,13 +56,15 @@ class Joint:
     @property
     def nv(self) -> int:
         """Entries in the velocity."""
-        return len(self.moves)
+        return {"floating": 6, "planar": 3}.get(self.kind, 1)
 
     @property
-    def moves(self) -> list[int]:
+    def moves(self) -> slice | list[int]:
         """The entries of the twist that its velocity adds to."""
-        alone = {"floating": [0, 1, 2, 3, 4, 5], "planar": [0, 1, 5], "prismatic": [self.axis]}
-        return alone.get(self.kind, [3 + self.axis])
+        if self.kind == "planar":
+            return [0, 1, 5]
+        first = {"floating": 0, "prismatic": self.axis}.get(self.kind, 3 + self.axis)
+        return slice(first, first + self.nv)  # adds in place, which a list does not
 
 
 def table_of(model: Any) -> tuple[Joint, ...]:
@@ -88,7 +90,8 @@ def _joint(model: Any, index: int) -> Joint:
         raise RobotError(f"joint {model.names[index]!r} is of type {kind}, which is not supported")
     turn = None
     if kind.endswith("Unaligned"):
-        turn = _axes_with_z(np.array(joint.extract().axis))
+        subspace = np.ravel(joint.createData().S)  # the joint's twist at unit velocity
+        turn = _axes_with_z(subspace[:3] + subspace[3:])
     rotation = placement.rotation.T if turn is None else turn @ placement.rotation.T
     return Joint(
         name=str(model.names[index]),

@@ -9,7 +9,7 @@ from noisemodel.joints import Joint
 from noisemodel.robot import Robot
 from noisemodel.types import Array, Real
 
-CHUNK = 8192
+CHUNK = 4096
 """Samples that are worked on at once: few enough for the cache, many enough to forget Python."""
 
 
@@ -74,7 +74,9 @@ def chunk_twists(joints: Sequence[Joint], q: Real, v: Real, *, out: Array) -> No
 
 
 def _revolute(axis: int, twist: Array, position: Array) -> None:
-    _turn(axis, twist, np.cos(position[0]), np.sin(position[0]))
+    tangent = np.tan(0.5 * position[0])  # one tangent takes less time than a sine and a cosine
+    double = 2.0 / (1.0 + tangent * tangent)
+    _turn(axis, twist, double - 1.0, double * tangent)
 
 
 def _continuous(axis: int, twist: Array, position: Array) -> None:

@@ -1,5 +1,6 @@
 """The robot: read once by Pinocchio, then a table of joints."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 from noisemodel import catalog, urdf
 from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRobotError
 from noisemodel.joints import Joint, table_of
+from noisemodel.native import kept_stderr
 from noisemodel.run import Run
 from noisemodel.types import Array
 from noisemodel.urdf import Mimic
@@ -65,7 +67,6 @@ class Robot:
         """
         listed = catalog.ROBOTS.get(str(name))
         path = locate(name)
-        roots = catalog.package_roots() if listed else (path.parent, *path.parent.parents[:2])
         if floating_base is None:
             floating_base = listed is not None and listed.floating_base
         description = urdf.read(path)
@@ -78,7 +79,7 @@ class Robot:
         return cls(
             name=str(name) if listed else path.stem,
             path=path,
-            package_roots=roots,
+            package_roots=package_roots(name),
             model=model,
             joints=table,
             nq=sum(joint.nq for joint in independent),
@@ -165,15 +166,30 @@ def locate(name: str | Path) -> Path:
     raise UnknownRobotError(str(name), catalog.ROBOTS)
 
 
+def package_roots(name: str | Path) -> tuple[Path, ...]:
+    """Name the folders in which a robot's meshes are looked up, and outside of which none may lie.
+
+    Args:
+        name: A listed name, or the path of a URDF: then its folder and the two above it.
+    """
+    if str(name) in catalog.ROBOTS:
+        return catalog.package_roots()
+    folder = Path(name).resolve().parent
+    return (folder, *folder.parents[:2])
+
+
 def _model(path: Path, floating_base: bool) -> Any:
     import pinocchio
 
     root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
-    try:
-        return pinocchio.buildModelFromUrdf(str(path), *root)
-    except (ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
-        raise RobotError(f"{path}: Pinocchio cannot read the URDF ({reason})") from error
+    with kept_stderr() as said:
+        try:
+            return pinocchio.buildModelFromUrdf(str(path), *root)
+        except (ValueError, RuntimeError) as error:
+            # The exception only says that the URDF is not valid; the reason went to stderr.
+            reasons = re.findall(r"Error: +(.+)", said()) or [str(error)]
+            reason = " ".join(reasons[0].split())
+            raise RobotError(f"{path}: Pinocchio cannot read the URDF ({reason})") from error
 
 
 def _coupled(
@@ -189,8 +205,14 @@ def _coupled(
     for joint in table:
         if joint.name in mimics:
             leader, multiplier, offset = _leader(joint.name, mimics, path)
-            if leader not in placed or "continuous" in (joint.kind, placed[leader].kind):
-                raise RobotError(f"{path}: joint {joint.name!r} cannot mimic {leader!r}")
+            if leader not in placed:
+                raise RobotError(
+                    f"{path}: joint {joint.name!r} mimics {leader!r}, which is missing"
+                )
+            if "continuous" in (joint.kind, placed[leader].kind):
+                raise RobotError(
+                    f"{path}: joint {joint.name!r} mimics {leader!r}; continuous joints cannot"
+                )
             placed[joint.name] = replace(
                 joint,
                 first_q=placed[leader].first_q,

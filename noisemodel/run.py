@@ -1,6 +1,7 @@
 """The run: one recording of one robot, checked when it is made."""
 
 import json
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -73,6 +74,7 @@ class Run:
         checks.check_valid(self.mask, len(self.time))
         checks.check_names("joint_names", self.joint_names)
         checks.check_names("desired_joint_names", self.desired_joint_names)
+        checks.check_words("stages", self.stages)
         for name, signal, width in self._signals():
             checks.check_signal(name, signal, (len(self.time), width))
         if self.base_pose is not None:
@@ -130,7 +132,8 @@ class Run:
         Raises:
             OutputError: If the file exists or cannot be written.
         """
-        runfile.write(Path(path), _arrays(self), overwrite=overwrite)
+        path = Path(path)
+        runfile.write(path, _arrays(self, folder=path.parent), overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | Path) -> Self:
@@ -154,7 +157,7 @@ class Run:
             raise RunFileError(path, str(error)) from error
 
 
-def _arrays(run: Run) -> dict[str, Any]:
+def _arrays(run: Run, *, folder: Path) -> dict[str, Any]:
     """Turn a run into the arrays of a run file."""
     signals = {name: signal for name, signal, _ in run._signals()}
     arrays = {
@@ -169,7 +172,7 @@ def _arrays(run: Run) -> dict[str, Any]:
     if not run.mask.all():
         arrays["valid"] = run.mask
     if run.robot is not None:
-        arrays["robot"] = run.robot
+        arrays["robot"] = _robot_from(folder, run.robot)
     if run.blocks:
         arrays["block_start"] = np.array([block.start for block in run.blocks])
         arrays["block_stop"] = np.array([block.stop for block in run.blocks])
@@ -182,7 +185,7 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     signals = {
         name: array
         for name, array in arrays.items()
-        if runfile.KINDS.get(name) in ("f", "b") and not name.startswith("block_")
+        if "samples" in runfile.ARRAYS.get(name, ("", ()))[1]
     }
     if "time" not in signals:
         raise RunError(f"array 'time' is missing; the file has {', '.join(arrays) or 'nothing'}")
@@ -215,22 +218,27 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
 
 
 def _names(arrays: Mapping[str, NDArray[Any]], name: str, default: list[str]) -> tuple[str, ...]:
-    names = arrays.get(name, np.array(default, dtype=str))
-    if names.ndim != 1:
-        raise RunError(f"{name}: shape {names.shape}, expected (joints,)")
-    return tuple(str(joint) for joint in names)
+    return tuple(str(joint) for joint in arrays.get(name, default))
 
 
 def _robot(arrays: Mapping[str, NDArray[Any]], folder: Path) -> str | None:
     robot = str(arrays.get("robot", ""))
-    if robot and robot.lower().endswith(".urdf"):
-        return str(folder / robot)
-    return robot or None
+    return str(folder / robot) if _is_urdf(robot) else robot or None
+
+
+def _robot_from(folder: Path, robot: str) -> str:
+    """Name a URDF as it is seen from the folder of the run file."""
+    moves = _is_urdf(robot) and not Path(robot).is_absolute()
+    return os.path.relpath(robot, folder) if moves else robot
+
+
+def _is_urdf(robot: str) -> bool:
+    return robot.lower().endswith(".urdf")
 
 
 def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:
     columns = [arrays.get(f"block_{name}", np.empty(0)) for name in ("start", "stop", "label")]
-    if len({column.shape for column in columns}) > 1 or columns[0].ndim != 1:
+    if len({column.shape for column in columns}) > 1:
         raise RunError(
             "block_start, block_stop and block_label have shapes "
             + ", ".join(str(column.shape) for column in columns)
@@ -244,7 +252,7 @@ def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:
 def _meta(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     try:
         meta = json.loads(str(arrays.get("meta", "{}")))
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise RunError(f"meta: not JSON ({error})") from error
     if not isinstance(meta, dict):
         raise RunError("meta: expected a JSON object")

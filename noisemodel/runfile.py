@@ -1,6 +1,9 @@
 """The run file, version 1: which arrays it has, read without trusting it."""
 
+import lzma
+import struct
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -16,27 +19,31 @@ STAGE = "stage_"
 MAX_BYTES = 16 * 2**30
 """An archive that would unpack to more than this is refused."""
 
-KINDS = {
-    "time": "f",
-    "velocity": "f",
-    "position": "f",
-    "velocity_desired": "f",
-    "position_desired": "f",
-    "effort": "f",
-    "valid": "b",
-    "joint_names": "U",
-    "desired_joint_names": "U",
-    "base_pose": "f",
-    "base_velocity": "f",
-    "robot": "U",
-    "block_start": "f",
-    "block_stop": "f",
-    "block_label": "U",
-    "format": "U",
-    "meta": "U",
+ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "time": ("f", ("samples",)),
+    "velocity": ("f", ("samples", "joints")),
+    "position": ("f", ("samples", "joints")),
+    "velocity_desired": ("f", ("samples", "desired")),
+    "position_desired": ("f", ("samples", "desired")),
+    "effort": ("f", ("samples", "joints")),
+    "valid": ("b", ("samples",)),
+    "joint_names": ("U", ("joints",)),
+    "desired_joint_names": ("U", ("desired",)),
+    "base_pose": ("f", ("samples", "7")),
+    "base_velocity": ("f", ("samples", "6")),
+    "robot": ("U", ()),
+    "block_start": ("f", ("blocks",)),
+    "block_stop": ("f", ("blocks",)),
+    "block_label": ("U", ("blocks",)),
+    "format": ("U", ()),
+    "meta": ("U", ()),
 }
-"""The arrays of a run file and the kind of number or text that each holds."""
+"""The arrays of a run file: the kind of number or text that each holds, and its axes."""
 
+DAMAGE = (EOFError, MemoryError, RuntimeError, struct.error, zlib.error, lzma.LZMAError)
+"""What zipfile and NumPy raise on archives that are broken, encrypted or lie about their size."""
+
+STAGE_ARRAY = ("f", ("samples", "joints"))
 KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
 
 
@@ -60,11 +67,11 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
                 raise RunFileError(path, f"unpacks to {unpacked} bytes; the limit is {MAX_BYTES}")
             names = [member.removesuffix(".npy") for member in archive.namelist()]
         for name in names:
-            if name not in KINDS and not name.startswith(STAGE):
+            if name not in ARRAYS and not name.startswith(STAGE):
                 raise RunFileError(
                     path,
-                    f"unknown array {name!r}{hint(name, KINDS)}; a run file has"
-                    f" {', '.join(KINDS)} and {STAGE}<name>; anything else belongs into meta",
+                    f"unknown array {name!r}{hint(name, ARRAYS)}; a run file has"
+                    f" {', '.join(ARRAYS)} and {STAGE}<name>; anything else belongs into meta",
                 )
         with np.load(path, allow_pickle=False) as arrays:
             found = {name: _plain(path, name, arrays[name]) for name in names}
@@ -72,9 +79,9 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
         raise
     except OSError as error:
         raise RunFileError(path, f"cannot be read ({error.strerror or error})") from error
-    except (ValueError, zipfile.BadZipFile, KeyError, EOFError, NotImplementedError) as error:
+    except (ValueError, zipfile.BadZipFile, KeyError) as error:
         raise RunFileError(path, f"not a run file: {_one_line(error)}") from error
-    except (MemoryError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+    except DAMAGE as error:
         raise RunFileError(path, f"damaged: {_one_line(error)}") from error
     version = str(found.get("format", FORMAT))
     if version != FORMAT:
@@ -101,8 +108,14 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
             raise OutputError(f"{path}: cannot be written ({_one_line(error)})") from error
 
 
-def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
-    wanted = KINDS.get(name, "f")
+def _plain(path: Path, name: str, array: Any) -> NDArray[Any]:
+    wanted, axes = ARRAYS.get(name, STAGE_ARRAY)
+    if not isinstance(array, np.ndarray):  # np.load hands out the bytes of what is no array
+        raise RunFileError(path, f"not a run file: {name} is no array")
+    if array.ndim != len(axes):
+        raise RunFileError(
+            path, f"{name} has shape {array.shape}, expected ({', '.join(axes) or 'a single text'})"
+        )
     if wanted == "f" and array.dtype.kind in "iu":
         return array.astype(np.float64)
     if wanted == "U" and array.size == 0:

@@ -1,0 +1,84 @@
+import os
+
+import pytest
+
+from noisemodel import OutputError
+from noisemodel.atomic import replacing
+
+
+def write(path, text, **options):
+    with replacing(path, **options) as temporary:
+        temporary.write_text(text)
+
+
+def test_a_file_appears_with_its_contents_and_nothing_else(tmp_path):
+    write(tmp_path / "out.txt", "whole")
+    assert (tmp_path / "out.txt").read_text() == "whole"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_nothing_is_seen_under_the_name_before_the_end(tmp_path):
+    with replacing(tmp_path / "out.txt") as temporary:
+        temporary.write_text("half")
+        assert not (tmp_path / "out.txt").exists()
+
+
+def test_the_file_has_the_permissions_of_any_new_file(tmp_path):
+    write(tmp_path / "out.txt", "")
+    (tmp_path / "other.txt").touch()
+    assert (tmp_path / "out.txt").stat().st_mode == (tmp_path / "other.txt").stat().st_mode
+
+
+@pytest.mark.parametrize("interruption", [KeyboardInterrupt, ZeroDivisionError])
+def test_an_interrupted_write_leaves_nothing_behind(tmp_path, interruption):
+    def interrupted():
+        with replacing(tmp_path / "out.txt") as temporary:
+            temporary.write_text("half")
+            raise interruption
+
+    with pytest.raises(interruption):
+        interrupted()
+    assert os.listdir(tmp_path) == []
+
+
+def test_an_interrupted_overwrite_leaves_the_old_file(tmp_path):
+    write(tmp_path / "out.txt", "old")
+
+    def interrupted():
+        with replacing(tmp_path / "out.txt", overwrite=True) as temporary:
+            temporary.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert (tmp_path / "out.txt").read_text() == "old"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_a_file_that_exists_is_not_replaced_unasked(tmp_path):
+    write(tmp_path / "out.txt", "old")
+    with pytest.raises(OutputError, match="exists already; choose another name, or allow"):
+        write(tmp_path / "out.txt", "new")
+    assert (tmp_path / "out.txt").read_text() == "old"
+    write(tmp_path / "out.txt", "new", overwrite=True)
+    assert (tmp_path / "out.txt").read_text() == "new"
+
+
+def test_a_folder_is_not_replaced(tmp_path):
+    with pytest.raises(OutputError, match="is a folder; name a file"):
+        write(tmp_path, "", overwrite=True)
+
+
+def test_a_missing_folder_is_named(tmp_path):
+    with pytest.raises(OutputError, match=r"gone/out.txt: cannot be written \(No such file"):
+        write(tmp_path / "gone" / "out.txt", "")
+
+
+def test_a_full_disk_is_one_error_and_leaves_nothing(tmp_path):
+    def full():
+        with replacing(tmp_path / "out.txt"):
+            raise OSError(28, "No space left on device")
+
+    with pytest.raises(OutputError, match=r"out.txt: cannot be written \(No space left on device"):
+        full()
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,178 @@
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from noisemodel import (
+    ROBOTS,
+    Robot,
+    RobotError,
+    Run,
+    RunError,
+    UnknownJointError,
+    UnknownRobotError,
+    catalog,
+    link_twists,
+)
+
+ARM = """
+<robot name="arm">
+  <link name="l0"/><link name="l1"/><link name="l2"/><link name="l3"/>
+  <joint name="shoulder" type="continuous">
+    <parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/></joint>
+  <joint name="elbow" type="revolute">
+    <parent link="l1"/><child link="l2"/><origin xyz="0.5 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="finger" type="prismatic">
+    <parent link="l2"/><child link="l3"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="1" effort="1" velocity="1"/>{follows}</joint>
+</robot>"""
+
+
+def arm(tmp_path, follows="", **options):
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.format(follows=follows))
+    return Robot.load(path, **options)
+
+
+def run(joint_names, position, velocity, **signals):
+    time = np.arange(len(position)) / 1000
+    return Run(time=time, position=position, velocity=velocity, joint_names=joint_names, **signals)
+
+
+def test_every_listed_robot_loads():
+    assert len(ROBOTS) == 69
+    for name, listed in ROBOTS.items():
+        if name != "ur3_empty":
+            robot = Robot.load(name)
+            assert robot.floating_base == listed.floating_base, name
+            assert len(robot.joints) == robot.model.njoints - 1, name
+            assert (robot.nq, robot.nv) == (robot.model.nq, robot.model.nv), name
+
+
+def test_the_empty_ur3_says_so_in_one_line():
+    with pytest.raises(RobotError, match=r"ur3.urdf: the URDF is empty or unexpanded") as caught:
+        Robot.load("ur3_empty")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_listed_robot_has_what_its_urdf_has():
+    talos = Robot.load("talos")
+    assert (talos.nq, talos.nv, talos.floating_base) == (39, 38, True)
+    assert talos.name == "talos"
+    assert talos.joint_names[0] == "leg_left_1_joint"
+    assert "root_joint" not in talos.joint_names
+    assert (Robot.load("talos", floating_base=False).nq) == 32
+
+
+def test_a_urdf_of_ones_own_stands_still_unless_told(tmp_path):
+    robot = arm(tmp_path)
+    assert robot.name == "arm"
+    assert robot.joint_names == ("shoulder", "elbow", "finger")
+    assert (robot.nq, robot.nv) == (4, 3)
+    assert arm(tmp_path, floating_base=True).nq == 11
+
+
+@pytest.mark.parametrize("name", ["talos", "kinova", "iris", "pr2"])
+def test_neutral_is_pinocchios(name):
+    robot = Robot.load(name)
+    assert np.array_equal(robot.neutral, pin.neutral(robot.model))
+
+
+def test_a_configuration_is_ordered_by_joint_name(tmp_path):
+    robot = arm(tmp_path)
+    given = run(("finger", "shoulder", "elbow"), np.array([[0.1, 2.0, 3.0]] * 2), np.eye(3)[:2])
+    q, v = robot.configuration(given)
+    assert np.allclose(q, [[np.cos(2), np.sin(2), 3.0, 0.1]] * 2, rtol=1e-15)
+    assert np.array_equal(v, [[0, 0, 1], [1, 0, 0]])
+
+
+def test_joints_that_the_run_does_not_name_rest(tmp_path):
+    q, v = arm(tmp_path).configuration(run(("elbow",), np.ones((2, 1)), np.ones((2, 1))))
+    assert np.array_equal(q, [[1, 0, 1, 0]] * 2)
+    assert np.array_equal(v, [[0, 1, 0]] * 2)
+
+
+def test_the_base_moves_as_the_run_says_and_rests_in_gaps(tmp_path):
+    robot = arm(tmp_path, floating_base=True)
+    pose = np.array([[1, 2, 3, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0, 0]], dtype=float)
+    q, v = robot.configuration(
+        run(
+            ("elbow",),
+            np.zeros((2, 1)),
+            np.zeros((2, 1)),
+            base_pose=pose,
+            base_velocity=np.array([[1, 2, 3, 4, 5, 6], [0] * 6], dtype=float),
+            valid=np.array([True, False]),
+        )
+    )
+    assert np.array_equal(q[:, :7], [pose[0], [0, 0, 0, 0, 0, 0, 1]])
+    assert np.array_equal(v[0, :6], [1, 2, 3, 4, 5, 6])
+
+
+def test_a_base_of_which_the_run_says_nothing_rests(tmp_path):
+    robot = arm(tmp_path, floating_base=True)
+    q, v = robot.configuration(run(("elbow",), np.ones((2, 1)), np.ones((2, 1))))
+    assert np.array_equal(q[0, :7], [0, 0, 0, 0, 0, 0, 1])
+    assert not v[:, :6].any()
+
+
+def test_mimic_joints_follow_and_take_no_place(tmp_path):
+    follows = '<mimic joint="elbow" multiplier="0.1" offset="0.2"/>'
+    robot = arm(tmp_path, follows, mimic=True)
+    assert robot.joint_names == ("shoulder", "elbow")
+    assert (robot.nq, robot.nv) == (3, 2)
+    q, v = robot.configuration(
+        run(("finger", "elbow"), np.array([[9.0, 1.0]] * 2), np.array([[9.0, 2.0]] * 2))
+    )
+    assert np.array_equal(q, [[1, 0, 1]] * 2)
+    assert np.array_equal(v, [[0, 2]] * 2)
+    independent = arm(tmp_path, follows)
+    explicit = link_twists(independent, np.array([[1, 0, 1, 0.3]]), np.array([[0, 2, 0.2]]))
+    assert np.allclose(link_twists(robot, q[:1], v[:1]), explicit, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("follows", "message"),
+    [
+        ('<mimic joint="knee"/>', "joint 'finger' mimics 'knee', which is missing"),
+        ('<mimic joint="finger"/>', "joint 'finger' mimics itself"),
+        ('<mimic joint="shoulder"/>', "'finger' mimics 'shoulder'; continuous joints cannot"),
+    ],
+)
+def test_a_mimic_joint_that_cannot_follow_is_named(tmp_path, follows, message):
+    assert arm(tmp_path, follows).nv == 3
+    with pytest.raises(RobotError, match=message):
+        arm(tmp_path, follows, mimic=True)
+
+
+def test_a_joint_that_the_robot_lacks_is_named_with_those_that_it_has(tmp_path):
+    knee = run(("knee",), np.zeros((2, 1)), np.zeros((2, 1)))
+    message = "no joint 'knee' in robot 'arm'; it has shoulder, elbow, finger"
+    with pytest.raises(UnknownJointError, match=message) as caught:
+        arm(tmp_path).configuration(knee)
+    assert (caught.value.joint, caught.value.known) == ("knee", ("shoulder", "elbow", "finger"))
+
+
+def test_a_run_without_positions_cannot_move_a_robot(tmp_path):
+    blind = Run(time=np.arange(2) / 1000, velocity=np.zeros((2, 1)), joint_names=("elbow",))
+    with pytest.raises(RunError, match="the run has no 'position'; 'arm' cannot be moved without"):
+        arm(tmp_path).configuration(blind)
+
+
+def test_a_name_that_is_not_listed_gets_a_suggestion():
+    with pytest.raises(UnknownRobotError, match=r"no robot 'tallos'.*did you mean 'talos'\?"):
+        Robot.load("tallos")
+
+
+def test_a_urdf_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(RobotError, match=r"gone.urdf: there is no such URDF file"):
+        Robot.load(tmp_path / "gone.urdf")
+
+
+def test_a_missing_example_robot_data_says_how_to_get_it(monkeypatch):
+    def gone(name):
+        raise catalog.PackageNotFoundError(name)
+
+    monkeypatch.setattr(catalog, "distribution", gone)
+    with pytest.raises(RobotError, match="pip install example-robot-data"):
+        Robot.load("talos")

@@ -1,0 +1,125 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from noisemodel import Block, Run, RunError
+
+TIME = np.arange(100) / 1000
+
+
+def run(**changes):
+    given = {"time": TIME, "velocity": np.ones((100, 2)), "joint_names": ("a", "b")}
+    return Run(**(given | changes))
+
+
+def test_time_and_velocity_alone_are_a_run():
+    alone = run()
+    assert alone.rate == 1000.0
+    assert alone.duration == pytest.approx(0.1)
+    assert alone.mask.all()
+    assert alone.desired_joint_names == ("a", "b")
+    assert np.array_equal(alone.motion, alone.velocity)
+
+
+@pytest.mark.parametrize("rate", [1.0, 60.0, 333.3, 1000.0, 10_000.0, 44_100.0])
+def test_the_rate_is_the_nominal_one(rate):
+    recorded = run(time=1.7e4 + np.arange(100) / rate)
+    assert recorded.rate == pytest.approx(rate, rel=1e-6)
+    assert run(time=np.arange(100) / rate).rate == pytest.approx(rate, rel=1e-9)
+
+
+def test_stamps_of_a_day_in_unix_time_are_uniform():
+    """Their own spacing is 2.4e-7 s, which is coarser than a thousandth of 0.1 ms."""
+    assert run(time=1.8e9 + np.arange(100) / 10_000).rate == pytest.approx(10_000, rel=3e-3)
+
+
+def test_blocks_are_sorted():
+    late, early = Block(0.05, 0.1, "impact"), Block(0.0, 0.05, "ok")
+    assert run(blocks=(late, early)).blocks == (early, late)
+
+
+def test_a_run_cannot_be_changed_in_place():
+    with pytest.raises(AttributeError):
+        run().robot = "talos"
+    with pytest.raises(TypeError):
+        run().meta["seed"] = 1
+    assert replace(run(), robot="talos").robot == "talos"
+
+
+def spoilt(value, row=3, column=1):
+    velocity = np.ones((100, 2))
+    velocity[row, column] = value
+    return velocity
+
+
+def shifted(row, by):
+    time = TIME.copy()
+    time[row:] += by
+    return time
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"time": TIME[:1], "velocity": np.ones((1, 2))}, "with at least 2 samples"),
+        ({"time": TIME[:, None]}, r"time: shape \(100, 1\), expected \(samples,\)"),
+        ({"time": shifted(7, np.nan)}, "time: nan in row 7"),
+        ({"time": shifted(7, np.inf)}, "time: inf in row 7"),
+        ({"time": shifted(7, -0.001)}, r"stands still in row 7 \(0.006 s, then 0.006 s\)"),
+        ({"time": shifted(7, -0.002)}, r"runs backwards in row 7 \(0.006 s, then 0.005 s\)"),
+        ({"time": shifted(7, 0.001)}, "not uniform, the step to row 7 is 0.002 s where the median"),
+        ({"time": TIME.astype(np.float32) + np.float32(1e3)}, "float32 is too coarse"),
+        ({"velocity": np.ones((100, 3))}, r"velocity: shape \(100, 3\), expected \(100, 2\)"),
+        ({"velocity": np.ones((99, 2))}, r"velocity: shape \(99, 2\), expected \(100, 2\)"),
+        ({"velocity": np.ones(100)}, r"velocity: shape \(100,\), expected \(100, 2\)"),
+        ({"velocity": np.ones((100, 2), dtype=object)}, "velocity: holds object, expected float"),
+        ({"velocity": spoilt(np.nan)}, "velocity: nan in row 3, column 1; mark gaps with valid"),
+        ({"velocity": spoilt(-np.inf)}, "velocity: -inf in row 3, column 1"),
+        ({"position": np.ones((100, 1))}, r"position: shape \(100, 1\), expected \(100, 2\)"),
+        ({"effort": spoilt(np.nan)}, "effort: nan in row 3, column 1"),
+        ({"velocity_desired": np.ones((100, 1))}, r"velocity_desired: shape \(100, 1\)"),
+        ({"stages": {"planner": np.ones((9, 2))}}, r"stage_planner: shape \(9, 2\)"),
+        ({"stages": {"a\nb": np.ones((100, 2))}}, r"stages: 'a\\nb' is no name"),
+        ({"base_velocity": np.ones((100, 7))}, r"base_velocity: shape \(100, 7\)"),
+        ({"base_pose": np.ones((100, 6))}, r"base_pose: shape \(100, 6\), expected \(100, 7\)"),
+        ({"base_pose": np.ones((100, 7))}, "quaternion in row 0 has norm 2, expected 1"),
+        ({"valid": np.ones(99, dtype=bool)}, r"valid: shape \(99,\) of bool, expected \(100,\)"),
+        ({"valid": np.ones(100)}, r"valid: shape \(100,\) of float64"),
+        ({"valid": np.zeros(100, dtype=bool)}, "valid: false in every sample"),
+        ({"joint_names": ("a", "a")}, "joint_names: a named twice"),
+        ({"joint_names": ("a", "")}, "joint_names: '' is no name"),
+        ({"desired_joint_names": ("c", "c")}, "desired_joint_names: c named twice"),
+    ],
+)
+def test_signals_that_do_not_fit_are_refused(changes, message):
+    with pytest.raises(RunError, match=message) as caught:
+        run(**changes)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "message"),
+    [
+        ([(0.05, 0.02, "ok")], "block 'ok': starts at 0.05 s, stops at 0.02 s"),
+        ([(0.05, 0.05, "ok")], "block 'ok': starts at 0.05 s, stops at 0.05 s"),
+        ([(np.nan, 0.05, "ok")], "block 'ok': starts at nan s"),
+        ([(0.05, 0.2, "ok")], "0.05 s to 0.2 s lies outside of the run, 0 s to 0.099 s"),
+        ([(-1.0, 0.05, "ok")], "-1 s to 0.05 s lies outside of the run"),
+        ([(0.0, 0.05, "ok"), (0.04, 0.06, "impact")], "'ok' until 0.05 s and 'impact' from 0.04 s"),
+        ([(0.0, 0.05, "")], "block_label: '' is no name"),
+    ],
+)
+def test_blocks_that_do_not_fit_are_refused(blocks, message):
+    with pytest.raises(RunError, match=message):
+        run(blocks=tuple(Block(*block) for block in blocks))
+
+
+def test_blocks_may_touch_and_reach_the_end_of_the_last_sample():
+    assert len(run(blocks=(Block(0.0, 0.05, "ok"), Block(0.05, 0.1, "impact"))).blocks) == 2
+
+
+def test_quaternions_in_gaps_are_not_looked_at():
+    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (100, 1))
+    pose[50] = 0.0
+    assert run(base_pose=pose, valid=np.arange(100) != 50).base_pose is not None

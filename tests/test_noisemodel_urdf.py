@@ -1,0 +1,85 @@
+import pytest
+
+from noisemodel import Robot, RobotError
+from noisemodel.urdf import Mimic, read
+
+LINKS = '<link name="base"/><link name="tip"/>'
+JOINT = """
+<joint name="elbow" type="revolute">
+  <parent link="base"/><child link="tip"/><origin xyz="0 0 1" rpy="0 0 0"/><axis xyz="0 0 1"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/>
+</joint>"""
+GOOD = f'<robot name="arm">{LINKS}{JOINT}</robot>'
+
+
+def chain(joints):
+    """A chain of so many joints."""
+    links = "".join(f'<link name="l{number}"/>' for number in range(joints + 1))
+    return f'<robot name="chain">{links}' + "".join(
+        f'<joint name="j{number}" type="fixed">'
+        f'<parent link="l{number}"/><child link="l{number + 1}"/></joint>'
+        for number in range(joints)
+    ) + "</robot>"  # fmt: skip
+
+
+def test_a_urdf_gives_its_name_and_who_mimics_whom(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(
+        GOOD.replace("<axis", '<mimic joint="wrist" multiplier="-2" offset="0.5"/><axis')
+    )
+    assert read(path).name == "arm"
+    assert read(path).mimics == {"elbow": Mimic("wrist", multiplier=-2.0, offset=0.5)}
+    path.write_text(GOOD.replace("<axis", '<mimic joint="wrist"/><axis'))
+    assert read(path).mimics == {"elbow": Mimic("wrist", multiplier=1.0, offset=0.0)}
+
+
+def test_fixed_joints_may_have_an_axis_of_length_0(tmp_path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(GOOD.replace('"revolute"', '"fixed"').replace('xyz="0 0 1"/>', 'xyz="0 0 0"/>'))
+    assert Robot.load(path).joint_names == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the URDF is empty"),
+        (" \n", "the URDF is empty"),
+        (GOOD[:200], "not XML"),
+        ("solid arm\nfacet normal", "not XML"),
+        ("\x00\x01\x02", "not XML"),
+        ("<sdf><model/></sdf>", "not a URDF, its root is <sdf>, expected <robot>"),
+        ("<robot/>", "its <robot> has no name"),
+        ('<robot name="arm"/>', "the URDF has no link"),
+        ('<!DOCTYPE robot [<!ENTITY a "b">]>' + GOOD, "no document type or entities"),
+        (GOOD.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>'), "'elbow' has length 0"),
+        (GOOD.replace('<axis xyz="0 0 1"/>', "<axis/>"), "'elbow' has length 0"),
+        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="0 nan 1" rpy'), "xyz='0 nan 1'> is not finite"),
+        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="0 inf 1" rpy'), "xyz='0 inf 1'> is not finite"),
+        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="0 1" rpy'), "has 2 numbers, expected 3"),
+        (GOOD.replace('xyz="0 0 1" rpy', 'xyz="a b c" rpy'), "xyz='a b c'> is not a number"),
+        (chain(5000), "5000 joints; the limit is 1000"),
+        (GOOD.replace('"revolute"', '"screw"'), r"Joint \[elbow\] has no known type \[screw\]"),
+        (
+            GOOD.replace('"tip"/><origin', '"toe"/><origin'),
+            r"child link \[toe\] of joint",
+        ),
+        (GOOD.replace(JOINT, JOINT * 2), "joint 'elbow' is not unique"),
+        (GOOD.replace(JOINT, ""), "Two root links found"),
+    ],
+)
+def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_trouble(tmp_path, capfd, text, message):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=message) as caught:
+        Robot.load(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr().err == ""  # Pinocchio's parser writes there by itself
+
+
+def test_a_huge_urdf_is_not_read(tmp_path):
+    path = tmp_path / "arm.urdf"
+    with path.open("wb") as stream:
+        stream.truncate(65 * 2**20)
+    with pytest.raises(RobotError, match="larger than 67108864 bytes"):
+        Robot.load(path)
