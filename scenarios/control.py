@@ -1,0 +1,118 @@
+"""The tool's controller: plan and contact force to joint references, once per millisecond."""
+
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from noisemodel.types import Array
+from scenarios.clock import TICK
+from scenarios.loop import Reference
+from scenarios.picking import Plan
+
+HIGHEST_ACCELERATION = 30.0
+"""The feed-forward does not answer jumps of the reference, in [rad/s²]."""
+FURTHEST = 0.03
+"""How far force control may move the tool, in [m]."""
+
+
+class ToolControl:
+    """Follows a plan with a tool that points down, and presses with the planned force.
+
+    Args:
+        model: The ``pinocchio.Model`` that the controller has.
+        frame: Name of the tool's frame.
+        point: The tip in the frame's axes, shape (3,), in [m].
+        rest: Joint positions at first, shape (joints,), in [rad].
+        plan: What the tool is to do.
+        gain: Speed of the tool per error of the contact force, in [m/(s N)].
+        time_constant: Low-pass on the contact force, in [s].
+    """
+
+    def __init__(
+        self,
+        model: Any,
+        frame: str,
+        point: Array,
+        rest: Array,
+        plan: Plan,
+        *,
+        gain: float,
+        time_constant: float,
+    ) -> None:
+        self._model, self._data = model, model.createData()
+        self._frame, self._point = model.getFrameId(frame), point
+        pin.framesForwardKinematics(model, self._data, rest)
+        self._upright = self._data.oMf[self._frame].rotation.copy()
+        self._plan, self._gain = plan, gain
+        self._share = TICK / (time_constant + TICK)
+        self._force = self._offset = self._left = 0.0
+        self._joints = [rest] * 3  # of the last three ticks
+        self._velocity = self._planned = np.zeros(len(rest))
+        self._velocities = np.gradient(plan.position, TICK, axis=0)
+        self._turning = np.gradient(plan.yaw, TICK)
+
+    def tick(self, number: int, sensors: Array) -> Reference:
+        """Advance by one tick.
+
+        Args:
+            number: Which tick it is.
+            sensors: Contact force that the sensor reports, shape (1,), in [N].
+
+        Returns:
+            What the joints are to do, one tick late: a velocity takes two neighbours.
+        """
+        tip = self._plan.position[number] + (0.0, 0.0, self._press(number, float(sensors[0])))
+        joints, inverse = self._solve(tip, self._plan.yaw[number])
+        before, here, after = self._joints = [*self._joints[1:], joints]
+        velocity = (after - before) / (2 * TICK)
+        acceleration = (after - 2 * here + before) / TICK**2
+        planned = inverse @ (*self._velocities[number], 0, 0, self._turning[number])
+        reference = Reference(
+            position=np.stack((before, here)),
+            velocity=np.stack((self._velocity, velocity)),
+            planned=np.stack((self._planned, planned)),
+            torque=pin.rnea(
+                self._model,
+                self._data,
+                here,
+                velocity,
+                np.clip(acceleration, -HIGHEST_ACCELERATION, HIGHEST_ACCELERATION),
+            ),
+            lift=inverse[:, 2],
+        )
+        self._velocity, self._planned = velocity, planned
+        return reference
+
+    def _press(self, number: int, force: float) -> float:
+        """Integrate the error of the contact force to a height of the tool."""
+        self._force += self._share * (force - self._force)
+        wanted = self._plan.force[number]
+        if np.isnan(wanted):
+            self._offset = self._left * self._plan.keep[number]
+        else:
+            rise = TICK * self._gain * (self._force - wanted)
+            self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
+        return self._offset
+
+    def _solve(self, tip: Array, yaw: float) -> tuple[Array, Array]:
+        """Take a Newton step to the joints that bring the tool there, and the inverse Jacobian.
+
+        One step per tick is enough: the tool moves by a millimetre in that time.
+        """
+        joints = self._joints[-1]
+        pin.computeJointJacobians(self._model, self._data, joints)
+        placement = pin.updateFramePlacement(self._model, self._data, self._frame)
+        lever = placement.rotation @ self._point
+        jacobian = pin.getFrameJacobian(
+            self._model, self._data, self._frame, pin.LOCAL_WORLD_ALIGNED
+        )
+        jacobian[:3] -= pin.skew(lever) @ jacobian[3:]  # of the tip, not of the frame
+        turn = placement.rotation.T @ pin.rpy.rpyToMatrix(0.0, 0.0, yaw) @ self._upright
+        error = np.concatenate(
+            (tip - placement.translation - lever, placement.rotation @ pin.log3(turn))
+        )
+        damped = jacobian @ jacobian.T + 1e-8 * np.eye(6)
+        inverse = jacobian.T @ np.linalg.inv(damped)
+        joints = joints + inverse @ error
+        return joints, inverse

@@ -1,0 +1,100 @@
+"""A robot's drives: encoders that are read, velocities that are reported, torques that follow."""
+
+from collections import deque
+
+import numpy as np
+
+from noisemodel.types import Array
+from scenarios.imperfections import Imperfections
+
+
+def tracking_gains(bandwidth: float, step: float) -> tuple[float, float]:
+    """Set the filter by which a drive tells velocities from its encoder.
+
+    Differences of single encoder counts at 10 kHz would drown every motion; servo drives track
+    their encoders instead. This is the critically damped alpha-beta filter: it predicts, and
+    corrects position and velocity by a share of what it missed.
+
+    Args:
+        bandwidth: Natural frequency, in [Hz].
+        step: Time between two readings, in [s].
+
+    Returns:
+        Share of the miss that corrects the position, and its multiple that corrects the
+        velocity, in [1/s]; both poles lie at exp(-2 pi bandwidth step).
+    """
+    pole = float(np.exp(-2 * np.pi * bandwidth * step))
+    return 1 - pole**2, (1 - pole) ** 2 / step
+
+
+class Drives:
+    """The drives of all joints, one sample after the other.
+
+    Args:
+        start: Joint positions at rest, shape (joints,), in [rad].
+        stiffness: Position gains, shape (joints,), in [N m/rad].
+        damping: Velocity gains, shape (joints,), in [N m s/rad].
+        limit: Largest torques, shape (joints,), in [N m].
+        offset: What the encoders read too much, shape (joints,), in [rad].
+        imperfections: Encoder, filter and delay.
+        step: Time between two samples, in [s].
+    """
+
+    def __init__(
+        self,
+        start: Array,
+        *,
+        stiffness: Array,
+        damping: Array,
+        limit: Array,
+        offset: Array,
+        imperfections: Imperfections,
+        step: float,
+    ) -> None:
+        self._stiffness, self._damping = stiffness, damping
+        self._limit, self._offset = limit, offset
+        self._count = imperfections.encoder_step
+        self._step = step
+        self._alpha, self._beta = tracking_gains(imperfections.encoder_bandwidth, step)
+        self._tracked, self._velocity = start + offset, np.zeros_like(start)
+        self._waiting: deque[Array] = deque(
+            [np.zeros_like(start)] * imperfections.torque_delay, imperfections.torque_delay
+        )
+
+    def read(self, position: Array, noise: Array) -> tuple[Array, Array]:
+        """Read all encoders.
+
+        Args:
+            position: True joint positions, shape (joints,), in [rad].
+            noise: Noise of this sample, shape (joints,), in [rad].
+
+        Returns:
+            Positions, in [rad], and velocities, in [rad/s], as the drives report them.
+        """
+        reading = np.rint((position + self._offset + noise) / self._count) * self._count
+        predicted = self._tracked + self._step * self._velocity
+        miss = reading - predicted
+        self._tracked = predicted + self._alpha * miss
+        self._velocity = self._velocity + self._beta * miss
+        return reading, self._velocity
+
+    def torque(
+        self, position: Array, velocity: Array, desired: Array, rate: Array, feedforward: Array
+    ) -> Array:
+        """Answer a reading; the answer arrives after the drives' delay.
+
+        Args:
+            position: Positions read, shape (joints,), in [rad].
+            velocity: Velocities reported, shape (joints,), in [rad/s].
+            desired: Positions to follow, shape (joints,), in [rad].
+            rate: Velocities to follow, shape (joints,), in [rad/s].
+            feedforward: Torques of the model, shape (joints,), in [N m].
+
+        Returns:
+            Torques that act now, shape (joints,), in [N m].
+        """
+        wanted = feedforward + self._stiffness * (desired - position)
+        wanted += self._damping * (rate - velocity)
+        acting = self._waiting.popleft()
+        self._waiting.append(np.minimum(np.maximum(wanted, -self._limit), self._limit))
+        return acting

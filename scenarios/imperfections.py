@@ -1,0 +1,104 @@
+"""What is imperfect about every robot, healthy ones too: drawn once per seed."""
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+
+from noisemodel.types import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Imperfections:
+    """How one robot differs from its model; scales multiply the robot's own settings.
+
+    Attributes:
+        stiffness: Scale of each drive's position gain.
+        damping: Scale of each drive's velocity gain.
+        force_gain: Scale of the force control's gain.
+        mass: Scale of each link's inertia; the controller does not know it.
+        payload: Mass at the tool that the controller does not know, in [kg].
+        friction: Scale of each joint's Coulomb friction.
+        viscous: Scale of each joint's viscous friction.
+        encoder_bits: Encoder counts per turn of a joint, as a power of two.
+        encoder_noise: Standard deviation of the encoders' noise, in [rad].
+        encoder_bandwidth: Natural frequency of the filter that reports velocities, in [Hz].
+        force_noise: Standard deviation of the force sensor's noise per millisecond, in [N].
+        torque_delay: Samples between a reading and the torque that answers it.
+    """
+
+    stiffness: tuple[float, ...]
+    damping: tuple[float, ...]
+    force_gain: float
+    mass: tuple[float, ...]
+    payload: float
+    friction: tuple[float, ...]
+    viscous: tuple[float, ...]
+    encoder_bits: int
+    encoder_noise: float
+    encoder_bandwidth: float
+    force_noise: float
+    torque_delay: int
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, joints: int) -> Self:
+        """Draw the imperfections of one robot.
+
+        Args:
+            rng: Source of chance.
+            joints: How many joints the robot has.
+
+        Returns:
+            Gains and masses off by up to 5 %, frictions by up to half, an encoder of 21 to 23 bit
+            (a motor's encoder behind its gear), 0.2 to 0.6 ms of delay.
+        """
+
+        def scales(spread: float) -> tuple[float, ...]:
+            return tuple(rng.uniform(1 - spread, 1 + spread, joints).tolist())
+
+        return cls(
+            stiffness=scales(0.05),
+            damping=scales(0.05),
+            force_gain=float(rng.uniform(0.95, 1.05)),
+            mass=scales(0.05),
+            payload=float(rng.uniform(0.0, 0.3)),
+            friction=scales(0.5),
+            viscous=scales(0.5),
+            encoder_bits=int(rng.integers(21, 24)),
+            encoder_noise=float(rng.uniform(0.2e-6, 1e-6)),
+            encoder_bandwidth=float(rng.uniform(400, 700)),
+            force_noise=float(rng.uniform(0.1, 0.4)),
+            torque_delay=int(rng.integers(2, 7)),
+        )
+
+    @property
+    def encoder_step(self) -> float:
+        """What an encoder can tell apart, in [rad]."""
+        return float(2 * np.pi / 2**self.encoder_bits)
+
+
+def real_model(model: Any, frame: str, point: Array, imperfections: Imperfections) -> Any:
+    """Change a robot's masses as its controller does not know them.
+
+    Args:
+        model: The ``pinocchio.Model`` that the controller has.
+        frame: Name of the frame that carries the payload.
+        point: Where it hangs, in the frame's axes, shape (3,), in [m].
+        imperfections: How the real robot differs.
+
+    Returns:
+        A changed copy of the model.
+    """
+    import pinocchio as pin
+
+    real = model.copy()
+    for index, scale in enumerate(imperfections.mass, start=1):
+        given = model.inertias[index]
+        real.inertias[index] = pin.Inertia(given.mass * scale, given.lever, given.inertia * scale)
+    holder = model.frames[model.getFrameId(frame)]
+    real.appendBodyToJoint(
+        holder.parentJoint,
+        pin.Inertia.FromSphere(imperfections.payload, 0.02),
+        holder.placement * pin.SE3(np.eye(3), point),
+    )
+    return real

@@ -1,0 +1,137 @@
+"""Defects draw faults that keep to their settings, and tell what they did."""
+
+import numpy as np
+import pytest
+
+from scenarios.defects import (
+    Decalibration,
+    ForceGain,
+    ForceJumps,
+    Multisine,
+    NoDefect,
+    Plates,
+    ReferenceJumps,
+)
+from scenarios.faults import pulses, ramps, sines
+from scenarios.picking import pick
+from scenarios.table import SCENARIOS
+
+TIME = np.arange(70_000) * 1e-4
+
+
+@pytest.fixture(scope="module")
+def plan():
+    return pick(
+        np.random.default_rng(0),
+        start=np.array([0.46, 0.0, 0.43]),
+        table=0.1,
+        reach=((0.4, 0.58), (-0.2, 0.2)),
+        duration=7.0,
+    )
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
+def test_the_same_seed_draws_the_same_faults(scenario, plan):
+    one, two = (scenario.defect.draw(np.random.default_rng(4), plan) for _ in range(2))
+    assert one.events == two.events
+    assert one.facts == two.facts
+    assert one.boxes == two.boxes
+    np.testing.assert_array_equal(one.shift(plan.time), two.shift(plan.time))
+    np.testing.assert_array_equal(one.force(plan.time), two.force(plan.time))
+    np.testing.assert_array_equal(one.overlay(TIME), two.overlay(TIME))
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
+def test_a_defect_announces_only_labels_that_its_scenario_lists(scenario, plan):
+    faults = scenario.defect.draw(np.random.default_rng(0), plan)
+    assert {event.label for event in faults.events} <= set(scenario.labels)
+
+
+def test_no_defect_changes_nothing(plan):
+    faults = NoDefect().draw(np.random.default_rng(0), plan)
+    assert not faults.shift(plan.time).any()
+    assert not faults.overlay(TIME).any()
+    assert not faults.force(plan.time).any()
+    assert (faults.boxes, dict(faults.decalibration), faults.force_gain) == ((), {}, 1.0)
+
+
+def test_plates_lie_on_the_table_where_the_tool_comes_down(plan):
+    faults = Plates().draw(np.random.default_rng(1), plan)
+    places = [touch.place for touch in plan.touches]
+    assert faults.boxes
+    for box in faults.boxes:
+        assert box.centre[2] - box.half[2] == pytest.approx(0.1)
+        assert 0.114 <= box.top <= 0.125
+        assert (box.centre[0], box.centre[1]) in [place[:2] for place in places]
+
+
+def test_jumps_of_the_reference_go_away_and_come_back(plan):
+    faults = ReferenceJumps().draw(np.random.default_rng(2), plan)
+    shift = np.linalg.norm(faults.shift(plan.time), axis=1)
+    assert not shift[: int(faults.events[0].start * 1e3)].any()
+    assert 0.001 <= shift.max() <= 0.004
+    after_second = int((faults.events[1].stop + 0.01) * 1e3)
+    assert shift[after_second] == pytest.approx(0, abs=1e-12)
+    steps = np.linalg.norm(np.diff(faults.shift(plan.time), axis=0), axis=1)
+    assert steps.max() <= 2.0 * 1e-3 + 1e-9  # never faster than the settings say
+
+
+def test_the_force_signal_jumps_only_while_the_tool_presses(plan):
+    faults = ForceJumps().draw(np.random.default_rng(3), plan)
+    wrong = plan.time[faults.force(plan.time) != 0]
+    assert wrong.size
+    assert all(
+        any(touch.start < time < touch.lift for touch in plan.touches) for time in wrong.tolist()
+    )
+
+
+def test_a_gain_and_an_encoder_are_off_by_what_was_drawn(plan):
+    gain = ForceGain(factor=(6.0, 7.0)).draw(np.random.default_rng(0), plan)
+    assert 6 <= gain.force_gain == gain.facts["factor"] <= 7
+    assert len(gain.events) == len(plan.touches)
+    encoder = Decalibration(joint=2, angle=(0.1, 0.2)).draw(np.random.default_rng(0), plan)
+    assert 0.1 <= encoder.decalibration[2] <= 0.2
+
+
+def test_a_multisine_has_one_line_per_hertz_of_its_band(plan):
+    wave = sines(
+        TIME,
+        rates=2 * np.pi * np.arange(40, 51.0),
+        phases=np.zeros(11),
+        amplitude=1e-3,
+        start=-1.0,
+        stop=9.0,
+    )[10_000:60_000, 0]
+    spectrum = np.abs(np.fft.rfft(wave))[::5]  # 5 s: every fifth bin is a whole hertz
+    assert set(np.flatnonzero(spectrum > 0.1 * spectrum.max())) == set(range(40, 51))
+    assert np.sqrt(2 * np.mean(wave**2)) == pytest.approx(1e-3, rel=1e-6)
+
+
+def test_the_rate_of_a_multisine_is_its_slope():
+    wave = sines(
+        TIME, rates=np.array([150.0]), phases=np.ones(1), amplitude=1e-3, start=1.0, stop=5.0
+    )
+    inside = slice(12_000, 48_000)
+    np.testing.assert_allclose(
+        np.gradient(wave[:, 0], 1e-4)[inside], wave[inside, 1], rtol=0, atol=1e-4
+    )
+    assert not wave[:10_000].any()
+    assert not wave[50_000:].any()
+
+
+def test_high_bands_get_small_amplitudes(plan):
+    settings = Multisine(bands=((900, 1000),), amplitude=(0.002, 0.002))
+    faults = settings.draw(np.random.default_rng(0), plan)
+    assert faults.facts["amplitude"] == pytest.approx(1.0 / (2 * np.pi * 1000))
+
+
+def test_ramps_and_pulses_add_up():
+    time = np.array([0.0, 1.0, 1.5, 2.0, 3.0])
+    moved = ramps(
+        time, starts=np.array([1.0]), rises=np.array([1.0]), moves=np.array([[0, 0, 2.0]])
+    )
+    np.testing.assert_allclose(moved[:, 2], [0, 0, 1, 2, 2])
+    pulse = pulses(
+        time, starts=np.array([1.0, 1.5]), stops=np.array([2.0, 2.5]), sizes=np.array([3.0, 4.0])
+    )
+    np.testing.assert_allclose(pulse, [0, 3, 7, 4, 0])

@@ -1,0 +1,133 @@
+"""Only what is felt is labelled, and nothing is called ok that a defect may have touched."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from scenarios.events import Event
+from scenarios.labels import annotate, deviation
+
+RATE = 10_000
+TIME = np.arange(4 * RATE) / RATE
+TWIN = np.stack((np.sin(TIME), np.cos(2 * TIME)), axis=1)
+
+
+def knock(at: float, size: float, decay: float = 0.02, hertz: float = 30.0):
+    """A joint that rings down after a blow, shape (samples, joints)."""
+    after = np.maximum(TIME - at, 0)
+    ring = size * np.exp(-after / decay) * np.cos(2 * np.pi * hertz * after) * (at <= TIME)
+    return np.stack((ring, 0 * ring), axis=1)
+
+
+def shake(start: float, stop: float, size: float, hertz: float = 40.0):
+    now = TIME - start
+    wave = size * np.sin(2 * np.pi * hertz * now) * (now >= 0) * (now < stop - start)
+    return np.stack((wave, 0.5 * wave), axis=1)
+
+
+def label(change, *events):
+    return annotate(TWIN + change, TWIN, events, rate=RATE)
+
+
+def failures(blocks):
+    return [block for block in blocks if block.label != "ok"]
+
+
+def test_a_run_like_its_twin_is_ok_from_end_to_end():
+    blocks, traces = label(np.zeros((len(TIME), 2)))
+    assert [(block.start, block.stop, block.label) for block in blocks] == [(0.0, 4.0, "ok")]
+    assert traces == ()
+
+
+def test_a_blow_that_is_felt_is_an_impact_from_its_onset():
+    blocks, (trace,) = label(knock(2.0, 1.0), Event("impact", "contact", 2.0, 2.02))
+    (impact,) = failures(blocks)
+    assert impact.label == "impact"
+    assert impact.start == pytest.approx(2.0, abs=0.001)
+    assert 0.02 < impact.stop - impact.start < 0.2
+    assert trace.labelled == pytest.approx(impact.stop - impact.start)
+    assert trace.peak > 0.1
+
+
+def test_a_blow_that_is_hardly_felt_is_recorded_and_neither_impact_nor_ok():
+    blocks, (trace,) = label(knock(2.0, 0.1), Event("impact", "contact", 2.0, 2.02))
+    assert failures(blocks) == []
+    assert not any(block.start < 2.01 < block.stop for block in blocks)
+    assert trace.labelled == 0
+    assert 0.03 < trace.peak < 0.1
+
+
+def test_a_place_that_is_off_is_not_noise():
+    slow = 0.3 * np.sin(2 * np.pi * 0.3 * TIME)[:, None] * np.ones(2)
+    blocks, _ = label(slow)
+    assert [block.label for block in blocks] == ["ok"]
+
+
+def test_a_sudden_velocity_is_a_high_acceleration_and_a_gentle_one_is_not():
+    def rise(seconds):
+        return 0.5 * np.clip((TIME - 2) / seconds, 0, 1)[:, None] * [1.0, 0.0]
+
+    event = Event("highaccelerations", "jump", 2.0, 2.001)
+    assert [block.label for block in failures(label(rise(0.01), event)[0])] == ["highaccelerations"]
+    assert failures(label(rise(0.2), event)[0]) == []
+
+
+def test_a_shaking_joint_oscillates_and_a_single_blow_does_not():
+    event = Event("oscillations", "multi-sine", 1.0, 3.0)
+    (block,) = failures(label(shake(1.0, 3.0, 0.2), event)[0])
+    assert block.label == "oscillations"
+    assert (block.start, block.stop) == pytest.approx((1.0, 3.0), abs=0.05)
+    assert failures(label(knock(2.0, 1.0, decay=0.01), event)[0]) == []
+
+
+def test_a_commanded_oscillation_without_a_trace_carries_no_label_at_all():
+    blocks, (trace,) = label(shake(1.0, 3.0, 0.01), Event("oscillations", "sine", 1.0, 3.0))
+    assert [block.label for block in blocks] == ["ok", "ok"]
+    assert blocks[0].stop == pytest.approx(0.95, abs=0.002)
+    assert blocks[1].start == pytest.approx(3.05, abs=0.002)
+    assert trace.labelled == 0
+
+
+def test_what_is_felt_long_after_the_event_is_left_without_a_label():
+    blocks, _ = label(shake(1.0, 3.0, 0.2), Event("impact", "contact", 1.0, 1.02))
+    (impact,) = failures(blocks)
+    assert impact.stop == pytest.approx(1.17, abs=1e-3)
+    assert all(block.stop < 1.0 or block.start > 3.0 for block in blocks if block.label == "ok")
+
+
+def test_what_begins_while_a_cause_acts_belongs_to_it():
+    blocks, traces = label(
+        shake(1.0, 3.0, 0.3),
+        Event("impact", "contact", 2.0, 2.02),
+        Event("oscillations", "multi-sine", 1.0, 3.0),
+    )
+    assert [block.label for block in failures(blocks)] == ["oscillations"]
+    assert [trace.event.label for trace in traces] == ["oscillations"]
+
+
+def test_an_event_ends_where_the_next_one_begins():
+    blocks, _ = label(
+        shake(1.0, 3.0, 0.3),
+        Event("impact", "contact", 1.0, 1.02),
+        Event("oscillations", "multi-sine", 1.1, 3.0),
+    )
+    impact, oscillation = failures(blocks)
+    assert impact.stop == oscillation.start == pytest.approx(1.1)
+
+
+def test_blocks_never_overlap_and_keep_their_distance_from_ok():
+    blocks, _ = label(
+        knock(1.0, 1.0) + shake(2.0, 3.0, 0.2),
+        Event("impact", "contact", 1.0, 1.02),
+        Event("oscillations", "multi-sine", 2.0, 3.0),
+    )
+    assert [block.label for block in blocks] == ["ok", "impact", "ok", "oscillations", "ok"]
+    for before, after in pairwise(blocks):
+        assert after.start - before.stop >= 0.0499
+
+
+def test_the_deviation_moves_nothing_ahead_of_its_cause():
+    fast = deviation(TWIN + knock(2.0, 1.0), TWIN, rate=RATE)
+    assert not fast[: 2 * RATE].any()
+    assert fast[2 * RATE + 1].any()

@@ -1,0 +1,131 @@
+"""The generated MuJoCo model moves, weighs and touches like the Pinocchio model it came from."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from noisemodel import Robot
+from scenarios.errors import UnsupportedModelError
+from scenarios.mujoco_model import Physics, build
+from scenarios.shapes import Box, Rod
+
+ODD = """<robot name="odd"><link name="base"/>
+<link name="a"><inertial><origin xyz="0.1 0 0.2" rpy="0.3 0 0"/><mass value="2"/>
+  <inertia ixx="0.03" iyy="0.04" izz="0.05" ixy="0.001" ixz="0" iyz="0.002"/></inertial></link>
+<link name="b"><inertial><mass value="1"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="c"><inertial><mass value="0.5"/>
+  <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="a"/>
+  <origin xyz="0 0.1 0.4" rpy="0.1 0.2 0.3"/><axis xyz="1 2 -1"/>
+  <limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+<joint name="slide" type="prismatic"><parent link="a"/><child link="b"/>
+  <origin xyz="0.3 0 0" rpy="0 -0.5 0"/><axis xyz="0 1 1"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="spin" type="continuous"><parent link="a"/><child link="c"/>
+  <origin xyz="0 0 0.2" rpy="1 0 0"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def physics(joints: int, **changes: float) -> Physics:
+    nothing = np.zeros(joints)
+    return Physics(timestep=1e-4, armature=nothing, damping=nothing, friction=nothing, **changes)
+
+
+@pytest.fixture(params=["panda", "odd"])
+def model(request):
+    if request.param == "odd":
+        return pin.buildModelFromXML(ODD)
+    return Robot.load("panda").model
+
+
+def states(model, rng):
+    """One state, in Pinocchio's and in MuJoCo's words: they differ for continuous joints."""
+    angles = rng.uniform(-0.5, 0.5, model.nv)
+    q = np.concatenate(
+        [
+            [np.cos(angle), np.sin(angle)] if joint.nq == 2 else [angle]
+            for joint, angle in zip(list(model.joints)[1:], angles, strict=True)
+        ]
+    )
+    return q, angles, rng.uniform(-2, 2, model.nv)
+
+
+def test_bodies_are_where_pinocchio_has_them_and_move_as_fast(model):
+    rng = np.random.default_rng(0)
+    built = build(model, physics(model.nv))
+    ours, theirs = model.createData(), mujoco.MjData(built)
+    for _ in range(20):
+        q, angles, v = states(model, rng)
+        pin.forwardKinematics(model, ours, q, v)
+        theirs.qpos[:], theirs.qvel[:] = angles, v
+        mujoco.mj_forward(built, theirs)
+        for index in range(1, model.njoints):
+            body = built.body(model.names[index]).id
+            np.testing.assert_allclose(
+                theirs.xpos[body], ours.oMi[index].translation, rtol=0, atol=1e-8
+            )
+            np.testing.assert_allclose(
+                theirs.xmat[body].reshape(3, 3), ours.oMi[index].rotation, rtol=0, atol=1e-8
+            )
+            twist = np.zeros(6)
+            mujoco.mj_objectVelocity(built, theirs, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 1)
+            np.testing.assert_allclose(twist[3:], ours.v[index].linear, rtol=0, atol=1e-8)
+            np.testing.assert_allclose(twist[:3], ours.v[index].angular, rtol=0, atol=1e-8)
+
+
+def test_the_same_motion_takes_the_same_torques(model):
+    rng = np.random.default_rng(1)
+    built = build(model, physics(model.nv))
+    data = mujoco.MjData(built)
+    for _ in range(5):
+        q, angles, v = states(model, rng)
+        acceleration = rng.uniform(-3, 3, model.nv)
+        data.qpos[:], data.qvel[:], data.qacc[:] = angles, v, acceleration
+        mujoco.mj_inverse(built, data)
+        torque = pin.rnea(model, model.createData(), q, v, acceleration)
+        np.testing.assert_allclose(data.qfrc_inverse, torque, rtol=1e-6, atol=1e-8)
+
+
+def test_actuators_are_the_joints_in_pinocchio_order(model):
+    built = build(model, physics(model.nv))
+    assert [built.actuator(index).name for index in range(built.nu)] == list(model.names)[1:]
+    assert built.nq == built.nv == model.nv
+
+
+def test_a_rod_touches_with_its_tip_and_feels_the_weight_that_rests_on_it():
+    urdf = """<robot name="lift"><link name="base"/><link name="tool"><inertial>
+      <mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
+      </inertial></link><joint name="slide" type="prismatic"><parent link="base"/>
+      <child link="tool"/><origin xyz="0 0 0.5" rpy="3.141592653589793 0 0"/><axis xyz="0 0 1"/>
+      <limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    built = build(
+        pin.buildModelFromXML(urdf),
+        physics(1),
+        rods=(Rod("tool", length=0.1, radius=0.01),),
+        boxes=(Box(centre=(0.0, 0.0, 0.15), half=(0.2, 0.2, 0.05)),),
+    )
+    data = mujoco.MjData(built)
+    data.qpos[0] = 0.1999  # the tip hangs 0.1 mm above the box, whose top is at 0.2 m
+    mujoco.mj_forward(built, data)
+    assert data.ncon == 0
+    for _ in range(5000):
+        mujoco.mj_step(built, data)
+    assert data.qpos[0] == pytest.approx(0.2, abs=1e-3)
+    assert data.sensordata[0] == pytest.approx(2 * 9.81, rel=1e-3)
+
+
+def test_a_floating_base_is_refused_by_name():
+    model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
+    with pytest.raises(
+        UnsupportedModelError,
+        match="joint 'root_joint' is floating; revolute, continuous, prismatic joints can be",
+    ):
+        build(model, physics(model.nv))
+
+
+def test_a_body_without_mass_is_refused():
+    model = pin.buildModelFromXML(ODD)
+    model.inertias[2] = pin.Inertia.Zero()
+    with pytest.raises(UnsupportedModelError, match="MuJoCo refuses the robot: .*slide"):
+        build(model, physics(model.nv))

@@ -1,0 +1,240 @@
+"""Simulated runs show what their scenario promises, and the same seed gives the same file."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import scenarios
+from noisemodel import Run
+from scenarios import simulation
+from scenarios.defects import Multisine, Plates
+
+SEEDS = (5, 10)
+SHORT = 3.0
+FAILURE = {name: line.labels[1] for name, line in scenarios.SCENARIOS.items() if name != "ok"}
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[tuple[str, int], Run]:
+    return {
+        (name, seed): scenarios.simulate("panda", name, seed, duration=SHORT)
+        for seed in SEEDS
+        for name in scenarios.SCENARIOS
+    }
+
+
+def labels(run: Run) -> set[str]:
+    return {block.label for block in run.blocks}
+
+
+def first_difference(one: Run, two: Run, stage: str) -> float:
+    """Time at which two runs part in a stage, in [s]."""
+    signal = {"desired": "velocity_desired", "measured": "velocity"}.get(stage)
+    a, b = (getattr(run, signal) if signal else run.stages[stage] for run in (one, two))
+    apart = np.abs(a - b).max(axis=1) > 0.02
+    return float(one.time[np.argmax(apart)]) if apart.any() else np.inf
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("name", FAILURE)
+def test_a_scenario_contains_its_failure_and_ok(runs, name, seed):
+    run = runs[name, seed]
+    assert {"ok", FAILURE[name]} <= labels(run) <= set(scenarios.SCENARIOS[name].labels)
+    assert any(event["labelled"] > 0 for event in run.meta["events"])
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_healthy_robot_is_ok_all_the_time(runs, seed):
+    run = runs["ok", seed]
+    assert [(block.start, block.stop, block.label) for block in run.blocks] == [(0.0, SHORT, "ok")]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_full_runs_keep_the_promise_too(seed):
+    for name, failure in FAILURE.items():
+        assert failure in labels(scenarios.simulate("panda", name, seed))
+    assert labels(scenarios.simulate("panda", "ok", seed)) == {"ok"}
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_runs_of_a_seed_are_the_same_until_the_defect_acts(runs, seed):
+    healthy = runs["ok", seed]
+    for name in ("table", "jump", "sensor", "chatter", "multisine"):
+        run = runs[name, seed]
+        onset = int(10_000 * min(event["start"] for event in run.meta["events"]))
+        np.testing.assert_array_equal(run.velocity[:onset], healthy.velocity[:onset])
+
+
+def test_each_defect_shows_first_in_the_stage_where_it_acts(runs):
+    healthy = runs["ok", 5]
+    order = ("planned", "commanded", "desired", "measured")
+    for name, stage in (
+        ("jump", "planned"),
+        ("sensor", "commanded"),
+        ("chatter", "commanded"),
+        ("multisine", "desired"),
+        ("table", "measured"),
+    ):
+        run = runs[name, 5]
+        before = [first_difference(run, healthy, other) for other in order[: order.index(stage)]]
+        assert first_difference(run, healthy, stage) < min([np.inf, *before])
+
+
+def test_a_run_is_complete_and_uniform(runs):
+    run = runs["table", 5]
+    assert run.rate == 10_000
+    assert run.velocity.shape == (30_000, 7)
+    assert run.robot == "panda"
+    for signal in (run.position, run.velocity, run.velocity_desired, run.position_desired):
+        assert signal.dtype == np.float32
+    assert set(run.stages) == {"planned", "commanded"}
+
+
+def test_a_run_says_how_it_was_made(runs, tmp_path):
+    run = runs["table", 5]
+    run.save(tmp_path / "run.npz")
+    loaded = Run.load(tmp_path / "run.npz")
+    assert dict(loaded.meta) == json.loads(json.dumps(dict(run.meta)))
+    assert loaded.blocks == run.blocks
+    assert (loaded.meta["scenario"], loaded.meta["seed"]) == ("table", 5)
+
+
+def test_reported_velocities_are_the_slopes_of_reported_positions(runs):
+    run = runs["ok", 5]
+    span = 200
+    slope = (run.position[span:] - run.position[:-span]).astype(float) / (span * 1e-4)
+    mean = np.cumsum(run.velocity.astype(float), axis=0)
+    mean = (mean[span:] - mean[:-span]) / span
+    assert np.abs(slope - mean).max() < 0.03
+
+
+def test_the_robot_stays_within_its_speed_and_torque(runs):
+    for seed in SEEDS:
+        run = runs["ok", seed]
+        assert (np.abs(run.velocity).max(axis=0) < [2.175] * 4 + [2.61] * 3).all()
+        assert (np.abs(run.effort).max(axis=0) < [87.0] * 4 + [12.0] * 3).all()
+
+
+def test_a_healthy_robot_is_not_silent(runs):
+    still = runs["ok", 5].velocity[:1000]
+    assert 1e-4 < still.std() < 5e-3
+    assert np.unique(still[:, 0]).size > 100
+
+
+def test_seeds_differ_in_motion_and_in_robot(runs):
+    one, two = (runs["ok", seed] for seed in SEEDS)
+    assert one.meta["imperfections"] != two.meta["imperfections"]
+    assert np.abs(one.position_desired[-1] - two.position_desired[-1]).max() > 0.01
+
+
+def test_an_unplanned_contact_is_recorded_with_its_impulse(runs):
+    (contact,) = [event for event in runs["table", 5].meta["events"] if event["label"] == "impact"]
+    assert 0.2 < contact["facts"]["impulse"] < 20
+    assert contact["facts"]["force"] > 50
+    assert not any(event["label"] == "impact" for event in runs["sensor", 5].meta["events"])
+
+
+def test_the_same_seed_gives_the_same_file_in_another_process(runs, tmp_path):
+    here, there = tmp_path / "here.npz", tmp_path / "there.npz"
+    runs["ok", 5].save(here)
+    code = (
+        "import sys, scenarios;"
+        "scenarios.simulate('panda', 'ok', 5, duration=float(sys.argv[1])).save(sys.argv[2])"
+    )
+    subprocess.run([sys.executable, "-c", code, str(SHORT), str(there)], check=True, timeout=120)
+    assert here.read_bytes() == there.read_bytes()
+
+
+def with_defect(monkeypatch, defect):
+    line = replace(scenarios.SCENARIOS["ok"], name="special", defect=defect)
+    monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "special": line})
+
+
+def test_a_defect_that_leaves_no_trace_yields_no_failure(monkeypatch):
+    with_defect(monkeypatch, Multisine(bands=((20, 30),), amplitude=(1e-7, 1e-7)))
+    run = scenarios.simulate("panda", "special", 10, duration=SHORT)
+    (event,) = run.meta["events"]
+    assert labels(run) == {"ok"}
+    assert event["labelled"] == 0
+    assert not any(block.start < event["start"] + 0.1 < block.stop for block in run.blocks)
+
+
+def test_a_plate_that_nobody_touches_changes_nothing(runs, monkeypatch):
+    with_defect(monkeypatch, Plates(height=(1e-4, 1e-4), half=1e-4, share=0.0))
+    run = scenarios.simulate("panda", "special", 10, duration=SHORT)
+    assert labels(run) == {"ok"}
+    assert run.meta["events"] == []
+
+
+def test_a_run_that_diverges_is_no_sample(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    nervous = replace(scenarios.ROBOTS["panda"], damping=(-200.0,) * 7)
+    monkeypatch.setattr(simulation, "ROBOTS", {"nervous": nervous})
+    with pytest.raises(
+        scenarios.SimulationError,
+        match=r"panda in scenario 'ok' with seed 10 diverged at -?\d\.\d{3} s \(a joint moved at",
+    ) as caught:
+        scenarios.simulate("nervous", "ok", 10, duration=SHORT)
+    assert caught.value.seed == 10
+    assert list(tmp_path.iterdir()) == []  # MuJoCo leaves no log either
+
+
+def test_unknown_names_are_answered_with_what_there_is():
+    with pytest.raises(
+        scenarios.UnknownScenarioError,
+        match=r"no scenario 'tabel' \(did you mean 'table'\?\); there are ok, table, .*multisine",
+    ):
+        scenarios.simulate("panda", "tabel", 0)
+    with pytest.raises(
+        scenarios.UnsimulatedRobotError,
+        match="robot 'baxter' cannot be simulated; there are panda",
+    ):
+        scenarios.simulate("baxter", "ok", 0)
+
+
+def test_a_scenario_of_another_family_is_refused(monkeypatch):
+    lame = replace(scenarios.SCENARIOS["ok"], name="lame", families=("quadruped",))
+    monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "lame": lame})
+    with pytest.raises(
+        scenarios.UnsuitedScenarioError,
+        match="scenario 'lame' has no meaning on 'panda'; it has ok, table",
+    ):
+        scenarios.simulate("panda", "lame", 0)
+
+
+def test_numbers_out_of_range_are_refused():
+    with pytest.raises(scenarios.ScenarioError, match="seed -1: expected an integer of at least 0"):
+        scenarios.simulate("panda", "ok", -1)
+    with pytest.raises(scenarios.ScenarioError, match="duration 1 s: expected at least 3 s"):
+        scenarios.simulate("panda", "ok", 0, duration=1.0)
+
+
+def test_without_mujoco_the_error_says_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(
+        scenarios.MissingSimulatorError, match=r"pip install 'noise-inspector\[sim\]'"
+    ):
+        scenarios.simulate("panda", "ok", 0)
+
+
+def test_listing_scenarios_needs_no_simulator():
+    code = (
+        "import sys, scenarios; assert scenarios.SCENARIOS and scenarios.ROBOTS;"
+        "loaded = {'mujoco', 'pinocchio', 'scipy.signal'} & set(sys.modules);"
+        "assert not loaded, loaded"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+
+
+def test_every_scenario_says_what_happens_in_one_sentence():
+    for name, line in scenarios.SCENARIOS.items():
+        assert line.name == name
+        assert line.description.endswith(".")
+        assert line.description.count(". ") == 0
+        assert line.families == ("arm",)
+        assert "ok" in line.labels
