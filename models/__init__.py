@@ -1,0 +1,67 @@
+"""Noise becomes labels: what a robot's noise signal says about its health.
+
+    frames -> |STFT| -> bands -> log -> course in time -> support vector machines -> class
+
+after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` names each
+choice on the way: NoisyTest's own, the paper's, or ours for any rate (`LogBands`). A `Dataset`
+holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts.
+
+This package knows no robot: a signal and its rate are all that it takes. It needs NumPy, and
+scikit-learn only to train.
+"""
+
+from models import noisytest
+from models.classifier import Classifier, nearest
+from models.dataset import Dataset
+from models.errors import (
+    DataFileError,
+    DatasetError,
+    FileError,
+    ModelFileError,
+    ModelsError,
+    OutputError,
+    ProfileError,
+    RateError,
+    RecordingError,
+    SignalError,
+    UnknownLabelError,
+)
+from models.evaluation import Evaluation, evaluate
+from models.features import features
+from models.framing import frame
+from models.labels import Event, Labels
+from models.logbands import LogBands
+from models.logfile import nominal_rate, read_log
+from models.profile import CLASSES, Profile
+from models.recording import Block, Recording
+
+__all__ = [
+    "CLASSES",
+    "Block",
+    "Classifier",
+    "DataFileError",
+    "Dataset",
+    "DatasetError",
+    "Evaluation",
+    "Event",
+    "FileError",
+    "Labels",
+    "LogBands",
+    "ModelFileError",
+    "ModelsError",
+    "OutputError",
+    "Profile",
+    "ProfileError",
+    "RateError",
+    "Recording",
+    "RecordingError",
+    "SignalError",
+    "UnknownLabelError",
+    "evaluate",
+    "features",
+    "frame",
+    "nearest",
+    "noisytest",
+    "nominal_rate",
+    "read_log",
+]

@@ -1,0 +1,89 @@
+"""Cutting: from an annotated block to the samples that its frames are taken from."""
+
+from math import inf
+
+import numpy as np
+
+from models.errors import RecordingError
+from models.framing import pad_end
+from models.profile import Profile
+from models.recording import Block, Recording
+from models.types import Mask, Real
+
+
+def cut(
+    recording: Recording, block: Block, profile: Profile, *, training: bool
+) -> tuple[Real, Mask]:
+    """Take a block's samples out of a recording, one frame of them or more.
+
+    A block shorter than a frame is padded in training, lest a frame mixes failures that follow
+    each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
+    for widened ones in training too.
+
+    Args:
+        recording: Where the block lies.
+        block: One annotated stretch of it.
+        profile: How long a frame is, and how blocks are cut.
+        training: Whether the frames are to learn from.
+
+    Returns:
+        Samples and which of them are valid, each of shape (samples,); padding counts as valid.
+
+    Raises:
+        RecordingError: If the block holds no sample, or the recording is shorter than a frame that
+            a block is widened to.
+    """
+    lost = int(profile.drop_first_sample)
+    precision = np.float32 if profile.single_precision else np.float64
+    time: Real = recording.time[lost:].astype(precision)
+    pad = training and profile.pad_short
+    start, stop = _bounds(time, block, profile, pad=pad)
+    samples = _samples(time, start, stop, profile)
+    signal: Real = recording.signal[lost:][samples].astype(precision)
+    if not len(signal):
+        raise RecordingError(
+            recording.name,
+            f"block {block.label!r} from {block.start:g} s to {block.stop:g} s holds no sample",
+        )
+    if len(signal) < profile.length and not (pad or profile.pad_widened):
+        raise RecordingError(
+            recording.name, f"{len(time)} samples are too short: one frame takes {profile.length}"
+        )
+    padding = max(profile.length - len(signal), 0)
+    valid = np.ones(len(time), bool) if recording.valid is None else recording.valid[lost:]
+    return (
+        pad_end(signal, length=profile.length),
+        np.pad(valid[samples], (0, padding), constant_values=True),
+    )
+
+
+def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[float, float]:
+    """Say from when to when, in NoisyTest's order of operations, for its rounding to be the same.
+
+    Args:
+        time: Times of the recording's samples, shape (samples,), in [s].
+        block: The annotated block.
+        profile: How long a frame is.
+        pad: Whether a short block keeps its bounds, to be padded.
+
+    Returns:
+        Start and stop, in [s].
+    """
+    start, stop = block.start, block.stop
+    if stop == inf and len(time):
+        stop = time[-1] + profile.open_end / profile.rate
+    if pad or stop - start >= profile.duration:
+        return start, stop
+    start -= (profile.duration - (stop - start)) / 2.0
+    if not profile.pad_widened and len(time):
+        start = max(min(start, time[-1] + 1.0 / profile.rate - profile.duration), time[0])
+    return start, start + profile.duration + profile.widen_extra / profile.rate
+
+
+def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
+    """Find the samples from a start to a stop, by their times or by counting them."""
+    if profile.cut_by_time:
+        inside = np.flatnonzero((time >= start) & (time <= stop))
+        return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)
+    first = max(round((start - float(time[0])) * profile.rate), 0)
+    return slice(first, first + round((stop - start) * profile.rate))

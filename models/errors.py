@@ -1,0 +1,87 @@
+"""What can be wrong with a signal, a data set or a model: one base error, facts in subclasses."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+
+class ModelsError(ValueError):
+    """The base of every error that `models` expects."""
+
+
+class SignalError(ModelsError):
+    """A signal, or frames of one, that cannot be classified."""
+
+
+class ProfileError(ModelsError):
+    """Settings of a profile that do not fit together."""
+
+
+class RecordingError(ModelsError):
+    """A recording whose samples or annotations are wrong.
+
+    Args:
+        name: The name of the recording.
+        problem: What is wrong with it, in one line.
+    """
+
+    def __init__(self, name: str, problem: str) -> None:
+        self.name, self.problem = name, problem
+        super().__init__(f"{name}: {problem}")
+
+
+class UnknownLabelError(RecordingError):
+    """An annotation whose label is no class of the profile.
+
+    Args:
+        name: The name of the recording.
+        label: The label that was given.
+        known: The classes that the profile has.
+    """
+
+    def __init__(self, name: str, label: str, known: Iterable[str]) -> None:
+        self.label, self.known = label, tuple(known)
+        super().__init__(name, f"label {label!r} is no class; there are {', '.join(self.known)}")
+
+
+class RateError(ModelsError):
+    """A sample rate that no model takes.
+
+    Args:
+        rate: The rate that was given, in [Hz].
+        known: The rates that there are, in [Hz].
+        advice: What to do about it.
+    """
+
+    def __init__(self, rate: float, known: Iterable[float], advice: str) -> None:
+        self.rate, self.known = rate, tuple(sorted(known))
+        there = ", ".join(f"{each:g}" for each in self.known) or "none"
+        super().__init__(f"rate of {rate:g} Hz; the models' rates are {there} Hz: {advice}")
+
+
+class FileError(ModelsError):
+    """A file that cannot be read or written.
+
+    Args:
+        path: The file.
+        problem: What is wrong with it, in one line.
+    """
+
+    def __init__(self, path: str | Path, problem: str) -> None:
+        self.path, self.problem = Path(path), problem
+        super().__init__(f"{path}: {problem}")
+
+
+class DataFileError(FileError):
+    """A file or folder of a data set that cannot be used."""
+
+
+class ModelFileError(FileError):
+    """A file that is not a model, or that holds one that is wrong."""
+
+
+class OutputError(FileError):
+    """An output that exists already or cannot be written."""
+
+
+class DatasetError(ModelsError):
+    """A data set that cannot be built, or that no classifier can be learnt from."""

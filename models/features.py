@@ -1,0 +1,170 @@
+"""Features: the numbers by which a machine tells one frame from another.
+
+Conventions: a spectrogram has the axes (frames, time, frequency). A feature vector of NoisyTest and
+the paper runs over time first: all coefficients of the first band, then those of the second.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from models.errors import SignalError
+from models.profile import Profile
+from models.types import Array, Index, Real
+
+POOLED = 3
+"""Numbers that `pool` keeps of each band."""
+
+
+def features(frames: Real, profile: Profile) -> Array:
+    """Describe each frame by the levels of its frequency bands and their course in time.
+
+    Args:
+        frames: Stretches of noise signal, shape (frames, length).
+        profile: What to compute, and the length that frames must have.
+
+    Returns:
+        Features, not yet standardised, shape (frames, features).
+
+    Raises:
+        SignalError: If the frames have another shape or values that are not finite.
+    """
+    _check(frames, profile)
+    if profile.single_precision:
+        frames = frames.astype(np.float32, copy=False)
+    exact = frames.astype(np.float64, copy=False)
+    spectrum = spectrogram(exact, window=profile.window, stride=profile.stride)
+    if profile.bands == "log":
+        amplitude = spectrum * (2.0 / _hann(profile.window).sum())
+        power = np.square(amplitude) @ band_shares(profile)
+        return pool(np.log(np.sqrt(power) + profile.floor))
+    loudness = np.log(compress(spectrum, comb=profile.bands == "comb") + profile.floor)
+    flat = dct(loudness).reshape(len(frames), -1)
+    return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
+
+
+def feature_count(profile: Profile) -> int:
+    """Say how many features a frame has."""
+    if profile.bands == "log":
+        return POOLED * (len(profile.edges) - 1)
+    return profile.bins // 3 * profile.transforms
+
+
+def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
+    """Amplitudes of the short-time Fourier transform (paper, Sec. III-A), not padded.
+
+    Args:
+        frames: Stretches of noise signal, shape (frames, length).
+        window: Samples of the periodic Hann window.
+        stride: Samples from one transform to the next.
+
+    Returns:
+        Amplitudes, shape (frames, time, frequency).
+    """
+    stretches = np.lib.stride_tricks.sliding_window_view(frames, window, axis=1)[:, ::stride]
+    transform = np.fft.rfft(stretches * _hann(window), axis=2)
+    amplitude: Array = np.abs(transform)
+    return amplitude
+
+
+def compress(spectrum: Array, *, comb: bool = False) -> Array:
+    """Sum three bins into one band (the mean would shift every logarithm by the same log 3).
+
+    Args:
+        spectrum: Amplitudes, shape (frames, time, frequency), a multiple of three bins.
+        comb: Whether to sum the bins that NoisyTest 0.0.1 sums, a third of the spectrum apart,
+            in place of adjacent ones.
+
+    Returns:
+        Amplitudes of the bands, shape (frames, time, frequency / 3).
+    """
+    bands: Array = spectrum[..., _bins_of_bands(spectrum.shape[-1], comb=comb)].sum(axis=-2)
+    return bands
+
+
+def dct(loudness: Array) -> Array:
+    """Describe the course of each band in time by its cosine transform of type II, orthonormal.
+
+    Args:
+        loudness: Levels of the bands, shape (frames, time, frequency).
+
+    Returns:
+        Coefficients, shape (frames, frequency, time). Distances between frames stay what they
+        were: the transform is a rotation, so that no decision depends on it.
+    """
+    coefficients: Array = np.swapaxes(loudness, 1, 2) @ _cosines(loudness.shape[1])
+    return coefficients
+
+
+def pool(loudness: Array) -> Array:
+    """Describe the course of each band in time by what does not depend on when things happen.
+
+    Args:
+        loudness: Levels of the bands, shape (frames, time, frequency).
+
+    Returns:
+        Mean, maximum and standard deviation of each band, shape (frames, 3 * frequency).
+    """
+    return np.hstack((loudness.mean(axis=1), loudness.max(axis=1), loudness.std(axis=1)))
+
+
+@lru_cache
+def band_shares(profile: Profile) -> Array:
+    """Share of each bin in the mean power of each band between the profile's edges.
+
+    A bin stands for half a bin's width on each side of its frequency and counts by the part of it
+    that lies in the band, so that a band narrower than a bin is never empty.
+
+    Args:
+        profile: A profile with band edges.
+
+    Returns:
+        Shares, each column summing to 1, shape (frequency, bands).
+    """
+    width = profile.rate / profile.window
+    centre = width * np.arange(profile.bins)[:, None]
+    low, high = np.array(profile.edges[:-1]), np.array(profile.edges[1:])
+    overlap = np.minimum(centre + width / 2, high) - np.maximum(centre - width / 2, low)
+    share = np.maximum(overlap, 0.0)
+    normalised: Array = share / share.sum(axis=0)
+    return normalised
+
+
+@lru_cache
+def _hann(window: int) -> Array:
+    hann: Array = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(window) / window)
+    return hann
+
+
+@lru_cache
+def _bins_of_bands(bins: int, *, comb: bool) -> Index:
+    """List the three bins of each band, shape (3, bands)."""
+    bands = bins // 3
+    third = np.arange(3)[:, None]
+    if not comb:
+        return 3 * np.arange(bands) + third
+    # NoisyTest writes the 0-1 matrix of bins and bands row by row, three ones and `bins` zeros in
+    # turn, where `bands` zeros were meant: ones drift through the columns, and most bins get none.
+    return 3 * (np.arange(3 * bands).reshape(3, bands) // 3) + third
+
+
+@lru_cache
+def _cosines(count: int) -> Array:
+    """Make the matrix of the cosine transform, shape (time, coefficients)."""
+    n, k = np.arange(count)[:, None], np.arange(count)
+    # X_k = sqrt(2 / n_t) sum x_n cos(pi / n_t (n + 1/2) k), X_0 over sqrt(2): the paper's pi / 2 in
+    # place of pi / n_t is a slip, being no orthonormal transform.
+    basis: Array = np.sqrt(2.0 / count) * np.cos(np.pi / count * (n + 0.5) * k)
+    basis[:, 0] /= np.sqrt(2.0)
+    return basis
+
+
+def _check(frames: Real, profile: Profile) -> None:
+    if frames.ndim != 2 or frames.shape[1] != profile.length:
+        raise SignalError(
+            f"frames of shape {frames.shape}, expected (frames, {profile.length})"
+            f" for profile {profile.name!r} at {profile.rate:g} Hz"
+        )
+    if not np.isfinite(frames).all():
+        number = int(np.flatnonzero(~np.isfinite(frames).all(axis=1))[0])
+        raise SignalError(f"frame {number} holds a value that is not finite")

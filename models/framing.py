@@ -1,0 +1,70 @@
+"""Framing: the stretches of a signal that are classified.
+
+Conventions: frame ``i`` holds the samples from ``i * hop`` up to ``i * hop + length``; a stretch at
+the end that is shorter than a hop belongs to no frame (paper, Sec. III-A, Framing).
+"""
+
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.errors import SignalError
+from models.types import Index, Real
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+
+
+def frame(signal: NDArray[Scalar], *, length: int = 4000, hop: int = 1000) -> NDArray[Scalar]:
+    """Cut a signal into overlapping frames.
+
+    Args:
+        signal: The noise signal, shape (samples,).
+        length: Samples of a frame.
+        hop: Samples from the start of one frame to the start of the next.
+
+    Returns:
+        A read-only view of the signal, shape (frames, length).
+
+    Raises:
+        SignalError: If the signal is not one-dimensional or shorter than one frame.
+    """
+    if signal.ndim != 1:
+        raise SignalError(f"a signal of shape {signal.shape}, expected (samples,)")
+    if len(signal) < length:
+        raise SignalError(
+            f"a signal of {len(signal)} samples is too short: one frame takes {length}"
+        )
+    return np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
+
+
+def frame_starts(samples: int, *, length: int, hop: int, flush_end: bool) -> Index:
+    """Say where the frames of a signal start.
+
+    Args:
+        samples: Samples of the signal, at least ``length``.
+        length: Samples of a frame.
+        hop: Samples from the start of one frame to the start of the next.
+        flush_end: Whether a last frame, flush with the end, covers what the hops leave over.
+
+    Returns:
+        Index of the first sample of each frame, shape (frames,).
+    """
+    last = samples - length
+    starts = np.arange(0, last + 1, hop)
+    return np.append(starts, last) if flush_end and starts[-1] < last else starts
+
+
+def pad_end(signal: Real, *, length: int) -> Real:
+    """Lengthen a signal at its end, continuous in value and slope.
+
+    Args:
+        signal: The signal, shape (samples,), at least one sample.
+        length: Samples that are wanted.
+
+    Returns:
+        The signal reflected at its last sample in time and in amplitude (paper, Sec. III-A),
+        shape (length,), or the signal itself if it is that long already.
+    """
+    missing = max(length - len(signal), 0)
+    return np.pad(signal, (0, missing), mode="reflect", reflect_type="odd")

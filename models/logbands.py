@@ -1,0 +1,87 @@
+"""Our own profile, in seconds and hertz, for any sample rate."""
+
+from dataclasses import dataclass
+
+from models.errors import ProfileError
+from models.features import POOLED
+from models.profile import CLASSES, Profile
+
+
+@dataclass(frozen=True, kw_only=True)
+class LogBands:
+    """Levels of log-spaced bands, pooled over time and standardised.
+
+    Band edges do not depend on the sample rate; bands that reach beyond half the rate drop out.
+    """
+
+    classes: tuple[str, ...] = CLASSES
+    """What a frame can be called, `ok` first."""
+    frame: float = 0.4
+    """Duration of a frame, in [s]."""
+    hop: float = 0.1
+    """Time from the start of one frame to the start of the next, in [s]."""
+    window: float = 0.1
+    """Duration of the window of one Fourier transform, in [s]."""
+    stride: float = 0.025
+    """Time from one Fourier transform to the next, in [s]."""
+    lowest: float = 15.0
+    """Lower edge of the first band: below, a Hann window sees the mean, in [Hz]."""
+    highest: float = 5000.0
+    """No band reaches beyond, in [Hz]."""
+    per_octave: float = 4.0
+    """Bands in an octave, where they are wider than what the window resolves."""
+    regularization: float = 10.0
+    """The machine's C."""
+    softness: float = 0.5
+    """Kernel parameter times the number of features: below 1, frames unlike any known still
+    fall on the side of those that they resemble most."""
+    least_deviation: float = 0.5
+    """Deviation of a level that is chance: what changes less is not scaled up, in [Np]."""
+
+    def at(self, rate: float) -> Profile:
+        """Make the profile for a sample rate, each duration rounded to the nearest sample.
+
+        Args:
+            rate: Sample rate of the signal, in [Hz].
+
+        Returns:
+            The profile: at 1 kHz a frame is 400 samples, every 100.
+
+        Raises:
+            ProfileError: If fewer than three bands lie below half the rate.
+        """
+        edges = self._edges(rate / 2)
+        if len(edges) < 4:
+            raise ProfileError(
+                f"a rate of {rate:g} Hz leaves {max(len(edges) - 1, 0)} bands up to"
+                f" {rate / 2:g} Hz, expected three or more: take a rate of 100 Hz at least"
+            )
+        return Profile(
+            name="logbands",
+            classes=self.classes,
+            rate=rate,
+            length=round(self.frame * rate),
+            hop=round(self.hop * rate),
+            window=round(self.window * rate),
+            stride=round(self.stride * rate),
+            bands="log",
+            edges=edges,
+            least_deviation=self.least_deviation,
+            kernel="rbf",
+            regularization=self.regularization,
+            # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
+            gamma=self.softness / (POOLED * (len(edges) - 1)),
+            multiclass="one-vs-one",
+            # Padding would make a train of impacts of one; frames to classify have none.
+            pad_short=False,
+            flush_end=True,
+        )
+
+    def _edges(self, nyquist: float) -> tuple[float, ...]:
+        """List the edges up to half the rate, each band as wide as the window resolves or wider."""
+        edges, ratio, resolution = [self.lowest], 2.0 ** (1.0 / self.per_octave), 1.0 / self.window
+        while (upper := max(edges[-1] + resolution, edges[-1] * ratio)) <= min(
+            self.highest, nyquist
+        ):
+            edges.append(upper)
+        return tuple(edges)

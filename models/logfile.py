@@ -1,0 +1,101 @@
+"""Read NoisyTest's `.log`: a row for each sample, with its time and its noise."""
+
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from models.errors import DataFileError
+from models.types import Array
+
+
+def read_log(path: str | Path) -> tuple[Array, Array]:
+    """Read a noise signal of two columns, separated by blanks or tabs.
+
+    Comments start with ``#``, anywhere; empty lines, a missing header and a missing last line end
+    are all right.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Times in [s] and the noise estimate, each of shape (samples,).
+
+    Raises:
+        DataFileError: If the file is missing or empty, a line is no pair of finite numbers, or
+            time does not go forward in even steps; the line is named.
+    """
+    columns = _read_fast(path)
+    if columns is None or columns.shape[1] != 2 or not np.isfinite(columns).all():
+        columns = _read_slowly(path)
+    time, noise = columns.T.copy()
+    _check_time(path, time)
+    return time, noise
+
+
+def nominal_rate(time: Array) -> float:
+    """Sample rate that evenly spaced times have on the whole, in [Hz].
+
+    Args:
+        time: Times, shape (samples,), two or more, in [s].
+
+    Returns:
+        The rate to nine digits, in [Hz].
+    """
+    return float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
+
+
+def _read_fast(path: str | Path) -> Array | None:
+    """Let NumPy's compiled reader try; None if anything is odd, or merely ragged."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.loadtxt(Path(path), ndmin=2, encoding="latin-1")
+        except (ValueError, UserWarning):
+            return None
+        except OSError as error:
+            raise DataFileError(path, f"cannot be read ({error.strerror or error})") from error
+
+
+def _read_slowly(path: str | Path) -> Array:
+    """Read line by line, to name the line that is wrong."""
+    rows = []
+    with Path(path).open(encoding="utf-8-sig", errors="replace") as lines:
+        for number, line in enumerate(lines, start=1):
+            words = line.partition("#")[0].split()
+            if words:
+                rows.append(_row(path, number, words))
+    if not rows:
+        raise DataFileError(path, "is empty; expected rows of time and noise")
+    return np.array(rows)
+
+
+def _row(path: str | Path, number: int, words: list[str]) -> list[float]:
+    if len(words) != 2:
+        raise DataFileError(
+            path, f"line {number} has {len(words)} columns, expected time and noise"
+        )
+    try:
+        row = [float(word) for word in words]
+    except ValueError as error:
+        raise DataFileError(path, f"line {number}: {error}") from error
+    if not np.isfinite(row).all():
+        raise DataFileError(path, f"line {number} is not finite: {' '.join(words)}")
+    return row
+
+
+def _check_time(path: str | Path, time: Array) -> None:
+    if len(time) < 2:
+        raise DataFileError(path, "has one row; a rate takes two or more")
+    steps = np.diff(time)
+    usual = np.median(steps)
+    # Printed times are rounded, so that half a step is no gap yet.
+    wrong = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * usual))
+    if len(wrong):
+        row = int(wrong[0])
+        what = "goes backward or stands still" if steps[row] <= 0 else "is not in even steps"
+        raise DataFileError(
+            path,
+            f"time {what} from row {row + 1} to row {row + 2}:"
+            f" {time[row]:.9g} s, then {time[row + 1]:.9g} s, where a step is {usual:.6g} s",
+        )

@@ -1,0 +1,138 @@
+"""The model file, version 1: one uncompressed `.npz` of plain arrays and a JSON manifest.
+
+Members: ``manifest`` (one text), ``vectors`` (vectors, features), ``coefficients`` (machines,
+vectors), ``intercept`` (machines,), ``mean`` and ``scale`` (features,). Nothing in it is ever
+unpickled; sizes are checked before an array is made. The same model is the same bytes.
+"""
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from models.atomic import write_bytes
+from models.errors import ModelFileError
+from models.manifest import check
+from models.types import Array
+
+FORMAT = "noise-model/1"
+LARGEST = 512 * 1024**2
+"""Bytes that a model file may have: a thousand times what is usual."""
+
+_DIMENSIONS = {
+    "manifest": 0,
+    "vectors": 2,
+    "coefficients": 2,
+    "intercept": 1,
+    "mean": 1,
+    "scale": 1,
+}
+
+
+def write(
+    path: str | Path,
+    manifest: Mapping[str, Any],
+    arrays: Mapping[str, Array],
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write a model file, whole or not at all.
+
+    Args:
+        path: The file to write.
+        manifest: What is known of the model, as JSON can hold it.
+        arrays: The arrays that the module's docstring lists.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    text = json.dumps({"format": FORMAT, **manifest}, sort_keys=True, allow_nan=False)
+    content = io.BytesIO()
+    np.savez(content, allow_pickle=False, manifest=np.array(text), **arrays)  # dated 1980 always
+    write_bytes(path, content.getvalue(), overwrite=overwrite)
+
+
+def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Read a model file after a look at its table of contents.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The manifest and the arrays, which are finite and of the shapes that it asks for.
+
+    Raises:
+        ModelFileError: If the file is missing, damaged, foreign, of another version, or
+            contradicts itself.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _check_members(path, archive)
+            members = {name: _member(path, archive, name) for name in _DIMENSIONS}
+    except OSError as error:
+        raise ModelFileError(path, f"cannot be read ({error.strerror or error})") from error
+    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
+        raise ModelFileError(path, f"is no model file, or a damaged one ({error})") from error
+    manifest = _manifest(path, str(members.pop("manifest")))
+    for name, array in members.items():
+        if not np.isfinite(array).all():
+            raise ModelFileError(path, f"array {name!r} holds values that are not finite")
+    check(path, manifest, members)
+    return manifest, members
+
+
+def _check_members(path: str | Path, archive: zipfile.ZipFile) -> None:
+    wanted = sorted(f"{name}.npy" for name in _DIMENSIONS)
+    there = sorted(archive.namelist())
+    if there != wanted:
+        raise ModelFileError(
+            path, f"is no model file: holds {', '.join(there)[:200]}, expected {', '.join(wanted)}"
+        )
+    for info in archive.infolist():
+        # Stored as they are, members cannot be larger than the file that holds them.
+        if info.compress_type != zipfile.ZIP_STORED or info.file_size != info.compress_size:
+            raise ModelFileError(path, f"member {info.filename!r} is compressed, expected stored")
+    if sum(info.file_size for info in archive.infolist()) > LARGEST:
+        raise ModelFileError(path, f"is larger than {LARGEST} bytes, the most that is read")
+
+
+def _member(path: str | Path, archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+    """Read one array, once its header has proved to be honest."""
+    content = archive.read(f"{name}.npy")
+    header = io.BytesIO(content)
+    try:
+        if npy.read_magic(header) != (1, 0):
+            raise ValueError("another version of .npy")
+        shape, _, dtype = npy.read_array_header_1_0(header)
+    except ValueError as error:
+        raise ModelFileError(path, f"array {name!r} is damaged ({error})") from error
+    fits = dtype.kind == "U" if name == "manifest" else dtype == np.dtype("<f8")
+    if not fits or len(shape) != _DIMENSIONS[name]:
+        raise ModelFileError(
+            path,
+            f"array {name!r} is of type {dtype} and shape {shape},"
+            f" expected {'text' if name == 'manifest' else 'float64'}, {_DIMENSIONS[name]}-D",
+        )
+    if prod(shape) * dtype.itemsize != len(content) - header.tell():
+        raise ModelFileError(path, f"array {name!r} is damaged: its size is not what it declares")
+    array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
+    return array
+
+
+def _manifest(path: str | Path, text: str) -> dict[str, Any]:
+    try:
+        manifest = json.loads(text)
+    except ValueError as error:
+        raise ModelFileError(path, f"manifest is no JSON ({error})") from error
+    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
+        other = manifest.get("format") if isinstance(manifest, dict) else manifest
+        raise ModelFileError(path, f"is of format {other!r}, this version reads {FORMAT!r}")
+    return manifest

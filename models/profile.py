@@ -1,0 +1,214 @@
+"""The profile: every number that turns a noise signal into features and labels."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from itertools import pairwise
+from math import isfinite
+from typing import Any, Literal, Self, TypeAlias, get_args
+
+from models.errors import ProfileError
+
+CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
+"""NoisyTest's classes, in its order; `ok` is the first of every model."""
+
+TOLERANCE = 1e-3
+"""Two sample rates are the same if they differ by less than this share."""
+
+Bands: TypeAlias = Literal["adjacent", "comb", "log"]
+Kernel: TypeAlias = Literal["linear", "rbf"]
+Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
+
+_CHOICES = {"bands": Bands, "kernel": Kernel, "multiclass": Multiclass}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Profile:
+    """Settings of framing, features and support vector machine; defaults are the paper's.
+
+    Raises:
+        ProfileError: If a setting is out of its range or two do not fit together.
+    """
+
+    name: str
+    """Whose recipe this is."""
+    classes: tuple[str, ...] = CLASSES
+    """What a frame can be called, `ok` first."""
+    rate: float = 10_000.0
+    """Sample rate of the signal, in [Hz]."""
+    length: int = 4000
+    """Samples of a frame."""
+    hop: int = 1000
+    """Samples from the start of one frame to the start of the next."""
+    window: int = 1024
+    """Samples of the Hann window of one Fourier transform."""
+    stride: int = 834
+    """Samples from one Fourier transform to the next (the paper's s_fft)."""
+    bands: Bands = "adjacent"
+    """How bins become bands: three adjacent ones, NoisyTest's comb, or ``edges``."""
+    edges: tuple[float, ...] = ()
+    """Edges of the bands of ``log``, ascending, in [Hz]."""
+    floor: float = 1e-6
+    """What is added to an amplitude before its logarithm."""
+    least_deviation: float = 0.0
+    """Deviation that a feature is taken to have at least, when features are scaled to the mean 0
+    and the deviation 1 of the training set; 0 leaves them as they are."""
+    kernel: Kernel = "rbf"
+    """Kernel of the support vector machine."""
+    regularization: float = 1.1
+    """The machine's C."""
+    gamma: float = 5.7e-4
+    """Kernel parameter; the linear kernel has none."""
+    multiclass: Multiclass = "one-vs-rest"
+    """How two-class machines make one for more classes."""
+    pad_short: bool = True
+    """Whether a training block shorter than a frame is padded, or else widened."""
+    open_end: int = 1
+    """Samples after the last one at which a block that lasts to the end stops."""
+    flush_end: bool = False
+    """Whether a last frame, flush with the end, leaves no tail of a signal unread."""
+
+    # What follows is NoisyTest's own, and off in every other profile.
+    # (Its `open_end` is 0.1 s: no sample more, but a short block's middle lies elsewhere.)
+    single_precision: bool = False
+    """Times, samples and features are rounded to 32-bit floats."""
+    drop_first_sample: bool = False
+    """The first sample of a recording is lost (its reader takes that row for the header)."""
+    cut_by_time: bool = False
+    """A block holds each sample whose time is from its start to its stop, both included."""
+    widen_extra: int = 0
+    """Samples that a short block of a validation set is widened to beyond one frame."""
+    pad_widened: bool = False
+    """A block widened past an end of its recording is padded, where others are moved inside."""
+
+    def __post_init__(self) -> None:
+        """Check every setting once."""
+        _check_types(self)
+        _check_ranges(self)
+        _check_bands(self)
+
+    @classmethod
+    def noisytest(cls, kernel: Kernel = "rbf") -> Self:
+        """NoisyTest 0.0.1, decision by decision, with its quirks.
+
+        Args:
+            kernel: Kernel of the support vector machine; each has parameters of its own.
+        """
+        return cls(
+            name="noisytest",
+            bands="comb",
+            multiclass="one-vs-one",
+            single_precision=True,
+            drop_first_sample=True,
+            cut_by_time=True,
+            open_end=1000,
+            widen_extra=1,
+            pad_widened=True,
+            **_tuned(kernel),
+        )
+
+    @classmethod
+    def paper(cls, kernel: Kernel = "rbf") -> Self:
+        """The text of the paper, Sec. III and its table of hyper-parameters.
+
+        Args:
+            kernel: Kernel of the support vector machine; each has parameters of its own.
+        """
+        return cls(name="paper", **_tuned(kernel))
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Self:
+        """Make a profile from what `as_dict` gave.
+
+        Args:
+            settings: A value for each field.
+
+        Raises:
+            ProfileError: If a field is missing, unknown or wrong.
+        """
+        names = {field.name for field in fields(cls)}
+        if wrong := sorted(names ^ settings.keys()):
+            state = "missing" if wrong[0] in names else "unknown"
+            raise ProfileError(f"setting {wrong[0]!r} is {state}")
+        lists = {key: tuple(each) for key, each in settings.items() if isinstance(each, list)}
+        return cls(**{**settings, **lists})
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give a value for each field, as JSON can hold it."""
+        return asdict(self) | {"classes": list(self.classes), "edges": list(self.edges)}
+
+    @property
+    def bins(self) -> int:
+        """Bins of one Fourier transform, from 0 Hz up to half the rate."""
+        return self.window // 2 + 1
+
+    @property
+    def transforms(self) -> int:
+        """Fourier transforms of one frame (the paper's n_t)."""
+        return 1 + (self.length - self.window) // self.stride
+
+    @property
+    def duration(self) -> float:
+        """Duration of a frame, in [s]."""
+        return self.length / self.rate
+
+
+def _tuned(kernel: Kernel) -> dict[str, Any]:
+    """Give the hyper-parameters that the paper's table lists for a kernel."""
+    if kernel == "linear":
+        return {"kernel": kernel, "stride": 401, "regularization": 1.0}
+    return {"kernel": kernel, "stride": 834, "regularization": 1.1, "gamma": 5.7e-4}
+
+
+def _check_types(profile: Profile) -> None:
+    for field in fields(profile):
+        value, kind = getattr(profile, field.name), field.type
+        if field.name in _CHOICES:
+            choices = get_args(_CHOICES[field.name])
+            fits, wanted = value in choices, f"one of {', '.join(choices)}"
+        elif kind is float:
+            fits, wanted = type(value) in (int, float) and isfinite(value), "a finite number"
+        elif kind in (int, bool, str):
+            fits, wanted = type(value) is kind, f"a value of type {kind.__name__}"
+        else:
+            item = str if field.name == "classes" else float
+            fits = isinstance(value, tuple) and all(type(each) is item for each in value)
+            wanted = f"a tuple of {item.__name__}"
+        if not fits:
+            raise ProfileError(f"{field.name} is {value!r}, expected {wanted}")
+
+
+def _check_ranges(profile: Profile) -> None:
+    positive = ("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma")
+    for name in positive:
+        if getattr(profile, name) <= 0:
+            raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected more than 0")
+    for name in ("open_end", "widen_extra", "least_deviation"):
+        if getattr(profile, name) < 0:
+            raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
+    if profile.window > profile.length:
+        raise ProfileError(
+            f"window of {profile.window} samples is longer than a frame of {profile.length}"
+        )
+    repeated = len(set(profile.classes)) < len(profile.classes)
+    if repeated or len(profile.classes) < 2 or profile.classes[0] != "ok":
+        raise ProfileError(
+            f"classes are {', '.join(profile.classes) or 'none'},"
+            " expected 'ok' and others, each once"
+        )
+
+
+def _check_bands(profile: Profile) -> None:
+    if profile.bands == "log":
+        edges = profile.edges
+        if len(edges) < 2 or any(low >= high for low, high in pairwise(edges)):
+            raise ProfileError(f"edges are {edges}, expected two or more, ascending")
+        if edges[0] < 0 or edges[-1] > profile.rate / 2:
+            raise ProfileError(
+                f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz,"
+                f" expected 0 to half the rate, {profile.rate / 2:g} Hz"
+            )
+    elif profile.bins % 3:
+        raise ProfileError(
+            f"window of {profile.window} samples has {profile.bins} bins, expected a multiple"
+            " of three (256, 1024, 4096)"
+        )

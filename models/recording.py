@@ -1,0 +1,114 @@
+"""A recording: one noise signal with the stretches of it that someone annotated."""
+
+import hashlib
+from dataclasses import dataclass
+from itertools import combinations
+from math import inf, isfinite
+from typing import NamedTuple
+
+import numpy as np
+
+from models.errors import RecordingError
+from models.types import Array, Mask, Real
+
+
+class Block(NamedTuple):
+    """An annotated stretch of a recording."""
+
+    start: float
+    """When it starts, in [s]."""
+    stop: float
+    """When it stops, in [s]; infinity if it lasts to the end."""
+    label: str
+    """What is heard in it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """One annotated noise signal, checked when it is made.
+
+    Attributes:
+        name: What the recording is called in messages and models.
+        signal: The noise estimate, shape (samples,).
+        rate: Sample rate, in [Hz].
+        blocks: Annotations; what overlaps must agree.
+        start: Time of the first sample, in [s].
+        valid: False in gaps, shape (samples,); None if there are none.
+        sha256: Hash of where the recording comes from; by default, that of its samples.
+
+    Raises:
+        RecordingError: If shapes do not fit, a value is not finite, or a block is reversed, lies
+            outside of the recording, or contradicts another.
+    """
+
+    name: str
+    signal: Real
+    rate: float
+    blocks: tuple[Block, ...] = ()
+    start: float = 0.0
+    valid: Mask | None = None
+    sha256: str = ""
+
+    def __post_init__(self) -> None:
+        """Check everything once, and hash what came without a hash."""
+        _check_signal(self)
+        plain = tuple(Block(float(each[0]), float(each[1]), str(each[2])) for each in self.blocks)
+        object.__setattr__(self, "blocks", plain)
+        _check_blocks(self)
+        if not self.sha256:
+            samples = np.ascontiguousarray(self.signal, dtype="<f8")
+            object.__setattr__(self, "sha256", hashlib.sha256(samples.tobytes()).hexdigest())
+
+    @property
+    def time(self) -> Array:
+        """Time of each sample, shape (samples,), in [s]."""
+        time: Array = self.start + np.arange(len(self.signal)) / self.rate
+        return time
+
+
+def _check_signal(recording: Recording) -> None:
+    signal, valid = recording.signal, recording.valid
+    if signal.ndim != 1 or not len(signal):
+        raise RecordingError(
+            recording.name, f"a signal of shape {signal.shape}, expected (samples,), one or more"
+        )
+    if valid is not None and valid.shape != signal.shape:
+        raise RecordingError(
+            recording.name, f"valid has shape {valid.shape}, the signal {signal.shape}"
+        )
+    if not np.isfinite(signal).all():
+        row = int(np.flatnonzero(~np.isfinite(signal))[0])
+        raise RecordingError(recording.name, f"sample {row} is not finite ({signal[row]})")
+    if not (isfinite(recording.rate) and recording.rate > 0 and isfinite(recording.start)):
+        raise RecordingError(
+            recording.name,
+            f"rate {recording.rate} Hz and start {recording.start} s, expected finite numbers,"
+            " the rate above 0",
+        )
+
+
+def _check_blocks(recording: Recording) -> None:
+    step = 1.0 / recording.rate
+    # Annotations are written with few digits: one sample more or less is no contradiction.
+    begin = recording.start - step
+    end = recording.start + (len(recording.signal) + 1) * step
+    for block in recording.blocks:
+        if not block.start < block.stop:
+            raise RecordingError(
+                recording.name, f"{_words(block)} stops before it starts, or lasts no time"
+            )
+        if block.start < begin or block.start >= end or end < block.stop < inf:
+            raise RecordingError(
+                recording.name,
+                f"{_words(block)} is outside of the recording, which lasts from"
+                f" {recording.start:g} s to {end - step:g} s",
+            )
+    for early, late in combinations(sorted(recording.blocks), 2):
+        if late.start < early.stop - step and late.label != early.label:
+            raise RecordingError(
+                recording.name, f"{_words(early)} and {_words(late)} overlap and contradict"
+            )
+
+
+def _words(block: Block) -> str:
+    return f"block {block.label!r} from {block.start:g} s to {block.stop:g} s"

@@ -1,0 +1,118 @@
+"""Support vector machines, evaluated in NumPy.
+
+Conventions: a machine decides between two sides, and a positive decision means its first one. In
+one-vs-one the machines are the pairs (0, 1), (0, 2), …, (1, 2), … of classes; in one-vs-rest there
+is one for each class, against all others.
+"""
+
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Self
+
+import numpy as np
+
+from models.profile import Kernel, Multiclass
+from models.types import Array, Index
+
+
+@dataclass(frozen=True, eq=False)
+class Machines:
+    """All two-class machines of a classifier, over the same vectors.
+
+    Attributes:
+        vectors: Support vectors, shape (vectors, features); with the linear kernel they may be
+            the machines' weights, shape (machines, features).
+        coefficients: Weight y_i alpha_i of each vector, shape (machines, vectors).
+        intercept: Bias b, shape (machines,).
+        kernel: The kernel function.
+        gamma: Parameter of the RBF kernel.
+    """
+
+    vectors: Array
+    coefficients: Array
+    intercept: Array
+    kernel: Kernel
+    gamma: float
+
+    def decision(self, features: Array) -> Array:
+        """Evaluate every machine, sum y_i alpha_i K(x_i, x) + b (paper, Sec. III-B).
+
+        Args:
+            features: Feature vectors, shape (frames, features).
+
+        Returns:
+            Decisions, shape (frames, machines).
+        """
+        similarity = features @ self.vectors.T
+        if self.kernel == "rbf":  # K(x, y) = exp(-gamma |x - y|^2)
+            squares = np.einsum("ij,ij->i", features, features)[:, None] + self._squares
+            similarity = np.exp(-self.gamma * (squares - 2.0 * similarity))
+        decisions: Array = similarity @ self.coefficients.T + self.intercept
+        return decisions
+
+    def condensed(self) -> Self:
+        """Merge the vectors of linear machines into one weight vector for each machine."""
+        if self.kernel != "linear":
+            return self
+        machines = len(self.intercept)
+        return replace(
+            self, vectors=self.coefficients @ self.vectors, coefficients=np.eye(machines)
+        )
+
+    @property
+    def _squares(self) -> Array:
+        squares: Array = np.einsum("ij,ij->i", self.vectors, self.vectors)
+        return squares
+
+
+def machine_count(classes: int, multiclass: Multiclass) -> int:
+    """Say how many two-class machines tell classes apart."""
+    return classes * (classes - 1) // 2 if multiclass == "one-vs-one" else classes
+
+
+def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
+    """Choose a class for each frame: by votes of the pairs, or by the largest decision.
+
+    Args:
+        decisions: Decisions of all machines, shape (frames, machines).
+        classes: How many classes there are.
+        multiclass: How machines make a choice.
+
+    Returns:
+        Index of a class for each frame, shape (frames,); the first of equals.
+    """
+    ballot = decisions
+    if multiclass == "one-vs-one":
+        ballot = _votes(decisions, classes)
+    chosen: Index = ballot.argmax(axis=1)
+    return chosen
+
+
+def score(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
+    """Grade all classes for each frame, larger meaning more certain.
+
+    Args:
+        decisions: Decisions of all machines, shape (frames, machines).
+        classes: How many classes there are.
+        multiclass: How machines make a choice.
+
+    Returns:
+        Scores, shape (frames, classes). One-vs-rest: the decisions. One-vs-one: votes, and less
+        than half a vote for the sum of decisions, as scikit-learn grades (`decision_function` in
+        its shape "ovr"); among classes with the same votes, `choose` takes the first.
+    """
+    if multiclass == "one-vs-rest":
+        return decisions
+    confidence = np.zeros((len(decisions), classes))
+    for machine, (first, second) in enumerate(combinations(range(classes), 2)):
+        confidence[:, first] += decisions[:, machine]
+        confidence[:, second] -= decisions[:, machine]
+    return _votes(decisions, classes) + confidence / (3.0 * (np.abs(confidence) + 1.0))
+
+
+def _votes(decisions: Array, classes: int) -> Array:
+    votes = np.zeros((len(decisions), classes))
+    for machine, (first, second) in enumerate(combinations(range(classes), 2)):
+        votes[:, first] += decisions[:, machine] > 0.0
+        votes[:, second] += decisions[:, machine] <= 0.0
+    return votes

@@ -1,0 +1,41 @@
+"""What several test modules need: the reference data, where it is at hand."""
+
+import hashlib
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SHARED = Path(__file__).parents[2] / "shared"
+
+
+@pytest.fixture(scope="session")
+def lola():
+    """A folder of synthetic logs in NoisyTest's form, made once and kept for the next time."""
+    script = SHARED / "tools" / "standin_lola.py"
+    if not script.exists():
+        pytest.skip("needs shared/tools/standin_lola.py, the generator of the stand-in data")
+    key = hashlib.sha256(script.read_bytes()).hexdigest()[:12]
+    folder = Path(tempfile.gettempdir()) / f"noise-inspector-lola-{key}"
+    if not folder.exists():
+        with tempfile.TemporaryDirectory(dir=folder.parent) as fresh:
+            subprocess.run([sys.executable, script, f"{fresh}/lola"], check=True)
+            try:
+                Path(fresh, "lola").rename(folder)
+            except OSError:  # another test process was faster
+                assert folder.exists()
+    return folder
+
+
+@pytest.fixture(scope="session")
+def golden():
+    """What NoisyTest 0.0.1 itself computes on the stand-in: arrays, and results by kernel."""
+    folder = SHARED / "golden" / "noisytest"
+    if not folder.exists():
+        pytest.skip("needs shared/golden/noisytest, the outputs of NoisyTest")
+    with np.load(folder / "golden.npz", allow_pickle=False) as arrays:
+        return dict(arrays), json.loads((folder / "golden.json").read_text())["results"]

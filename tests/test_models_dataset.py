@@ -1,0 +1,170 @@
+from dataclasses import replace
+from math import inf
+
+import numpy as np
+import pytest
+
+import models
+from models.cutting import cut
+from models.recording import Block, Recording
+
+PROFILE = replace(models.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)
+THEIRS = replace(
+    models.Profile.noisytest(), rate=1000.0, length=400, hop=100, window=256, stride=48
+)
+
+
+def recording(*blocks, samples=3000, **changes):
+    """A ramp, so that each value says which sample it is."""
+    facts = {"name": "walk", "signal": np.arange(float(samples)), "rate": 1000.0, "blocks": blocks}
+    return Recording(**{**facts, **changes})
+
+
+def cut_block(begin, stop, profile=PROFILE, *, training=True, **changes):
+    block = Block(begin, stop, "impact")
+    return cut(recording(block, **changes), block, profile, training=training)[0]
+
+
+def test_a_block_holds_its_start_and_not_its_stop():
+    assert cut_block(1.0, 1.5).tolist() == list(range(1000, 1500))
+
+
+def test_time_counts_from_the_start_of_the_recording():
+    assert cut_block(11.0, 11.5, start=10.0).tolist() == list(range(1000, 1500))
+
+
+def test_an_open_block_reaches_the_last_sample():
+    assert cut_block(2.5, inf).tolist() == list(range(2500, 3000))
+    ours = models.LogBands().at(1000.0)
+    assert cut_block(2.5, inf, ours).tolist() == list(range(2500, 3000))
+
+
+def test_a_short_block_is_padded_in_training():
+    samples = cut_block(1.0, 1.25)
+    assert samples.tolist() == list(range(1000, 1400))  # odd reflection continues a ramp
+
+
+def test_a_short_block_is_widened_on_both_sides_otherwise():
+    assert cut_block(1.0, 1.2, training=False).tolist() == list(range(900, 1300))
+
+
+def test_a_profile_may_widen_in_training_too():
+    ours = models.LogBands().at(1000.0)
+    assert cut_block(1.0, 1.2, ours, training=True).tolist() == list(range(900, 1300))
+
+
+@pytest.mark.parametrize(("start", "stop", "first"), [(0.0, 0.1, 0), (2.9, 3.0, 2600)])
+def test_a_block_near_an_end_is_widened_inside(start, stop, first):
+    assert cut_block(start, stop, training=False).tolist() == list(range(first, first + 400))
+
+
+def test_noisytest_takes_the_stop_in_and_loses_the_first_sample():
+    assert cut_block(1.0, 1.5, THEIRS).tolist() == list(range(1000, 1501))
+    assert cut_block(0.0, 0.5, THEIRS).tolist() == list(range(1, 501))
+
+
+def test_noisytest_widens_by_a_sample_more_and_pads_at_the_ends():
+    # Rounding to 32 bits decides whether the samples on both bounds are in: one frame anyhow.
+    assert len(cut_block(1.0, 1.2, THEIRS, training=False)) in (401, 402)
+    samples = cut_block(0.0, 0.1, THEIRS, training=False)
+    assert samples.tolist() == list(range(1, 401))  # the ramp, padded behind 0.251 s
+
+
+def test_a_recording_shorter_than_a_frame_cannot_be_widened():
+    with pytest.raises(models.RecordingError, match="walk: 300 samples are too short"):
+        cut_block(0.1, 0.2, training=False, samples=300)
+
+
+def test_a_block_between_two_samples_is_refused():
+    with pytest.raises(models.RecordingError, match=r"from 1.0001 s to 1.0002 s holds no sample"):
+        cut_block(1.0001, 1.0002)
+
+
+def test_a_dataset_keeps_labels_runs_and_hashes():
+    walk = recording(Block(0.0, 0.5, "ok"), Block(0.6, 0.7, "impact"))
+    stand = recording(Block(1.0, 1.6, "ok"), name="stand", sha256="abc")
+    dataset = models.Dataset.of([walk, stand], PROFILE)
+    assert dataset.labels.tolist() == ["ok", "ok", "impact", "ok", "ok", "ok"]
+    assert dataset.runs.tolist() == ["walk"] * 3 + ["stand"] * 3
+    assert dataset.frames[:, 0].tolist() == [0, 100, 600, 1000, 1100, 1200]
+    assert dataset.frames.shape == (6, 400)
+    assert dict(dataset.hashes) == {"walk": walk.sha256, "stand": "abc"}
+
+
+def test_equal_samples_have_equal_hashes():
+    assert recording().sha256 == recording().sha256 != recording(samples=2999).sha256
+
+
+def test_frames_that_touch_a_gap_are_left_out():
+    valid = np.ones(3000, bool)
+    valid[450] = False
+    walk = recording(Block(0.0, 1.0, "ok"), Block(0.44, 0.46, "ok"), valid=valid)
+    dataset = models.Dataset.of([walk], PROFILE)
+    assert dataset.frames[:, 0].tolist() == [0, 500, 600]
+    assert dataset.labels.tolist() == ["ok"] * 3
+
+
+def test_a_label_that_is_no_class_is_named():
+    with pytest.raises(
+        models.UnknownLabelError, match="walk: label 'rattle' is no class; there are ok, impact"
+    ):
+        models.Dataset.of([recording(Block(0.0, 1.0, "rattle"))], PROFILE)
+
+
+def test_a_class_of_ones_own_needs_only_its_name():
+    profile = replace(PROFILE, classes=("ok", "rattle"))
+    dataset = models.Dataset.of([recording(Block(0.0, 0.4, "rattle"))], profile)
+    assert dataset.labels.tolist() == ["rattle"]
+
+
+def test_a_recording_of_another_rate_is_refused():
+    with pytest.raises(models.RateError, match=r"rate of 990 Hz; .* 1000 Hz: recording 'walk'"):
+        models.Dataset.of([recording(Block(0.0, 1.0, "ok"), rate=990.0)], PROFILE)
+
+
+def test_two_recordings_of_one_name_are_refused():
+    with pytest.raises(models.DatasetError, match="two recordings are called 'walk'"):
+        models.Dataset.of([recording(), recording()], PROFILE)
+
+
+def test_no_frame_at_all_is_refused():
+    with pytest.raises(models.DatasetError, match="no annotated frame in 1 recordings"):
+        models.Dataset.of([recording()], PROFILE)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "reason"),
+    [
+        ([(1.0, 0.5, "ok")], "block 'ok' from 1 s to 0.5 s stops before it starts"),
+        ([(1.0, 3.5, "ok")], "outside of the recording, which lasts from 0 s to 3 s"),
+        ([(-1.0, 0.5, "ok")], "outside of the recording"),
+        ([(4.0, inf, "ok")], "outside of the recording"),
+        (
+            [(0.0, 2.0, "ok"), (0.1, 0.2, "ok"), (1.9, 2.5, "impact")],
+            "block 'ok' from 0 s to 2 s and block 'impact' from 1.9 s to 2.5 s overlap",
+        ),
+    ],
+)
+def test_blocks_that_cannot_be_are_refused(blocks, reason):
+    with pytest.raises(models.RecordingError, match=f"walk: .*{reason}"):
+        recording(*blocks)
+
+
+def test_blocks_that_overlap_and_agree_are_welcome():
+    assert len(recording(Block(0.0, 2.0, "ok"), Block(1.0, 2.5, "ok")).blocks) == 2
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"signal": np.zeros((3, 2))}, r"a signal of shape \(3, 2\)"),
+        ({"signal": np.zeros(0)}, r"a signal of shape \(0,\)"),
+        ({"signal": np.array([0.0, 1.0, np.nan])}, "sample 2 is not finite"),
+        ({"valid": np.ones(5, bool)}, r"valid has shape \(5,\), the signal \(3000,\)"),
+        ({"rate": 0.0}, "rate 0.0 Hz"),
+        ({"start": inf}, "start inf s"),
+    ],
+)
+def test_recordings_that_cannot_be_are_refused(changes, reason):
+    with pytest.raises(models.RecordingError, match=f"walk: .*{reason}"):
+        recording(**changes)

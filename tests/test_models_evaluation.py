@@ -1,0 +1,85 @@
+import json
+
+import numpy as np
+import pytest
+
+import models
+from models.evaluation import Evaluation
+
+TRUTH = np.array(["ok"] * 6 + ["impact"] * 2 + ["oscillations"] * 2)
+CLASSES = ("ok", "impact", "oscillations")
+
+
+def evaluation(*called):
+    return Evaluation.of(TRUTH, np.array(called), CLASSES)
+
+
+PERFECT = evaluation(*TRUTH)
+ALL_OK = evaluation(*["ok"] * 10)
+MIXED = evaluation(*["ok"] * 5, "impact", "impact", "ok", "oscillations", "impact")
+
+
+def test_a_perfect_classifier_scores_one():
+    assert PERFECT.subset_accuracy == PERFECT.failure_detection_rate == 1.0
+    assert PERFECT.balanced_accuracy == PERFECT.failure_recall == 1.0
+    assert PERFECT.false_alarm_rate == 0.0
+    assert PERFECT.recall.tolist() == PERFECT.precision.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_calling_everything_ok_shows_why_the_papers_measures_mislead():
+    assert ALL_OK.subset_accuracy == ALL_OK.failure_detection_rate == 0.6
+    assert ALL_OK.failure_recall == ALL_OK.false_alarm_rate == 0.0
+    assert ALL_OK.balanced_accuracy == pytest.approx(1 / 3)
+
+
+def test_measures_are_counted_by_hand():
+    assert MIXED.confusion.tolist() == [[5, 1, 0], [1, 1, 0], [0, 1, 1]]
+    assert MIXED.false_negative_errors.tolist() == [0.1, 0.1, 0.1]
+    assert MIXED.false_positive_errors.tolist() == [0.1, 0.2, 0.0]
+    assert MIXED.failure_detection_rate == 0.9
+    assert MIXED.subset_accuracy == 0.7
+    assert MIXED.recall.tolist() == [5 / 6, 1 / 2, 1 / 2]
+    assert MIXED.precision.tolist() == [5 / 6, 1 / 3, 1.0]
+    assert MIXED.failure_recall == 0.75  # which failure it is does not matter here
+    assert MIXED.false_alarm_rate == 1 / 6
+
+
+def test_errors_and_accuracy_make_up_all_frames():
+    for each in (PERFECT, ALL_OK, MIXED):
+        assert each.false_negative_errors.sum() + each.subset_accuracy == pytest.approx(1.0)
+        assert each.false_positive_errors.sum() + each.subset_accuracy == pytest.approx(1.0)
+
+
+def test_what_cannot_be_measured_is_none():
+    only_ok = Evaluation.of(np.array(["ok"]), np.array(["ok"]), CLASSES).as_dict()
+    assert only_ok["failure_recall"] is None
+    assert only_ok["recall"] == {"ok": 1.0, "impact": None, "oscillations": None}
+    assert only_ok["balanced_accuracy"] == 1.0
+
+
+def test_a_label_that_the_classifier_does_not_have_counts_as_missed():
+    strange = Evaluation.of(np.array(["ok", "rattle"]), np.array(["ok", "ok"]), CLASSES)
+    assert strange.classes == (*CLASSES, "rattle")
+    assert strange.failure_recall == 0.0
+
+
+def test_measures_go_through_json():
+    assert json.loads(json.dumps(MIXED.as_dict())) == MIXED.as_dict()
+
+
+def test_it_prints_both_groups_and_how_they_differ():
+    text = str(MIXED)
+    lines = {" ".join(line.split()) for line in text.splitlines()}
+    assert "10 frames ok impact oscillations" in lines
+    assert "Failure detection rate 90.0%" in lines
+    assert "False positive errors 10.0% 20.0% 0.0%" in lines
+    assert "Failure recall 75.0%" in lines
+    assert "ok 5 1 0" in lines
+    assert "calling all of them ok would detect 60.0% of failures by its measure" in text
+
+
+def test_nothing_to_compare_is_refused():
+    with pytest.raises(models.DatasetError, match="0 labels and 0 predictions"):
+        Evaluation.of(np.array([]), np.array([]), CLASSES)
+    with pytest.raises(models.DatasetError, match="10 labels and 1 predictions"):
+        Evaluation.of(TRUTH, np.array(["ok"]), CLASSES)

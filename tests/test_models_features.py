@@ -1,0 +1,169 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.fft import dct as scipy_dct
+from scipy.signal import get_window
+
+import models
+from models.features import band_shares, compress, dct, feature_count, pool, spectrogram
+
+RANDOM = np.random.default_rng(7)
+PROFILES = [
+    *(models.Profile.noisytest(kernel) for kernel in ("rbf", "linear")),
+    *(models.Profile.paper(kernel) for kernel in ("rbf", "linear")),
+    *(models.LogBands().at(rate) for rate in (250.0, 333.0, 1000.0, 10_000.0, 48_000.0)),
+]
+NAMES = [f"{each.name}-{each.kernel}-{each.rate:g}" for each in PROFILES]
+
+
+def tone(profile, frequency, amplitude=1.0):
+    """One frame of a sine on top of a slow motion's constant noise."""
+    time = np.arange(profile.length) / profile.rate
+    return (3.0 + amplitude * np.sin(2 * np.pi * frequency * time))[None]
+
+
+def distances(features):
+    return np.linalg.norm(features[:, None] - features, axis=2)
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=NAMES)
+def test_every_profile_gives_finite_features_of_its_count(profile):
+    for frames in (RANDOM.random((3, profile.length)), np.zeros((3, profile.length))):
+        features = models.features(frames, profile)
+        assert features.shape == (3, feature_count(profile))
+        assert np.isfinite(features).all()
+
+
+@pytest.mark.parametrize("profile", PROFILES, ids=NAMES)
+def test_a_frames_features_do_not_depend_on_its_company(profile):
+    frames = RANDOM.random((5, profile.length))
+    together = models.features(frames, profile)
+    alone = np.vstack([models.features(frames[i : i + 1], profile) for i in range(5)])
+    np.testing.assert_allclose(together, alone, rtol=1e-6 if profile.single_precision else 1e-9)
+
+
+def test_the_spectrogram_transforms_stretches_under_a_periodic_hann_window():
+    frames = RANDOM.random((2, 4000))
+    ours = spectrogram(frames, window=1024, stride=834)
+    for time in range(4):
+        stretch = frames[:, time * 834 : time * 834 + 1024]
+        theirs = np.abs(np.fft.rfft(stretch * get_window("hann", 1024)))
+        np.testing.assert_allclose(ours[:, time], theirs, atol=1e-10)
+    assert ours.shape == (2, 4, 513)
+
+
+def test_the_spectrogram_scales_with_the_signal():
+    frames = RANDOM.random((2, 4000))
+    once, thrice = (spectrogram(k * frames, window=1024, stride=401) for k in (1.0, 3.0))
+    np.testing.assert_allclose(thrice, 3.0 * once)
+
+
+def test_the_papers_bands_are_three_adjacent_bins():
+    bins = RANDOM.random((2, 4, 513))
+    expected = bins.reshape(2, 4, 171, 3).sum(axis=3)
+    np.testing.assert_allclose(compress(bins), expected)
+
+
+def test_noisytests_bands_are_57_combs_each_three_times():
+    bins = np.broadcast_to(np.eye(513), (1, 513, 513))
+    reads = compress(bins, comb=True)[0].T
+    assert np.flatnonzero(reads[0]).tolist() == [0, 172, 344]
+    assert np.flatnonzero(reads[3]).tolist() == [3, 175, 347]
+    assert len(np.unique(reads, axis=0)) == 57
+    assert np.count_nonzero(reads.any(axis=0)) == 171
+
+
+def test_the_comb_is_the_matrix_that_noisytest_builds():
+    line = np.tile([1.0] * 3 + [0.0] * 513, 171)[: 513 * 171].reshape(513, 171)
+    bins = RANDOM.random((1, 4, 513))
+    np.testing.assert_allclose(compress(bins, comb=True), bins @ line)
+
+
+def test_the_cosine_transform_is_scipys():
+    loudness = RANDOM.random((2, 8, 171))
+    np.testing.assert_allclose(
+        dct(loudness), scipy_dct(loudness, norm="ortho", axis=1).swapaxes(1, 2), atol=1e-12
+    )
+
+
+def test_the_cosine_transform_changes_no_distance():
+    loudness = RANDOM.random((6, 4, 171))
+    np.testing.assert_allclose(
+        distances(dct(loudness).reshape(6, -1)), distances(loudness.reshape(6, -1))
+    )
+
+
+@pytest.mark.parametrize("frequency", [60.0, 200.0, 1000.0, 3333.0])
+def test_a_tone_lands_in_its_band(frequency):
+    paper = models.Profile.paper()
+    amplitude = spectrogram(tone(paper, frequency) - 3.0, window=1024, stride=834)
+    loudest = compress(amplitude)[0].argmax(axis=1)
+    width = 3 * paper.rate / paper.window
+    assert np.abs(loudest * width - frequency).max() <= width
+
+    ours = models.LogBands().at(10_000.0)
+    mean = models.features(tone(ours, frequency), ours)[0, : len(ours.edges) - 1]
+    low, high = ours.edges[mean.argmax()], ours.edges[mean.argmax() + 1]
+    assert low <= frequency <= high
+
+
+@pytest.mark.parametrize("rate", [333.0, 1000.0, 48_000.0])
+def test_log_bands_hear_the_same_tone_at_any_rate(rate):
+    def mean(profile):
+        return models.features(tone(profile, 61.0), profile)[0, 4]
+
+    low, high = models.LogBands().at(rate), models.LogBands().at(10_000.0)
+    assert mean(low) == pytest.approx(mean(high), abs=0.05)
+
+
+def test_log_bands_do_not_care_when_a_burst_comes():
+    profile = models.LogBands().at(10_000.0)
+    burst = RANDOM.standard_normal(300)
+    frames = np.zeros((2, 4000))
+    frames[0, 1100:1400] = frames[1, 2100:2400] = burst
+    early, late = models.features(frames, profile)
+    np.testing.assert_allclose(early, late, atol=1e-9)
+
+
+def test_each_band_shares_out_its_power_once():
+    for profile in PROFILES[4:]:
+        shares = band_shares(profile)
+        assert shares.shape == (profile.bins, len(profile.edges) - 1)
+        np.testing.assert_allclose(shares.sum(axis=0), 1.0)
+
+
+def test_a_steady_level_has_no_deviation():
+    pooled = pool(np.full((2, 13, 5), 4.0))
+    assert np.array_equal(pooled, np.repeat([[4.0, 4.0, 0.0]], 2, axis=0).repeat(5, axis=1))
+
+
+def test_a_constant_signal_sounds_only_at_zero_hertz():
+    profile = models.LogBands().at(1000.0)
+    features = models.features(np.full((1, 400), 5.0), profile)
+    silent, bands = np.log(profile.floor), len(profile.edges) - 1
+    np.testing.assert_allclose(features[0, : 2 * bands], silent, atol=1e-6)
+
+
+def test_single_precision_is_all_that_32_bits_can_tell():
+    profile = models.Profile.noisytest()
+    frames = RANDOM.random((2, 4000))
+    features = models.features(frames, profile)
+    assert np.array_equal(features, features.astype(np.float32))
+    assert np.array_equal(features, models.features(frames.astype(np.float32), profile))
+    exact = models.features(frames, replace(profile, single_precision=False))
+    np.testing.assert_allclose(features, exact, atol=1e-2)
+
+
+def test_frames_of_another_length_are_refused():
+    with pytest.raises(models.SignalError, match=r"shape \(2, 400\), expected \(frames, 4000\)"):
+        models.features(np.zeros((2, 400)), models.Profile.paper())
+    with pytest.raises(models.SignalError, match=r"shape \(4000,\), expected \(frames, 4000\)"):
+        models.features(np.zeros(4000), models.Profile.paper())
+
+
+def test_a_frame_that_is_not_finite_is_named():
+    frames = np.zeros((3, 4000))
+    frames[1, 7] = np.inf
+    with pytest.raises(models.SignalError, match="frame 1 holds a value that is not finite"):
+        models.features(frames, models.Profile.paper())

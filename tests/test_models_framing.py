@@ -1,0 +1,51 @@
+import numpy as np
+import pytest
+
+import models
+from models.framing import frame_starts, pad_end
+
+
+@pytest.mark.parametrize(("samples", "frames"), [(400, 1), (499, 1), (500, 2), (1000, 7)])
+def test_as_many_frames_as_hops_fit(samples, frames):
+    cut = models.frame(np.arange(float(samples)), length=400, hop=100)
+    assert cut.shape == (frames, 400)
+    assert np.array_equal(cut[:, 0], 100.0 * np.arange(frames))
+
+
+def test_frames_are_of_the_paper_unless_told_otherwise():
+    assert models.frame(np.zeros(10_000)).shape == (7, 4000)
+
+
+def test_frames_are_a_view_that_cannot_be_written():
+    signal = np.arange(1000.0)
+    cut = models.frame(signal, length=400, hop=100)
+    assert np.shares_memory(cut, signal)
+    assert not cut.flags.writeable
+
+
+def test_a_flush_frame_covers_the_tail_once():
+    def starts(samples):
+        return frame_starts(samples, length=400, hop=100, flush_end=True).tolist()
+
+    assert starts(500) == [0, 100]
+    assert starts(501) == [0, 100, 101]
+
+
+def test_padding_continues_value_and_slope():
+    ramp = np.arange(10.0)
+    assert np.array_equal(pad_end(ramp, length=25), np.arange(25.0))
+    assert np.array_equal(pad_end(np.array([1.0, 4.0, 2.0]), length=5), [1.0, 4.0, 2.0, 0.0, 3.0])
+
+
+def test_padding_leaves_a_long_signal_alone():
+    assert np.array_equal(pad_end(np.arange(10.0), length=4), np.arange(10.0))
+
+
+def test_a_signal_shorter_than_a_frame_is_refused():
+    with pytest.raises(models.SignalError, match="399 samples is too short: one frame takes 400"):
+        models.frame(np.zeros(399), length=400, hop=100)
+
+
+def test_a_signal_of_several_columns_is_refused():
+    with pytest.raises(models.SignalError, match=r"shape \(1000, 2\), expected \(samples,\)"):
+        models.frame(np.zeros((1000, 2)), length=400, hop=100)

@@ -1,0 +1,142 @@
+"""NoisyTest 0.0.1, decision by decision: its own outputs on the stand-in data are the reference."""
+
+import numpy as np
+import pytest
+
+import models
+from models.features import compress, dct, spectrogram
+from models.training import fit
+
+SETS = ("training", "validation", "validation_reduced_joints")
+COUNTS = {"training": [208, 22, 14, 47], "validation": [129, 11, 12, 39]}
+
+
+@pytest.fixture(scope="module")
+def recordings(lola):
+    return {name: list(models.noisytest.read_folder(lola / name)) for name in SETS}
+
+
+@pytest.fixture(scope="module", params=["rbf", "linear"])
+def trial(request, recordings, golden):
+    """A kernel's profile, data sets and classifier, with NoisyTest's arrays and results."""
+    arrays, results = golden
+    kernel = request.param
+    profile = models.Profile.noisytest(kernel)
+    sets = {
+        name: models.Dataset.of(recordings[name], profile, training=name == "training")
+        for name in SETS
+    }
+    classifier = models.Classifier.train(sets["training"], profile)
+    mine = {
+        name.removeprefix(f"{kernel}_"): array
+        for name, array in arrays.items()
+        if not name.startswith({"rbf": "linear", "linear": "rbf"}[kernel])
+    }
+    return profile, sets, classifier, mine, results[kernel]
+
+
+def classes(indices):
+    return np.array(models.CLASSES)[indices]
+
+
+@pytest.mark.parametrize("name", ["training", "validation"])
+def test_frames_are_noisytests_to_the_bit(trial, name):
+    _, sets, _, theirs, _ = trial
+    labels = sets[name].labels
+    assert [int((labels == each).sum()) for each in models.CLASSES] == COUNTS[name]
+    assert np.array_equal(labels, classes(theirs[f"{name}_target"]))
+    frames = sets[name].frames
+    assert frames.dtype == np.float32
+    assert np.array_equal(frames[theirs[f"{name}_idx"]], theirs[f"{name}_frames"])
+
+
+@pytest.mark.parametrize("name", ["training", "validation"])
+def test_every_stage_is_noisytests(trial, name):
+    profile, _, _, theirs, _ = trial
+    frames = theirs[f"{name}_frames"].astype(np.float64)
+    spectrum = spectrogram(frames, window=profile.window, stride=profile.stride)
+    loudest = theirs[f"{name}_stft"].max()
+    assert np.abs(spectrum - theirs[f"{name}_stft"]).max() < 1e-6 * loudest
+    bands = compress(spectrum, comb=True)
+    assert np.abs(bands - theirs[f"{name}_comp"]).max() < 1e-6 * loudest
+    # In 32 bits, a quiet bin under a line of 1e3 is off by up to 4.4e-3; ours are exact here.
+    loudness = np.log(bands + profile.floor)
+    assert np.abs(loudness - theirs[f"{name}_log"]).max() < 4.5e-3
+    assert np.abs(dct(loudness) - theirs[f"{name}_dct"]).max() < 4.5e-3
+    features = models.features(theirs[f"{name}_frames"], profile)
+    assert np.abs(features - theirs[f"{name}_flat"]).max() < 4.5e-3
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_every_prediction_is_noisytests(trial, name):
+    _, sets, classifier, theirs, _ = trial
+    assert np.array_equal(classifier.predict(sets[name].frames), classes(theirs[f"{name}_pred"]))
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_every_decision_is_noisytests(trial, name):
+    _, sets, classifier, theirs, _ = trial
+    decisions = classifier.decision(sets[name].frames)
+    # libsvm stops at 1e-3, so that its answer hangs on the last bits of what it is given.
+    assert np.abs(decisions - theirs[f"{name}_dec_ovo"]).max() < 2.2e-3
+    if name == "validation":
+        scores = classifier.scores(sets[name].frames)
+        assert np.abs(scores - theirs[f"{name}_dec_ovr"]).max() < 2.2e-3
+
+
+def test_support_vectors_are_noisytests(trial):
+    profile, sets, _, theirs, _ = trial
+    features = models.features(sets["training"].frames, profile)
+    targets = np.array([models.CLASSES.index(each) for each in sets["training"].labels])
+    assert np.array_equal(fit(features, targets, profile).vectors, features[theirs["support"]])
+
+
+def test_every_label_of_a_run_is_noisytests(trial, lola):
+    _, _, classifier, _, results = trial
+    for name, run in results["run"].items():
+        time, noise = models.read_log(lola / name.removeprefix("data/"))
+        labels = classifier.classify(noise, models.nominal_rate(time), start=float(time[0]))
+        assert labels.label.tolist() == classes(run["pred"]).tolist()
+        warnings = [
+            f"WARNING:possible {label} in time region {start:.2}-{stop:.2}"
+            for start, stop, label in zip(labels.start, labels.stop, labels.label, strict=True)
+            if label != "ok"
+        ]
+        assert warnings == run["warnings"]
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_every_measure_is_noisytests(trial, name):
+    _, sets, classifier, _, results = trial
+    report, theirs = models.evaluate(classifier, sets[name]), results[name]
+    assert report.confusion.tolist() == theirs["confusion_rows_true"]
+    measures = report.as_dict()
+    assert measures["false_negative_errors"] == pytest.approx(theirs["FN"])
+    assert measures["false_positive_errors"] == pytest.approx(theirs["FP"])
+    for ours, other in (
+        ("subset_accuracy", "subset_accuracy"),
+        ("failure_detection_rate", "failure_detection_rate"),
+        ("failure_recall", "true_failure_recall"),
+        ("false_alarm_rate", "false_alarm_rate"),
+        ("balanced_accuracy", "balanced_accuracy"),
+    ):
+        assert measures[ours] == pytest.approx(theirs[other])
+
+
+def test_our_own_profile_beats_both_on_the_same_data(recordings):
+    def balanced(profile):
+        training, validation = (
+            models.Dataset.of(recordings[name], profile, training=name == "training")
+            for name in ("training", "validation")
+        )
+        classifier = models.Classifier.train(training, profile)
+        return models.evaluate(classifier, validation).balanced_accuracy
+
+    ours = balanced(models.LogBands().at(10_000.0))
+    assert ours > 0.9
+    for theirs in (
+        models.Profile.noisytest(),
+        models.Profile.paper(),
+        models.Profile.paper("linear"),
+    ):
+        assert ours > balanced(theirs)

@@ -1,0 +1,240 @@
+import io
+import json
+import os
+import zipfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import models
+
+PROFILE = models.LogBands(classes=("ok", "rattle", "squeal")).at(500.0)
+RANDOM = np.random.default_rng(5)
+
+
+def trained(profile=PROFILE):
+    time = np.arange(2000) / profile.rate
+    hums = {"ok": 30.0, "rattle": 90.0, "squeal": 180.0}
+    recordings = [
+        models.Recording(
+            label,
+            1.0 + 0.1 * np.sin(2 * np.pi * hum * time) + 0.01 * np.cos(np.arange(2000) ** 2),
+            profile.rate,
+            (models.Block(0.0, float("inf"), label),),
+        )
+        for label, hum in hums.items()
+    ]
+    return models.Classifier.train(models.Dataset.of(recordings, profile), profile)
+
+
+CLASSIFIER = trained()
+FRAMES = 1.0 + 0.1 * RANDOM.random((20, PROFILE.length))
+
+
+@pytest.fixture
+def path(tmp_path):
+    """A model file in a folder of its own."""
+    CLASSIFIER.save(tmp_path / "model.npz")
+    return tmp_path / "model.npz"
+
+
+def rewrite(path, **changes):
+    """Write the members of a model file anew, with changes; None leaves one out."""
+    with np.load(path, allow_pickle=False) as members:
+        arrays = dict(members) | changes
+    kept = {name: array for name, array in arrays.items() if array is not None}
+    np.savez(path, allow_pickle=True, **kept)
+
+
+def rewrite_manifest(path, **changes):
+    with np.load(path, allow_pickle=False) as members:
+        manifest = json.loads(str(members["manifest"])) | changes
+    kept = {name: value for name, value in manifest.items() if value is not None}
+    rewrite(path, manifest=np.array(json.dumps(kept)))
+
+
+def refused(path, reason):
+    with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
+        models.Classifier.load(path)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"kernel": "linear"}, {"multiclass": "one-vs-rest"}, {"least_deviation": 0.0}],
+)
+def test_a_model_that_was_saved_decides_as_before(tmp_path, changes):
+    classifier = trained(replace(PROFILE, **changes))
+    classifier.save(tmp_path / "model.npz")
+    loaded = models.Classifier.load(tmp_path / "model.npz")
+    assert np.array_equal(loaded.decision(FRAMES), classifier.decision(FRAMES))
+    assert np.array_equal(loaded.predict(FRAMES), classifier.predict(FRAMES))
+    assert loaded.profile == classifier.profile
+    assert loaded.classes == ("ok", "rattle", "squeal")
+    assert (loaded.runs, loaded.metrics) == (classifier.runs, classifier.metrics)
+    assert set(loaded.versions) == {"noise-inspector", "numpy", "scikit-learn"}
+
+
+def test_training_twice_gives_the_same_bytes(path, tmp_path):
+    os.utime(path, (0, 0))
+    trained().save(tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
+
+
+def test_plain_numpy_reads_it_too(path):
+    with np.load(path, allow_pickle=False) as members:
+        manifest = json.loads(str(members["manifest"]))
+    assert manifest["format"] == "noise-model/1"
+    assert manifest["rate"] == 500.0
+    assert manifest["metrics"]["training"]["subset_accuracy"] == 1.0
+    assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
+
+
+def test_a_model_is_not_overwritten_unless_asked(path):
+    before = path.read_bytes()
+    with pytest.raises(models.OutputError, match=r"model.npz: exists already; choose another name"):
+        CLASSIFIER.save(path)
+    assert path.read_bytes() == before
+    path.write_bytes(b"old")
+    CLASSIFIER.save(path, overwrite=True)
+    assert path.read_bytes() == before
+
+
+def test_a_failed_write_leaves_nothing_behind(path, monkeypatch):
+    def fail(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", fail)
+    before = path.read_bytes()
+    with pytest.raises(models.OutputError, match="cannot be written .No space left on device"):
+        CLASSIFIER.save(path, overwrite=True)
+    assert path.read_bytes() == before
+    assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_place_that_cannot_be_written_is_named(tmp_path):
+    with pytest.raises(models.OutputError, match=r"none/model.npz: cannot be written .No such"):
+        CLASSIFIER.save(tmp_path / "none" / "model.npz")
+    with pytest.raises(models.OutputError, match="is a folder; name a file"):
+        CLASSIFIER.save(tmp_path)
+
+
+def test_a_model_that_is_not_there_is_named(tmp_path):
+    refused(tmp_path / "model.npz", "cannot be read .No such file")
+
+
+@pytest.mark.parametrize("content", [b"", b"not a zip", b"PK\x03\x04 but no more"])
+def test_a_foreign_file_is_refused(path, content):
+    path.write_bytes(content)
+    refused(path, "is no model file, or a damaged one")
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5, 0.9, 0.999])
+def test_a_truncated_file_is_refused(path, share):
+    content = path.read_bytes()
+    path.write_bytes(content[: int(share * len(content))])
+    refused(path, "is no model file, or a damaged one")
+
+
+def test_a_flipped_bit_anywhere_is_refused_or_harmless(path):
+    content = path.read_bytes()
+    expected = CLASSIFIER.decision(FRAMES)
+    refusals = 0
+    for position in RANDOM.integers(0, len(content), 200):
+        damaged = bytearray(content)
+        damaged[position] ^= 1 << int(RANDOM.integers(8))
+        path.write_bytes(damaged)
+        try:
+            loaded = models.Classifier.load(path)
+        except models.ModelFileError:
+            refusals += 1
+        else:
+            assert np.array_equal(loaded.decision(FRAMES), expected)
+    assert refusals > 150
+
+
+def test_another_archive_of_arrays_is_refused(path):
+    np.savez(path, time=np.zeros(3))
+    refused(path, "is no model file: holds time.npy, expected coefficients.npy, intercept.npy")
+
+
+def test_a_missing_or_additional_array_is_refused(path):
+    rewrite(path, intercept=None)
+    refused(path, "is no model file: holds coefficients.npy, manifest.npy")
+    CLASSIFIER.save(path, overwrite=True)
+    rewrite(path, surprise=np.zeros(3))
+    refused(path, "surprise.npy")
+
+
+def test_pickled_objects_are_refused_unread(path):
+    class Bomb:
+        def __reduce__(self):
+            return (os.abort, ())
+
+    rewrite(path, mean=np.array([Bomb()], dtype=object))
+    refused(path, "array 'mean' is of type object")
+
+
+def test_compressed_members_are_refused(path):
+    with np.load(path, allow_pickle=False) as members:
+        arrays = dict(members)
+    np.savez_compressed(path, **arrays)
+    refused(path, "is compressed, expected stored")
+
+
+def test_a_header_that_promises_more_than_there_is_is_refused(path):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
+    )
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    members["intercept.npy"] = header.getvalue() + b"12345678"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    refused(path, "array 'intercept' is damaged: its size is not what it declares")
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"intercept": np.zeros(3, np.float32)}, "array 'intercept' is of type float32"),
+        ({"intercept": np.zeros((3, 1))}, r"shape \(3, 1\), expected float64, 1-D"),
+        ({"intercept": np.zeros(4)}, r"array 'intercept' has shape \(4,\), .* asks for \(3,\)"),
+        ({"intercept": np.full(3, np.nan)}, "array 'intercept' holds values that are not finite"),
+        ({"scale": np.zeros_like(CLASSIFIER.scale)}, "array 'scale' holds values that are not abo"),
+        ({"mean": np.zeros(3)}, r"array 'mean' has shape \(3,\)"),
+        ({"manifest": np.zeros(3)}, "array 'manifest' is of type float64"),
+        ({"manifest": np.array("{")}, "manifest is no JSON"),
+        ({"manifest": np.array("[]")}, r"is of format \[\], this version reads 'noise-model/1'"),
+    ],
+)
+def test_wrong_arrays_are_refused(path, changes, reason):
+    rewrite(path, **changes)
+    refused(path, reason)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        ({"format": "noise-model/2"}, "is of format 'noise-model/2', this version reads"),
+        ({"format": None}, "is of format None"),
+        ({"classes": None}, "manifest has classes = None, expected a list"),
+        ({"runs": "walk"}, "manifest has runs = walk, expected a dict"),
+        ({"rate": "fast"}, "manifest has rate = fast, expected a float"),
+        ({"rate": 1000.0}, "rate is 1000.0 Hz, but 500.0 Hz in its profile"),
+        ({"classes": ["ok"]}, "are not two or more of ok, rattle, squeal, in order"),
+        ({"classes": ["rattle", "ok", "squeal"]}, "are not two or more of"),
+        ({"classes": ["ok", "rattle"]}, r"array 'coefficients' has shape .* asks for \(1, "),
+        ({"profile": {}}, "manifest has a wrong profile: setting 'bands' is missing"),
+    ],
+)
+def test_wrong_manifests_are_refused(path, changes, reason):
+    rewrite_manifest(path, **changes)
+    refused(path, reason)
+
+
+def test_settings_of_another_version_are_named(path):
+    rewrite_manifest(path, profile=PROFILE.as_dict() | {"wavelet": "haar"})
+    refused(path, "manifest has a wrong profile: setting 'wavelet' is unknown")

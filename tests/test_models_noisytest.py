@@ -1,0 +1,221 @@
+import hashlib
+import json
+from contextlib import suppress
+from math import inf
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import models
+from models.noisytest import profile_from_config, read_annotations, read_folder, read_recording
+
+IN_PLACE = settings(
+    deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+TOML = """
+[data]
+chunk_ranges = [[0, 0.5], [1.25, -1]]
+chunk_labels = ["ok", "impact"]
+"""
+
+
+@pytest.fixture
+def log(tmp_path):
+    """Writes a `.log` of some text."""
+
+    def write(text, name="walk.log"):
+        path = tmp_path / name
+        path.write_bytes(text.encode())
+        return path
+
+    return write
+
+
+def rows(samples, rate=10_000):
+    return "".join(f"{i / rate:.12f} {0.001 * i:.15e}\n" for i in range(samples))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "# time noise\n0.0 1.5\n0.1 2.5\n0.2 3.5\n",
+        "0.0 1.5\n0.1 2.5\n0.2 3.5",
+        "0.0\t1.5\r\n0.1\t2.5\r\n0.2\t3.5\r\n",
+        "\n\n0.0   1.5 \n  \n 0.1 \t 2.5\n# in between\n0.2 3.5 # a remark\n\n",
+        "\ufeff0 15e-1\n1e-1 2.5\n.2 +3.5\n",
+        "# Prüfstand\n0.0 1.5\n0.1 2.5\n0.2 3.5\n",
+    ],
+    ids=["header", "bare", "tabs-crlf", "blanks", "byte-order-mark", "umlaut"],
+)
+def test_logs_are_read_as_people_write_them(log, text):
+    time, noise = models.read_log(log(text))
+    assert time.tolist() == [0.0, 0.1, 0.2]
+    assert noise.tolist() == [1.5, 2.5, 3.5]
+
+
+@IN_PLACE
+@given(
+    noise=st.lists(st.floats(-1e9, 1e9), min_size=2, max_size=20),
+    start=st.integers(-1000, 1000),
+    gap=st.sampled_from([" ", "\t", "   "]),
+    end=st.sampled_from(["\n", "\r\n", " # remark\n", "\n\n"]),
+)
+def test_logs_give_back_what_was_written(log, noise, start, gap, end):
+    text = end.join(f"{start + i}{gap}{value!r}" for i, value in enumerate(noise))
+    time, read = models.read_log(log(text))
+    assert time.tolist() == [start + i for i in range(len(noise))]
+    assert read.tolist() == noise
+
+
+@IN_PLACE
+@given(st.text(max_size=60))
+def test_any_text_is_read_or_refused_with_a_reason(log, text):
+    with suppress(models.DataFileError):
+        time, noise = models.read_log(log(text))
+        assert len(time) == len(noise) >= 2
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("", "walk.log: is empty; expected rows of time and noise"),
+        ("# only\n# comments\n", "is empty"),
+        ("0 1\n", "has one row"),
+        ("# x\n0 1\n1 2 3\n2 3\n", "line 3 has 3 columns, expected time and noise"),
+        ("0 1 0\n1 2 0\n", "line 1 has 3 columns"),
+        ("0 1\n1\n", "line 2 has 1 columns"),
+        ("time noise\n0 1\n1 2\n", "line 1: could not convert string to float: 'time'"),
+        ("0 1\n1 nan\n2 1\n", "line 2 is not finite: 1 nan"),
+        ("0 1\n\n1 1\ninf 1\n", "line 4 is not finite: inf 1"),
+        (
+            "0 1\n1 1\n1 1\n2 1\n",
+            "goes backward or stands still from row 2 to row 3: 1 s, then 1 s",
+        ),
+        ("0 1\n1 1\n.5 1\n2 1\n3 1\n", "goes backward or stands still from row 2 to row 3"),
+        ("0 1\n1 1\n2 1\n4 1\n", "not in even steps from row 3 to row 4: 2 s, then 4 s"),
+    ],
+)
+def test_what_is_wrong_with_a_log_is_named(log, text, reason):
+    with pytest.raises(models.DataFileError, match=reason):
+        models.read_log(log(text))
+
+
+def test_a_log_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(models.DataFileError, match=r"none.log: cannot be read"):
+        models.read_log(tmp_path / "none.log")
+
+
+def test_the_rate_is_that_of_the_whole_log():
+    time = np.round(np.arange(2000) / 1000, 3) + 5.0
+    assert models.nominal_rate(time) == 1000.0
+
+
+def test_annotations_take_integers_and_open_ends(log):
+    blocks = read_annotations(log(TOML, "walk.toml"))
+    assert blocks == (models.Block(0.0, 0.5, "ok"), models.Block(1.25, inf, "impact"))
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("chunk_ranges = [", "is no TOML"),
+        ("[data]\nchunk_ranges = []", "lacks chunk_ranges or chunk_labels in a table"),
+        ("[simulation]\n", "lacks chunk_ranges or chunk_labels"),
+        ('[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]', "not lists of one length"),
+        ('[data]\nchunk_ranges = [[0]]\nchunk_labels = ["ok"]', r"chunk \[0\] with label 'ok'"),
+        ("[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = [1]", r"chunk \[0, 1\] with label 1"),
+    ],
+)
+def test_what_is_wrong_with_annotations_is_named(log, text, reason):
+    with pytest.raises(models.DataFileError, match=reason):
+        read_annotations(log(text, "walk.toml"))
+
+
+def test_a_recording_joins_signal_annotations_and_hash(log):
+    log(TOML, "walk.toml")
+    path = log(rows(20_000))
+    recording = read_recording(path, rate=10_000.0)
+    assert (recording.name, recording.rate, len(recording.signal)) == ("walk", 10_000.0, 20_000)
+    assert recording.sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_log_without_annotations_is_refused(log, tmp_path):
+    log(rows(10))
+    with pytest.raises(models.DataFileError, match=r"walk.toml: .* each .log needs its .toml"):
+        list(read_folder(tmp_path))
+
+
+def test_a_log_of_another_rate_is_refused(log, tmp_path):
+    log(TOML, "walk.toml")
+    log(rows(20_000, rate=9_200))
+    with pytest.raises(models.RateError, match=r"rate of 9200 Hz; .* 10000 Hz: .*walk.log"):
+        list(read_folder(tmp_path, rate=10_000.0))
+
+
+def test_an_empty_folder_is_refused(tmp_path):
+    with pytest.raises(models.DataFileError, match=r"has no .log file; name a folder"):
+        list(read_folder(tmp_path))
+    with pytest.raises(models.DataFileError, match="is no folder"):
+        list(read_folder(tmp_path / "none"))
+
+
+def config(path, **sections):
+    path.write_text(json.dumps({name: {"arguments": each} for name, each in sections.items()}))
+    return path
+
+
+def test_noisytests_configuration_becomes_a_profile(tmp_path):
+    path = config(
+        tmp_path / "config.json",
+        import_preprocessor={"keywords_to_target_data": {"rattle": 1, "ok": 0}},
+        feature_preprocessor={"fft_stride_length": 401},
+        model={"regularization": 1, "kernel_gamma": 0.001, "kernel": "linear"},
+    )
+    profile = profile_from_config(path)
+    assert (profile.name, profile.bands) == ("noisytest", "comb")
+    assert profile.classes == ("ok", "rattle")
+    assert (profile.stride, profile.regularization, profile.gamma) == (401, 1, 0.001)
+    assert profile.kernel == "linear"
+
+
+def test_an_empty_configuration_is_noisytests_default(tmp_path):
+    path = tmp_path / "config.json"
+    path.write_text("{}")
+    assert profile_from_config(path) == models.Profile.noisytest("rbf")
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("{", "is no JSON"),
+        ("[]", "the configuration is .*, expected a JSON object"),
+        ('{"modell": {}}', "unknown key 'modell' in the configuration; it takes import_pre"),
+        ('{"model": {"args": {}}}', "unknown key 'args' in model; it takes arguments"),
+        ('{"model": {"arguments": {"C": 1}}}', "unknown key 'C' in model; it takes regularization"),
+        ('{"model": {"arguments": {"kernel": "poly"}}}', "kernel is 'poly', expected one of"),
+        ('{"model": {"arguments": {"kernel_gamma": "scale"}}}', "gamma is 'scale', expected a fin"),
+        (
+            '{"feature_preprocessor": {"arguments": {"fft_sample_length": 512}}}',
+            "expected a multiple of three",
+        ),
+        (
+            '{"import_preprocessor": {"arguments": {"keywords_to_target_data": {"ok": 1}}}}',
+            "expected labels with the numbers 0, 1, 2",
+        ),
+        (
+            '{"import_preprocessor": {"arguments": {"keywords_to_target_data": {"bad":0,"ok":1}}}}',
+            "classes are bad, ok, expected 'ok' and others",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_configuration_is_named(tmp_path, text, reason):
+    path = tmp_path / "config.json"
+    path.write_text(text)
+    with pytest.raises(models.DataFileError, match=rf"config.json: .*{reason}"):
+        profile_from_config(path)
+
+
+def test_the_stand_ins_configuration_is_the_golden_profile(lola):
+    assert profile_from_config(lola / "noisytest-config.json") == models.Profile.noisytest("rbf")
