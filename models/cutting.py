@@ -18,7 +18,7 @@ def cut(
 
     A block shorter than a frame is padded in training, lest a frame mixes failures that follow
     each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
-    for widened ones in training too.
+    for widened ones in training too, and for failures in every place of a frame.
 
     Args:
         recording: Where the block lies.
@@ -37,7 +37,10 @@ def cut(
     precision = np.float32 if profile.single_precision else np.float64
     time: Real = recording.time[lost:].astype(precision)
     pad = training and profile.pad_short
-    start, stop = _bounds(time, block, profile, pad=pad)
+    spread = training and profile.spread_failures and block.label != profile.classes[0]
+    start, stop = _bounds(
+        time, _spread(block, time, profile) if spread else block, profile, pad=pad
+    )
     samples = _samples(time, start, stop, profile)
     signal: Real = recording.signal[lost:][samples].astype(precision)
     if not len(signal):
@@ -78,6 +81,20 @@ def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[f
     if not profile.pad_widened and len(time):
         start = max(min(start, time[-1] + 1.0 / profile.rate - profile.duration), time[0])
     return start, start + profile.duration + profile.widen_extra / profile.rate
+
+
+def _spread(block: Block, time: Real, profile: Profile) -> Block:
+    """Widen a block to all frames that hold it whole, or that it fills by half or more.
+
+    When a signal is labelled, a frame sees a failure come in at its end and leave at its start; a
+    machine that has learnt it from the middle alone takes it for another one there.
+    """
+    if not len(time):
+        return block
+    shared = min(block.stop - block.start, profile.duration / 2.0)
+    start = max(block.start + shared - profile.duration, float(time[0]))
+    stop = min(block.stop - shared + profile.duration, float(time[-1]) + 1.0 / profile.rate)
+    return Block(start, stop, block.label)
 
 
 def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:

@@ -74,6 +74,7 @@ class LogBands:
             multiclass="one-vs-one",
             # Padding would make a train of impacts of one; frames to classify have none.
             pad_short=False,
+            spread_failures=True,
             flush_end=True,
         )
 

@@ -62,6 +62,8 @@ class Profile:
     """How two-class machines make one for more classes."""
     pad_short: bool = True
     """Whether a training block shorter than a frame is padded, or else widened."""
+    spread_failures: bool = False
+    """Whether training frames hold a failure in every place, and not in their middle alone."""
     open_end: int = 1
     """Samples after the last one at which a block that lasts to the end stops."""
     flush_end: bool = False

@@ -35,7 +35,7 @@ def test_time_counts_from_the_start_of_the_recording():
 
 def test_an_open_block_reaches_the_last_sample():
     assert cut_block(2.5, inf).tolist() == list(range(2500, 3000))
-    ours = models.LogBands().at(1000.0)
+    ours = replace(models.LogBands().at(1000.0), spread_failures=False)
     assert cut_block(2.5, inf, ours).tolist() == list(range(2500, 3000))
 
 
@@ -49,7 +49,7 @@ def test_a_short_block_is_widened_on_both_sides_otherwise():
 
 
 def test_a_profile_may_widen_in_training_too():
-    ours = models.LogBands().at(1000.0)
+    ours = replace(models.LogBands().at(1000.0), spread_failures=False)
     assert cut_block(1.0, 1.2, ours, training=True).tolist() == list(range(900, 1300))
 
 
@@ -168,3 +168,32 @@ def test_blocks_that_overlap_and_agree_are_welcome():
 def test_recordings_that_cannot_be_are_refused(changes, reason):
     with pytest.raises(models.RecordingError, match=f"walk: .*{reason}"):
         recording(**changes)
+
+
+@pytest.mark.parametrize("duration", [0.1, 0.2, 0.3, 0.7])
+def test_our_profile_learns_a_failure_in_every_place_of_a_frame(duration):
+    profile = models.LogBands().at(1000.0)
+    signal = np.arange(4000.0)
+    block = Block(2.0, 2.0 + duration, "impact")
+    dataset = models.Dataset.of([Recording("a", signal, 1000.0, (block,))], profile)
+    first = dataset.frames[:, 0]
+    overlap = np.minimum(first + 400, 2000 + 1000 * duration) - np.maximum(first, 2000)
+    assert len(first) > 2
+    assert overlap.min() >= min(1000 * duration, 200) - 1e-9
+    assert first.min() == pytest.approx(2000 + min(1000 * duration, 200) - 400)
+
+
+def test_failures_are_spread_in_training_alone_and_ok_never_is():
+    profile = models.LogBands().at(1000.0)
+    blocks = (Block(0.5, 0.9, "ok"), Block(2.0, 2.1, "impact"))
+    recording = Recording("a", np.arange(4000.0), 1000.0, blocks)
+    assert models.Dataset.of([recording], profile).labels.tolist().count("ok") == 1
+    measured = models.Dataset.of([recording], profile, training=False)
+    assert measured.labels.tolist() == ["ok", "impact"]
+
+
+def test_spreading_a_failure_stays_inside_the_recording():
+    profile = models.LogBands().at(1000.0)
+    blocks = (Block(0.0, 0.1, "impact"), Block(0.9, 1.0, "impact"))
+    recording = Recording("a", np.arange(1000.0), 1000.0, blocks)
+    assert models.Dataset.of([recording], profile).frames.shape[1] == 400
