@@ -1,0 +1,1 @@
+"""Commands, recordings and reports for people."""

@@ -1,0 +1,21 @@
+"""What can go wrong for a person: one base error, subclasses that keep their facts."""
+
+from pathlib import Path
+
+
+class InspectorError(ValueError):
+    """The base of every error that `inspector` expects."""
+
+
+class LogError(InspectorError):
+    """A log that cannot be read as the motion of a robot.
+
+    Args:
+        path: The log.
+        problem: What is wrong with it, in one line.
+        row: The line of the file where that is (the header is line 1), if it is in one place.
+    """
+
+    def __init__(self, path: Path, problem: str, row: int | None = None) -> None:
+        self.path, self.problem, self.row = path, problem, row
+        super().__init__(f"{path}{'' if row is None else f', row {row}'}: {problem}")

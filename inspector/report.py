@@ -1,0 +1,54 @@
+"""The report that lies in a recording, in Markdown."""
+
+from collections.abc import Sequence
+
+from inspector.inspection import Inspection
+
+
+def report(inspection: Inspection) -> str:
+    """Write the report of an inspected run.
+
+    Args:
+        inspection: The run with what was found in it.
+
+    Returns:
+        Markdown: the verdict, the events, the run, and what is missing.
+    """
+    run = inspection.run
+    facts = [
+        ("robot", run.robot or "not named"),
+        ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
+        ("joints", str(len(run.joint_names))),
+        ("model", inspection.model or "none"),
+        *((key, str(run.meta[key])) for key in ("scenario", "seed") if key in run.meta),
+    ]
+    parts = [
+        f"# {inspection.name}",
+        f"**{verdict(inspection)}**",
+        _table(("", ""), facts),
+    ]
+    if inspection.events:
+        rows = [(e.label, f"{e.start:.2f}", f"{e.stop:.2f}") for e in inspection.events]
+        parts += ["## Events", _table(("class", "from [s]", "to [s]"), rows)]
+    if run.blocks:
+        rows = [(b.label, f"{b.start:.2f}", f"{b.stop:.2f}") for b in run.blocks]
+        parts += ["## Annotated", _table(("class", "from [s]", "to [s]"), rows)]
+    if inspection.remarks:
+        parts += ["## Remarks", "\n".join(f"- {remark}" for remark in inspection.remarks)]
+    return "\n\n".join(parts) + "\n"
+
+
+def verdict(inspection: Inspection) -> str:
+    """Say in a few words what was found."""
+    if inspection.labels is None:
+        return "Cannot tell"
+    if not inspection.events:
+        return "Quiet"
+    kinds = sorted({event.label for event in inspection.events})
+    count = len(inspection.events)
+    return f"{count} {'finding' if count == 1 else 'findings'}: {', '.join(kinds)}"
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

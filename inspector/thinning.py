@@ -1,0 +1,28 @@
+"""Fewer points for a plot, without losing a peak."""
+
+import numpy as np
+
+from noisemodel.types import Array, Real
+
+
+def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
+    """Keep the least and the greatest value of each bucket of samples.
+
+    Args:
+        time: Shape (samples,), in [s].
+        values: Shape (samples, series).
+        points: How many points each series may have at most.
+
+    Returns:
+        Times, shape (kept,), and values, shape (kept, series), kept ≤ points; everything, if
+        there are not more samples than points.
+    """
+    if len(time) <= points:
+        return time, np.asarray(values, dtype=np.float64)
+    size = -(-len(time) // (points // 2))
+    starts = np.arange(0, len(time), size)
+    thin = np.empty((2 * len(starts), values.shape[1]))
+    thin[0::2] = np.minimum.reduceat(values, starts, axis=0)
+    thin[1::2] = np.maximum.reduceat(values, starts, axis=0)
+    halves = np.minimum(starts + size // 2, len(time) - 1)
+    return time[np.stack((starts, halves), axis=1).ravel()], thin

@@ -1,0 +1,100 @@
+"""What CI wants to know of a run: status, events, one line why."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+
+import models
+import noisemodel as nm
+from inspector.errors import InspectorError
+from inspector.labelling import CannotTellError, Labelled, Library, label_noise, label_run
+
+EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
+"""The errors that are told in one line; all others are bugs."""
+
+
+class Status(StrEnum):
+    """How a run fared."""
+
+    OK = "ok"
+    FINDINGS = "findings"
+    CANNOT_TELL = "cannot-tell"
+    BAD_INPUT = "bad-input"
+
+
+EXIT = {Status.BAD_INPUT: 3, Status.FINDINGS: 1, Status.CANNOT_TELL: 4, Status.OK: 0}
+"""Exit status of each, the worst first."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found in one run.
+
+    Attributes:
+        path: The file.
+        status: How it fared.
+        model: Name of the model that looked, empty if none could.
+        events: Findings, in order.
+        message: A line that says more, may be empty.
+    """
+
+    path: Path
+    status: Status
+    model: str = ""
+    events: tuple[models.Event, ...] = ()
+    message: str = ""
+
+
+def judge(path: Path, library: Library) -> Verdict:
+    """Classify one file; expected errors become part of the verdict.
+
+    Args:
+        path: A run file, or one of NoisyTest's two-column logs (``*.log``).
+        library: Models to choose from.
+
+    Returns:
+        The verdict.
+    """
+    try:
+        labelled = _labelled(path, library)
+    except CannotTellError as error:
+        return Verdict(path, Status.CANNOT_TELL, message=str(error))
+    except EXPECTED as error:
+        message = str(error).removeprefix(f"{path}: ")
+        return Verdict(path, Status.BAD_INPUT, message=message)
+    events = labelled.labels.events()
+    status = Status.FINDINGS if events else Status.OK
+    return Verdict(path, status, labelled.model, events, labelled.remark)
+
+
+def exit_status(verdicts: Iterable[Verdict]) -> int:
+    """Take the worst of several: bad input, findings, cannot tell, ok."""
+    statuses = {verdict.status for verdict in verdicts}
+    return next((code for status, code in EXIT.items() if status in statuses), 0)
+
+
+def judge_all(paths: Sequence[Path], library: Library, *, jobs: int = 1) -> Iterator[Verdict]:
+    """Classify many files; one bad file never stops the rest.
+
+    Args:
+        paths: The files.
+        library: Models to choose from.
+        jobs: How many to work on at once.
+
+    Yields:
+        A verdict per file, in their order.
+    """
+    if jobs == 1 or len(paths) == 1:
+        yield from (judge(path, library) for path in paths)
+        return
+    from joblib import Parallel, delayed
+
+    pool = Parallel(n_jobs=jobs, return_as="generator")
+    yield from pool(delayed(judge)(path, library) for path in paths)
+
+
+def _labelled(path: Path, library: Library) -> Labelled:
+    if path.suffix == ".log":
+        return label_noise(*models.read_log(path), library)
+    return label_run(nm.Run.load(path), library)

@@ -1,0 +1,305 @@
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspector import viewer
+from inspector.assets import demo_run, model_files
+from inspector.cli import main
+from noisemodel import Run
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def inspector(monkeypatch, capsys):
+    """Call the command line; returns exit status, what it printed, and what it complained."""
+    monkeypatch.setattr(viewer, "has_display", lambda: False)
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["inspector", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out, printed.err
+
+    return call
+
+
+def bare_run(path: Path, *, rate: float = 10_000.0, seconds: float = 1.0) -> Path:
+    time = np.arange(round(seconds * rate)) / rate
+    np.savez(path, time=time, velocity=np.cos(time)[:, None])
+    return path
+
+
+def test_the_demo_is_shown_without_a_display(inspector, tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for _ in range(2):  # the second time it replaces its own recording
+        status, out, err = inspector("view")
+        assert (status, err) == (0, "")
+    (recording,) = tmp_path.rglob("demo-*.rrd")
+    assert f"recording: {recording}" in out
+    assert f"rerun {recording}" in out
+    assert "--serve-web --bind 127.0.0.1" in out
+
+
+def test_the_demo_run_is_small_and_has_its_defect(inspector):
+    assert demo_run().stat().st_size <= 3_000_000
+    run = Run.load(demo_run())
+    assert run.rate == 10_000.0
+    assert 3.5 <= run.duration <= 4.5
+    assert run.velocity.dtype == np.float32
+    assert {block.label for block in run.blocks} - {"ok"}
+    status, out, _ = inspector("classify", demo_run())
+    assert status == 1
+    assert "findings" in out
+
+
+def test_the_viewer_is_started_on_loopback_and_not_waited_for(inspector, monkeypatch, tmp_path):
+    started = []
+
+    class Viewer:
+        def __init__(self, command, **_):
+            started.append(command)
+
+        def wait(self, timeout):
+            raise subprocess.TimeoutExpired("rerun", timeout)
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(viewer, "has_display", lambda: True)
+    monkeypatch.setattr(subprocess, "Popen", Viewer)
+    status, out, _ = inspector("view", bare_run(tmp_path / "run.npz"))
+    assert status == 0
+    assert "recording:" not in out
+    (command,) = started
+    assert command[command.index("--bind") + 1] == "127.0.0.1"
+
+
+def test_a_viewer_that_dies_is_said_and_the_recording_stays(inspector, monkeypatch, tmp_path):
+    class Viewer:
+        def __init__(self, *_, **__): ...
+
+        def wait(self, timeout):
+            return 101
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    monkeypatch.setattr(viewer, "has_display", lambda: True)
+    monkeypatch.setattr(subprocess, "Popen", Viewer)
+    status, out, err = inspector("view", bare_run(tmp_path / "run.npz"))
+    assert status == 0
+    assert err == "the viewer ended with status 101\n"
+    assert "recording:" in out
+
+
+def test_a_rate_below_every_model_shows_everything_but_the_lanes(inspector, tmp_path):
+    run = bare_run(tmp_path / "slow.npz", rate=200.0, seconds=5.0)
+    status, out, _ = inspector("view", run, "--save", tmp_path / "slow.rrd")
+    assert status == 0
+    assert "No class lanes" in out
+    assert (tmp_path / "slow.rrd").exists()
+    status, out, _ = inspector("classify", run)
+    assert status == 4
+    assert "cannot-tell" in out
+    assert "200 Hz" in out
+
+
+def test_a_run_between_two_rates_is_lowered_never_raised(inspector, tmp_path):
+    status, out, _ = inspector("classify", bare_run(tmp_path / "run.npz", rate=4000.0))
+    assert status in (0, 1)
+    assert "Labelled at 1000 Hz" in out
+
+
+def test_noisytests_logs_are_classified(inspector, tmp_path):
+    time = np.arange(10_000) / 10_000
+    np.savetxt(tmp_path / "quiet.log", np.column_stack((time, 1 + 0.1 * np.cos(time))))
+    status, out, _ = inspector("classify", tmp_path / "quiet.log", "--format", "json")
+    (verdict,) = json.loads(out)["runs"]
+    assert status in (0, 1)
+    assert verdict["status"] in ("ok", "findings")
+    assert "10khz" in verdict["model"]
+
+
+def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
+    (tmp_path / "text.npz").write_text("not an archive")
+    good = bare_run(tmp_path / "good.npz")
+    status, out, err = inspector(
+        "classify",
+        good,
+        tmp_path / "text.npz",
+        tmp_path / "gone.npz",
+        "-j",
+        "2",
+        "--format",
+        "json",
+    )
+    assert status == 3
+    states = [run["status"] for run in json.loads(out)["runs"]]
+    assert states[0] in ("ok", "findings")
+    assert states[1:] == ["bad-input", "bad-input"]
+    lines = err.splitlines()
+    assert len(lines) == 2
+    assert "text.npz: not a run file" in lines[0]
+    assert "gone.npz: cannot be read (No such file or directory)" in lines[1]
+
+
+def test_a_run_too_short_for_a_frame_is_bad_input(inspector, tmp_path):
+    status, _, err = inspector("classify", bare_run(tmp_path / "short.npz", seconds=0.2))
+    assert status == 3
+    assert "2000" in err
+    assert "4000" in err
+
+
+@pytest.mark.parametrize("format_", ["junit", "github", "json"])
+def test_every_format_for_machines_names_a_bad_file(inspector, tmp_path, format_):
+    (tmp_path / "bad.npz").write_text("")
+    status, out, _ = inspector("classify", tmp_path / "bad.npz", "--format", format_)
+    assert status == 3
+    assert "bad.npz" in out
+
+
+def test_wrong_usage_exits_with_2(inspector):
+    for wrong in (["classify"], ["classify", "x", "--format", "yaml"], ["fly"], ["view", "--fast"]):
+        status, out, _ = inspector(*wrong)
+        assert status == 2
+        assert out == ""
+
+
+def test_a_model_that_is_damaged_is_one_line(inspector, tmp_path):
+    model = tmp_path / "model.npz"
+    model.write_bytes(model_files()[0].read_bytes()[:1000])
+    run = bare_run(tmp_path / "run.npz")
+    status, _, err = inspector("classify", run, "--model", model)
+    assert status == 3
+    assert err.count("\n") == 1
+    assert "model.npz" in err
+
+
+def test_outputs_that_exist_are_kept(inspector, tmp_path):
+    run = bare_run(tmp_path / "run.npz")
+    (tmp_path / "out.rrd").write_text("precious")
+    status, _, err = inspector("view", run, "--save", tmp_path / "out.rrd")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "exists already" in err
+    assert (tmp_path / "out.rrd").read_text() == "precious"
+    assert inspector("view", run, "--save", tmp_path / "out.rrd", "--overwrite")[0] == 0
+
+
+def test_an_output_that_cannot_be_written_is_one_line(inspector, tmp_path):
+    run = bare_run(tmp_path / "run.npz")
+    status, _, err = inspector("view", run, "--save", tmp_path / "no" / "out.rrd")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "cannot be written (No such file or directory)" in err
+
+
+def test_the_noise_is_printed_and_written(inspector, tmp_path):
+    run = bare_run(tmp_path / "run.npz")
+    status, out, _ = inspector("noise", run, "--csv", tmp_path / "noise.csv")
+    assert status == 0
+    assert "peak 1 rad/s at 0.000 s" in out
+    assert "100.0%  joint1" in out
+    lines = (tmp_path / "noise.csv").read_text().splitlines()
+    assert lines[0] == "time [s],simplified [rad/s]"
+    assert len(lines) == 10_001
+
+
+def test_a_log_is_imported(inspector, tmp_path):
+    time = np.arange(2000) / 1000
+    log = "\n".join(["time,elbow.velocity", *(f"{t:.4f},{np.sin(t):.6f}" for t in time)])
+    (tmp_path / "log.csv").write_text(log)
+    status, out, _ = inspector("import", tmp_path / "log.csv", "-o", tmp_path / "run.npz")
+    assert status == 0
+    assert "2.00 s at 1000 Hz" in out
+    assert Run.load(tmp_path / "run.npz").joint_names == ("elbow",)
+
+
+def test_a_model_is_trained_and_evaluated(inspector, tmp_path):
+    generator = np.random.default_rng(0)
+    for seed in range(3):
+        time = np.arange(20_000) / 10_000
+        calm = 1 + 0.01 * generator.normal(size=20_000)
+        calm[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
+        np.savez(
+            tmp_path / f"run{seed}.npz",
+            time=time,
+            velocity=calm[:, None],
+            block_start=[0.0, 1.0],
+            block_stop=[1.0, 2.0],
+            block_label=["ok", "oscillations"],
+        )
+    model = tmp_path / "model.npz"
+    runs = [tmp_path / f"run{seed}.npz" for seed in range(2)]
+    status, out, _ = inspector("train", *runs, "-o", model, "--rate", 1000)
+    assert status == 0
+    assert "Subset accuracy" in out
+    status, out, _ = inspector("evaluate", model, *runs)
+    assert status == 0
+    assert "Failure recall" in out
+    status, out, _ = inspector("evaluate", model, tmp_path / "run2.npz", "--json")
+    assert status == 0
+    confusion = np.array(json.loads(out)["confusion"])
+    np.testing.assert_array_equal(confusion.sum(axis=1), [7, 7])
+
+
+def test_a_profile_that_does_not_exist_at_a_rate_is_said(inspector, tmp_path):
+    run = bare_run(tmp_path / "run.npz")
+    arguments = ["train", run, "-o", tmp_path / "m.npz", "--profile"]
+    status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
+    assert (status, "exists at 10000 Hz only" in err) == (3, True)
+    status, _, err = inspector(*arguments, "best")
+    assert (status, "no profile 'best'; there are logbands" in err) == (3, True)
+    status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
+    assert (status, "has no annotated blocks" in err) == (3, True)
+
+
+def test_robots_are_listed(inspector):
+    status, out, _ = inspector("robots")
+    assert status == 0
+    assert len(out.splitlines()) == 69
+    assert "talos " in out
+
+
+def test_scenarios_are_listed(inspector):
+    status, out, _ = inspector("simulate", "--list")
+    assert status == 0
+    assert {"ok", "table", "jump", "chatter", "multisine"} <= {
+        line.split()[0] for line in out.splitlines()
+    }
+
+
+def test_an_unknown_scenario_is_one_line(inspector, tmp_path):
+    status, _, err = inspector("simulate", "panda", "--scenario", "dance", "-o", tmp_path / "r.npz")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "dance" in err
+    assert "table" in err
+
+
+def imported_by(*arguments):
+    code = (
+        "import sys; from inspector.cli import main\n"
+        f"sys.argv = {['inspector', *map(str, arguments)]!r}\n"
+        "try:\n    main()\nexcept SystemExit:\n    pass\n"
+        "print('imported:', *sorted(sys.modules))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(done.stdout.rpartition("imported:")[2].split())
+
+
+def test_help_imports_nothing_heavy():
+    modules = imported_by("--help")
+    assert not modules & {"numpy", "rerun", "sklearn", "pinocchio", "scipy", "models", "noisemodel"}
+
+
+def test_classifying_imports_neither_scikit_learn_nor_scipy_signal_nor_rerun():
+    modules = imported_by("classify", demo_run())
+    assert "models" in modules
+    assert not modules & {"sklearn", "scipy.signal", "rerun", "pinocchio", "mujoco"}

@@ -1,0 +1,85 @@
+import json
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+from inspector.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
+from inspector.verdict import Status, Verdict, exit_status
+from models import Event
+
+QUIET = Verdict(Path("quiet.npz"), Status.OK, "arm-10khz")
+LOUD = Verdict(
+    Path("loud.npz"),
+    Status.FINDINGS,
+    "arm-10khz",
+    (Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8)),
+)
+SLOW = Verdict(Path("slow.npz"), Status.CANNOT_TELL, message="30 Hz is below every model")
+BROKEN = Verdict(Path("broken,1.npz"), Status.BAD_INPUT, message="not a run file: 100%\nbad")
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "status"),
+    [
+        ([], 0),
+        ([QUIET], 0),
+        ([QUIET, SLOW], 4),
+        ([QUIET, SLOW, LOUD], 1),
+        ([QUIET, SLOW, LOUD, BROKEN], 3),
+    ],
+)
+def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
+    assert exit_status(verdicts) == status
+
+
+def test_text_says_what_was_found_and_when():
+    lines = text([QUIET, LOUD]).splitlines()
+    assert lines[0] == "quiet.npz: ok [arm-10khz]"
+    assert lines[2] == "  impact from 1.00 s to 1.50 s (score 0.90)"
+
+
+def test_json_is_noise_verdict_1():
+    verdicts = json.loads(as_json([LOUD, SLOW]))
+    assert verdicts["format"] == "noise-verdict/1"
+    loud, slow = verdicts["runs"]
+    assert loud["events"][1] == {"label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8}
+    assert (loud["run"], loud["status"], loud["model"]) == ("loud.npz", "findings", "arm-10khz")
+    assert (slow["status"], slow["events"]) == ("cannot-tell", [])
+    assert slow["message"] == "30 Hz is below every model"
+
+
+def test_junit_counts_and_tells_why():
+    suite = ET.fromstring(junit([QUIET, LOUD, SLOW, BROKEN])).find("testsuite")
+    assert {key: suite.get(key) for key in ("tests", "failures", "errors", "skipped")} == {
+        "tests": "4",
+        "failures": "1",
+        "errors": "1",
+        "skipped": "1",
+    }
+    failure = suite.find("testcase[@name='loud.npz']/failure")
+    assert failure.get("message") == "impact from 1.00 s to 1.50 s"
+    assert "oscillations from 2.00 s to 3.00 s" in failure.text
+
+
+def test_junit_drops_control_characters_that_xml_forbids():
+    odd = Verdict(Path("a\x00b\x1b.npz"), Status.BAD_INPUT, message="x\x07y")
+    assert ET.fromstring(junit([odd])).find(".//testcase").get("name") == "ab.npz"
+
+
+def test_github_annotations_escape_what_would_end_them():
+    line = github([BROKEN])
+    assert line == "::error file=broken%2C1.npz::bad-input: not a run file: 100%25%0Abad"
+
+
+def test_github_gets_ten_annotations_of_a_kind_at_most():
+    lines = github([LOUD] * 25 + [SLOW]).splitlines()
+    errors = [line for line in lines if line.startswith("::error")]
+    assert len(errors) == ANNOTATIONS
+    assert errors[-1] == "::error::16 more runs are not shown here"
+    assert sum(line.startswith("::warning") for line in lines) == 1
+
+
+def test_nothing_to_say_is_said_in_every_format():
+    for write in FORMATS.values():
+        assert isinstance(write([]), str)

@@ -1,0 +1,26 @@
+import struct
+
+import pytest
+
+from inspector.assets import demo_run, model_files
+from inspector.inspection import inspect
+from inspector.labelling import load_library
+from inspector.recording import write
+
+picture = pytest.importorskip("picture")
+pytestmark = pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING)
+
+
+def test_the_viewer_draws_the_demo_and_reports_no_error(tmp_path):
+    path = tmp_path / "demo.rrd"
+    write(inspect(demo_run(), load_library(model_files())), path)
+    with picture.headless_viewer() as client:
+        png = picture.picture(client, path, 2.0)
+        state = client.get_state()
+        errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
+    assert png.startswith(b"\x89PNG")
+    assert struct.unpack(">II", png[16:24]) >= (1000, 500)
+    shown = {view.name for view in state.views}
+    assert {"Robot", "Classes", "Noise, simplified estimate [rad/s]"} <= shown
+    assert not [report for view in state.views for report in view.reports]
+    assert not errors

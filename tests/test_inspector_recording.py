@@ -1,0 +1,274 @@
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from inspector.errors import InspectorError
+from inspector.inspection import Inspection, inspect
+from inspector.meshes import MeshError
+from inspector.recording import NOISE_POINTS, write
+from models import Event, Labels
+from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
+
+CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
+
+
+@pytest.fixture(autouse=True)
+def strict():
+    rr.set_strict_mode(True)
+
+
+def panda_run(**changes):
+    time = np.arange(30_000) / 10_000
+    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
+    fields = {
+        "time": time,
+        "velocity": np.cos(phase),
+        "velocity_desired": np.cos(phase),
+        "position": 0.1 * np.sin(phase),
+        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
+        "robot": "panda",
+        "blocks": (Block(0.2, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
+        "meta": {"scenario": "made up", "seed": 1},
+    }
+    return Run(**(fields | changes))
+
+
+def inspected(run, tmp_path, labels=None) -> Inspection:
+    path = tmp_path / "run.npz"
+    run.save(path, overwrite=True)
+    events = (Event("impact", 0.5, 1.0, 0.9),) if labels else ()
+    return dataclasses.replace(inspect(path, {}), labels=labels, events=events, model="a model")
+
+
+def some_labels():
+    start = np.arange(0, 2.6, 0.1)
+    label = np.array(["ok"] * len(start), dtype="U20")
+    label[5:8] = "impact"
+    scores = np.tile([0.7, 0.1, 0.1, 0.1], (len(start), 1))
+    return Labels(start=start, stop=start + 0.4, label=label, scores=scores, classes=CLASSES)
+
+
+def read(path: Path, entity: str, component: str):
+    """Read a component back: times in [s] (None if static), values."""
+    times, values = [], []
+    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names:
+            values += batch.column(component).to_pylist()
+            if not chunk.is_static:
+                times += batch.column("time").cast(pa.int64()).to_pylist()
+    return (np.array(times) / 1e9 if times else None), values
+
+
+def entities(path: Path):
+    return set(RrdReader(path).store().schema().entity_paths())
+
+
+@pytest.fixture
+def whole(tmp_path):
+    path = tmp_path / "out.rrd"
+    run = panda_run()
+    write(inspected(run, tmp_path, some_labels()), path)
+    return path, run
+
+
+def test_a_recording_holds_everything(whole):
+    path, _ = whole
+    assert {
+        "/class/found",
+        "/class/annotated",
+        "/score/ok",
+        "/score/oscillations",
+        "/noise/simplified",
+        "/joints/velocity/0",
+        "/joints/velocity/0_desired",
+        "/joints/position/0",
+        "/spectrogram/bands/00",
+        "/spectrogram/levels",
+        "/robot/motion/panda_joint1",
+        "/robot/panda/visual_geometries/panda_link3/visual_0",
+        "/report",
+        "/events",
+    } <= entities(path)
+    (recording,) = RrdReader(path).recordings()
+    assert recording.application_id == "inspector"
+    assert len(RrdReader(path).blueprints()) == 1
+
+
+def test_the_noise_is_logged_sample_by_sample_and_drawn_by_its_extremes(whole):
+    path, run = whole
+    time, noise = read(path, "/noise/simplified", "Scalars:scalars")
+    expected = np.sqrt(2 * (run.velocity**2).sum(axis=1))
+    np.testing.assert_allclose(np.ravel(noise), expected, rtol=1e-12)
+    np.testing.assert_allclose(time, run.time, atol=1e-9)
+    _, policy = read(path, "/noise/simplified", "SeriesLines:aggregation_policy")
+    assert policy == [[5]]  # MinMax: the default would hide vibration
+
+
+def test_lanes_hold_changes_only_and_end_where_the_labels_end(whole):
+    path, _ = whole
+    time, states = read(path, "/class/found", "StateChange:state")
+    assert [state[0] for state in states] == ["ok", "impact", "ok", ""]
+    np.testing.assert_allclose(time, [0.15, 0.65, 0.95, 2.75], atol=1e-6)
+    time, states = read(path, "/class/annotated", "StateChange:state")
+    assert [state[0] for state in states] == ["ok", "oscillations", ""]
+    np.testing.assert_allclose(time, [0.2, 1.0, 1.5], atol=1e-9)
+
+
+def test_the_robot_stands_as_its_joints_say(whole):
+    path, run = whole
+    time, turns = read(path, "/robot/motion/panda_joint1", "Transform3D:quaternion")
+    angles = np.interp(time, run.time, run.position[:, 0])
+    quaternion = np.array([turn[0] for turn in turns])
+    np.testing.assert_allclose(quaternion[:, 2], np.sin(angles / 2), atol=1e-5)
+    assert len(time) == 150  # 50 frames per second
+
+
+def test_a_floating_base_moves_in_the_world(tmp_path):
+    time = np.arange(4000) / 1000
+    pose = np.zeros((4000, 7))
+    pose[:, 0], pose[:, 6] = 0.1 * time, 1.0
+    run = Run(
+        time=time,
+        velocity=np.zeros((4000, 1)),
+        position=np.zeros((4000, 1)),
+        joint_names=("HAA",),
+        base_pose=pose,
+        base_velocity=np.zeros((4000, 6)),
+        robot=str(one_legged(tmp_path)),
+    )
+    path = tmp_path / "out.rrd"
+    write(inspected(run, tmp_path), path)
+    _, places = read(path, "/robot/motion/base", "Transform3D:translation")
+    np.testing.assert_allclose([place[0][0] for place in places], 0.1 * time[::20], atol=1e-6)
+
+
+def one_legged(folder: Path) -> Path:
+    path = folder / "leg.urdf"
+    path.write_text(
+        """<robot name="leg"><link name="base"/><link name="thigh"><visual><geometry>
+        <box size="0.1 0.1 0.4"/></geometry></visual></link><joint name="HAA" type="revolute">
+        <parent link="base"/><child link="thigh"/><axis xyz="1 0 0"/>
+        <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    )
+    return path
+
+
+def test_the_report_says_what_was_found(whole):
+    path, _ = whole
+    _, (text,) = read(path, "/report", "TextDocument:text")
+    assert "1 finding: impact" in text[0]
+    assert "| impact | 0.50 | 1.00 |" in text[0]
+    assert "| scenario | made up |" in text[0]
+
+
+def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
+    path = tmp_path / "out.rrd"
+    np.savez(tmp_path / "bare.npz", time=np.arange(300) / 250, velocity=np.ones((300, 2)))
+    write(inspect(tmp_path / "bare.npz", {}), path)
+    found = entities(path)
+    assert {"/noise/simplified", "/spectrogram/levels", "/joints/velocity/0"} <= found
+    assert not any(entity.startswith(("/robot", "/class")) for entity in found)
+    _, (text,) = read(path, "/report", "TextDocument:text")
+    assert "Cannot tell" in text[0]
+    assert "No 3D robot: the run names none." in text[0]
+    assert "no desired velocities" in text[0]
+
+
+def test_a_robot_that_is_not_known_is_said_and_the_rest_is_shown(tmp_path):
+    path = tmp_path / "out.rrd"
+    write(inspected(panda_run(robot="hal9000"), tmp_path), path)
+    _, (text,) = read(path, "/report", "TextDocument:text")
+    assert "'hal9000' is neither a listed robot nor a URDF file" in text[0]
+    assert "/noise/simplified" in entities(path)
+
+
+def test_many_joints_are_spread_over_plots(tmp_path):
+    names = tuple(f"joint{i}" for i in range(20))
+    values = np.ones((30_000, 20))
+    run = panda_run(
+        joint_names=names, velocity=values, velocity_desired=None, position=None, robot=None
+    )
+    path = tmp_path / "out.rrd"
+    write(inspected(run, tmp_path), path)
+    assert {"/joints/velocity/0", "/joints/velocity/1", "/joints/velocity/2"} <= entities(path)
+
+
+def test_a_long_run_has_no_more_points_than_a_short_one(tmp_path):
+    time = np.arange(250_000) / 1000
+    velocity = np.random.default_rng(0).normal(size=(250_000, 1))
+    run = Run(time=time, velocity=velocity, joint_names=("a",))
+    path = tmp_path / "out.rrd"
+    write(inspected(run, tmp_path), path)
+    _, noise = read(path, "/noise/simplified", "Scalars:scalars")
+    assert len(noise) <= NOISE_POINTS
+    assert max(noise)[0] == pytest.approx(np.abs(velocity).max())
+
+
+def test_gaps_are_not_drawn(tmp_path):
+    valid = np.ones(30_000, dtype=bool)
+    valid[10_000:20_000] = False
+    path = tmp_path / "out.rrd"
+    write(inspected(panda_run(valid=valid), tmp_path), path)
+    time, _ = read(path, "/noise/simplified", "Scalars:scalars")
+    assert not ((time > 1.0) & (time < 1.9999)).any()
+
+
+def test_the_same_input_makes_the_same_recording_id(tmp_path):
+    ids = []
+    for name in ("a.rrd", "b.rrd"):
+        write(inspected(panda_run(), tmp_path), tmp_path / name)
+        ids.append(RrdReader(tmp_path / name).recordings()[0].recording_id)
+    assert ids[0] == ids[1]
+
+
+def test_a_joint_that_the_robot_lacks_is_named(tmp_path):
+    names = ("elbow", *(f"panda_joint{i}" for i in range(2, 8)))
+    found = inspected(panda_run(joint_names=names), tmp_path)
+    with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'; it has panda_"):
+        write(found, tmp_path / "out.rrd")
+    assert not list(tmp_path.glob("*.rrd"))
+
+
+def test_an_unreadable_urdf_is_named(tmp_path):
+    (tmp_path / "bad.urdf").write_text("<robot")
+    found = inspected(panda_run(robot=str(tmp_path / "bad.urdf")), tmp_path)
+    with pytest.raises(RobotError, match="bad.urdf: not XML"):
+        write(found, tmp_path / "out.rrd")
+
+
+def test_an_unreadable_mesh_is_named_and_the_run_can_be_shown_without(tmp_path):
+    leg = one_legged(tmp_path)
+    leg.write_text(leg.read_text().replace("<box size=", '<mesh filename="gone.stl" scale='))
+    found = inspected(panda_run(robot=str(leg)), tmp_path)
+    with pytest.raises(MeshError, match="mesh gone.stl: not found"):
+        write(found, tmp_path / "out.rrd")
+    write(found, tmp_path / "out.rrd", robot=False)
+    assert "/noise/simplified" in entities(tmp_path / "out.rrd")
+
+
+def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):
+    path = tmp_path / "out.rrd"
+    path.write_text("precious")
+    found = inspected(panda_run(robot=None), tmp_path)
+    with pytest.raises(OutputError, match="exists already"):
+        write(found, path)
+    assert path.read_text() == "precious"
+    write(found, path, overwrite=True)
+    assert "/noise/simplified" in entities(path)
+
+
+def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):
+    def break_off(*_):
+        raise InspectorError("broken off")
+
+    found = inspected(panda_run(robot=None), tmp_path)
+    monkeypatch.setattr("inspector.recording._log_text", break_off)
+    with pytest.raises(InspectorError, match="broken off"):
+        write(found, tmp_path / "out.rrd")
+    assert {path.name for path in tmp_path.iterdir()} == {"run.npz"}
