@@ -158,11 +158,13 @@ def simulate(
 ) -> None:
     """Simulate a robot with a defect, labelled by construction (needs the extra `sim`)."""
     import scenarios
+    from noisemodel.atomic import refuse_existing
 
     if list_:
         for name, entry in scenarios.SCENARIOS.items():
             typer.echo(f"{name:12} {entry.description}")
         return
+    refuse_existing(output, overwrite=overwrite)
     run = scenarios.simulate(robot, scenario, seed, duration=duration)
     run.save(output, overwrite=overwrite)
     typer.echo(f"{output}: {run.duration:.2f} s at {run.rate:g} Hz")

@@ -7,6 +7,7 @@ from pathlib import Path
 import models
 import noisemodel as nm
 from inspector.errors import InspectorError
+from noisemodel.atomic import refuse_existing
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
     "logbands": lambda rate: models.LogBands().at(rate),
@@ -34,12 +35,14 @@ def train(
 
     Raises:
         InspectorError: If there is no such profile, or it does not exist at this rate.
+        OutputError: If the file exists or cannot be written.
     """
     if profile not in PROFILES:
         raise InspectorError(f"no profile {profile!r}; there are {', '.join(PROFILES)}")
     settings = PROFILES[profile](rate)
     if settings.rate != rate:
         raise InspectorError(f"profile {profile} exists at {settings.rate:g} Hz only, not {rate:g}")
+    refuse_existing(output, overwrite=overwrite)
     dataset = models.Dataset.of(list(recordings(inputs, rate)), settings)
     classifier = models.Classifier.train(dataset, settings)
     classifier.save(output, overwrite=overwrite)

@@ -24,10 +24,7 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
         OutputError: If ``path`` exists and may not be replaced, or cannot be written.
     """
     path = Path(path)
-    if path.is_dir():
-        raise OutputError(f"{path}: is a folder; name a file")
-    if path.exists() and not overwrite:
-        raise OutputError(f"{path}: exists already; choose another name, or allow overwriting")
+    refuse_existing(path, overwrite=overwrite)
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     except OSError as error:
@@ -42,6 +39,25 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
+    """Refuse an output before long work is done for it.
+
+    Args:
+        path: The file that will be written.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If ``path`` exists and may not be replaced, is a folder, or has no folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file")
+    if path.exists() and not overwrite:
+        raise OutputError(f"{path}: exists already; choose another name, or allow overwriting")
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
 
 
 def _umask() -> int:

@@ -192,7 +192,15 @@ def test_an_output_that_cannot_be_written_is_one_line(inspector, tmp_path):
     run = bare_run(tmp_path / "run.npz")
     status, _, err = inspector("view", run, "--save", tmp_path / "no" / "out.rrd")
     assert (status, err.count("\n")) == (3, 1)
-    assert "cannot be written (No such file or directory)" in err
+    assert "cannot be written (No such file" in err
+
+
+def test_long_work_is_not_begun_for_an_output_that_exists(inspector, tmp_path):
+    (tmp_path / "out.npz").write_text("precious")
+    for long in (["simulate", "panda"], ["train", tmp_path / "gone.npz"]):
+        status, _, err = inspector(*long, "-o", tmp_path / "out.npz")
+        assert (status, err.count("\n")) == (3, 1)
+        assert "exists already" in err
 
 
 def test_the_noise_is_printed_and_written(inspector, tmp_path):
