@@ -1,7 +1,7 @@
 """The robot: read once by Pinocchio, then a table of joints."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -13,7 +13,7 @@ from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRo
 from noisemodel.joints import Joint, table_of
 from noisemodel.native import kept_stderr
 from noisemodel.run import Run
-from noisemodel.types import Array
+from noisemodel.types import Array, Real
 from noisemodel.urdf import Mimic
 
 ROOT = "root_joint"
@@ -113,27 +113,62 @@ class Robot:
         """
         if run.position is None:
             raise RunError(f"the run has no 'position'; {self.name!r} cannot be moved without")
-        by_name = {joint.name: joint for joint in self.joints if joint.nv == 1}
-        q = np.tile(self.neutral, (len(run.time), 1))
-        v = np.zeros((len(run.time), self.nv))
-        for column, name in enumerate(run.joint_names):
-            if name not in by_name:
-                raise UnknownJointError(name, self.name, self.joint_names)
-            joint, position = by_name[name], run.position[:, column]
-            if name in self.mimics:
-                continue
-            if joint.kind == "continuous":
-                q[:, joint.first_q] = np.cos(position)
-                q[:, joint.first_q + 1] = np.sin(position)
-            else:
-                q[:, joint.first_q] = position
-            v[:, joint.first_v] = run.velocity[:, column]
+        q = self._positions(run.joint_names, run.position)
+        v = self._velocities(run.joint_names, run.velocity)
         if self.floating_base:
             if run.base_pose is not None:
                 q[run.mask, :7] = run.base_pose[run.mask]
             if run.base_velocity is not None:
                 v[:, :6] = run.base_velocity
         return q, v
+
+    def desired(self, run: Run) -> tuple[Array, Array] | None:
+        """Order a run's desired motion as Pinocchio does; its base rests.
+
+        Args:
+            run: A run with positions, measured or desired: without desired ones the joints are
+                where they were measured.
+
+        Returns:
+            Configurations, shape (samples, nq), and velocities, shape (samples, nv); None where
+            the run has no desired velocities.
+
+        Raises:
+            UnknownJointError: If the run names a joint that the robot does not have.
+            RunError: If the run has no positions.
+        """
+        if run.velocity_desired is None:
+            return None
+        v = self._velocities(run.desired_joint_names, run.velocity_desired)
+        if run.position_desired is None:
+            return self.configuration(run)[0], v
+        return self._positions(run.desired_joint_names, run.position_desired), v
+
+    def _positions(self, names: tuple[str, ...], position: Real) -> Array:
+        q = np.tile(self.neutral, (len(position), 1))
+        for column, joint in self._named(names):
+            angle = position[:, column]
+            if joint.kind == "continuous":
+                q[:, joint.first_q] = np.cos(angle)
+                q[:, joint.first_q + 1] = np.sin(angle)
+            else:
+                q[:, joint.first_q] = angle
+        return q
+
+    def _velocities(self, names: tuple[str, ...], velocity: Real) -> Array:
+        v = np.zeros((len(velocity), self.nv))
+        for column, joint in self._named(names):
+            v[:, joint.first_v] = velocity[:, column]
+        return v
+
+    def _named(self, names: tuple[str, ...]) -> Iterator[tuple[int, Joint]]:
+        """Go through the columns of joints that move by themselves."""
+        by_name = {joint.name: joint for joint in self.joints if joint.nv == 1}
+        for column, name in enumerate(names):
+            if name not in by_name:
+                raise UnknownJointError(name, self.name, self.joint_names)
+            if name not in self.mimics:
+                yield column, by_name[name]
 
     @property
     def neutral(self) -> Array:

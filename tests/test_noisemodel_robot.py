@@ -1,3 +1,5 @@
+import dataclasses
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -176,3 +178,24 @@ def test_a_missing_example_robot_data_says_how_to_get_it(monkeypatch):
     monkeypatch.setattr(catalog, "distribution", gone)
     with pytest.raises(RobotError, match="pip install example-robot-data"):
         Robot.load("talos")
+
+
+def test_the_desired_motion_is_ordered_like_the_measured_one():
+    time = np.arange(3) / 10
+    names = ("panda_joint2", "panda_joint1")
+    values = np.array([[2.0, 1.0]] * 3)
+    run = Run(
+        time=time,
+        position=values,
+        velocity=values,
+        velocity_desired=10 * values[:, :1],
+        desired_joint_names=("panda_joint2",),
+        joint_names=names,
+    )
+    robot = Robot.load("panda")
+    q, v = robot.desired(run)
+    assert v[0].tolist() == [0.0, 20.0, *[0.0] * 7]
+    assert q[0, :2].tolist() == [1.0, 2.0]  # no desired positions: where they were measured
+    q, _ = robot.desired(dataclasses.replace(run, position_desired=7 * values[:, :1]))
+    assert q[0, :2].tolist() == [0.0, 14.0]
+    assert robot.desired(dataclasses.replace(run, velocity_desired=None)) is None
