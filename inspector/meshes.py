@@ -1,10 +1,12 @@
 """A robot's URDF made safe to draw: visuals only, every mesh found inside the robot's folders."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import noisemodel
 from inspector.errors import InspectorError
+from noisemodel import meshfile, meshpath
 
 DRAWN = {".stl", ".dae", ".obj", ".glb", ".gltf"}
 
@@ -45,44 +47,12 @@ def drawable(urdf: Path, roots: Sequence[Path]) -> str:
 
 
 def _checked(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
-    if not address:
-        raise MeshError("''", f"{urdf.name} names a mesh without a file")
-    allowed = [root.resolve() for root in (*roots, urdf.parent)]
-    found = [path.resolve() for path in _candidates(address, urdf, roots) if path.is_file()]
-    if not found:
-        raise MeshError(address, f"not found in {', '.join(map(str, roots))}")
-    path = found[0]
-    if not any(path.is_relative_to(root) for root in allowed):
-        raise MeshError(address, f"lies outside of {', '.join(map(str, roots))}")
-    if path.suffix.lower() not in DRAWN:
-        raise MeshError(address, f"of kind {path.suffix!r}, expected {', '.join(sorted(DRAWN))}")
-    _check_whole(address, path)
+    try:
+        path = meshpath.find(address, urdf, roots)
+        if path.suffix.lower() not in DRAWN:
+            known = ", ".join(sorted(DRAWN))
+            raise MeshError(address, f"of kind {path.suffix!r}, expected {known}")
+        meshfile.check_whole(path)  # the viewer would draw nothing, and say nothing
+    except noisemodel.MeshError as error:
+        raise MeshError(address or "''", error.problem) from error
     return path
-
-
-def _candidates(address: str, urdf: Path, roots: Sequence[Path]) -> Iterator[Path]:
-    scheme, _, rest = address.rpartition("://")
-    if scheme == "package":
-        yield from (root / rest.lstrip("/") for root in roots)
-    elif scheme in ("", "file"):
-        yield urdf.parent / rest
-
-
-def _check_whole(address: str, path: Path) -> None:
-    """See whether a file ends where it should; the viewer would draw nothing, and say nothing."""
-    size = path.stat().st_size
-    with path.open("rb") as stream:
-        head = stream.read(84)
-        stream.seek(max(0, size - 64))
-        tail = stream.read()
-    if not head.strip():
-        raise MeshError(address, "is empty")
-    kind = path.suffix.lower()
-    if kind == ".obj" and b"\0" in head:
-        raise MeshError(address, "is not text, as an OBJ is")
-    if kind == ".dae" and b"</COLLADA>" not in tail:
-        raise MeshError(address, "is cut off, </COLLADA> is missing")
-    if kind == ".stl" and not (head.startswith(b"solid") and b"endsolid" in tail):
-        triangles = int.from_bytes(head[80:84], "little")
-        if size < 84 + 50 * triangles or len(head) < 84:
-            raise MeshError(address, f"is cut off, {triangles} triangles do not fit {size} bytes")

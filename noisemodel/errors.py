@@ -34,6 +34,64 @@ class RobotError(NoiseModelError):
     """A robot that cannot be found or read, or that moves in a way that is not supported."""
 
 
+class UnknownKindError(NoiseModelError):
+    """A kind of noise estimate that there is not.
+
+    Args:
+        kind: The kind that was asked for.
+        known: The kinds that there are.
+    """
+
+    def __init__(self, kind: str, known: Sequence[str]) -> None:
+        self.kind, self.known = kind, tuple(known)
+        super().__init__(f"no kind {kind!r} of noise; there are {', '.join(known)}")
+
+
+class CornerError(NoiseModelError):
+    """A sample rate at which the radiation of small links cannot be told.
+
+    Args:
+        links: The links that are too small.
+        corners: The corner frequency of each, in [Hz].
+        rate: The sample rate, in [Hz].
+    """
+
+    def __init__(self, links: Sequence[str], corners: Sequence[float], rate: float) -> None:
+        self.links, self.corners, self.rate = tuple(links), tuple(corners), rate
+        named = ", ".join(
+            f"{link} ({corner:.0f} Hz)" for link, corner in zip(links, corners, strict=True)
+        )
+        super().__init__(
+            f"at {rate:g} Hz efficiency 'dipole' needs corners below {rate / 2:g} Hz, these links"
+            f" are too small: {named}; give a number for the efficiency, or a higher rate"
+        )
+
+
+class GeometryError(NoiseModelError):
+    """A robot whose surface cannot be had."""
+
+
+class MeshError(GeometryError):
+    """A mesh that cannot be read, or that has no surface.
+
+    Args:
+        mesh: Its file, or its address in the URDF.
+        problem: What is wrong with it, in one line.
+    """
+
+    def __init__(self, mesh: str | Path, problem: str) -> None:
+        self.mesh, self.problem = str(mesh), problem
+        super().__init__(f"mesh {mesh}: {problem}")
+
+
+class MissingMeshError(MeshError):
+    """A mesh that the URDF names and nobody has."""
+
+    def __init__(self, mesh: str | Path, problem: str) -> None:
+        super().__init__(mesh, problem)
+        self.args = (f"{self}; `missing='skip'` goes on without",)
+
+
 class UnknownRobotError(RobotError):
     """A name that is no listed robot, and no URDF file either.
 

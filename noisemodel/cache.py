@@ -1,0 +1,77 @@
+"""Arrays that took long to make, kept in the user's cache folder for the next time."""
+
+import hashlib
+import io
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel.atomic import replacing
+from noisemodel.errors import OutputError
+
+Arrays: TypeAlias = dict[str, NDArray[Any]]
+
+DIGEST = 32
+"""Bytes after the archive that tell whether it is whole; npz does not mind them."""
+
+
+def remembered(key: str, make: Callable[[], Arrays]) -> Arrays:
+    """Look arrays up by a key, and make them if they are not known yet.
+
+    A cache is a convenience: a file that is damaged is made anew, a folder that cannot be
+    written to is left alone. It may be deleted at any time.
+
+    Args:
+        key: All that the arrays depend on, the version of the code that makes them included; also
+            the file's name. Letters, digits and hyphens.
+        make: Makes the arrays; what it raises is passed on, and nothing is kept.
+
+    Returns:
+        The arrays by name, as ``make`` returns them.
+    """
+    try:
+        file = folder() / f"{key}.npz"
+    except RuntimeError:  # the user has no home
+        return make()
+    try:
+        return _read(file)
+    except (OSError, ValueError):
+        arrays = make()
+    with suppress(OSError, OutputError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        _write(file, arrays)
+    return arrays
+
+
+def _read(file: Path) -> Arrays:
+    content = file.read_bytes()
+    archive, digest = content[:-DIGEST], content[-DIGEST:]
+    if hashlib.sha256(archive).digest() != digest:
+        raise ValueError("damaged")
+    with np.load(io.BytesIO(archive), allow_pickle=False) as kept:
+        return dict(kept)
+
+
+def _write(file: Path, arrays: Arrays) -> None:
+    archive = io.BytesIO()
+    np.savez(archive, allow_pickle=False, **arrays)
+    content = archive.getvalue()
+    with replacing(file, overwrite=True) as temporary:
+        temporary.write_bytes(content + hashlib.sha256(content).digest())
+
+
+def folder() -> Path:
+    """Name the folder of what is remembered about surfaces (which need not exist).
+
+    Raises:
+        RuntimeError: If the user has no home.
+    """
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # as the XDG base directory specification has it
+        base = Path.home() / ".cache"
+    return base / "noise-inspector" / "surfaces"

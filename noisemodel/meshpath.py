@@ -1,0 +1,46 @@
+"""Where the mesh is that a URDF names: inside of the robot's own folders, or nowhere."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from noisemodel.errors import MeshError, MissingMeshError
+
+
+def find(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
+    """Find the file of a mesh.
+
+    Args:
+        address: As the URDF has it: ``package://`` (two slashes or three), ``file://``, or a path
+            relative to the URDF.
+        urdf: The URDF.
+        roots: Folders in which ``package://`` addresses are looked up. Meshes lie in one of these
+            or beside the URDF.
+
+    Returns:
+        The file, with links resolved.
+
+    Raises:
+        MissingMeshError: If there is no such file.
+        MeshError: If there is no address, or the file lies outside of the robot's folders or
+            cannot be reached.
+    """
+    if not address:
+        raise MeshError("''", f"{urdf.name} names a mesh without a file")
+    try:
+        found = [path.resolve() for path in _candidates(address, urdf, roots) if path.is_file()]
+    except OSError as error:  # no permission, or a name too long for a file
+        raise MeshError(address, f"cannot be looked up ({error.strerror})") from error
+    if not found:
+        raise MissingMeshError(address, f"not found in {', '.join(map(str, roots))}")
+    allowed = [root.resolve() for root in (*roots, urdf.parent)]
+    if not any(found[0].is_relative_to(root) for root in allowed):
+        raise MeshError(address, f"lies outside of {', '.join(map(str, roots))}")
+    return found[0]
+
+
+def _candidates(address: str, urdf: Path, roots: Sequence[Path]) -> Iterator[Path]:
+    scheme, _, rest = address.rpartition("://")
+    if scheme == "package":
+        yield from (root / rest.lstrip("/") for root in roots)
+    elif scheme in ("", "file"):
+        yield urdf.parent / rest

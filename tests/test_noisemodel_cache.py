@@ -1,0 +1,117 @@
+import hashlib
+import io
+
+import numpy as np
+import pytest
+
+from noisemodel import cache
+from noisemodel.cache import remembered
+
+
+@pytest.fixture(autouse=True)
+def home(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return tmp_path / "noise-inspector" / "surfaces"
+
+
+class Maker:
+    """Makes arrays, and counts how often."""
+
+    def __init__(self):
+        self.calls = 0
+
+    def __call__(self):
+        self.calls += 1
+        return {"points": np.arange(6.0).reshape(2, 3), "faces": np.array([[0, 1, 0]], np.int32)}
+
+
+def assert_made(arrays):
+    assert set(arrays) == {"points", "faces"}
+    assert np.array_equal(arrays["points"], [[0, 1, 2], [3, 4, 5]])
+    assert arrays["faces"].dtype == np.int32
+
+
+def test_what_is_remembered_is_made_once():
+    make = Maker()
+    assert_made(remembered("a-1", make))
+    assert_made(remembered("a-1", make))
+    assert make.calls == 1
+
+
+def test_another_key_is_another_thing():
+    make = Maker()
+    remembered("a-1", make)
+    remembered("a-2", make)
+    assert make.calls == 2
+
+
+def test_it_lies_in_the_users_cache_folder(home):
+    remembered("a-1", Maker())
+    assert [path.name for path in home.iterdir()] == ["a-1.npz"]
+
+
+@pytest.mark.parametrize("value", ["", "relative/folder", None])
+def test_without_an_absolute_folder_it_is_the_one_in_the_home(tmp_path, monkeypatch, value):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    if value is None:
+        monkeypatch.delenv("XDG_CACHE_HOME")
+    else:
+        monkeypatch.setenv("XDG_CACHE_HOME", value)
+    assert cache.folder() == tmp_path / ".cache" / "noise-inspector" / "surfaces"
+
+
+@pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x05\x06" + b"\0" * 18])
+def test_a_damaged_file_is_made_anew(home, content):
+    make = Maker()
+    remembered("a-1", make)
+    (home / "a-1.npz").write_bytes(content)
+    remembered("a-1", make)
+    assert_made(remembered("a-1", make))
+    assert make.calls == 2
+
+
+def test_a_file_with_one_byte_changed_anywhere_is_made_anew(home):
+    make = Maker()
+    remembered("a-1", make)
+    whole = (home / "a-1.npz").read_bytes()
+    for position in range(len(whole)):
+        damaged = bytearray(whole)
+        damaged[position] ^= 0x55
+        (home / "a-1.npz").write_bytes(damaged)
+        assert_made(remembered("a-1", make))
+    assert make.calls == 1 + len(whole)
+
+
+def test_pickles_in_the_folder_are_not_opened(home):
+    home.mkdir(parents=True)
+    archive = io.BytesIO()
+    np.savez(archive, points=np.array([{"a": 1}], dtype=object))
+    content = archive.getvalue()
+    (home / "a-1.npz").write_bytes(content + hashlib.sha256(content).digest())
+    assert_made(remembered("a-1", Maker()))
+
+
+def test_a_folder_that_cannot_be_written_to_is_no_error(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("in the way")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
+    make = Maker()
+    assert_made(remembered("a-1", make))
+    assert_made(remembered("a-1", make))
+    assert make.calls == 2
+
+
+def test_what_cannot_be_made_is_not_remembered(home):
+    def fail():
+        raise ValueError("no such thing")
+
+    with pytest.raises(ValueError, match="no such thing"):
+        remembered("a-1", fail)
+    assert not home.exists()
+    assert_made(remembered("a-1", Maker()))
+
+
+def test_nothing_but_the_archive_is_left_behind(home):
+    remembered("a-1", Maker())
+    assert len(list(home.iterdir())) == 1
+    with np.load(home / "a-1.npz", allow_pickle=False) as archive:
+        assert_made(dict(archive))

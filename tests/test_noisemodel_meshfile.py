@@ -1,0 +1,338 @@
+import struct
+
+import numpy as np
+import pytest
+import trimesh
+
+from noisemodel import MeshError, catalog, meshfile, shapes
+
+TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
+BRICK = shapes.box(1, 2, 3)
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    return tmp_path / "cache" / "noise-inspector" / "surfaces"
+
+
+def area(triangles):
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+
+
+def stl(triangles, header=b""):
+    facets = b"".join(struct.pack("<12fH", 0, 0, 0, *triangle.ravel(), 0) for triangle in triangles)
+    return header.ljust(80, b"\0") + struct.pack("<I", len(triangles)) + facets
+
+
+def ascii_stl(triangles, name="part"):
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join("vertex {:.9g} {:.9g} {:.9g}\n".format(*corner) for corner in triangle)
+        + "endloop\nendfacet\n"
+        for triangle in triangles
+    )
+    return f"solid {name}\n{facets}endsolid {name}\n".encode()
+
+
+def obj(triangles):
+    points = "".join("v {} {} {}\n".format(*point) for point in triangles.reshape(-1, 3))
+    faces = "".join(f"f {3 * i + 1} {3 * i + 2} {3 * i + 3}\n" for i in range(len(triangles)))
+    return (points + faces).encode()
+
+
+def numbers(array):
+    return " ".join(map(str, np.ravel(array)))
+
+
+def geometry(triangles, name="g", part=None):
+    part = part or (
+        f'<triangles><input semantic="VERTEX" source="#{name}-v" offset="0"/>'
+        f"<p>{numbers(range(3 * len(triangles)))}</p></triangles>"
+    )
+    return f"""<geometry id="{name}"><mesh>
+      <source id="{name}-s"><float_array id="{name}-f">{numbers(triangles)}</float_array>
+        <technique_common><accessor source="#{name}-f" count="{triangles.size // 3}" stride="3"/>
+        </technique_common></source>
+      <vertices id="{name}-v"><input semantic="POSITION" source="#{name}-s"/></vertices>
+      {part}</mesh></geometry>"""
+
+
+def dae(geometries, nodes, asset="", extra=""):
+    return f"""<?xml version="1.0"?>
+    <COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+    <asset>{asset}</asset><library_geometries>{geometries}</library_geometries>{extra}
+    <library_visual_scenes><visual_scene id="scene">{nodes}</visual_scene></library_visual_scenes>
+    <scene><instance_visual_scene url="#scene"/></scene></COLLADA>""".encode()
+
+
+def read(folder, name, content):
+    (folder / name).write_bytes(content)
+    return meshfile.read(folder / name)
+
+
+NODE = '<node id="n"><instance_geometry url="#g"/></node>'
+NODE_H = NODE.replace("#g", "#h")
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("brick.stl", stl(BRICK)),
+        ("brick.STL", stl(BRICK)),
+        ("solid.stl", stl(BRICK, header=b"solid but binary")),
+        ("more.stl", stl(BRICK) + b"trailing bytes"),
+        ("ascii.stl", ascii_stl(BRICK)),
+        ("brick.obj", obj(BRICK)),
+        ("brick.dae", dae(geometry(BRICK), NODE)),
+        ("brick.DAE", dae(geometry(BRICK), NODE)),
+    ],
+)
+def test_one_brick_is_the_same_in_every_kind_of_file(tmp_path, name, content):
+    triangles = read(tmp_path, name, content)
+    assert triangles.dtype == np.float64
+    assert np.array_equal(triangles, BRICK)
+    assert area(triangles) == 22.0
+    assert np.array_equal(meshfile.read(tmp_path / name), BRICK)  # now from the cache
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("two.stl", ascii_stl(BRICK[:5], "a") + ascii_stl(BRICK[5:], "b")),
+        ("two.dae", dae(geometry(BRICK[:5]) + geometry(BRICK[5:], "h"), NODE + NODE_H)),
+        ("two.obj", obj(BRICK).replace(b"f 7", b"o second\nusemtl paint\nf 7")),
+    ],
+)
+def test_a_brick_in_two_parts_is_still_that_brick(tmp_path, name, content):
+    triangles = read(tmp_path, name, content)
+    assert len(triangles) == 12
+    assert area(triangles) == 22.0
+
+
+def test_digits_beyond_single_precision_are_kept(tmp_path):
+    fine = BRICK * 0.1234567890123
+    for name, content in (("a.obj", obj(fine)), ("a.dae", dae(geometry(fine), NODE))):
+        assert np.array_equal(read(tmp_path, name, content), fine)
+        assert np.array_equal(meshfile.read(tmp_path / name), fine)
+
+
+def test_what_is_cached_belongs_to_the_content_not_to_the_name(tmp_path, cache):
+    assert area(read(tmp_path, "a.obj", obj(BRICK))) == 22.0
+    assert area(read(tmp_path, "b.obj", obj(BRICK))) == 22.0
+    assert len(list(cache.iterdir())) == 1
+    assert area(read(tmp_path, "a.obj", obj(2 * BRICK))) == 88.0
+
+
+def test_faces_of_an_obj_may_come_before_their_points_and_be_broken_into_lines(tmp_path):
+    content = b"f 1 2 \\\n 3 # comment\nv 0 0 0 1 # a weight\nv 1 0 0 .5 .5 .5\nv 0 1 0\n"
+    assert np.array_equal(read(tmp_path, "a.obj", content), TRIANGLE)
+
+
+def test_faces_of_an_obj_may_count_backwards_from_their_own_line(tmp_path):
+    content = (
+        b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 0\nv 2 0 0\nv 0 2 0\nf -3/1 -2/1 -1//2\n"
+    )
+    triangles = read(tmp_path, "a.obj", content)
+    assert np.array_equal(triangles, np.concatenate((TRIANGLE, 2 * TRIANGLE)))
+
+
+def test_an_obj_names_no_other_file_that_is_read(tmp_path):
+    content = b"mtllib /etc/hostname\nusemtl x\n" + obj(BRICK)
+    assert area(read(tmp_path, "a.obj", content)) == 22.0
+
+
+def test_comments_in_any_encoding_do_not_matter(tmp_path):
+    assert area(read(tmp_path, "a.obj", "# Größe\n".encode("latin-1") + obj(BRICK))) == 22.0
+    assert area(read(tmp_path, "a.stl", ascii_stl(BRICK).replace(b"part", b"\xe4"))) == 22.0
+
+
+def test_a_dae_is_taken_as_it_is_written_whatever_its_unit_and_upward_axis(tmp_path):
+    asset = '<unit meter="0.001" name="mm"/><up_axis>Y_UP</up_axis>'
+    assert np.array_equal(read(tmp_path, "a.dae", dae(geometry(BRICK), NODE, asset)), BRICK)
+
+
+def test_the_nodes_of_a_dae_move_what_they_contain_in_their_order(tmp_path):
+    nodes = """<node><translate>1 0 0</translate><rotate>0 0 2 90</rotate>
+      <node><scale>2 1 1</scale><matrix>1 0 0 0  0 1 0 5  0 0 1 0  0 0 0 1</matrix>
+      <instance_geometry url="#g"/></node></node>"""
+    triangles = read(tmp_path, "a.dae", dae(geometry(TRIANGLE), nodes))
+    # Up by 5 along y, then twice as long along x, then x to y and y to -x, then 1 along x.
+    assert np.allclose(triangles, [[[-4, 0, 0], [-4, 2, 0], [-5, 0, 0]]], rtol=0, atol=1e-15)
+
+
+def test_a_node_of_a_dae_may_stand_in_several_places(tmp_path):
+    library = f"<library_nodes>{NODE}</library_nodes>"
+    nodes = """<node><instance_node url="#n"/></node>
+      <node><translate>0 0 9</translate><instance_node url="#n"/></node>"""
+    triangles = read(tmp_path, "a.dae", dae(geometry(TRIANGLE), nodes, extra=library))
+    assert np.array_equal(triangles, np.concatenate((TRIANGLE, TRIANGLE + np.array([0, 0, 9]))))
+
+
+def test_a_broken_material_takes_no_geometry_away(tmp_path):
+    effect = """<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><sampler2D>
+      <source>gone</source></sampler2D></newparam></profile_COMMON></effect></library_effects>"""
+    node = """<node><instance_geometry url="#g"><bind_material><technique_common>
+      <instance_material symbol="m" target="#gone"/></technique_common></bind_material>
+      </instance_geometry></node>"""
+    assert np.array_equal(read(tmp_path, "a.dae", dae(geometry(BRICK), node, extra=effect)), BRICK)
+
+
+PENTAGON = np.array([[0, 0, 0], [2, 0, 0], [3, 1, 0], [2, 2, 0], [0, 2, 0]], dtype=float)
+INPUTS = """<input semantic="NORMAL" source="#none" offset="0"/>
+  <input semantic="VERTEX" source="#g-v" offset="1"/>"""
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        f"<polylist>{INPUTS}<vcount>5</vcount><p>9 0 9 1 9 2 9 3 9 4</p></polylist>",
+        f"<polylist>{INPUTS}<vcount>3 2 4</vcount>"
+        "<p>9 0 9 1 9 2 9 0 9 1 9 0 9 2 9 3 9 4</p></polylist>",
+        f"<polygons>{INPUTS}<p>9 0 9 1 9 2</p><p>9 0 9 2 9 3 9 4</p></polygons>",
+        f"<trifans>{INPUTS}<p>9 0 9 1 9 2 9 3 9 4</p></trifans>",
+        f"<tristrips>{INPUTS}<p>9 1 9 2 9 0 9 3 9 4</p></tristrips>",
+        f"<lines>{INPUTS}<p>9 0 9 1</p></lines>"
+        f"<triangles>{INPUTS}<p>9 0 9 1 9 2 9 0 9 2 9 3 9 0 9 3 9 4</p></triangles>",
+    ],
+    ids=["polylist", "mixed polylist", "polygons", "fan", "strip", "lines beside triangles"],
+)
+def test_a_pentagon_has_the_same_area_however_it_is_cut(tmp_path, part):
+    triangles = read(tmp_path, "a.dae", dae(geometry(PENTAGON, part=part), NODE))
+    assert len(triangles) == 3
+    assert area(triangles) == 5.0
+
+
+def test_the_hull_of_a_dented_brick_is_the_brick(tmp_path):
+    dent = np.array([[[-0.5, 0, 1.5], [0.5, 0, 1.5], [0, 0, 0]]])
+    (tmp_path / "dented.stl").write_bytes(stl(np.concatenate((BRICK, dent))))
+    hull = meshfile.hull(tmp_path / "dented.stl")
+    assert area(meshfile.read(tmp_path / "dented.stl")) == 22.75
+    assert np.isclose(area(hull), 22.0, rtol=1e-12)
+
+
+ASCII = ascii_stl(BRICK)
+BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("a.stl", b"", "is empty"),
+        ("a.obj", b" \n", "is empty"),
+        ("a.stl", stl(BRICK)[:-1], "is cut off, 12 triangles do not fit 683 bytes"),
+        ("a.stl", stl(BRICK)[:60], "is cut off"),
+        ("a.stl", ASCII[:-30], "is cut off"),
+        ("a.stl", b"hello", "is cut off"),
+        ("a.stl", stl(BRICK[:0]), "has no triangles"),
+        ("a.stl", b"solid\nendsolid\n", "has no triangles"),
+        ("a.stl", stl(BRICK * np.nan), r"has corners that are not finite \(NaN or infinity\)"),
+        ("a.stl", ASCII.replace(b"vertex 0.5", b"vertex nan"), "not finite"),
+        ("a.stl", ASCII.replace(b"vertex 0.5", b"vertex half", 1), "cannot be read"),
+        ("a.stl", ASCII.replace(b"vertex 0.5 1 1.5\n", b"", 1), "cannot be read"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "has no triangles"),
+        ("a.obj", b"\0\x01\xff" * 9, "is not text, as an OBJ is"),
+        ("a.obj", obj(BRICK).replace(b"0.5", b"half"), "cannot be read"),
+        ("a.obj", obj(BRICK).replace(b"0.5 ", b"", 1), "cannot be read"),
+        ("a.obj", obj(BRICK).replace(b"0.5", b"nan"), "not finite"),
+        ("a.obj", obj(TRIANGLE) + b"f 1 2 9\n", "a face names point 9 of 3"),
+        ("a.obj", obj(TRIANGLE) + b"f 0 1 2\n", "'f 0 1 2' names a point that is not there"),
+        ("a.obj", obj(TRIANGLE) + b"f -1 -2 -4\n", "'f -1 -2 -4' names a point"),
+        ("a.dae", b"<COLLADA>", "is cut off, </COLLADA> is missing"),
+        ("a.dae", b"<COLLADA><a></COLLADA>", "cannot be read .mismatched tag"),
+        ("a.dae", b"<!DOCTYPE a><COLLADA></COLLADA>", "it has a document type or entities"),
+        ("a.dae", b"<COLLADA></COLLADA>", "<COLLADA> has no <instance_visual_scene>"),
+        ("a.dae", dae("", ""), "has no triangles"),
+        ("a.dae", dae("", NODE), "<instance_geometry> refers to '#g', which is not there"),
+        ("a.dae", dae("", BAD_NODE), "cannot be read .*recursion"),
+        ("a.dae", dae(geometry(BRICK * np.nan), NODE), "not finite"),
+        ("a.dae", dae(geometry(BRICK), NODE).replace(b"0.5", b"half"), "cannot be read"),
+        ("a.dae", dae(geometry(BRICK), NODE).replace(b"34 35<", b"34 36<"), "names a point"),
+        ("a.dae", dae(geometry(BRICK), NODE).replace(b" 35<", b"<"), "cannot be read"),
+        (
+            "a.dae",
+            dae(geometry(BRICK), NODE).replace(b'"3"', b'"9' + b"0" * 30 + b'"'),
+            "cannot be",
+        ),
+        ("a.obj", obj(TRIANGLE) + b"f 1 2 9" + b"0" * 30, "a face names point 90"),
+        ("a.dae", dae(geometry(BRICK), NODE).replace(b'"VERTEX"', b'"V"'), "no input VERTEX"),
+        ("a.dae", dae(geometry(BRICK), NODE).replace(b'"POSITION"', b'"P"'), "no input POSITION"),
+        ("a.dae", dae("", "<node><skew>0 0 0 0 0 0 0</skew></node>"), "it has a <skew>"),
+        ("a.dae", dae("", "<node><instance_controller/></node>"), "it has a skin"),
+        ("a.dae", dae(geometry(BRICK, part=f"<polygons>{INPUTS}<ph/></polygons>"), NODE), "holes"),
+        ("a.dae", dae(geometry(BRICK, part=f"<patch>{INPUTS}</patch>"), NODE), "it has <patch>"),
+        (
+            "a.dae",
+            dae(geometry(BRICK, part=f"<polylist>{INPUTS}<vcount>4</vcount></polylist>"), NODE),
+            "a <polylist> of 4 corners has 0",
+        ),
+        ("a.step", b"x", "of kind '.step', expected .dae, .obj, .stl"),
+    ],
+)
+def test_a_file_that_is_no_mesh_is_named_in_one_line(tmp_path, cache, name, content, problem):
+    with pytest.raises(MeshError, match=f"mesh {tmp_path}/{name}: .*{problem}") as caught:
+        read(tmp_path, name, content)
+    assert "\n" not in str(caught.value)
+    assert not cache.exists()
+
+
+def test_a_file_that_cannot_be_opened_is_named(tmp_path):
+    with pytest.raises(MeshError, match=r"gone.stl: cannot be read \(No such file or directory\)"):
+        meshfile.read(tmp_path / "gone.stl")
+
+
+def test_a_flat_mesh_has_no_hull(tmp_path):
+    (tmp_path / "flat.stl").write_bytes(stl(BRICK[:2]))
+    with pytest.raises(MeshError, match="flat.stl: is flat, it has no convex hull"):
+        meshfile.hull(tmp_path / "flat.stl")
+
+
+@pytest.mark.parametrize("damage", ["cut", "changed"])
+def test_damaged_files_are_errors_or_meshes_and_nothing_else(tmp_path, damage):
+    random = np.random.default_rng(1)
+    whole = {"a.stl": ASCII, "b.stl": stl(BRICK), "a.obj": obj(BRICK)}
+    whole["a.dae"] = dae(geometry(BRICK), NODE)
+    for name, content in whole.items():
+        for _ in range(40):
+            place = int(random.integers(len(content)))
+            bad = content[:place]
+            if damage == "changed":
+                bad += bytes([int(random.integers(256))]) + content[place + 1 :]
+            try:
+                triangles = read(tmp_path, name, bad)
+            except MeshError:
+                continue
+            assert np.isfinite(triangles).all()
+
+
+@pytest.mark.slow
+def test_every_stl_and_obj_of_the_listed_robots_is_as_trimesh_reads_it():
+    files = [*catalog.package_roots()[-1].rglob("*.*")]
+    count = 0
+    for file in files:
+        if file.suffix.lower() in (".stl", ".obj"):
+            mesh = trimesh.load_mesh(file, process=False)
+            ours = meshfile.read(file)
+            assert len(ours) == len(mesh.faces), file
+            assert np.isclose(area(ours), mesh.area, rtol=1e-12), file
+            bounds = (ours.min(axis=(0, 1)), ours.max(axis=(0, 1)))
+            assert np.allclose(bounds, mesh.bounds, rtol=0, atol=1e-12), file
+            count += 1
+    assert count == 491
+
+
+@pytest.mark.slow
+def test_every_dae_of_the_listed_robots_fills_the_box_that_pinocchio_finds():
+    import coal  # its boxes are right, its triangles are not
+
+    files = [f for f in catalog.package_roots()[-1].rglob("*.*") if f.suffix.lower() == ".dae"]
+    for file in files:
+        mesh = coal.MeshLoader().load(str(file), np.ones(3))
+        mesh.computeLocalAABB()
+        low, high = np.ravel(mesh.aabb_local.min_), np.ravel(mesh.aabb_local.max_)
+        points = meshfile.read(file).reshape(-1, 3)
+        size = np.abs(high - low).max()
+        assert np.abs(points.min(axis=0) - low).max() < 1e-6 * size, file
+        assert np.abs(points.max(axis=0) - high).max() < 1e-6 * size, file
+    assert len(files) == 286
