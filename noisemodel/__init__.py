@@ -7,24 +7,42 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 
 from noisemodel.block import Block
 from noisemodel.catalog import ROBOTS
+from noisemodel.compare import compare
+from noisemodel.comparison import Comparison
 from noisemodel.errors import (
+    CornerError,
+    GeometryError,
+    MeshError,
+    MissingMeshError,
     NoiseModelError,
     OutputError,
     RobotError,
     RunError,
     RunFileError,
     UnknownJointError,
+    UnknownKindError,
     UnknownRobotError,
 )
+from noisemodel.extended import extended, extended_chunks
 from noisemodel.kinematics import link_twists
 from noisemodel.lowering import lowered
+from noisemodel.noise import Noise
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.simplified import simplified
+from noisemodel.speed import KINDS, surface_speed
+from noisemodel.surface import Surface
 
 __all__ = [
+    "KINDS",
     "ROBOTS",
     "Block",
+    "Comparison",
+    "CornerError",
+    "GeometryError",
+    "MeshError",
+    "MissingMeshError",
+    "Noise",
     "NoiseModelError",
     "OutputError",
     "Robot",
@@ -32,9 +50,15 @@ __all__ = [
     "Run",
     "RunError",
     "RunFileError",
+    "Surface",
     "UnknownJointError",
+    "UnknownKindError",
     "UnknownRobotError",
+    "compare",
+    "extended",
+    "extended_chunks",
     "link_twists",
     "lowered",
     "simplified",
+    "surface_speed",
 ]

@@ -140,26 +140,30 @@ class Robot:
         if run.velocity_desired is None:
             return None
         v = self._velocities(run.desired_joint_names, run.velocity_desired)
+        if run.position_desired is None and run.position is not None:
+            return self._positions(run.joint_names, run.position), v
         if run.position_desired is None:
-            return self.configuration(run)[0], v
+            raise RunError(f"the run has no positions; {self.name!r} cannot be moved without")
         return self._positions(run.desired_joint_names, run.position_desired), v
 
     def _positions(self, names: tuple[str, ...], position: Real) -> Array:
-        q = np.tile(self.neutral, (len(position), 1))
+        # Samples lie next to each other in memory, as batch kinematics reads them.
+        q = np.tile(self.neutral[:, None], len(position))
+        columns = np.ascontiguousarray(position.T)
         for column, joint in self._named(names):
-            angle = position[:, column]
+            angle = columns[column]
             if joint.kind == "continuous":
-                q[:, joint.first_q] = np.cos(angle)
-                q[:, joint.first_q + 1] = np.sin(angle)
+                q[joint.first_q], q[joint.first_q + 1] = np.cos(angle), np.sin(angle)
             else:
-                q[:, joint.first_q] = angle
-        return q
+                q[joint.first_q] = angle
+        return q.T
 
     def _velocities(self, names: tuple[str, ...], velocity: Real) -> Array:
-        v = np.zeros((len(velocity), self.nv))
+        v = np.zeros((self.nv, len(velocity)))
+        columns = np.ascontiguousarray(velocity.T)
         for column, joint in self._named(names):
-            v[:, joint.first_v] = velocity[:, column]
-        return v
+            v[joint.first_v] = columns[column]
+        return v.T
 
     def _named(self, names: tuple[str, ...]) -> Iterator[tuple[int, Joint]]:
         """Go through the columns of joints that move by themselves."""

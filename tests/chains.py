@@ -1,0 +1,36 @@
+"""Robots that are chains of simple shapes, and random motions for robots."""
+
+import numpy as np
+import pinocchio as pin
+
+from noisemodel import Robot
+
+BAR = '<visual><origin xyz="0.1 0 0.3"/><geometry><box size="0.2 0.1 0.6"/></geometry></visual>'
+
+
+def chain(folder, *kinds, shapes=None, axis="0 0 1", follow="", **options):
+    """A robot with a joint of each kind, and a bar on each link unless told otherwise."""
+    shapes = [BAR] * len(kinds) if shapes is None else shapes
+    text = '<robot name="chain"><link name="link0"/>'
+    for number, (kind, shape) in enumerate(zip(kinds, shapes, strict=True), start=1):
+        text += f"""
+          <link name="link{number}">{shape}</link>
+          <joint name="joint{number}" type="{kind}">
+            <parent link="link{number - 1}"/><child link="link{number}"/>
+            <origin xyz="0.1 0.2 0.6" rpy="0.3 0.5 0.7"/><axis xyz="{axis}"/>
+            <limit lower="-9" upper="9" effort="1" velocity="1"/>{follow if number > 1 else ""}
+          </joint>"""
+    path = folder / "chain.urdf"
+    path.write_text(text + "</robot>")
+    return Robot.load(path, **options)
+
+
+def motion(robot, samples=40, seed=1):
+    """Configurations far from neutral, and velocities."""
+    random = np.random.default_rng(seed)
+    if robot.mimics:
+        return random.standard_normal((2, samples, robot.nv))
+    neutral = pin.neutral(robot.model)
+    steps = 2 * random.standard_normal((samples, robot.nv))
+    q = np.array([pin.integrate(robot.model, neutral, step) for step in steps])
+    return q, random.standard_normal((samples, robot.nv))

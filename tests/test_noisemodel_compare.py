@@ -1,0 +1,171 @@
+import numpy as np
+import pytest
+from chains import BAR, chain, motion
+
+from noisemodel import (
+    GeometryError,
+    NoiseModelError,
+    Robot,
+    Surface,
+    UnknownKindError,
+    compare,
+    extended,
+)
+
+RATE = 1000.0
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def panda():
+    robot = Robot.load("panda")
+    return robot, Surface.of(robot)
+
+
+def swinging(robot, samples=2000):
+    """Every joint swings at its own rate."""
+    time = np.arange(samples)[:, None] / RATE
+    rates = 2 * np.pi * np.linspace(0.7, 3.1, robot.nv)
+    return np.sin(rates * time) / rates, np.cos(rates * time)
+
+
+@pytest.fixture(scope="module")
+def comparison(panda):
+    return compare(panda[0], *swinging(panda[0]), rate=RATE, surface=panda[1], events=[(500, 700)])
+
+
+def test_each_kind_is_as_itself(comparison):
+    assert np.allclose(np.diag(comparison.correlation), 1.0, rtol=1e-12)
+    assert not np.diag(comparison.distance).any()
+
+
+def test_comparing_has_no_direction(comparison):
+    assert np.allclose(comparison.correlation, comparison.correlation.T, rtol=1e-12)
+    assert np.array_equal(comparison.distance, comparison.distance.T)
+    assert (np.abs(comparison.correlation) <= 1 + 1e-12).all()
+
+
+def test_one_revolute_joint_alone_makes_the_same_noise_in_every_kind(tmp_path):
+    """With one degree of freedom all kinds are the same up to a factor."""
+    robot = chain(tmp_path, "revolute")
+    found = compare(robot, *swinging(robot), rate=RATE, events=[(0, 100)])
+    assert np.allclose(found.correlation, 1.0, rtol=1e-9)
+    assert np.allclose(found.distance, 0.0, atol=1e-6)
+    assert np.ptp(found.contrast) < 1e-9
+    assert np.allclose(found.shares, 1.0)
+    assert np.allclose(found.terms, [[0, 0, 1]], atol=1e-9)
+
+
+def test_a_factor_is_no_difference(panda):
+    robot, surface = panda
+    q, v = swinging(robot)
+    one, ten = (compare(robot, q, scale * v, rate=RATE, surface=surface) for scale in (1, 10))
+    assert np.allclose(one.correlation, ten.correlation, rtol=1e-9)
+    assert np.allclose(one.distance, ten.distance, rtol=1e-9)
+    assert np.allclose(one.terms, ten.terms, rtol=1e-9)
+
+
+def test_shares_are_those_of_the_noise(panda, comparison):
+    robot, surface = panda
+    for kind in ("paper", "normal"):
+        noise = extended(robot, surface, *swinging(robot), kind)
+        found = comparison.shares[comparison.kinds.index(kind)]
+        assert np.allclose(found, noise.shares()[0], rtol=1e-12)
+    assert np.allclose(comparison.shares.sum(axis=1), 1.0, rtol=1e-12)
+
+
+def test_the_simplified_noise_shares_by_joint_velocity(panda, comparison):
+    _, v = swinging(panda[0])
+    squares = (v**2).sum(axis=0)
+    assert np.allclose(comparison.shares[0], squares / squares.sum(), rtol=1e-12)
+
+
+def test_a_joint_that_follows_has_no_share_of_the_simplified_noise(panda):
+    robot = Robot.load("panda", mimic=True)
+    q, v = swinging(robot)
+    found = compare(robot, q, v, ["simplified"], rate=RATE)
+    assert found.shares[0, -1] == 0.0
+    assert found.shares[0, -2] > 0.0
+    assert found.shares[0].sum() == pytest.approx(1.0)
+
+
+def test_the_terms_are_shares_of_the_power_of_paper(panda, comparison):
+    assert comparison.terms.shape == (9, 3)
+    assert comparison.terms.sum() == pytest.approx(1.0, rel=1e-12)
+    paper = comparison.shares[comparison.kinds.index("paper")]
+    assert np.allclose(comparison.terms.sum(axis=1), paper, rtol=1e-12)
+
+
+def test_an_event_stands_out_by_its_level(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    v = np.ones((1000, 1))
+    v[400:500] = 10.0
+    found = compare(robot, np.zeros((1000, 1)), v, rate=RATE, events=[(400, 500)])
+    assert np.allclose(found.contrast, 20.0, rtol=1e-9)
+
+
+def test_without_events_there_is_no_contrast(panda):
+    found = compare(panda[0], *swinging(panda[0]), ["paper", "simplified"], rate=RATE)
+    assert np.isnan(found.contrast).all()
+    assert "contrast" not in str(found)
+
+
+def test_a_chatter_that_one_kind_cannot_hear_is_found_in_its_frequencies(tmp_path):
+    """A slider's bare carrier chatters: "C" has no link to hear it by, "paper" has the slider."""
+    robot = chain(tmp_path, "revolute", "prismatic", shapes=["", BAR])
+    q, v = swinging(robot, samples=4000)
+    v[:, 0] += 0.5 * np.cos(2 * np.pi * 200 * np.arange(4000) / RATE)
+    found = compare(robot, q, v, ["C", "paper"], rate=RATE)
+    assert found.distance_by_frequency.shape == (2, 2, len(found.frequency))
+    assert found.frequency[0] == 0.0
+    assert found.frequency[-1] == pytest.approx(RATE / 2, rel=1e-12)
+    overall = np.sqrt(np.mean(found.distance_by_frequency[0, 1] ** 2))
+    assert overall == pytest.approx(found.distance[0, 1], rel=1e-12)
+    apart = found.distance_by_frequency[0, 1]
+    assert apart[np.abs(found.frequency - 200).argmin()] > 2 * np.median(apart)
+
+
+def test_silence_is_compared_without_a_word(panda):
+    robot, surface = panda
+    q, v = swinging(robot)
+    found = compare(robot, q, 0 * v, rate=RATE, surface=surface)
+    assert np.isnan(found.correlation).all()
+    assert not found.distance.any()
+    assert not found.shares.any()
+    assert not found.terms.any()
+
+
+def test_a_comparison_prints_as_a_table(comparison):
+    text = str(comparison)
+    for word in ("simplified", "normal", "correlation", "spectral distance [dB]", "contrast"):
+        assert word in text
+    assert "of the energy of paper: A " in text
+    assert max(map(len, text.splitlines())) <= 28 + 6 * 11
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"kinds": ["paper", "loud"]}, UnknownKindError, "no kind 'loud' of noise; .* simplified"),
+        ({"kinds": []}, NoiseModelError, "no kinds to compare, expected some of simplified"),
+        ({"rate": 0.0}, NoiseModelError, "rate is 0 Hz"),
+        ({"rate": 30.0}, NoiseModelError, "2000 samples at 30 Hz, expected .* 40 Hz"),
+        ({"rate": 1e6}, NoiseModelError, r"2000 samples at 1e\+06 Hz, expected 0\.1024 s at least"),
+        ({"events": [(5, 5)]}, NoiseModelError, "a stretch from sample 5 to 5"),
+    ],
+)
+def test_what_cannot_be_compared_is_refused(panda, options, error, message):
+    with pytest.raises(error, match=message):
+        compare(panda[0], *swinging(panda[0]), **({"rate": RATE} | options))
+
+
+def test_the_surface_of_another_robot_is_refused(panda, tmp_path):
+    robot = chain(tmp_path, "revolute")
+    with pytest.raises(GeometryError, match="which has 1"):
+        compare(robot, *motion(robot, samples=200), rate=RATE, surface=panda[1])
