@@ -15,6 +15,8 @@ class Contents:
     Attributes:
         joints: Title and entity paths of each plot of joint signals.
         root: Frame that the robot is seen from; None without a robot.
+        links: Whether there is noise of links.
+        terms: Whether there are the paper's terms A, B and C.
         scores: Whether there are scores.
         lanes: Whether there are found or annotated classes.
         rate: Samples per second, in [Hz].
@@ -22,6 +24,8 @@ class Contents:
 
     joints: Sequence[tuple[str, Sequence[str]]]
     root: str | None
+    links: bool
+    terms: bool
     scores: bool
     lanes: bool
     rate: float
@@ -36,14 +40,13 @@ def layout(contents: Contents) -> rrb.Blueprint:
     Returns:
         The blueprint; all time axes are linked.
     """
-    over_time: list[tuple[rrb.View | rrb.Container, float]] = [
-        (_lanes(), 2),
-        (_noise(), 3),
-        (_spectrogram(contents), 3),
-        (_joints(contents), 4),
-    ]
-    if not contents.lanes:
-        over_time = over_time[1:]
+    over_time: list[tuple[rrb.View | rrb.Container, float]] = []
+    if contents.lanes:
+        over_time.append((_lanes(), 2.6))
+    over_time.append((_noise(), 2.2))
+    if contents.links:
+        over_time.append((_power(contents), 2.2))
+    over_time += [(_spectrogram(contents), 2.8), (_details(contents), 4.2)]
     right = rrb.Vertical(
         *(part for part, _ in over_time), row_shares=[share for _, share in over_time]
     )
@@ -53,7 +56,7 @@ def layout(contents: Contents) -> rrb.Blueprint:
     )
     left: rrb.Container = text
     if contents.root is not None:
-        left = rrb.Vertical(_robot(contents.root), text, row_shares=[3, 2])
+        left = rrb.Vertical(_robot(contents.root, coloured=contents.links), text, row_shares=[3, 2])
     return rrb.Blueprint(
         rrb.Horizontal(left, right, column_shares=[2, 3]),
         rrb.BlueprintPanel(state="collapsed"),
@@ -68,11 +71,11 @@ def _time_axis() -> rrb.TimeAxis:
     return rrb.TimeAxis(link="LinkToGlobal")
 
 
-def _robot(root: str) -> rrb.Spatial3DView:
+def _robot(root: str, *, coloured: bool) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         contents=["/robot/**"],
-        name="Robot",
+        name="Robot, coloured by vibration" if coloured else "Robot",
         spatial_information=rrb.SpatialInformation(target_frame=root),
         background=rrb.Background(color=(24, 26, 30)),
         line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=(70, 74, 82, 130)),
@@ -89,6 +92,31 @@ def _noise() -> rrb.TimeSeriesView:
         name="Noise, simplified estimate [rad/s]",
         plot_legend=rrb.PlotLegend(visible=False),
         axis_x=_time_axis(),
+    )
+
+
+def _power(contents: Contents) -> rrb.Tabs:
+    def plot(name: str, *paths: str) -> rrb.TimeSeriesView:
+        return rrb.TimeSeriesView(
+            origin="/power",
+            contents=list(paths),
+            name=name,
+            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
+            axis_x=_time_axis(),
+        )
+
+    plots = [
+        plot("Sound power, extended estimate [dB re 1 pW]", "/power/total"),
+        plot("loudest links", "/power/links/**"),
+    ]
+    if contents.terms:
+        plots.append(plot("terms A, B, C", "/power/terms/**", "/power/total"))
+    return rrb.Tabs(*plots, active_tab=0)
+
+
+def _levels() -> rrb.StateTimelineView:
+    return rrb.StateTimelineView(
+        origin="/level", name="Loudest links, above 10 Hz", time_view=_time_axis()
     )
 
 
@@ -112,8 +140,9 @@ def _spectrogram(contents: Contents) -> rrb.Tabs:
     )
 
 
-def _joints(contents: Contents) -> rrb.Tabs:
-    plots = [
+def _details(contents: Contents) -> rrb.Tabs:
+    plots: list[rrb.View] = [_levels()] if contents.links else []
+    plots += [
         rrb.TimeSeriesView(
             origin="/joints",
             contents=list(paths),

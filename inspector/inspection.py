@@ -7,7 +7,9 @@ from pathlib import Path
 
 import models
 import noisemodel as nm
+from inspector.errors import InspectorError
 from inspector.labelling import CannotTellError, Library, label_run
+from inspector.linknoise import LinkNoise, link_noise
 from noisemodel.types import Array
 
 
@@ -23,6 +25,7 @@ class Inspection:
         labels: One label per frame; None where no model fits.
         model: Name of the model that labelled, empty without.
         events: Findings: stretches that are not ``ok``.
+        links: Noise link by link; None without a robot.
         remarks: What is missing and why, a sentence each.
     """
 
@@ -33,26 +36,39 @@ class Inspection:
     labels: models.Labels | None
     model: str
     events: tuple[models.Event, ...]
+    links: LinkNoise | None
     remarks: tuple[str, ...]
 
     @property
     def has_robot(self) -> bool:
         """Whether there is a robot to draw, and motion to move it by."""
-        return _robot_known(self.run) and self.run.position is not None
+        return self.links is not None
 
 
-def inspect(path: Path, library: Library) -> Inspection:
+def inspect(
+    path: Path,
+    library: Library,
+    *,
+    robot: bool = True,
+    kind: str = "normal",
+    terms: bool = False,
+) -> Inspection:
     """Read a run file, compute its noise and label it.
 
     Args:
         path: A run file.
         library: Models to choose from by rate.
+        robot: Whether to look at the robot, if the run names one that is known.
+        kind: Kind of the extended noise, see ``noisemodel.extended``.
+        terms: Whether to look at the paper's terms A, B and C one by one.
 
     Returns:
         The run with its labels, or with a remark why there are none.
 
     Raises:
         RunFileError: If the file is no run file.
+        RobotError: If its robot cannot be read, or lacks one of its joints.
+        InspectorError: If the robot's shape cannot be had.
     """
     run = nm.Run.load(path)
     remarks = list(_remarks(run))
@@ -64,6 +80,15 @@ def inspect(path: Path, library: Library) -> Inspection:
     else:
         labels, model = labelled.labels, labelled.model
         remarks += [labelled.remark] if labelled.remark else []
+    links = None
+    if robot and robot_known(run) and run.position is not None:
+        try:
+            links = link_noise(run, kind, terms=terms)
+        except nm.GeometryError as error:
+            raise InspectorError(
+                f"{error}; `--no-robot` shows the run without the robot"
+            ) from error
+        remarks += links.remarks
     return Inspection(
         name=path.stem,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -72,11 +97,13 @@ def inspect(path: Path, library: Library) -> Inspection:
         labels=labels,
         model=model,
         events=() if labels is None else labels.events(),
+        links=links,
         remarks=tuple(remarks),
     )
 
 
-def _robot_known(run: nm.Run) -> bool:
+def robot_known(run: nm.Run) -> bool:
+    """Whether a run names a listed robot, or a URDF."""
     return run.robot is not None and (run.robot in nm.ROBOTS or run.robot.endswith(".urdf"))
 
 
@@ -84,7 +111,7 @@ def _remarks(run: nm.Run) -> Iterator[str]:
     """Say what a run does not hold."""
     if run.robot is None:
         yield "No 3D robot: the run names none."
-    elif not _robot_known(run):
+    elif not robot_known(run):
         yield f"No 3D robot: {run.robot!r} is neither a listed robot nor a URDF file."
     elif run.position is None:
         yield "No 3D robot: the run has no positions."

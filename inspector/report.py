@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from inspector.inspection import Inspection
+from models import Event
 
 
 def report(inspection: Inspection) -> str:
@@ -28,14 +29,32 @@ def report(inspection: Inspection) -> str:
         _table(("", ""), facts),
     ]
     if inspection.events:
-        rows = [(e.label, f"{e.start:.2f}", f"{e.stop:.2f}") for e in inspection.events]
-        parts += ["## Events", _table(("class", "from [s]", "to [s]"), rows)]
+        found = [
+            (e.label, f"{e.start:.2f}", f"{e.stop:.2f}", culprits(inspection, e))
+            for e in inspection.events
+        ]
+        head = ("class", "from [s]", "to [s]", "links with the largest excess")
+        parts += ["## Events", _table(head, found)]
     if run.blocks:
         rows = [(b.label, f"{b.start:.2f}", f"{b.stop:.2f}") for b in run.blocks]
         parts += ["## Annotated", _table(("class", "from [s]", "to [s]"), rows)]
     if inspection.remarks:
         parts += ["## Remarks", "\n".join(f"- {remark}" for remark in inspection.remarks)]
     return "\n\n".join(parts) + "\n"
+
+
+def sentence(inspection: Inspection, event: Event) -> str:
+    """Say what an event is, when, and in which links it shows."""
+    links = culprits(inspection, event)
+    return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{links and f': {links}'}"
+
+
+def culprits(inspection: Inspection, event: Event) -> str:
+    """Name the links in which an event shows most, with their shares of the excess."""
+    if inspection.links is None:
+        return ""
+    shares = inspection.links.culprits(event, inspection.events)
+    return ", ".join(f"{link} {share:.0%}" for link, share in shares)
 
 
 def verdict(inspection: Inspection) -> str:

@@ -16,6 +16,14 @@ from noisemodel.run import Run
 FRAMES_PER_SECOND = 50.0
 MAX_FRAMES = 2000
 WORLD = "world"
+COLOURED = {
+    "Asset3D": "albedo_factor",
+    "Boxes3D": "colors",
+    "Capsules3D": "colors",
+    "Cylinders3D": "colors",
+    "Ellipsoids3D": "colors",
+}
+"""The shapes that a URDF becomes, and what colours each."""
 
 
 def load(name: str) -> UrdfTree:
@@ -54,16 +62,55 @@ def check_joints(tree: UrdfTree, run: Run) -> None:
             raise UnknownJointError(name, tree.name, known)
 
 
-def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run) -> None:
+def root(tree: UrdfTree, run: Run) -> str:
+    """Name the frame that a robot is seen from: its base, or the world if that moves."""
+    return WORLD if run.base_pose is not None else str(tree.root_link().name)
+
+
+def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
+    """List, for each link that moves, the URDF's links that are fixed to it, itself first.
+
+    What is fixed to the root belongs to the root.
+    """
+    groups = {tree.root_link().name: [tree.root_link().name]}
+    carrier = {tree.root_link().name: tree.root_link().name}
+    waiting = list(tree.joints())
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent_link in carrier]
+        for joint in ready:
+            fixed = joint.joint_type == "fixed"
+            carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
+            groups.setdefault(carrier[joint.child_link], []).append(joint.child_link)
+        waiting = [joint for joint in waiting if joint not in ready]
+    return groups
+
+
+def shapes(tree: UrdfTree) -> dict[str, str]:
+    """Tell the shape of each entity that is drawn, a key of ``COLOURED``."""
+    found = {}
+    for chunk in tree.stream().to_chunks():
+        for name in chunk.to_record_batch().schema.names:
+            shape, _, component = name.partition(":")
+            if shape in COLOURED and component != COLOURED[shape]:
+                found[chunk.entity_path] = shape
+    return found
+
+
+def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bool) -> None:
     """Log a robot and its motion.
 
     Args:
         recording: Where to.
         tree: The robot.
         run: A run with positions; joints that it does not name rest.
+        coloured: Whether colours over time will follow: the URDF's own, which are static and
+            would hide them, are left out then.
     """
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    rr.send_chunks(tree.stream(), recording=recording)
+    drawn = tree.stream()
+    if coloured:
+        drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])
+    rr.send_chunks(drawn, recording=recording)
     assert run.position is not None
     step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
     shown = np.arange(0, len(run.time), step)

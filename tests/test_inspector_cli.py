@@ -214,6 +214,29 @@ def test_the_noise_is_printed_and_written(inspector, tmp_path):
     assert len(lines) == 10_001
 
 
+def test_simplified_and_extended_noise_are_printed_side_by_side(inspector, tmp_path):
+    status, out, _ = inspector("noise", demo_run(), "--csv", tmp_path / "noise.csv")
+    assert status == 0
+    simplified, _, paper = out.partition("paper: rms")
+    assert "simplified: rms" in simplified
+    assert "panda_joint2, desired" in simplified
+    assert "panda_link3" in paper
+    head, first, *_ = (tmp_path / "noise.csv").read_text(encoding="utf-8").splitlines()
+    assert head == "time [s],simplified [rad/s],paper [√W]"
+    assert len(first.split(",")) == 3
+    status, out, _ = inspector("noise", demo_run(), "--kind", "normal", "--kind", "A")
+    assert [line.split(":")[0] for line in out.splitlines() if "rms" in line] == ["normal", "A"]
+
+
+def test_a_kind_that_does_not_exist_or_cannot_be_had_is_one_line(inspector, tmp_path):
+    status, _, err = inspector("noise", demo_run(), "--kind", "loud")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "no kind 'loud' of noise; there are simplified, paper" in err
+    status, _, err = inspector("noise", bare_run(tmp_path / "run.npz"), "--kind", "paper")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "kind 'paper' needs a robot, the run names None" in err
+
+
 def test_a_log_is_imported(inspector, tmp_path):
     time = np.arange(2000) / 1000
     log = "\n".join(["time,elbow.velocity", *(f"{t:.4f},{np.sin(t):.6f}" for t in time)])

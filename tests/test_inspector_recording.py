@@ -9,7 +9,6 @@ from rerun.chunk import RrdReader
 
 from inspector.errors import InspectorError
 from inspector.inspection import Inspection, inspect
-from inspector.meshes import MeshError
 from inspector.recording import NOISE_POINTS, write
 from models import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
@@ -25,10 +24,12 @@ def strict():
 def panda_run(**changes):
     time = np.arange(30_000) / 10_000
     phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
+    rattle = 0.1 * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
+    velocity = np.cos(phase) + rattle[:, None]
     fields = {
         "time": time,
-        "velocity": np.cos(phase),
-        "velocity_desired": np.cos(phase),
+        "velocity": velocity,
+        "velocity_desired": velocity,
         "position": 0.1 * np.sin(phase),
         "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
         "robot": "panda",
@@ -38,11 +39,12 @@ def panda_run(**changes):
     return Run(**(fields | changes))
 
 
-def inspected(run, tmp_path, labels=None) -> Inspection:
+def inspected(run, tmp_path, labels=None, **options) -> Inspection:
     path = tmp_path / "run.npz"
     run.save(path, overwrite=True)
     events = (Event("impact", 0.5, 1.0, 0.9),) if labels else ()
-    return dataclasses.replace(inspect(path, {}), labels=labels, events=events, model="a model")
+    found = inspect(path, {}, **options)
+    return dataclasses.replace(found, labels=labels, events=events, model="a model")
 
 
 def some_labels():
@@ -163,7 +165,7 @@ def test_the_report_says_what_was_found(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert "1 finding: impact" in text[0]
-    assert "| impact | 0.50 | 1.00 |" in text[0]
+    assert "| impact | 0.50 | 1.00 | panda_" in text[0]
     assert "| scenario | made up |" in text[0]
 
 
@@ -229,27 +231,76 @@ def test_the_same_input_makes_the_same_recording_id(tmp_path):
 
 def test_a_joint_that_the_robot_lacks_is_named(tmp_path):
     names = ("elbow", *(f"panda_joint{i}" for i in range(2, 8)))
-    found = inspected(panda_run(joint_names=names), tmp_path)
     with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'; it has panda_"):
-        write(found, tmp_path / "out.rrd")
-    assert not list(tmp_path.glob("*.rrd"))
+        inspected(panda_run(joint_names=names), tmp_path)
 
 
 def test_an_unreadable_urdf_is_named(tmp_path):
     (tmp_path / "bad.urdf").write_text("<robot")
-    found = inspected(panda_run(robot=str(tmp_path / "bad.urdf")), tmp_path)
     with pytest.raises(RobotError, match="bad.urdf: not XML"):
-        write(found, tmp_path / "out.rrd")
+        inspected(panda_run(robot=str(tmp_path / "bad.urdf")), tmp_path)
 
 
 def test_an_unreadable_mesh_is_named_and_the_run_can_be_shown_without(tmp_path):
     leg = one_legged(tmp_path)
     leg.write_text(leg.read_text().replace("<box size=", '<mesh filename="gone.stl" scale='))
-    found = inspected(panda_run(robot=str(leg)), tmp_path)
-    with pytest.raises(MeshError, match="mesh gone.stl: not found"):
-        write(found, tmp_path / "out.rrd")
-    write(found, tmp_path / "out.rrd", robot=False)
+    run = Run(
+        time=np.arange(4000) / 1000,
+        velocity=np.zeros((4000, 1)),
+        position=np.zeros((4000, 1)),
+        joint_names=("HAA",),
+        robot=str(leg),
+    )
+    with pytest.raises(InspectorError, match="mesh gone.stl: not found.*--no-robot"):
+        inspected(run, tmp_path)
+    write(inspected(run, tmp_path, robot=False), tmp_path / "out.rrd")
     assert "/noise/simplified" in entities(tmp_path / "out.rrd")
+
+
+def test_links_are_coloured_by_their_vibration_and_the_urdfs_static_colours_are_gone(whole):
+    path, _ = whole
+    mesh = "/robot/panda/visual_geometries/panda_link3/visual_0"
+    time, colours = read(path, mesh, "Asset3D:albedo_factor")
+    assert time is not None  # a static colour would hide the others
+    assert len(colours) >= 1
+
+
+def test_links_made_of_boxes_are_coloured_too(tmp_path):
+    time = np.arange(4000) / 1000
+    run = Run(
+        time=time,
+        velocity=np.sin(2 * np.pi * 50 * time)[:, None] * (time > 2)[:, None],
+        position=np.zeros((4000, 1)),
+        joint_names=("HAA",),
+        robot=str(one_legged(tmp_path)),
+    )
+    write(inspected(run, tmp_path), tmp_path / "out.rrd")
+    thigh = "/robot/leg/visual_geometries/thigh/visual_0"
+    seconds, colours = read(tmp_path / "out.rrd", thigh, "Boxes3D:colors")
+    assert seconds is not None
+    assert len({colour[0] for colour in colours}) > 1
+
+
+def test_the_loudest_links_have_lanes_and_the_power_is_beside_the_noise(whole):
+    path, _ = whole
+    found = entities(path)
+    assert "/power/total" in found
+    assert len([entity for entity in found if entity.startswith("/level/")]) == 9
+    time, level = read(path, "/power/total", "Scalars:scalars")
+    assert len(time) == 300  # every 10 ms
+    assert 60 < np.median(level) < 160
+
+
+def test_the_papers_terms_are_shown_on_demand(tmp_path):
+    path = tmp_path / "out.rrd"
+    assert "/power/terms/A" not in entities_of(panda_run(), tmp_path, path)
+    shown = entities_of(panda_run(), tmp_path, path, kind="paper", terms=True)
+    assert {"/power/terms/A", "/power/terms/B", "/power/terms/C"} <= shown
+
+
+def entities_of(run, tmp_path, path, **options):
+    write(inspected(run, tmp_path, **options), path, overwrite=True)
+    return entities(path)
 
 
 def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):

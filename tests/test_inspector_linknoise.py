@@ -1,0 +1,122 @@
+import numpy as np
+import pytest
+
+from inspector.linklevels import STATES, levels, shades, states
+from inspector.linknoise import link_noise, vibrating
+from models import Event
+from noisemodel import Robot, Run, Surface, extended
+
+
+def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):
+    """Move a UR5 slowly; one joint may rattle at 100 Hz from 2 s to 2.5 s."""
+    time = np.arange(round(rate * seconds)) / rate
+    names = Robot.load("ur5").joint_names
+    velocity = 0.5 * np.cos(np.outer(time, np.linspace(0.5, 1.5, 6)))
+    position = np.sin(np.outer(time, np.linspace(0.5, 1.5, 6)))
+    if rattling is not None:
+        during = (time >= 2.0) & (time < 2.5)
+        velocity[during, rattling] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
+    fields = {
+        "time": time,
+        "velocity": velocity,
+        "position": position,
+        "joint_names": names,
+        "robot": "ur5",
+    }
+    return Run(**(fields | changes))
+
+
+EVENT = Event("oscillations", 2.0, 2.5, 1.0)
+
+
+def test_bins_hold_the_mean_power_of_the_extended_noise():
+    run = arm_run()
+    robot = Robot.load("ur5")
+    noise = extended(robot, Surface.of(robot, "auto"), *robot.configuration(run), "normal")
+    found = link_noise(run)
+    np.testing.assert_allclose(found.power.mean(axis=0), noise.power.mean(axis=0), rtol=1e-12)
+    np.testing.assert_allclose(found.total[7], noise.total[70:80].mean(), rtol=1e-12)
+    assert found.time[7] == pytest.approx(0.075)
+    assert found.links == noise.names
+
+
+def test_the_desired_motion_adds_its_own_power():
+    run = arm_run()
+    both = arm_run(velocity_desired=run.velocity, position_desired=run.position)
+    np.testing.assert_allclose(link_noise(both).power, 2 * link_noise(run).power, rtol=1e-12)
+
+
+def test_a_rattling_joint_is_named_by_its_link():
+    for joint, link in ((5, "wrist_3_link"), (4, "wrist_2_link")):
+        culprits = link_noise(arm_run(joint)).culprits(EVENT, [EVENT])
+        names = [name for name, _ in culprits]
+        assert link in names
+        assert "shoulder_link" not in names
+        assert sum(share for _, share in culprits) <= 1.0 + 1e-12
+
+
+def test_an_event_in_which_nothing_changes_has_no_culprits():
+    still = arm_run(velocity=np.zeros((4000, 6)))
+    assert link_noise(still).culprits(EVENT, [EVENT]) == ()
+
+
+def test_slow_motion_is_no_vibration_and_fast_motion_is():
+    time = np.arange(4000) / 1000
+    valid = np.ones(4000, dtype=bool)
+    slow = np.sin(2 * np.pi * 0.5 * time)[:, None]
+    assert np.abs(vibrating(slow, valid, 1000.0))[100:-100].max() < 0.02
+    fast = np.sin(2 * np.pi * 100 * time)[:, None]
+    np.testing.assert_allclose(vibrating(fast, valid, 1000.0)[100:-100], fast[100:-100], atol=0.02)
+
+
+def test_gaps_are_silent_and_do_not_ring():
+    valid = np.ones(4000, dtype=bool)
+    valid[1500:1600] = False
+    velocity = np.where(valid[:, None], 1.0, 0.0) * np.ones((1, 6))
+    found = link_noise(arm_run(velocity=velocity, valid=valid))
+    assert found.power[150:160].max() == 0.0
+    assert found.vibration.max() < 1e-20
+
+
+def test_a_long_run_has_no_more_bins_than_a_short_one():
+    assert len(link_noise(arm_run(rate=100.0, seconds=120.0)).time) <= 4001
+
+
+def test_joints_that_the_run_does_not_name_are_said_to_rest():
+    run = arm_run()
+    part = Run(
+        time=run.time,
+        velocity=run.velocity[:, :5],
+        position=run.position[:, :5],
+        joint_names=run.joint_names[:5],
+        robot="ur5",
+    )
+    assert "wrist_3_joint: they rest" in link_noise(part).remarks[0]
+
+
+def test_levels_are_relative_to_the_loudest_peak():
+    found = levels(link_noise(arm_run(5)))
+    assert found.level.max() == 0.0
+    assert 2.0 <= found.time[np.unravel_index(found.level.argmax(), found.level.shape)[0]] < 2.5
+
+
+def test_states_do_not_flicker_around_a_threshold():
+    level = np.array([-30.0, -19.9, -20.1, -19.9, -20.1, -22.9, -23.1, -5.0, -8.0, -9.1])
+    assert states(level) == [
+        "quiet",
+        *["elevated"] * 5,
+        "quiet",
+        "critical",
+        "critical",
+        "high",
+    ]
+    assert states(np.array([-np.inf])) == ["quiet"]
+
+
+def test_shades_go_from_grey_to_red_in_few_steps():
+    rgba = shades(np.linspace(-60, 0, 1000))
+    assert rgba[0].tolist() == [150, 155, 165, 255]
+    assert rgba[-1].tolist() == [229, 40, 40, 255]
+    assert len(np.unique(rgba, axis=0)) <= 16
+    assert shades(np.array([-np.inf]))[0].tolist() == [150, 155, 165, 255]
+    assert list(STATES) == ["quiet", "elevated", "high", "critical"]
