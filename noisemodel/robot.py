@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -209,11 +210,16 @@ def package_roots(name: str | Path) -> tuple[Path, ...]:
     """Name the folders in which a robot's meshes are looked up, and outside of which none may lie.
 
     Args:
-        name: A listed name, or the path of a URDF: then its folder and the two above it.
+        name: A listed name, or the path of a URDF: then its folder and the two above it, or
+            those of the listed robots where the URDF lies among them.
     """
     if str(name) in catalog.ROBOTS:
         return catalog.package_roots()
     folder = Path(name).resolve().parent
+    with suppress(RobotError):
+        listed = catalog.package_roots()
+        if folder.is_relative_to(listed[-1].resolve()):
+            return listed
     return (folder, *folder.parents[:2])
 
 

@@ -126,3 +126,10 @@ def test_surfaces_and_speeds_are_the_golden_ones(case):
     for kind, key in (("paper", "P_abc_quad"), ("mean", "P_mean_quad"), ("normal", "P_rmsn_exact")):
         power = impedance * (surface.area[links] * speeds[kind] ** 2).sum(axis=1)
         assert np.allclose(power, golden[key], rtol=1e-4, atol=1e-12), kind
+
+
+def test_a_listed_robot_has_the_same_surface_by_its_name_and_by_its_path():
+    by_name = Robot.load("solo12")
+    by_path = Robot.load(by_name.path, floating_base=True)
+    assert by_path.package_roots == by_name.package_roots
+    np.testing.assert_array_equal(Surface.of(by_path).area, Surface.of(by_name).area)
