@@ -56,20 +56,22 @@ class LinkNoise:
         """Indices of the links, the one that vibrates with the largest peak first."""
         return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
 
-    def culprits(self, event: Event, others: Sequence[Event]) -> tuple[tuple[str, float], ...]:
-        """Name the links in which an event shows most.
+    def culprits(
+        self, failure: Event | nm.Block, others: Sequence[Event | nm.Block]
+    ) -> tuple[tuple[str, float], ...]:
+        """Name the links in which a failure shows most.
 
-        A link's excess is its power above 10 Hz during the event, less its median outside of all
-        events; shares are of the robot's whole excess.
+        A link's excess is its power above 10 Hz during the failure, less its median outside of
+        all failures; shares are of the robot's whole excess.
 
         Args:
-            event: The event.
-            others: All events of the run.
+            failure: A finding, or an annotated block.
+            others: All failures of the run, found and annotated.
 
         Returns:
             Up to three links and their shares, the largest first.
         """
-        inside = (self.time >= event.start) & (self.time < event.stop)
+        inside = (self.time >= failure.start) & (self.time < failure.stop)
         busy = np.any([(self.time >= e.start) & (self.time < e.stop) for e in others], axis=0)
         if not inside.any():
             return ()

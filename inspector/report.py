@@ -4,6 +4,9 @@ from collections.abc import Sequence
 
 from inspector.inspection import Inspection
 from models import Event
+from noisemodel import Block
+
+HEAD = ("class", "from [s]", "to [s]", "links with the largest excess")
 
 
 def report(inspection: Inspection) -> str:
@@ -33,11 +36,13 @@ def report(inspection: Inspection) -> str:
             (e.label, f"{e.start:.2f}", f"{e.stop:.2f}", culprits(inspection, e))
             for e in inspection.events
         ]
-        head = ("class", "from [s]", "to [s]", "links with the largest excess")
-        parts += ["## Events", _table(head, found)]
+        parts += ["## Events", _table(HEAD, found)]
     if run.blocks:
-        rows = [(b.label, f"{b.start:.2f}", f"{b.stop:.2f}") for b in run.blocks]
-        parts += ["## Annotated", _table(("class", "from [s]", "to [s]"), rows)]
+        rows = [
+            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", culprits(inspection, b))
+            for b in run.blocks
+        ]
+        parts += ["## Annotated", _table(HEAD, rows)]
     if inspection.remarks:
         parts += ["## Remarks", "\n".join(f"- {remark}" for remark in inspection.remarks)]
     return "\n\n".join(parts) + "\n"
@@ -49,11 +54,12 @@ def sentence(inspection: Inspection, event: Event) -> str:
     return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{links and f': {links}'}"
 
 
-def culprits(inspection: Inspection, event: Event) -> str:
-    """Name the links in which an event shows most, with their shares of the excess."""
-    if inspection.links is None:
+def culprits(inspection: Inspection, failure: Event | Block) -> str:
+    """Name the links in which a failure shows most, with their shares of the excess."""
+    if inspection.links is None or failure.label == "ok":
         return ""
-    shares = inspection.links.culprits(event, inspection.events)
+    annotated = [block for block in inspection.run.blocks if block.label != "ok"]
+    shares = inspection.links.culprits(failure, [*inspection.events, *annotated])
     return ", ".join(f"{link} {share:.0%}" for link, share in shares)
 
 

@@ -167,6 +167,7 @@ def test_the_report_says_what_was_found(whole):
     assert "1 finding: impact" in text[0]
     assert "| impact | 0.50 | 1.00 | panda_" in text[0]
     assert "| scenario | made up |" in text[0]
+    assert "| ok | 0.20 | 1.00 |  |" in text[0]
 
 
 def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
