@@ -166,11 +166,11 @@ def import_(
 
 @app.command()
 def simulate(
-    robot: Annotated[str, typer.Argument(help="The robot.")] = "panda",
+    robot: Annotated[str, typer.Argument(help="The robot: panda.")] = "panda",
     scenario: Annotated[str, typer.Option(help="What happens to it.")] = "ok",
     seed: Annotated[int, typer.Option(min=0, help="Makes each run another one.")] = 0,
     duration: Annotated[
-        float | None, typer.Option(min=0.5, help="In [s]; unless given, as the scenario has it.")
+        float | None, typer.Option(min=0.5, help="In seconds; 7 unless given.")
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path(
         "run.npz"
@@ -209,8 +209,8 @@ def train(
     """Train a model on annotated runs."""
     from inspector.training import train as train_model
 
-    report = train_model(inputs, profile, rate, output, overwrite=overwrite)
-    typer.echo(str(report))
+    typer.echo(str(train_model(inputs, profile, rate, output, overwrite=overwrite)))
+    typer.echo(f"{output}: written; measured above on the frames that it was trained on")
 
 
 @app.command()
@@ -226,6 +226,48 @@ def evaluate(
 
     report = evaluate_model(model, inputs)
     typer.echo(dumps(report.as_dict(), indent=2) if as_json else str(report))
+
+
+@app.command()
+def compare(
+    runs: Annotated[
+        list[Path] | None, typer.Argument(help="Run files with robot and positions.")
+    ] = None,
+    robots: Annotated[
+        str, typer.Option(help="Robots to move by a motion of our own: talos,go2 or all.")
+    ] = "",
+    kinds: Annotated[
+        str, typer.Option(help="Of simplified, paper, A, B, C, mean, rms, normal.")
+    ] = "simplified,C,paper,mean,rms,normal",
+    geometry: Annotated[str, typer.Option(help="visual, collision, hull or auto.")] = "auto",
+    seed: Annotated[int, typer.Option(min=0, help="Makes our own motion another one.")] = 0,
+    csv: Annotated[Path | None, typer.Option(help="Write all numbers here.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Write a recording (.rrd) here.")] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write a PNG here (needs the extra `report`).")
+    ] = None,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Robots at once.")] = 1,
+    overwrite: Overwrite = False,
+) -> None:
+    """Compare the noise models; exit 3 if nothing could be compared."""
+    from inspector import comparing, comparisonoutput
+    from inspector.comparisontable import table
+    from inspector.progress import progress
+
+    sources = comparing.sources_of(runs or (), robots)
+    if not sources:
+        raise typer.BadParameter("name run files, or robots with --robots")
+    settings = comparing.Settings(tuple(kinds.split(",")), geometry, seed)
+    outputs = comparisonoutput.Outputs(csv, save, picture, overwrite=overwrite)
+    outputs.check(len(sources))
+    results = comparing.compare_all(sources, settings, jobs=jobs)
+    found, failed = comparing.sorted_out(progress(results, "compare", total=len(sources)))
+    for bad in failed:
+        typer.echo(f"inspector: {bad.name}: {bad.message}", err=True)
+    if not found:
+        raise typer.Exit(3)
+    outputs.write(found)
+    typer.echo(table(found))
 
 
 @app.command()

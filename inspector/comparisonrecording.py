@@ -1,0 +1,159 @@
+"""Compared noise models as a rerun recording: one above the other, on one time axis."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from inspector import colors, series
+from inspector.comparison import Compared
+from inspector.comparisontable import table
+from inspector.linknoise import vibrating
+from inspector.spectrogram import spectrogram
+from noisemodel.atomic import replacing
+from noisemodel.noise import decibel
+from noisemodel.types import Array
+
+APPLICATION = "inspector"
+STEP = 0.01
+"""Time over which a level is taken, in [s]."""
+FLOOR_DB = -60.0
+"""Levels below this are drawn at it, in [dB]."""
+RANGE_DB = (-25.0, 20.0)
+"""What is drawn: the same for all, so that heights compare, in [dB]."""
+
+
+def write(found: Sequence[Compared], path: Path, *, overwrite: bool = False) -> None:
+    """Write comparisons as one recording, whole or not at all.
+
+    Args:
+        found: One comparison or more, of the same kinds.
+        path: The file to write, by convention ``*.rrd``.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    text = table(found)
+    # The same comparison has the same id: opened again, it replaces itself in the viewer.
+    identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
+    with replacing(path, overwrite=overwrite) as temporary:
+        recording = rr.RecordingStream(APPLICATION, recording_id=identity.hexdigest()[:32])
+        recording.save(temporary, default_blueprint=layout(found))
+        for one in found:
+            _log(recording, one)
+        document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
+        recording.log("/report", document, static=True)
+        recording.send_recording_name(f"noise models: {', '.join(one.name for one in found)}")
+        recording.flush()
+        recording.disconnect()
+
+
+def levels(one: Compared, pressure: Array) -> tuple[Array, Array]:
+    """Take the level of each estimate every 10 ms, relative to its own root mean square.
+
+    Args:
+        one: The comparison.
+        pressure: Its pressures, or a part of them, shape (kinds, samples).
+
+    Returns:
+        Centres of the steps, shape (steps,), in [s], and levels, shape (steps, kinds), in [dB].
+    """
+    size = max(1, round(STEP * one.rate))
+    firsts = np.arange(0, len(one.time), size)
+    counts = np.diff(np.append(firsts, len(one.time)))
+    power = np.add.reduceat(pressure**2, firsts, axis=1) / counts
+    mean = np.mean(pressure**2, axis=1)
+    level = decibel(power.T / np.where(mean > 0.0, mean, 1.0))
+    return one.time[firsts] + counts / 2 / one.rate, np.maximum(level, FLOOR_DB)
+
+
+def layout(found: Sequence[Compared]) -> rrb.Blueprint:
+    """Lay out a recording: one tab per robot, in it events, levels and spectrograms.
+
+    Args:
+        found: The comparisons.
+
+    Returns:
+        The blueprint; all time axes are linked.
+    """
+    report = rrb.TextDocumentView(origin="/report", name="Table")
+    return rrb.Blueprint(
+        rrb.Tabs(*(_robot(one) for one in found), report, active_tab=0),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        rrb.TimePanel(state="collapsed", timeline=series.TIMELINE, play_state="paused"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _log(recording: rr.RecordingStream, one: Compared) -> None:
+    whole = np.ones(len(one.time), dtype=bool)
+    parts = {
+        "vibration": vibrating(one.pressure.T, whole, one.rate).T,
+        "level": one.pressure,
+    }
+    for part, pressure in parts.items():
+        time, level = levels(one, pressure)
+        for index, color in enumerate(colors.of_series(len(one.kinds))):
+            kind = one.kinds[index]
+            path = f"{_root(one)}/{part}/{kind}"
+            series.log_lines(
+                recording, path, time, level[:, [index]], names=[kind], colours=[color]
+            )
+    for kind, pressure in zip(one.kinds, one.pressure, strict=True):
+        spectrum = spectrogram(pressure, one.rate, start=float(one.time[0]), valid=whole)
+        series.log_heat_strip(recording, f"{_root(one)}/spectrogram/{kind}", spectrum)
+    labels = tuple(dict.fromkeys(event.label for event in one.events))
+    states = dict(zip(labels, colors.of_series(len(labels)), strict=True))
+    stretches = [(event.start, event.stop, event.label) for event in one.events]
+    series.log_lane(recording, f"{_root(one)}/events", stretches, states)
+
+
+def _robot(one: Compared) -> rrb.Container:
+    lane = rrb.StateTimelineView(
+        origin=_root(one), contents=["$origin/events"], name="Events", time_view=_time_axis()
+    )
+    fast = rrb.Vertical(*(_line(one, "vibration", kind) for kind in one.kinds), name="above 10 Hz")
+    whole = rrb.Vertical(*(_line(one, "level", kind) for kind in one.kinds), name="whole motion")
+    strips = rrb.Tabs(*(_strip(one, kind) for kind in one.kinds), active_tab=0)
+    return rrb.Vertical(
+        lane,
+        rrb.Tabs(fast, whole, active_tab=0),
+        strips,
+        row_shares=[1.0, 1.2 * len(one.kinds), 3.0],
+        name=one.name,
+    )
+
+
+def _line(one: Compared, part: str, kind: str) -> rrb.TimeSeriesView:
+    return rrb.TimeSeriesView(
+        origin=f"{_root(one)}/{part}/{kind}",
+        name=f"{kind} [dB re its own rms]",
+        plot_legend=rrb.PlotLegend(visible=False),
+        axis_x=_time_axis(),
+        axis_y=rrb.ScalarAxis(range=RANGE_DB),
+    )
+
+
+def _strip(one: Compared, kind: str) -> rrb.TimeSeriesView:
+    top = min(series.TOP_HZ, one.rate / 2)
+    return rrb.TimeSeriesView(
+        origin=f"{_root(one)}/spectrogram/{kind}",
+        name=f"{kind}, 0-{top:.0f} Hz",
+        plot_legend=rrb.PlotLegend(visible=False),
+        axis_x=_time_axis(),
+        axis_y=rrb.ScalarAxis(range=(0.0, top), zoom_lock=True),
+    )
+
+
+def _time_axis() -> rrb.TimeAxis:
+    return rrb.TimeAxis(link="LinkToGlobal")
+
+
+def _root(one: Compared) -> str:
+    return f"/{rr.escape_entity_path_part(one.name)}"

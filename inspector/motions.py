@@ -1,0 +1,185 @@
+"""A motion that any robot can make, without a simulator: slow travel, ripple, two shakes, a jerk.
+
+Every joint travels by three slow sines and ripples a little at all frequencies above, as real
+drives do. A floating base sways in the same way at a tenth of the speed. Three events stand out:
+
+- ``shake-near`` and ``shake-far``: the joint that carries most of the robot and the one at the end
+  of the longest chain vibrate, one after the other, equally fast and at one frequency. To the
+  simplified noise they are alike;
+- ``jerk``: all joints change their speed within one sample, and recover.
+
+Positions keep to the limits of the URDF: the travel of a joint with little room or speed is scaled
+down. Limits that leave no room at all (lower = upper) or no speed are not taken for limits. Joints
+that mimic another one follow it; the base's place makes no noise and stays at the origin.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+import noisemodel as nm
+from noisemodel.types import Array
+
+SECONDS = 6.0
+RATE = 4000.0
+PACE = {"prismatic": 0.3}
+"""Speed of the travel in [m/s]; of joints that turn it is 1 rad/s."""
+BASE_PACE = 0.1
+"""Speed of a floating base, in [m/s] and [rad/s]."""
+TRAVEL_HZ = (0.1, 0.8)
+SINES = 3
+RIPPLE = 0.01
+"""Root mean square of the ripple, as a share of the joint's pace."""
+RIPPLE_HZ = 10.0
+"""The ripple begins here, and has the same power in every octave above."""
+ROOM = 0.9
+"""Share of its room and its speed that a joint may use for its travel."""
+SHAKE = 0.2
+"""Amplitude of a shake, in [rad/s]."""
+SHAKE_HZ = (40.0, 200.0)
+SHAKES = {"shake-near": (1.0, 1.8), "shake-far": (2.6, 3.4)}
+JERK = (4.6, 4.8)
+JERK_DECAY = 0.03
+"""Time in which the change of speed is taken back, in [s]."""
+
+
+class Limits(NamedTuple):
+    """What a robot's joints can do, each of shape (joints,); inf where nothing is said.
+
+    Attributes:
+        centre: Middle of the range, 0 without one, in [rad] or [m].
+        room: Width of the range, in [rad] or [m].
+        speed: Largest speed, in [rad/s] or [m/s].
+    """
+
+    centre: Array
+    room: Array
+    speed: Array
+
+
+def made_up(robot: nm.Robot, *, seed: int = 0) -> nm.Run:
+    """Move a robot as this module's first lines say.
+
+    Args:
+        robot: Any robot.
+        seed: Makes each motion another one.
+
+    Returns:
+        The run; its blocks are the events.
+    """
+    random = np.random.default_rng(seed)
+    time = np.arange(round(SECONDS * RATE)) / RATE
+    joints = {joint.name: joint for joint in robot.joints if joint.name in robot.joint_names}
+    pace = np.array([PACE.get(joint.kind, 1.0) for joint in joints.values()])
+    velocity = _wander(time, len(joints), random) * pace
+    bounds = limits(robot)
+    position = np.cumsum(velocity, axis=0) / RATE
+    low, high = _extent(position)
+    scale = np.minimum(1.0, ROOM * bounds.room / np.maximum(high - low, 1e-9))
+    scale = np.minimum(scale, ROOM * bounds.speed / np.maximum(abs(velocity).max(axis=0), 1e-9))
+    velocity = velocity * scale
+    hertz = random.uniform(*SHAKE_HZ)
+    blocks = [nm.Block(*JERK, "jerk")]
+    for (label, (start, stop)), joint in zip(SHAKES.items(), ends(robot), strict=False):
+        column = robot.joint_names.index(joint)
+        velocity[:, column] += SHAKE * _burst(time, start, stop, hertz)
+        blocks.append(nm.Block(start, stop, label))
+    base = BASE_PACE * _wander(time, 6, random) if robot.floating_base else None
+    return nm.Run(
+        time=time,
+        velocity=velocity,
+        position=bounds.centre + np.cumsum(velocity, axis=0) / RATE - scale * (low + high) / 2,
+        base_velocity=base,
+        joint_names=robot.joint_names,
+        robot=robot.name if robot.name in nm.ROBOTS else str(robot.path),
+        blocks=tuple(blocks),
+        meta={"scenario": "made up", "seed": seed},
+    )
+
+
+def limits(robot: nm.Robot) -> Limits:
+    """Read what the URDF says about each joint that moves by itself.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        The limits, in the order of ``robot.joint_names``.
+    """
+    model = robot.model
+    rows = []
+    kinds = {joint.name: joint.kind for joint in robot.joints}
+    for name in robot.joint_names:
+        index = model.getJointId(name)
+        lower = float(model.lowerPositionLimit[model.idx_qs[index]])
+        upper = float(model.upperPositionLimit[model.idx_qs[index]])
+        speed = float(model.velocityLimit[model.idx_vs[index]])
+        bounded = kinds[name] != "continuous" and 0.0 < upper - lower < np.inf
+        centre, room = ((lower + upper) / 2, upper - lower) if bounded else (0.0, np.inf)
+        rows.append((centre, room, speed if speed > 0.0 else np.inf))
+    return Limits(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
+
+
+def ends(robot: nm.Robot) -> tuple[str, ...]:
+    """Name the joint that carries most and the one at the end of the longest chain.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        Two joints that turn; one or none where there are no more.
+    """
+    depth, load = np.zeros((2, len(robot.joints) + 1), dtype=int)
+    for index, joint in enumerate(robot.joints, start=1):
+        depth[index] = depth[joint.parent] + 1
+    for index in range(len(robot.joints), 0, -1):
+        load[robot.joints[index - 1].parent] += load[index] + 1
+    turning = [
+        index
+        for index, joint in enumerate(robot.joints, start=1)
+        if joint.kind in ("revolute", "continuous") and joint.name not in robot.mimics
+    ]
+    if not turning:
+        return ()
+    near = max(turning, key=lambda index: (load[index], -depth[index]))
+    far = max(turning, key=lambda index: (depth[index], -load[index]))
+    return tuple(dict.fromkeys(robot.joints[index - 1].name for index in (near, far)))
+
+
+def _wander(time: Array, axes: int, random: np.random.Generator) -> Array:
+    """Travel, ripple and jerk of each axis at a pace of 1, shape (samples, axes)."""
+    travel = _travel(time, axes, random)
+    ripple = RIPPLE * _ripple(len(time), axes, random)
+    after = np.maximum(time - JERK[0], 0.0)
+    jump = 0.5 * (time >= JERK[0]) * np.exp(-after / JERK_DECAY)
+    wander: Array = travel + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
+    return wander
+
+
+def _travel(time: Array, axes: int, random: np.random.Generator) -> Array:
+    """Sum slow sines, spread evenly over octaves, to a mean square of 1, shape (samples, axes)."""
+    hertz = np.exp(random.uniform(np.log(TRAVEL_HZ[0]), np.log(TRAVEL_HZ[1]), (SINES, axes)))
+    phase = random.uniform(0.0, 2.0 * np.pi, (SINES, axes))
+    travel: Array = np.sin(2.0 * np.pi * time[:, None, None] * hertz + phase).sum(axis=1)
+    return travel * float(np.sqrt(2.0 / SINES))
+
+
+def _ripple(samples: int, axes: int, random: np.random.Generator) -> Array:
+    """Make noise with a mean square of 1, shape (samples, axes)."""
+    hertz = np.fft.rfftfreq(samples, 1.0 / RATE)
+    white = np.fft.rfft(random.standard_normal((samples, axes)), axis=0)
+    slope = np.where(hertz < RIPPLE_HZ, 0.0, 1.0 / np.sqrt(np.maximum(hertz, RIPPLE_HZ)))
+    pink: Array = np.fft.irfft(white * slope[:, None], n=samples, axis=0)
+    ripple: Array = pink / np.sqrt(np.mean(pink**2, axis=0))
+    return ripple
+
+
+def _burst(time: Array, start: float, stop: float, hertz: float) -> Array:
+    """Swell and fade away between two times, shape (samples,)."""
+    place = np.clip((time - start) / (stop - start), 0.0, 1.0)
+    burst: Array = np.sin(np.pi * place) ** 2 * np.sin(2.0 * np.pi * hertz * time)
+    return burst
+
+
+def _extent(position: Array) -> tuple[Array, Array]:
+    return position.min(axis=0), position.max(axis=0)

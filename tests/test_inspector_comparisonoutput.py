@@ -1,0 +1,189 @@
+import csv
+import sys
+
+import numpy as np
+import pytest
+import rerun as rr
+from chains import chain
+from rerun.chunk import RrdReader
+
+from inspector import picture
+from inspector.cli import main
+from inspector.comparing import Settings, compare_robot
+from inspector.comparisoncsv import write_csv
+from inspector.comparisonrecording import levels, write
+from inspector.comparisontable import medians, table
+from inspector.motions import made_up
+
+KINDS = ("simplified", "paper", "normal")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def cache(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory):
+    return str(chain(tmp_path_factory.mktemp("arm"), "revolute", "revolute", "prismatic").path)
+
+
+@pytest.fixture(scope="module")
+def found(urdf):
+    return [compare_robot(urdf, Settings(KINDS, seed=seed)) for seed in (0, 1, 2)]
+
+
+@pytest.fixture
+def inspector(monkeypatch, capsys):
+    """Call the command line; returns exit status, what it printed, and what it complained."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["inspector", "compare", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out, printed.err
+
+    return call
+
+
+def entities(path):
+    return set(RrdReader(path).store().schema().entity_paths())
+
+
+def test_a_table_has_a_row_per_robot_and_medians(found):
+    lines = table(found).splitlines()
+    assert "Held against 'normal'" in lines[0]
+    assert sum("chain.urdf" in line for line in lines) == 3
+    assert sum(line.startswith("median of 3 fixed") for line in lines) == 1
+    assert not any("of 3 floating" in line for line in lines)
+    (row,) = (line for line in lines if line.startswith("normal"))
+    assert row.split()[1:5] == ["0.0"] * 4
+    assert len({line.index("A") for line in lines if line.split()[:3] == ["A", "B", "C"]}) == 1
+    assert max(map(len, lines)) <= 130
+
+
+def test_a_table_prints_the_numbers_of_the_comparison(found):
+    one = found[0]
+    row = next(line for line in table([one]).splitlines() if "chain.urdf" in line)
+    shares = [f"{share:.0%}" for share in one.found.terms.sum(axis=0)]
+    numbers = [f"{n:.2f}" for n in one.found.correlation[2, :2]]
+    numbers += [f"{n:.1f}" for n in one.found.distance[2, :2]]
+    assert row.split()[1:8] == [*shares, *numbers]
+    assert row.endswith(one.loudest[0])
+
+
+def test_medians_pass_over_what_is_not_there():
+    rows = [np.array([1.0, np.nan, np.nan]), np.array([3.0, 5.0, np.nan])]
+    np.testing.assert_array_equal(medians(rows), [2.0, 5.0, np.nan])
+
+
+def test_the_csv_has_a_row_per_robot_and_kind(found, tmp_path):
+    write_csv(found[:2], tmp_path / "out.csv")
+    with (tmp_path / "out.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["kind"] for row in rows] == [*KINDS, *KINDS]
+    assert {row["reference"] for row in rows} == {"normal"}
+    assert float(rows[0]["correlation"]) == pytest.approx(
+        found[0].found.correlation[0, 2], abs=1e-4
+    )
+    assert sum(float(rows[0][f"share_{term}"]) for term in "ABC") == pytest.approx(1.0, abs=2e-4)
+    assert [event.label for event in found[0].events][2] == "jerk"
+    assert float(rows[1]["contrast_jerk_db"]) == pytest.approx(found[0].contrast[1, 2], abs=1e-4)
+    bands = [name for name in rows[0] if name.startswith("distance_") and name != "distance_db"]
+    assert bands[0] == "distance_0_20_db"
+    assert bands[-1] == "distance_500_up_db"
+
+
+def test_a_recording_holds_every_model_of_every_robot(found, urdf, tmp_path):
+    rr.set_strict_mode(True)
+    write(found[:1], tmp_path / "out.rrd")
+    root = f"/{rr.escape_entity_path_part(urdf)}"
+    held = entities(tmp_path / "out.rrd")
+    for kind in KINDS:
+        assert f"{root}/level/{kind}" in held
+        assert f"{root}/vibration/{kind}" in held
+        assert f"{root}/spectrogram/{kind}/00" in held
+    assert {f"{root}/events", "/report"} <= held
+    assert len(RrdReader(tmp_path / "out.rrd").blueprints()) == 1
+
+
+def test_levels_are_relative_to_the_root_mean_square(found):
+    time, level = levels(found[0], found[0].pressure)
+    assert level.shape == (len(time), len(KINDS))
+    np.testing.assert_allclose(np.mean(10 ** (level / 10), axis=0), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(np.diff(time), 0.01, rtol=1e-9)
+    _, silence = levels(found[0], np.zeros_like(found[0].pressure))
+    assert (silence == -60.0).all()
+
+
+def test_a_picture_is_drawn_without_a_display(found, tmp_path):
+    pytest.importorskip("matplotlib")
+    picture.draw(found, tmp_path / "out.png")
+    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_command_writes_everything_and_goes_on_after_a_robot_that_cannot_be_had(
+    inspector, urdf, tmp_path
+):
+    pytest.importorskip("matplotlib")
+    outputs = {name: tmp_path / f"out.{name}" for name in ("csv", "rrd", "png")}
+    arguments = ["--robots", f"{urdf},ur3_empty,robby", "--kinds", ",".join(KINDS), "-j", "2"]
+    arguments += ["--csv", outputs["csv"], "--save", outputs["rrd"], "--picture", outputs["png"]]
+    status, out, err = inspector(*arguments)
+    assert status == 0
+    assert "correlation" in out
+    assert [line.split(": ")[1] for line in err.splitlines()] == ["ur3_empty", "robby"]
+    assert all(path.stat().st_size > 0 for path in outputs.values())
+    status, _, err = inspector(*arguments)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "out.csv: exists already" in err
+    status, _, _ = inspector(*arguments, "--overwrite")
+    assert status == 0
+
+
+def test_the_command_compares_runs(inspector, tmp_path):
+    run = made_up(chain(tmp_path, "revolute", "revolute"))
+    run.save(tmp_path / "run.npz")
+    status, out, err = inspector(tmp_path / "run.npz", "--kinds", "simplified,C")
+    assert (status, err) == (0, "")
+    assert "Held against 'C'" in out
+    assert "run.npz" in out
+
+
+def test_runs_without_robot_are_one_line_and_nothing_else_is_left(inspector, tmp_path):
+    time = np.arange(1000) / 1000
+    np.savez(tmp_path / "bare.npz", time=time, velocity=np.cos(time)[:, None])
+    np.savez(tmp_path / "still.npz", time=time, velocity=np.cos(time)[:, None], robot="panda")
+    status, out, err = inspector(tmp_path / "bare.npz", tmp_path / "still.npz")
+    assert (status, out) == (3, "")
+    first, second = err.splitlines()
+    assert first.endswith("bare.npz: the run names no robot; `inspector import --robot` adds one")
+    assert second.endswith("still.npz: the run has no positions, which the extended noise needs")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "message"),
+    [
+        ([], 2, "name run files, or robots with --robots"),
+        (["--robots", "panda", "--kinds", "paper,loud"], 3, "no kind 'loud' of noise"),
+        (["--robots", "panda", "--geometry", "skin"], 3, "geometry 'skin' is not known"),
+        (["--robots", "panda", "--csv", "/no/such/folder/x.csv"], 3, "cannot be written"),
+        (["--robots", "robby"], 3, "no robot 'robby'"),
+        (["--robots", "all", "--save", "x.rrd"], 3, "x.rrd: a recording holds 8 robots and runs"),
+    ],
+)
+def test_what_cannot_be_compared_is_one_line(inspector, arguments, status, message):
+    found, out, err = inspector(*arguments)
+    assert (found, out) == (status, "")
+    assert message in err
+    assert status == 2 or err.count("\n") == 1
+
+
+def test_without_matplotlib_a_picture_is_refused_before_any_work(inspector, monkeypatch, tmp_path):
+    monkeypatch.setattr(picture, "find_spec", lambda _: None)
+    status, _, err = inspector("--robots", "panda", "--picture", tmp_path / "out.png")
+    assert (status, err.count("\n")) == (3, 1)
+    assert 'a picture needs matplotlib; `pip install "noise-inspector[report]"`' in err

@@ -1,0 +1,79 @@
+import numpy as np
+import pytest
+from chains import chain
+
+from inspector.motions import RATE, SHAKES, ends, limits, made_up
+from noisemodel import Robot
+
+ODD = (
+    "panda",  # prismatic, mimic
+    "tiago",  # continuous, prismatic, slow
+    "baxter",  # mimic, little room
+    "double_pendulum",  # no room and no speed
+    "iris_rotors",  # limits of 1e16
+    "hector",  # nothing but a base
+    "talos",
+)
+
+
+@pytest.fixture(scope="module", params=ODD)
+def robot(request):
+    return Robot.load(request.param, mimic=True)
+
+
+def test_positions_stay_within_the_limits(robot):
+    run, bounds = made_up(robot), limits(robot)
+    assert (np.abs(run.position - bounds.centre) <= bounds.room / 2).all()
+    assert np.isfinite(run.position).all()
+
+
+def test_every_joint_moves_and_the_base_sways_if_it_can(robot):
+    run = made_up(robot)
+    assert (np.ptp(run.velocity, axis=0) > 0.0).all()
+    assert (run.base_velocity is not None) == robot.floating_base
+    if robot.floating_base:
+        assert 0.0 < np.sqrt(np.mean(run.base_velocity**2)) < 0.3
+
+
+def test_velocities_are_the_slopes_of_positions(robot):
+    run = made_up(robot)
+    slope = np.diff(run.position, axis=0) * RATE
+    np.testing.assert_allclose(slope, run.velocity[1:], atol=1e-7)
+
+
+def test_a_seed_makes_one_motion_and_another_seed_another():
+    robot = Robot.load("panda")
+    one, same, other = (made_up(robot, seed=seed) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(one.velocity, same.velocity)
+    assert not np.allclose(one.velocity, other.velocity)
+
+
+def test_both_shakes_are_equally_fast(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", "revolute")
+    run = made_up(robot)
+    near, far = ends(robot)
+    energies = []
+    for label, name in zip(SHAKES, (near, far), strict=True):
+        (block,) = [block for block in run.blocks if block.label == label]
+        inside = (run.time >= block.start) & (run.time < block.stop)
+        velocity = run.velocity[inside, robot.joint_names.index(name)]
+        spectrum = np.abs(np.fft.rfft(velocity * np.hanning(len(velocity))))
+        energies.append(spectrum[30:].max())
+    assert energies[0] == pytest.approx(energies[1], rel=0.1)
+
+
+def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):
+    robot = chain(tmp_path, "prismatic", "revolute", "continuous", "revolute", "prismatic")
+    assert ends(robot) == ("joint2", "joint4")
+    assert ends(chain(tmp_path, "prismatic")) == ()
+    assert ends(chain(tmp_path, "revolute")) == ("joint1",)
+
+
+def test_limits_that_leave_no_room_are_none(tmp_path):
+    bounds = limits(Robot.load("double_pendulum"))
+    assert np.isinf(bounds.room).all()
+    assert np.isinf(bounds.speed).all()
+    np.testing.assert_array_equal(bounds.centre, 0.0)
+    bounds = limits(chain(tmp_path, "revolute", "continuous"))
+    np.testing.assert_array_equal(bounds.room, [18.0, np.inf])
+    np.testing.assert_array_equal(bounds.speed, [1.0, 1.0])
