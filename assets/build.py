@@ -3,8 +3,9 @@
     python assets/build.py [--folder build] [--jobs 2]
 
 Each run is kept twice: as simulated, and with a noisier log, since the velocities of real robots
-are up to ten times noisier than a good encoder's. Runs stay in the folder; started again, this
-makes what is missing and redoes nothing.
+are up to ten times noisier than a good encoder's. Good runs are kept a third time without any
+sensor noise, as other simulators have it, and standstill is added. Runs stay in the folder;
+started again, this makes what is missing and redoes nothing.
 """
 
 import argparse
@@ -65,6 +66,16 @@ def _simulate(folder: Path, seed: int, *, defects: bool) -> None:
         noisier = path.with_stem(f"{path.stem}-noisy")
         if not noisier.exists():
             _noisier(Run.load(path), seed).save(noisier)
+    clean = folder / f"ok-{seed:03d}-clean.npz"
+    if not clean.exists():
+        run = Run.load(folder / f"ok-{seed:03d}.npz")
+        assert run.velocity_desired is not None
+        replace(run, velocity=run.velocity_desired).save(clean)
+    still = folder / "standstill.npz"
+    if not still.exists():
+        run = Run.load(clean)
+        silence = np.zeros_like(run.velocity)
+        replace(run, velocity=silence, velocity_desired=silence).save(still, overwrite=True)
 
 
 def _noisier(run: Run, seed: int) -> Run:

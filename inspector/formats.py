@@ -24,7 +24,7 @@ def text(verdicts: Sequence[Verdict]) -> str:
         model = f" [{verdict.model}]" if verdict.model else ""
         message = f": {verdict.message}" if verdict.message else ""
         lines.append(f"{verdict.path}: {verdict.status}{model}{message}")
-        lines += [f"  {_sentence(event)} (score {event.score:.2f})" for event in verdict.events]
+        lines += [f"  {_sentence(event)}" for event in verdict.events]
     return "\n".join(lines)
 
 

@@ -22,7 +22,9 @@ def write_bytes(path: str | Path, content: bytes, *, overwrite: bool = False) ->
     if path.is_dir():
         raise OutputError(path, "is a folder; name a file")
     if path.exists() and not overwrite:
-        raise OutputError(path, "exists already; choose another name, or allow overwriting")
+        raise OutputError(
+            path, "exists already; choose another name, or overwrite it (--overwrite)"
+        )
     try:
         handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     except OSError as error:

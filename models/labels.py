@@ -1,11 +1,10 @@
 """Labels: what a classifier hears in each frame of a signal, and the events that they make."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
-from models.types import Array, Words
+from models.types import Array, Index, Words
 
 
 @dataclass(frozen=True)
@@ -44,29 +43,23 @@ class Labels:
     classes: tuple[str, ...]
 
     def events(self) -> tuple[Event, ...]:
-        """Merge adjacent frames of one failure class.
+        """Merge frames of one failure class that overlap or follow each other.
 
         Returns:
-            Findings only, no `ok`, in order of time. Frames overlap, and so may events.
+            Findings only, no `ok`, in order of time. Frames overlap, and so may events of
+            different classes; events of one class never do.
         """
-        if not len(self.label):
-            return ()
-        changes = [
-            i
-            for i in range(1, len(self))
-            if self.label[i] != self.label[i - 1] or self.start[i] > self.stop[i - 1]
-        ]
-        bounds = pairwise([0, *changes, len(self.label)])
-        return tuple(
-            self._event(first, last) for first, last in bounds if self.label[first] != "ok"
-        )
+        found: list[Event] = []
+        for label in (name for name in self.classes if name != "ok"):
+            own = np.flatnonzero(self.label == label)
+            apart = np.flatnonzero(self.start[own[1:]] > self.stop[own[:-1]]) + 1
+            found += [self._event(group) for group in np.split(own, apart) if len(group)]
+        return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
 
-    def _event(self, first: int, last: int) -> Event:
-        label = str(self.label[first])
-        scores = self.scores[first:last, self.classes.index(label)]
-        return Event(
-            label, float(self.start[first]), float(self.stop[last - 1]), float(np.max(scores))
-        )
+    def _event(self, frames: Index) -> Event:
+        label = str(self.label[frames[0]])
+        score = float(self.scores[frames, self.classes.index(label)].max())
+        return Event(label, float(self.start[frames[0]]), float(self.stop[frames[-1]]), score)
 
     def __len__(self) -> int:
         return len(self.label)

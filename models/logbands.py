@@ -30,6 +30,8 @@ class LogBands:
     """No band reaches beyond, in [Hz]."""
     per_octave: float = 4.0
     """Bands in an octave, where they are wider than what the window resolves."""
+    floor: float = 3e-5
+    """Added to a band's amplitude: what is quieter than the best encoders is all the same."""
     regularization: float = 10.0
     """The machine's C."""
     softness: float = 0.5
@@ -66,6 +68,7 @@ class LogBands:
             stride=round(self.stride * rate),
             bands="log",
             edges=edges,
+            floor=self.floor,
             least_deviation=self.least_deviation,
             kernel="rbf",
             regularization=self.regularization,

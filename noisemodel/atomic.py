@@ -55,7 +55,9 @@ def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file")
     if path.exists() and not overwrite:
-        raise OutputError(f"{path}: exists already; choose another name, or allow overwriting")
+        raise OutputError(
+            f"{path}: exists already; choose another name, or overwrite it (--overwrite)"
+        )
     if not path.parent.is_dir():
         raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
 

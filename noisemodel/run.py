@@ -201,7 +201,10 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     meta = _meta(arrays)
     if differentiated:
         meta["differentiated"] = differentiated
-    joints = signals["velocity"].shape[-1]
+    velocity = signals["velocity"]
+    samples, joints = len(signals["time"]), velocity.shape[-1]
+    if velocity.ndim == 2 and len(velocity) != samples and joints == samples:
+        joints = len(velocity)  # transposed, as the error will say
     return {
         **signals,
         "joint_names": _names(arrays, "joint_names", [f"joint{i + 1}" for i in range(joints)]),

@@ -70,8 +70,9 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
             if name not in ARRAYS and not name.startswith(STAGE):
                 raise RunFileError(
                     path,
-                    f"unknown array {name!r}{hint(name, ARRAYS)}; a run file has"
-                    f" {', '.join(ARRAYS)} and {STAGE}<name>; anything else belongs into meta",
+                    f"unknown array {name!r}{hint(name, ARRAYS)}; a run file has time, and velocity"
+                    f" or position, and of {', '.join(ARRAYS)} and {STAGE}<name> what there is;"
+                    " anything else belongs into meta",
                 )
         with np.load(path, allow_pickle=False) as arrays:
             found = {name: _plain(path, name, arrays[name]) for name in names}
@@ -80,7 +81,8 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
     except OSError as error:
         raise RunFileError(path, f"cannot be read ({error.strerror or error})") from error
     except (ValueError, zipfile.BadZipFile, KeyError) as error:
-        raise RunFileError(path, f"not a run file: {_one_line(error)}") from error
+        csv = "; `inspector import` makes a run of a CSV log" if path.suffix == ".csv" else ""
+        raise RunFileError(path, f"not a run file: {_one_line(error)}{csv}") from error
     except DAMAGE as error:
         raise RunFileError(path, f"damaged: {_one_line(error)}") from error
     version = str(found.get("format", FORMAT))

@@ -36,7 +36,7 @@ def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
 def test_text_says_what_was_found_and_when():
     lines = text([QUIET, LOUD]).splitlines()
     assert lines[0] == "quiet.npz: ok [arm-10khz]"
-    assert lines[2] == "  impact from 1.00 s to 1.50 s (score 0.90)"
+    assert lines[2] == "  impact from 1.00 s to 1.50 s"
 
 
 def test_json_is_noise_verdict_1():

@@ -57,7 +57,7 @@ def test_an_interrupted_overwrite_leaves_the_old_file(tmp_path):
 
 def test_a_file_that_exists_is_not_replaced_unasked(tmp_path):
     write(tmp_path / "out.txt", "old")
-    with pytest.raises(OutputError, match="exists already; choose another name, or allow"):
+    with pytest.raises(OutputError, match="exists already; choose another name, or overwrite it"):
         write(tmp_path / "out.txt", "new")
     assert (tmp_path / "out.txt").read_text() == "old"
     write(tmp_path / "out.txt", "new", overwrite=True)

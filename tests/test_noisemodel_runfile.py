@@ -266,7 +266,7 @@ def test_a_folder_and_a_missing_file_are_named(tmp_path):
 def test_an_output_that_exists_is_kept(tmp_path):
     path = saved(tmp_path)
     before, run = path.read_bytes(), Run.load(path)
-    with pytest.raises(OutputError, match="exists already; choose another name, or allow over"):
+    with pytest.raises(OutputError, match="exists already; choose another name, or overwrite it"):
         run.save(path)
     assert path.read_bytes() == before
     run.save(path, overwrite=True)

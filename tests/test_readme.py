@@ -22,7 +22,8 @@ def test_the_code_of_the_readme_runs(tmp_path):
         text=True,
     )
     assert done.returncode == 0, done.stderr
-    assert (tmp_path / "run.npz").exists()
+    assert (tmp_path / "elbow.npz").exists()
+    assert (tmp_path / "plain.npz").exists()
 
 
 def test_the_first_screen_has_eight_lines_of_python():

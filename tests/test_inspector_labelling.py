@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from inspector.assets import model_files
+from inspector.labelling import CannotTellError, label_noise, label_run, load_library
+from noisemodel import Run
+
+LIBRARY = load_library(model_files())
+
+
+def run_of(velocity, rate):
+    names = tuple(f"joint{i}" for i in range(velocity.shape[1]))
+    time = np.arange(len(velocity)) / rate
+    return Run(time=time, velocity=velocity, velocity_desired=velocity, joint_names=names)
+
+
+@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
+@pytest.mark.parametrize("speed", [0.0, 0.3])
+def test_standstill_and_uniform_motion_are_quiet(rate, speed):
+    run = run_of(np.full((int(3 * rate), 7), speed), rate)
+    assert label_run(run, LIBRARY).labels.events() == ()
+
+
+@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
+def test_a_smooth_motion_without_any_sensor_noise_is_quiet(rate):
+    time = np.arange(int(4 * rate)) / rate
+    run = run_of(np.sin(2 * np.pi * 0.3 * np.outer(time, np.linspace(0.5, 1, 7))), rate)
+    assert label_run(run, LIBRARY).labels.events() == ()
+
+
+@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
+def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
+    time = np.arange(int(6 * rate)) / rate
+    velocity = np.sin(2 * np.pi * 0.3 * np.outer(time, np.linspace(0.5, 1, 7)))
+    during = (time >= 2.0) & (time < 4.0)
+    velocity[during] += 0.1 * np.sin(2 * np.pi * 120 * time[during])[:, None]
+    events = label_run(run_of(velocity, rate), LIBRARY).labels.events()
+    assert "oscillations" in {event.label for event in events}
+    assert min(event.start for event in events) > 1.3
+    assert max(event.stop for event in events) < 4.7
+
+
+def test_a_faster_run_is_lowered_and_a_slower_one_is_not_judged():
+    labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), LIBRARY)
+    assert labelled.remark == "Labelled at 1000 Hz, the rate of model arm-1khz."
+    with pytest.raises(CannotTellError, match="500 Hz"):
+        label_run(run_of(np.zeros((2000, 1)), 500.0), LIBRARY)
+
+
+def test_a_scalar_noise_cannot_be_lowered():
+    time = np.arange(20_000) / 5000.0
+    with pytest.raises(CannotTellError, match="5000 Hz cannot be lowered to the 1000 Hz of model"):
+        label_noise(time, np.ones(20_000), LIBRARY)
