@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TypeAlias
 
@@ -12,6 +13,7 @@ from inspector.comparison import Compared, Failed
 from inspector.errors import InspectorError
 from inspector.linknoise import vibrating
 from inspector.motions import made_up
+from inspector.parallel import each
 from noisemodel.compare import COMPARED, SIMPLIFIED
 from noisemodel.differentiate import stretches
 from noisemodel.geometry import GEOMETRIES
@@ -83,16 +85,10 @@ def compare_all(
         settings: What is compared.
         jobs: How many to work on at once.
 
-    Yields:
+    Returns:
         A result per source, in their order.
     """
-    if jobs == 1 or len(sources) == 1:
-        yield from (_attempt(source, settings) for source in sources)
-        return
-    from joblib import Parallel, delayed
-
-    pool = Parallel(n_jobs=jobs, return_as="generator")
-    yield from pool(delayed(_attempt)(source, settings) for source in sources)
+    return each(partial(_attempt, settings=settings), sources, jobs=jobs)
 
 
 def sorted_out(results: Iterable[Compared | Failed]) -> tuple[list[Compared], list[Failed]]:

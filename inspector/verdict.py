@@ -3,12 +3,14 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 
 import models
 import noisemodel as nm
 from inspector.errors import InspectorError
 from inspector.labelling import CannotTellError, Labelled, Library, label_noise, label_run
+from inspector.parallel import each
 
 EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
 """The errors that are told in one line; all others are bugs."""
@@ -82,16 +84,10 @@ def judge_all(paths: Sequence[Path], library: Library, *, jobs: int = 1) -> Iter
         library: Models to choose from.
         jobs: How many to work on at once.
 
-    Yields:
+    Returns:
         A verdict per file, in their order.
     """
-    if jobs == 1 or len(paths) == 1:
-        yield from (judge(path, library) for path in paths)
-        return
-    from joblib import Parallel, delayed
-
-    pool = Parallel(n_jobs=jobs, return_as="generator")
-    yield from pool(delayed(judge)(path, library) for path in paths)
+    return each(partial(judge, library=library), paths, jobs=jobs)
 
 
 def _labelled(path: Path, library: Library) -> Labelled:
