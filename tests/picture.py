@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from rerun.experimental import ViewerClient
 
@@ -77,6 +78,16 @@ def picture(client: ViewerClient, recording: Path, seconds: float) -> bytes:
         except Exception as error:
             print("again:", error, file=sys.stderr)
     return frames[-1]
+
+
+def settled(client: ViewerClient) -> Any:
+    """Ask for the viewer's state; reports that go away while data arrives are no reports."""
+    until = time.monotonic() + 20.0
+    while True:
+        state = client.get_state()
+        if time.monotonic() > until or not any(view.reports for view in state.views):
+            return state
+        time.sleep(0.5)
 
 
 def main() -> None:

@@ -16,11 +16,15 @@ def test_the_viewer_draws_the_demo_and_reports_no_error(tmp_path):
     write(inspect(demo_run(), load_library(model_files())), path)
     with picture.headless_viewer() as client:
         png = picture.picture(client, path, 2.0)
-        state = client.get_state()
+        state = picture.settled(client)
         errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
     assert png.startswith(b"\x89PNG")
     assert struct.unpack(">II", png[16:24]) >= (1000, 500)
     shown = {view.name for view in state.views}
-    assert {"Robot", "Classes", "Noise, simplified estimate [rad/s]"} <= shown
+    assert {
+        "Robot, coloured by vibration",
+        "Classes",
+        "Noise, simplified estimate [rad/s]",
+    } <= shown
     assert not [report for view in state.views for report in view.reports]
     assert not errors
