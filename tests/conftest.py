@@ -1,4 +1,4 @@
-"""What several test modules need: the reference data, where it is at hand."""
+"""What several test modules need: a cache of their own, and the reference data if at hand."""
 
 import hashlib
 import json
@@ -11,6 +11,14 @@ import numpy as np
 import pytest
 
 SHARED = Path(__file__).parents[2] / "shared"
+
+
+@pytest.fixture(autouse=True, scope="session")
+def cache(tmp_path_factory):
+    """A cache folder of the tests' own: nothing is read from the user's, nothing is left there."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -30,13 +30,6 @@ from noisemodel import (
 FEW = Settings(("simplified", "C", "paper", "normal"))
 
 
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 def arm(folder, *kinds, **options):
     return str(chain(folder, *kinds, **options).path)
 

@@ -18,13 +18,6 @@ from inspector.motions import made_up
 KINDS = ("simplified", "paper", "normal")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 @pytest.fixture(scope="module")
 def urdf(tmp_path_factory):
     return str(chain(tmp_path_factory.mktemp("arm"), "revolute", "revolute", "prismatic").path)

@@ -9,13 +9,6 @@ RATE = 20_000.0
 SPHERE = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'
 
 
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 def slider(tmp_path, *shapes):
     robot = chain(tmp_path, *["prismatic"] * len(shapes), shapes=shapes)
     return robot, Surface.of(robot)

@@ -19,13 +19,6 @@ from noisemodel import (
 IMPEDANCE = 1.204 * 343.2
 
 
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 @pytest.fixture(scope="module")
 def solo():
     robot = Robot.load("solo12")

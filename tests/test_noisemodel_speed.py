@@ -20,13 +20,6 @@ from noisemodel.moments import cross_matrix
 EVERY = ("revolute", "continuous", "prismatic", "planar", "floating", "revolute")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 @pytest.fixture(scope="module")
 def panda():
     robot = Robot.load("panda")

@@ -18,13 +18,6 @@ CASES = {
 }
 
 
-@pytest.fixture(autouse=True, scope="module")
-def cache(tmp_path_factory):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
-        yield
-
-
 def test_lever_of_a_bar_is_its_mean_distance_from_the_axis():
     """A thin bar from 0 to 1 m along x: half a metre about z, next to nothing about itself."""
     bar = shapes.box(1.0, 1e-4, 1e-4) + np.array([0.5, 0, 0])
