@@ -1,0 +1,42 @@
+"""The command that judges runs."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import ModelFiles
+
+
+class Format(StrEnum):
+    """How verdicts are written."""
+
+    TEXT = "text"
+    JSON = "json"
+    JUNIT = "junit"
+    GITHUB = "github"
+
+
+def classify(
+    runs: Annotated[
+        list[Path], typer.Argument(help="Run files, or NoisyTest's logs.", show_default=False)
+    ],
+    format: Annotated[Format, typer.Option("--format", help="How to print.")] = Format.TEXT,  # noqa: A002
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Runs at once.")] = 1,
+    model: ModelFiles = None,
+) -> None:
+    """Label runs; exit 0 if all are quiet, 1 findings, 3 bad input, 4 cannot tell."""
+    from inspector import assets
+    from inspector.formats import FORMATS
+    from inspector.labelling import load_library
+    from inspector.progress import progress
+    from inspector.verdict import exit_status, judge_all
+
+    library = load_library(model or assets.model_files())
+    verdicts = list(progress(judge_all(runs, library, jobs=jobs), "classify", total=len(runs)))
+    typer.echo(FORMATS[format](verdicts))
+    for bad in verdicts:
+        if bad.status == "bad-input":
+            typer.echo(f"inspector: {bad.path}: {bad.message}", err=True)
+    raise typer.Exit(exit_status(verdicts))
