@@ -6,7 +6,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,9 +105,20 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
     with replacing(path, overwrite=overwrite) as temporary:
         try:
             with temporary.open("wb") as stream:
-                np.savez_compressed(stream, allow_pickle=False, **arrays)
+                _pack(stream, arrays)
         except ValueError as error:
             raise OutputError(f"{path}: cannot be written ({_one_line(error)})") from error
+
+
+def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
+    """Write what ``np.savez_compressed`` would, in half its time.
+
+    More than the quickest compression hardly makes the noise of a log smaller.
+    """
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
+        for name, array in arrays.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
+                np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
 def _plain(path: Path, name: str, array: Any) -> NDArray[Any]:
