@@ -4,14 +4,16 @@
 
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` names each
 choice on the way: NoisyTest's own, the paper's, or ours for any rate (`LogBands`). A `Dataset`
-holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts.
+holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts. A
+`Stream` labels a signal while it comes in.
 
 This package knows no robot: a signal and its rate are all that it takes. It needs NumPy, and
 scikit-learn only to train.
 """
 
 from models import noisytest
-from models.classifier import Classifier, nearest
+from models.choice import nearest
+from models.classifier import Classifier
 from models.dataset import Dataset
 from models.errors import (
     DataFileError,
@@ -34,6 +36,7 @@ from models.logbands import LogBands
 from models.logfile import nominal_rate, read_log
 from models.profile import CLASSES, Profile
 from models.recording import Block, Recording
+from models.stream import Stream
 
 __all__ = [
     "CLASSES",
@@ -56,6 +59,7 @@ __all__ = [
     "Recording",
     "RecordingError",
     "SignalError",
+    "Stream",
     "UnknownLabelError",
     "evaluate",
     "features",

@@ -1,6 +1,6 @@
 """The classifier: a profile, its machines, and where they were learnt."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -164,14 +164,35 @@ class Classifier:
         gaps = np.concatenate(([0], np.cumsum(~valid)))
         starts = starts[gaps[starts + length] == gaps[starts]]
         view = np.lib.stride_tricks.sliding_window_view(signal, length)
-        decisions = self._decide(view, starts)
+        return self.labels(self._decide(view, starts), starts, rate, start=start)
+
+    def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
+        """Say what decisions on frames mean.
+
+        Args:
+            decisions: Of all machines, shape (frames, machines).
+            starts: First sample of each frame, shape (frames,).
+            rate: Sample rate of the signal, in [Hz].
+            start: Time of its first sample, in [s].
+        """
         return Labels(
             start + starts / rate,
-            start + (starts + length) / rate,
+            start + (starts + self.profile.length) / rate,
             self._choose(decisions),
             self._score(decisions),
             self.classes,
         )
+
+    def judge(self, plain: Array) -> Array:
+        """Evaluate the two-class machines on features.
+
+        Args:
+            plain: Features, not yet standardised, shape (frames, features).
+
+        Returns:
+            Decisions, shape (frames, machines).
+        """
+        return self.machines.decision((plain - self.mean) / self.scale)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
@@ -231,11 +252,9 @@ class Classifier:
         )
 
     def _decide(self, frames: Real, index: Index) -> Array:
-        return np.concatenate([self._decide_chunk(frames[chunk]) for chunk in _chunks(index)])
-
-    def _decide_chunk(self, frames: Real) -> Array:
-        plain = features(frames, self.profile)
-        return self.machines.decision((plain - self.mean) / self.scale)
+        return np.concatenate(
+            [self.judge(features(frames[chunk], self.profile)) for chunk in _chunks(index)]
+        )
 
     def _choose(self, decisions: Array) -> Words:
         chosen = svm.choose(
@@ -245,23 +264,6 @@ class Classifier:
 
     def _score(self, decisions: Array) -> Array:
         return svm.score(decisions, classes=len(self.classes), multiclass=self.profile.multiclass)
-
-
-def nearest(models: Iterable[Classifier], rate: float) -> Classifier:
-    """Find the model of the nearest rate at or below a signal's own: down, never up.
-
-    Args:
-        models: Models of any rates.
-        rate: Sample rate of the signal, in [Hz].
-
-    Raises:
-        RateError: If all models are of higher rates, or there are none.
-    """
-    models = list(models)
-    below = [model for model in models if model.rate <= rate * (1.0 + TOLERANCE)]
-    if not below:
-        raise RateError(rate, [model.rate for model in models], "too low for any; log faster")
-    return max(below, key=lambda model: model.rate)
 
 
 def _chunks(index: Index) -> list[Index]:

@@ -30,16 +30,54 @@ def features(frames: Real, profile: Profile) -> Array:
         SignalError: If the frames have another shape or values that are not finite.
     """
     _check(frames, profile)
+    exact = rounded(frames, profile)
+    return course(levels(_stretches(exact, profile.window, profile.stride), profile), profile)
+
+
+def rounded(samples: Real, profile: Profile) -> Array:
+    """Round samples as the profile asks for, and make 64-bit numbers of them.
+
+    Args:
+        samples: A noise signal, any shape.
+        profile: Says whether samples are 32-bit numbers.
+    """
     if profile.single_precision:
-        frames = frames.astype(np.float32, copy=False)
-    exact = frames.astype(np.float64, copy=False)
-    spectrum = spectrogram(exact, window=profile.window, stride=profile.stride)
+        samples = samples.astype(np.float32, copy=False)
+    return samples.astype(np.float64, copy=False)
+
+
+def levels(stretches: Array, profile: Profile) -> Array:
+    """Tell how loud each frequency band is in each window of a Fourier transform.
+
+    Args:
+        stretches: Samples of the windows, shape (..., window).
+        profile: What to compute.
+
+    Returns:
+        Logarithms of the bands' amplitudes, shape (..., bands).
+    """
+    spectrum = _amplitude(stretches)
     if profile.bands == "log":
         amplitude = spectrum * (2.0 / _hann(profile.window).sum())
         power = np.square(amplitude) @ band_shares(profile)
-        return pool(np.log(np.sqrt(power) + profile.floor))
-    loudness = np.log(compress(spectrum, comb=profile.bands == "comb") + profile.floor)
-    flat = dct(loudness).reshape(len(frames), -1)
+        loudness: Array = np.log(np.sqrt(power) + profile.floor)
+        return loudness
+    return np.log(compress(spectrum, comb=profile.bands == "comb") + profile.floor)
+
+
+def course(loudness: Array, profile: Profile) -> Array:
+    """Describe each frame by the course of its levels in time.
+
+    Args:
+        loudness: Levels of the frames' windows, shape (frames, time, bands).
+        profile: What to compute.
+
+    Returns:
+        Features, not yet standardised, shape (frames, features).
+    """
+    if profile.bands == "log":
+        return pool(loudness)
+    flat = dct(loudness).reshape(len(loudness), feature_count(profile))
     return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
 
 
@@ -61,10 +99,7 @@ def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
     Returns:
         Amplitudes, shape (frames, time, frequency).
     """
-    stretches = np.lib.stride_tricks.sliding_window_view(frames, window, axis=1)[:, ::stride]
-    transform = np.fft.rfft(stretches * _hann(window), axis=2)
-    amplitude: Array = np.abs(transform)
-    return amplitude
+    return _amplitude(_stretches(frames, window, stride))
 
 
 def compress(spectrum: Array, *, comb: bool = False) -> Array:
@@ -128,6 +163,16 @@ def band_shares(profile: Profile) -> Array:
     share = np.maximum(overlap, 0.0)
     normalised: Array = share / share.sum(axis=0)
     return normalised
+
+
+def _stretches(frames: Array, window: int, stride: int) -> Array:
+    return np.lib.stride_tricks.sliding_window_view(frames, window, axis=1)[:, ::stride]
+
+
+def _amplitude(stretches: Array) -> Array:
+    transform = np.fft.rfft(stretches * _hann(stretches.shape[-1]), axis=-1)
+    amplitude: Array = np.abs(transform)
+    return amplitude
 
 
 @lru_cache

@@ -6,6 +6,7 @@ is one for each class, against all others.
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from itertools import combinations
 from typing import Self
 
@@ -59,7 +60,7 @@ class Machines:
             self, vectors=self.coefficients @ self.vectors, coefficients=np.eye(machines)
         )
 
-    @property
+    @cached_property
     def _squares(self) -> Array:
         squares: Array = np.einsum("ij,ij->i", self.vectors, self.vectors)
         return squares
@@ -103,16 +104,20 @@ def score(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
     """
     if multiclass == "one-vs-rest":
         return decisions
-    confidence = np.zeros((len(decisions), classes))
-    for machine, (first, second) in enumerate(combinations(range(classes), 2)):
-        confidence[:, first] += decisions[:, machine]
-        confidence[:, second] -= decisions[:, machine]
+    first, second = _sides(classes)
+    confidence = decisions @ (first - second)
     return _votes(decisions, classes) + confidence / (3.0 * (np.abs(confidence) + 1.0))
 
 
 def _votes(decisions: Array, classes: int) -> Array:
-    votes = np.zeros((len(decisions), classes))
-    for machine, (first, second) in enumerate(combinations(range(classes), 2)):
-        votes[:, first] += decisions[:, machine] > 0.0
-        votes[:, second] += decisions[:, machine] <= 0.0
+    first, second = _sides(classes)
+    votes: Array = (decisions > 0.0) @ first + (decisions <= 0.0) @ second
     return votes
+
+
+@lru_cache
+def _sides(classes: int) -> tuple[Array, Array]:
+    """Mark the first and the second class of each pair, shape (machines, classes) each."""
+    first, second = np.array(list(combinations(range(classes), 2))).T
+    unit = np.eye(classes)
+    return unit[first], unit[second]

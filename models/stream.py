@@ -1,0 +1,200 @@
+"""Labels of a noise signal while it comes in, the same as those of the whole signal."""
+
+from bisect import bisect_right
+from typing import TypeAlias
+
+import numpy as np
+
+from models.classifier import Classifier
+from models.errors import RateError, SignalError
+from models.features import course, levels, rounded
+from models.labels import Labels
+from models.profile import TOLERANCE
+from models.types import Array, Index, Mask, Real
+
+Decided: TypeAlias = tuple[Index, Array]
+"""Where frames start, shape (frames,), and the decisions on them, shape (frames, machines)."""
+
+
+class Stream:
+    """A classifier that is fed sample by sample, or in chunks of any size.
+
+    What it answers, one after the other, is what `Classifier.classify` says of the whole signal:
+    a frame's label comes with the frame's last sample. Each Fourier transform is computed once,
+    as soon as its window is complete, for all frames that it belongs to. Memory does not grow.
+
+    Args:
+        classifier: The model.
+        rate: Sample rate of the signal, in [Hz], which must be the model's; the model's unless
+            given.
+        start: Time of the first sample, in [s].
+
+    Raises:
+        RateError: If the model is of another rate. Motion can be lowered before it becomes noise;
+            the noise itself cannot.
+    """
+
+    def __init__(
+        self, classifier: Classifier, *, rate: float | None = None, start: float = 0.0
+    ) -> None:
+        self.classifier = classifier
+        self.rate = classifier.rate if rate is None else rate
+        self.start = start
+        if not abs(self.rate / classifier.rate - 1.0) <= TOLERANCE:
+            raise RateError(
+                self.rate, [classifier.rate], "lower the motion's rate, or take another model"
+            )
+        profile = self._profile = classifier.profile
+        # Frames start every hop, and their windows at the same phases of each hop. Windows are
+        # numbered in order of time; `_of_frame` numbers those of the first frame.
+        hops, phase = np.divmod(profile.stride * np.arange(profile.transforms), profile.hop)
+        phases, rank = np.unique(phase, return_inverse=True)
+        self._of_frame = hops * len(phases) + rank
+        self._phases: list[int] = phases.tolist()
+        # Room for a frame, and for as much as is taken at once.
+        self._samples = np.zeros(3 * profile.length)
+        self._valid = np.zeros(3 * profile.length, dtype=bool)
+        self._windows = np.lib.stride_tricks.sliding_window_view(self._samples, profile.window)
+        rows = len(self._phases) * (2 * profile.length // profile.hop + 2)
+        bands = levels(self._windows[:1], profile).shape[1]
+        self._levels = np.zeros((rows, bands))  # of window i in row i modulo rows
+        nothing = np.empty(0, dtype=np.intp), np.empty((0, len(classifier.machines.intercept)))
+        self._nothing = self._labels([nothing])
+        self._begin()
+
+    @property
+    def count(self) -> int:
+        """Samples that came so far."""
+        return self._count
+
+    def push(self, samples: Real, valid: Mask | None = None) -> Labels:
+        """Take samples of the noise signal.
+
+        Args:
+            samples: Any number of them, none included, shape (samples,).
+            valid: False in gaps, shape (samples,); frames that touch a gap are left out.
+
+        Returns:
+            Labels of the frames that these samples complete, most often none.
+
+        Raises:
+            SignalError: If the samples are not finite, or not one-dimensional; none is taken.
+        """
+        samples = np.asarray(samples)
+        _check(samples, valid, self._count)
+        exact = rounded(samples, self._profile)
+        found: list[Decided] = []
+        for first in range(0, len(exact), self._profile.length):
+            piece = slice(first, first + self._profile.length)
+            self._keep(exact[piece], True if valid is None else valid[piece])
+            if self._count >= self._due:
+                found += self._advance()
+        return self._labels(found) if found else self._nothing
+
+    def skip(self, samples: int) -> None:
+        """Pass over a gap: the same as pushing so many samples that are not valid.
+
+        Args:
+            samples: How many were lost; a gap of hours takes no longer than one of seconds.
+        """
+        length, hop = self._profile.length, self._profile.hop
+        self._lose(min(samples, length))
+        # Frames that wait now lie wholly in the gap, and so would all that are jumped over.
+        jump = max(samples - length, 0) // hop * hop
+        self._count += jump
+        self._frame += jump
+        self._due += jump
+        self._done += jump // hop * len(self._phases)
+        self._lose(samples - min(samples, length) - jump)
+
+    def finish(self) -> Labels:
+        """End the signal; what is pushed next begins another one.
+
+        Returns:
+            The label of the last frame, flush with the end, if the profile asks for one where no
+            hop leads.
+        """
+        profile, found = self._profile, list[Decided]()
+        last = self._count - profile.length
+        flush = profile.flush_end and last > self._first
+        if flush and (last - self._first) % profile.hop and self._is_whole(last):
+            places = last - self._base + profile.stride * np.arange(profile.transforms)
+            found = self._decide([last], levels(self._windows[places], profile)[None])
+        self._begin()
+        return self._labels(found) if found else self._nothing
+
+    def _begin(self) -> None:
+        self._count = 0  # samples that came
+        self._held = 0  # samples in the buffer
+        self._first = int(self._profile.drop_first_sample)
+        self._frame = self._first  # start of the next frame
+        self._done = 0  # windows that are transformed
+        self._due = self._first + self._profile.window  # count with which there is work to do
+
+    def _lose(self, samples: int) -> None:
+        self.push(np.zeros(samples), np.zeros(samples, dtype=bool))
+
+    def _keep(self, samples: Array, valid: Mask | bool) -> None:
+        """Append at most a frame's length of samples to the buffer."""
+        length = self._profile.length
+        if self._held + len(samples) > len(self._samples):
+            for buffer in (self._samples, self._valid):
+                buffer[:length] = buffer[self._held - length : self._held]
+            self._held = length
+        stop = self._held + len(samples)
+        self._samples[self._held : stop], self._valid[self._held : stop] = samples, valid
+        self._held = stop
+        self._count += len(samples)
+
+    def _advance(self) -> list[Decided]:
+        """Transform the windows that are complete now, and decide on the frames that are."""
+        profile, rows = self._profile, len(self._levels)
+        hops, phase = divmod(self._count - profile.window - self._first, profile.hop)
+        complete = hops * len(self._phases) + bisect_right(self._phases, phase)
+        fresh = range(self._done, complete)
+        if fresh:
+            places = [self._start(window) - self._base for window in fresh]
+            transformed = levels(self._windows[places], profile)
+            self._levels[[window % rows for window in fresh]] = transformed
+        frames = range(self._frame, self._count - profile.length + 1, profile.hop)
+        self._frame += len(frames) * profile.hop
+        self._done = complete
+        self._due = min(self._frame + profile.length, self._start(complete) + profile.window)
+        whole = [frame for frame in frames if self._is_whole(frame)]
+        first = [(frame - self._first) // profile.hop * len(self._phases) for frame in whole]
+        windows = np.add.outer(np.array(first, dtype=np.intp), self._of_frame)
+        return self._decide(whole, self._levels[windows % rows]) if whole else []
+
+    @property
+    def _base(self) -> int:
+        """The sample that is first in the buffer."""
+        return self._count - self._held
+
+    def _start(self, window: int) -> int:
+        """Say at which sample a window starts, by its number."""
+        hops, phase = divmod(window, len(self._phases))
+        return self._first + hops * self._profile.hop + self._phases[phase]
+
+    def _is_whole(self, frame: int) -> bool:
+        """Whether no gap touches the frame that starts at a sample."""
+        place = frame - self._base
+        return bool(self._valid[place : place + self._profile.length].all())
+
+    def _decide(self, frames: list[int], loudness: Array) -> list[Decided]:
+        return [(np.array(frames), self.classifier.judge(course(loudness, self._profile)))]
+
+    def _labels(self, found: list[Decided]) -> Labels:
+        starts, decisions = (np.concatenate(each) for each in zip(*found, strict=True))
+        return self.classifier.labels(decisions, starts, self.rate, start=self.start)
+
+
+def _check(samples: Real, valid: Mask | None, count: int) -> None:
+    shape = samples.shape if valid is None else valid.shape
+    if samples.ndim != 1 or shape != samples.shape:
+        raise SignalError(
+            f"samples of shape {samples.shape} and validity of shape {shape},"
+            " expected (samples,) for both"
+        )
+    if not np.isfinite(samples).all():
+        row = int(np.flatnonzero(~np.isfinite(samples))[0])
+        raise SignalError(f"sample {count + row} of the signal is not finite ({samples[row]})")

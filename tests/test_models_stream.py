@@ -1,0 +1,211 @@
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import models
+
+RATE = 1000.0
+OURS = models.LogBands().at(RATE)
+PROFILES = {
+    "ours": OURS,
+    # Windows of different frames never coincide, and some frames share none.
+    "noisytest": replace(
+        models.Profile.noisytest(), rate=RATE, length=400, hop=100, window=64, stride=71
+    ),
+    "paper": replace(models.Profile.paper(), rate=RATE, length=400, hop=100, window=64, stride=48),
+    "frames apart": replace(OURS, hop=650, stride=37),
+}
+
+
+def noise(samples, seed=0):
+    """A walk that hums in its second half and knocks once."""
+    time, random = np.arange(samples) / RATE, np.random.default_rng(seed)
+    signal = 1.0 + 0.3 * np.sin(7.0 * time) + 0.01 * random.standard_normal(samples)
+    signal[samples // 2 :] += 0.2 * np.sin(240 * np.pi * time[samples // 2 :])
+    signal[samples // 4 : samples // 4 + 9] += 1.0
+    return signal
+
+
+@cache
+def classifier(name):
+    """A classifier that knows a hum when it hears one."""
+    blocks = [(0.0, 1.9, "ok"), (2.1, 4.0, "oscillations")]
+    blocks = tuple(models.Block(start, stop, label) for start, stop, label in blocks)
+    recording = models.Recording("walk", noise(4000, seed=1), RATE, blocks)
+    profile = PROFILES[name]
+    return models.Classifier.train(models.Dataset.of([recording], profile), profile)
+
+
+def streamed(stream, signal, cuts, valid=None):
+    """Push a signal in pieces, and finish it."""
+    edges = [0, *sorted(cuts), len(signal)]
+    pieces = [slice(a, b) for a, b in pairwise(edges)]
+    parts = [
+        stream.push(signal[piece], None if valid is None else valid[piece]) for piece in pieces
+    ]
+    return joined([*parts, stream.finish()])
+
+
+def joined(parts):
+    """The labels of several answers as those of one."""
+    fields = ("start", "stop", "label", "scores")
+    return models.Labels(
+        *(np.concatenate([getattr(part, name) for part in parts]) for name in fields),
+        parts[0].classes,
+    )
+
+
+def assert_equal(ours, batch):
+    assert ours.classes == batch.classes
+    assert np.array_equal(ours.start, batch.start)
+    assert np.array_equal(ours.stop, batch.stop)
+    assert np.array_equal(ours.label, batch.label)
+    np.testing.assert_allclose(ours.scores, batch.scores, atol=1e-9)
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("name", PROFILES)
+def test_labels_are_those_of_the_whole_signal_however_it_is_cut(name, data):
+    samples = data.draw(st.integers(401, 3000))
+    cuts = data.draw(st.lists(st.integers(0, samples), max_size=30))
+    signal = noise(samples, seed=samples)
+    stream = models.Stream(classifier(name), start=5.0)
+    batch = classifier(name).classify(signal, RATE, start=5.0)
+    assert_equal(streamed(stream, signal, cuts), batch)
+
+
+@settings(max_examples=40, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("name", PROFILES)
+def test_frames_that_touch_a_gap_are_left_out_as_in_the_whole_signal(name, data):
+    samples = data.draw(st.integers(401, 3000))
+    cuts = data.draw(st.lists(st.integers(0, samples), max_size=10))
+    valid = np.ones(samples, dtype=bool)
+    for first in data.draw(st.lists(st.integers(0, samples - 1), max_size=3)):
+        valid[first : first + data.draw(st.integers(1, 900))] = False
+    signal = noise(samples) * valid
+    batch = classifier(name).classify(signal, RATE, valid=valid)
+    assert_equal(streamed(models.Stream(classifier(name)), signal, cuts, valid), batch)
+
+
+@settings(max_examples=30, deadline=None)
+@given(before=st.integers(0, 900), lost=st.integers(0, 5000), after=st.integers(0, 1500))
+@pytest.mark.parametrize("name", PROFILES)
+def test_skipping_is_pushing_a_gap(name, before, lost, after):
+    signal = noise(before + after)
+    skipping, pushing = models.Stream(classifier(name)), models.Stream(classifier(name))
+    parts = [skipping.push(signal[:before])]
+    skipping.skip(lost)
+    parts += [skipping.push(signal[before:]), skipping.finish()]
+    whole = np.concatenate((signal[:before], np.zeros(lost), signal[before:]))
+    valid = np.ones(len(whole), dtype=bool)
+    valid[before : before + lost] = False
+    assert_equal(joined(parts), streamed(pushing, whole, [], valid))
+
+
+def test_a_label_comes_with_the_last_sample_of_its_frame():
+    stream, signal = models.Stream(classifier("ours")), noise(1000)
+    came = [i for i in range(1000) if len(stream.push(signal[i : i + 1]))]
+    assert came == [399, 499, 599, 699, 799, 899, 999]
+    assert stream.count == 1000
+
+
+def test_a_gap_of_a_year_is_passed_at_once_and_the_clock_goes_on():
+    stream = models.Stream(classifier("ours"))
+    stream.push(noise(1000))
+    year = round(365 * 86_400 * RATE)
+    stream.skip(year)
+    labels = stream.push(noise(1000))
+    assert stream.count == year + 2000
+    assert labels.start[0] == pytest.approx((year + 1000) / RATE)
+    assert set(labels.label[-2:]) == {"oscillations"}
+
+
+def test_after_its_end_another_signal_begins():
+    stream, signal = models.Stream(classifier("ours")), noise(1234)
+    once, again = (streamed(stream, signal, [17]) for _ in range(2))
+    assert_equal(once, again)
+    assert stream.count == 0
+
+
+def test_a_signal_shorter_than_a_frame_has_no_labels():
+    labels = streamed(models.Stream(classifier("ours")), noise(399), [5])
+    assert len(labels) == 0
+    assert labels.scores.shape == (0, 2)
+
+
+def test_memory_does_not_grow():
+    stream, signal = models.Stream(classifier("noisytest")), noise(1000)
+    sizes = []
+    for _ in range(20):
+        stream.push(signal)
+        arrays = [each for each in vars(stream).values() if isinstance(each, np.ndarray)]
+        sizes.append((len(vars(stream)), sum(each.nbytes for each in arrays)))
+    assert len(set(sizes)) == 1
+
+
+def test_every_transform_is_computed_once(monkeypatch):
+    import models.stream as module
+
+    transformed = []
+
+    def counted(stretches, profile):
+        transformed.append(len(stretches))
+        return original(stretches, profile)
+
+    original = module.levels
+    stream = models.Stream(classifier("ours"))
+    monkeypatch.setattr(module, "levels", counted)
+    for sample in np.split(noise(1000), 40):
+        stream.push(sample)
+    assert sum(transformed) == 1 + (1000 - OURS.window) // OURS.stride
+
+
+@pytest.mark.parametrize("rate", [10_000.0, 990.0, 0.0, float("nan")])
+def test_a_signal_of_another_rate_is_refused(rate):
+    with pytest.raises(models.RateError, match="rates are 1000 Hz: lower the motion's rate"):
+        models.Stream(classifier("ours"), rate=rate)
+
+
+def test_a_rate_that_is_nearly_the_models_counts_time_by_its_own():
+    signal = noise(1500)
+    stream = models.Stream(classifier("ours"), rate=1000.5)
+    batch = classifier("ours").classify(signal, 1000.5)
+    assert_equal(streamed(stream, signal, [700]), batch)
+
+
+@pytest.mark.parametrize(
+    ("samples", "valid", "reason"),
+    [
+        (np.zeros((3, 2)), None, r"samples of shape \(3, 2\)"),
+        (np.zeros(3), np.ones(2, bool), r"validity of shape \(2,\), expected \(samples,\) for"),
+        (np.array([0.0, np.nan]), None, r"sample 11 of the signal is not finite \(nan\)"),
+    ],
+)
+def test_samples_that_make_no_signal_are_refused_and_none_is_taken(samples, valid, reason):
+    stream = models.Stream(classifier("ours"))
+    stream.push(np.zeros(10))
+    with pytest.raises(models.SignalError, match=reason):
+        stream.push(samples, valid)
+    assert stream.count == 10
+
+
+def test_streaming_needs_neither_scikit_learn_nor_scipy(tmp_path):
+    classifier("ours").save(tmp_path / "model.npz")
+    code = (
+        "import sys, numpy, models\n"
+        "stream = models.Stream(models.Classifier.load(sys.argv[1]))\n"
+        "print(len(stream.push(numpy.zeros(2000))))\n"
+        "print(sorted({'sklearn', 'scipy', 'noisemodel', 'joblib'} & set(sys.modules)))\n"
+    )
+    command = [sys.executable, "-c", code, tmp_path / "model.npz"]
+    answer = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert answer.stdout.split("\n")[:2] == ["17", "[]"]
