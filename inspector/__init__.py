@@ -1,1 +1,24 @@
-"""Commands, recordings and reports for people."""
+"""Commands, recordings and reports for people; ``read_log`` for programs."""
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from inspector.logs.importing import Imported
+    from inspector.logs.library import read_log, read_logs
+
+__all__ = ["Imported", "read_log", "read_logs"]
+
+_HOMES = {
+    "Imported": "inspector.logs.importing",
+    "read_log": "inspector.logs.library",
+    "read_logs": "inspector.logs.library",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what is asked for: `inspector --help` needs none of it, and it takes long."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    return getattr(import_module(_HOMES[name]), name)

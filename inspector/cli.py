@@ -4,7 +4,14 @@ import sys
 
 import typer
 
-from inspector.commands import comparing, judging, learning, logs, looking, simulating
+from inspector.commands import (
+    comparing,
+    judging,
+    learning,
+    logs,
+    looking,
+    simulating,
+)
 
 app = typer.Typer(
     help="Inspect the noise that a robot's joints would make.",

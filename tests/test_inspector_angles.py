@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from csvlogs import TIME, log, write
 
+from inspector import read_log
 from inspector.errors import LogError
-from inspector.importing import read_csv
 
 
 def test_degrees_are_converted_but_not_what_slides(tmp_path):
@@ -17,11 +17,11 @@ def test_degrees_are_converted_but_not_what_slides(tmp_path):
         "panda_finger_joint1.effort": np.full(400, 1.0),
     }
     path = write(tmp_path / "log.csv", columns)
-    run = read_csv(path, robot="panda", degrees=True).run
+    run = read_log(path, robot="panda", units="degrees").run
     assert np.allclose(run.position[0], [np.pi / 2, 0.04], rtol=1e-15)
     assert np.allclose(run.velocity[0], [np.pi, 0.01], rtol=1e-15)
     assert np.array_equal(run.effort[0], [10.0, 1.0])
-    assert read_csv(path, degrees=True).run.position[0, 1] == pytest.approx(np.deg2rad(0.04))
+    assert read_log(path, units="degrees").run.position[0, 1] == pytest.approx(np.deg2rad(0.04))
 
 
 @pytest.mark.parametrize(
@@ -31,7 +31,7 @@ def test_degrees_passed_as_radians_are_named_with_their_row(tmp_path, column, va
     path = log(tmp_path, **{column: np.where(TIME < 0.05, 0.0, value)})
     message = f"row 7: column '{column}' holds {value:g}, too much for radians; if .* --degrees"
     with pytest.raises(LogError, match=message) as caught:
-        read_csv(path)
+        read_log(path)
     assert caught.value.row == 7
 
 
@@ -45,4 +45,4 @@ def test_wheels_and_sliders_may_go_far(tmp_path):
             "torso_lift_joint.position": position,
         },
     )
-    assert read_csv(path, robot="tiago").run.position.max() == 50.0
+    assert read_log(path, robot="tiago").run.position.max() == 50.0

@@ -5,15 +5,15 @@ import numpy as np
 import pytest
 from csvlogs import TIME, jittered, log, swing, write
 
+from inspector import read_log
 from inspector.errors import LogError
-from inspector.importing import read_csv
 from noisemodel import Robot, Run, UnknownJointError, UnknownRobotError
 
 PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 
 
 def test_a_uniform_log_is_taken_bit_for_bit(tmp_path):
-    imported = read_csv(log(tmp_path))
+    imported = read_log(log(tmp_path))
     position, velocity = swing(TIME)
     run = imported.run
     assert np.array_equal(run.time, TIME)
@@ -28,14 +28,14 @@ def test_a_uniform_log_is_taken_bit_for_bit(tmp_path):
 
 
 def test_an_imported_run_is_saved_and_loaded(tmp_path):
-    run = read_csv(log(tmp_path, jittered())).run
+    run = read_log(log(tmp_path, jittered())).run
     run.save(tmp_path / "run.npz")
     assert Run.load(tmp_path / "run.npz").meta == run.meta
 
 
 def test_velocities_that_are_missing_are_differentiated_and_it_is_said(tmp_path):
     position, velocity = swing(TIME)
-    imported = read_csv(write(tmp_path / "log.csv", {"time": TIME, "a.position": position}))
+    imported = read_log(write(tmp_path / "log.csv", {"time": TIME, "a.position": position}))
     assert np.abs(imported.run.velocity[:, 0] - velocity).max() < 5e-3 * np.abs(velocity).max()
     method = "Savitzky-Golay, window 7, order 3"
     assert imported.run.meta["differentiated"] == {"velocity": method}
@@ -43,7 +43,7 @@ def test_velocities_that_are_missing_are_differentiated_and_it_is_said(tmp_path)
 
 
 def test_a_joint_without_positions_leaves_all_positions_out(tmp_path):
-    imported = read_csv(log(tmp_path, **{"wrist.velocity": TIME, "elbow.effort": TIME}))
+    imported = read_log(log(tmp_path, **{"wrist.velocity": TIME, "elbow.effort": TIME}))
     assert imported.run.joint_names == ("elbow", "wrist")
     assert imported.run.position is None
     assert imported.run.effort is None
@@ -55,18 +55,18 @@ def test_a_joint_without_positions_leaves_all_positions_out(tmp_path):
 
 def test_joints_are_checked_against_the_robot(tmp_path):
     path = write(tmp_path / "log.csv", {"time": TIME, "panda_joint3.velocity": TIME})
-    assert read_csv(path, robot="panda").run.robot == "panda"
+    assert read_log(path, robot="panda").run.robot == "panda"
     with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'; it has panda"):
-        read_csv(log(tmp_path), robot="panda")
+        read_log(log(tmp_path), robot="panda")
     with pytest.raises(UnknownRobotError, match="no robot 'pandda'"):
-        read_csv(path, robot="pandda")
+        read_log(path, robot="pandda")
 
 
 def test_desired_motion_comes_onto_the_measured_clock(tmp_path):
     measured = log(tmp_path, jittered() + 50)
     late = np.arange(1000) / 250 + 50.5
     desired = write(tmp_path / "desired.csv", {"time": late, "elbow.velocity": swing(late - 50)[1]})
-    imported = read_csv(measured, desired=desired)
+    imported = read_log(measured, desired=desired)
     run = imported.run
     expected = swing(run.time + 0.5)[1]
     assert run.rate == 100.0
@@ -79,7 +79,7 @@ def test_desired_motion_comes_onto_the_measured_clock(tmp_path):
 
 def test_uniform_logs_of_one_clock_are_taken_bit_for_bit(tmp_path):
     desired = log(tmp_path, TIME[100:], name="desired.csv")
-    run = read_csv(log(tmp_path), desired=desired).run
+    run = read_log(log(tmp_path), desired=desired).run
     assert np.array_equal(run.velocity_desired, run.velocity)
     assert np.array_equal(run.position_desired[:, 0], swing(TIME)[0][100:])
     assert run.time[0] == 0.0
@@ -88,7 +88,7 @@ def test_uniform_logs_of_one_clock_are_taken_bit_for_bit(tmp_path):
 def test_a_desired_log_goes_before_desired_columns(tmp_path):
     measured = log(tmp_path, **{"elbow.velocity_desired": TIME})
     desired = log(tmp_path, name="desired.csv", **{"elbow.velocity_desired": -TIME})
-    imported = read_csv(measured, desired=desired)
+    imported = read_log(measured, desired=desired)
     assert np.array_equal(imported.run.velocity_desired[:, 0], -TIME)
     assert imported.run.position_desired is None
     assert imported.remarks == (
@@ -99,7 +99,7 @@ def test_a_desired_log_goes_before_desired_columns(tmp_path):
 
 def test_gaps_of_the_desired_motion_are_gaps(tmp_path):
     desired = log(tmp_path, np.delete(TIME, slice(200, 220)), name="desired.csv")
-    run = read_csv(log(tmp_path), desired=desired).run
+    run = read_log(log(tmp_path), desired=desired).run
     assert np.array_equal(np.flatnonzero(~run.mask), np.arange(200, 220))
     assert not run.velocity[~run.mask].any()
 
@@ -108,14 +108,14 @@ def test_logs_that_share_no_time_are_refused(tmp_path):
     desired = log(tmp_path, TIME + 1.7e9, name="desired.csv")
     message = r"desired.csv: the stamps from 1700000000.0 s to .* share no time with .* to 3.99 s"
     with pytest.raises(LogError, match=message):
-        read_csv(log(tmp_path), desired=desired)
+        read_log(log(tmp_path), desired=desired)
 
 
 def test_desired_angles_that_wrap_are_interpolated_the_short_way(tmp_path):
     time = np.arange(-1, 402) / 100 + 0.005
     wrapped = (3 * time + np.pi) % (2 * np.pi) - np.pi
     desired = write(tmp_path / "desired.csv", {"time": time, "elbow.position": wrapped})
-    run = read_csv(log(tmp_path), desired=desired).run
+    run = read_log(log(tmp_path), desired=desired).run
     assert np.allclose(np.diff(run.position_desired[:, 0]), 0.03, rtol=0, atol=1e-9)
 
 
@@ -123,13 +123,13 @@ def test_desired_angles_that_wrap_are_interpolated_the_short_way(tmp_path):
 def test_desired_motion_alone_is_no_run(tmp_path, others):
     path = write(tmp_path / "log.csv", {"time": TIME, "target_qd_0": TIME} | others)
     with pytest.raises(LogError, match="holds no measured motion, only desired"):
-        read_csv(path)
+        read_log(path)
 
 
 @pytest.mark.skipif(not PANDA.is_dir(), reason="data/panda is not beside this checkout")
 def test_the_panda_log_is_imported_in_one_call():
     before = clock.process_time()
-    imported = read_csv(PANDA / "measured.csv", desired=PANDA / "desired.csv", robot="panda")
+    imported = read_log(PANDA / "measured.csv", desired=PANDA / "desired.csv", robot="panda")
     assert clock.process_time() - before < 5.0  # takes half a second where nothing else runs
     run = imported.run
     assert run.rate == 1000.0
@@ -145,6 +145,7 @@ def test_the_panda_log_is_imported_in_one_call():
         "measured.csv",
         "measured.csv",
         "desired.csv",
+        "desired.csv",
     ]
     assert "measured.csv: 4 gaps, 0.0343 s in all, the first at 4.9651 s" in imported.remarks[1]
     configuration, velocity = Robot.load("panda").configuration(run)
@@ -153,7 +154,7 @@ def test_the_panda_log_is_imported_in_one_call():
 
 @pytest.mark.skipif(not PANDA.is_dir(), reason="data/panda is not beside this checkout")
 def test_the_panda_run_agrees_with_the_log_at_its_stamps():
-    run = read_csv(PANDA / "measured.csv", desired=PANDA / "desired.csv").run
+    run = read_log(PANDA / "measured.csv", desired=PANDA / "desired.csv").run
     for name, signals in (
         ("measured.csv", {"position": slice(1, 8), "velocity": slice(8, 15)}),
         ("desired.csv", {"velocity_desired": slice(1, 8)}),

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from csvlogs import TIME, jittered, log, swing, write
 
+from inspector import read_log
 from inspector.errors import InspectorError, LogError
-from inspector.importing import read_csv
 
 
 def test_irregular_stamps_are_resampled_to_the_round_rate_nearby(tmp_path):
     time = jittered() * 100 / 98.2
-    imported = read_csv(log(tmp_path, time))
+    imported = read_log(log(tmp_path, time))
     run, (position, velocity) = imported.run, swing(imported.run.time)
     assert run.rate == 100.0
     assert np.abs(run.position[:, 0] - position).max() < 5e-3
@@ -30,32 +30,32 @@ def test_irregular_stamps_are_resampled_to_the_round_rate_nearby(tmp_path):
 def test_a_rate_within_5_percent_of_a_round_one_is_taken_for_it(tmp_path, nominal, rate):
     steps = np.tile([0.9, 1.0, 1.0, 1.1], 100) / nominal
     time = np.concatenate(([0.0], np.cumsum(steps)))
-    assert read_csv(log(tmp_path, time)).run.rate == pytest.approx(rate, rel=1e-9)
+    assert read_log(log(tmp_path, time)).run.rate == pytest.approx(rate, rel=1e-9)
 
 
 def test_a_uniform_rate_is_left_alone_round_or_not(tmp_path):
-    assert read_csv(log(tmp_path, np.arange(400) / 98.0)).run.rate == pytest.approx(98.0, rel=1e-9)
+    assert read_log(log(tmp_path, np.arange(400) / 98.0)).run.rate == pytest.approx(98.0, rel=1e-9)
 
 
 def test_a_declared_rate_is_the_rate(tmp_path):
-    assert read_csv(log(tmp_path), rate=125).run.rate == pytest.approx(125.0)
+    assert read_log(log(tmp_path), rate=125).run.rate == pytest.approx(125.0)
     with pytest.raises(LogError, match="the stamps come at 100 Hz; a run of 1000 Hz cannot be had"):
-        read_csv(log(tmp_path), rate=1000)
+        read_log(log(tmp_path), rate=1000)
     with pytest.raises(InspectorError, match="the rate is 0 Hz; expected a number above 0"):
-        read_csv(log(tmp_path), rate=0)
+        read_log(log(tmp_path), rate=0)
 
 
 def test_resampling_does_not_overshoot(tmp_path):
     step = np.where(TIME < 2, 0.0, 1.0)
     columns = {"time": jittered(), "a.velocity": step}
-    velocity = read_csv(write(tmp_path / "log.csv", columns)).run.velocity
+    velocity = read_log(write(tmp_path / "log.csv", columns)).run.velocity
     assert velocity.min() >= 0
     assert velocity.max() <= 1
 
 
 def test_gaps_are_marked_and_nothing_is_computed_in_them(tmp_path):
     time = np.delete(jittered(), slice(100, 120))
-    imported = read_csv(log(tmp_path, time))
+    imported = read_log(log(tmp_path, time))
     run = imported.run
     gap = (run.time > time[99]) & (run.time < time[100])
     assert np.array_equal(run.mask, ~gap)
@@ -68,7 +68,7 @@ def test_gaps_are_marked_and_nothing_is_computed_in_them(tmp_path):
 
 def test_a_uniform_log_with_a_gap_keeps_its_samples(tmp_path):
     time = np.delete(TIME, slice(100, 120))
-    run = read_csv(log(tmp_path, time)).run
+    run = read_log(log(tmp_path, time)).run
     assert np.array_equal(np.flatnonzero(~run.mask), np.arange(100, 120))
     assert np.allclose(run.velocity[run.mask, 0], swing(time)[1], rtol=1e-12, atol=1e-12)
 
@@ -76,6 +76,6 @@ def test_a_uniform_log_with_a_gap_keeps_its_samples(tmp_path):
 def test_angles_that_wrap_are_interpolated_the_short_way(tmp_path):
     time = jittered()
     wrapped = (3 * time + np.pi) % (2 * np.pi) - np.pi
-    run = read_csv(write(tmp_path / "log.csv", {"time": time, "a.position": wrapped})).run
+    run = read_log(write(tmp_path / "log.csv", {"time": time, "a.position": wrapped})).run
     assert np.allclose(run.position[:, 0], 3 * run.time, rtol=0, atol=1e-9)
     assert np.allclose(run.velocity, 3.0, rtol=0, atol=1e-9)

@@ -1,18 +1,27 @@
 """Commands on logs of robots."""
 
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from inspector.commands.options import Output, Overwrite
+from inspector.commands.options import Overwrite
 
 
 def import_(
-    log: Annotated[Path, typer.Argument(help="A wide CSV log.", show_default=False)],
-    output: Output,
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="CSV, Parquet, HDF5, npz, ROS bags, LeRobot data sets.", show_default=False
+        ),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The run file; a folder for several runs."),
+    ] = None,
     desired: Annotated[
-        Path | None, typer.Option(help="Another CSV, with the desired motion on its own clock.")
+        Path | None, typer.Option(help="Another log, with the desired motion on its own clock.")
     ] = None,
     robot: Annotated[str | None, typer.Option(help="A listed robot, or a URDF.")] = None,
     rate: Annotated[
@@ -20,18 +29,74 @@ def import_(
     ] = None,
     map_: Annotated[
         list[str] | None,
-        typer.Option("--map", help="velocity.JOINT=COLUMN; may be repeated."),
+        typer.Option("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
     ] = None,
-    degrees: Annotated[bool, typer.Option(help="Angles in the log are in degrees.")] = False,
+    mapping: Annotated[Path | None, typer.Option(help="A mapping that was saved.")] = None,
+    save_mapping: Annotated[
+        Path | None, typer.Option(help="Keep what is said here as a mapping (TOML).")
+    ] = None,
+    joints: Annotated[
+        str | None, typer.Option(help="Names of the columns of arrays: a,b,c.")
+    ] = None,
+    topic: Annotated[
+        list[str] | None, typer.Option(help="Read this topic of a bag; repeatable.")
+    ] = None,
+    episode: Annotated[list[str] | None, typer.Option(help="Read this one; repeatable.")] = None,
+    offset: Annotated[
+        float | None,
+        typer.Option(help="Add this to the desired motion's stamps, in [s]; else estimated."),
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Of angles: radians, degrees or normalised.")
+    ] = None,
+    degrees: Annotated[bool, typer.Option("--degrees", help="Angles are in degrees.")] = False,
+    list_: Annotated[bool, typer.Option("--list", help="Only list what is inside.")] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Turn a CSV log into a run file."""
-    from inspector.importing import read_csv
+    """Turn logs into run files; exit 3 if one of them cannot be read."""
+    from inspector.logs.batch import import_logs
+    from inspector.logs.library import listing, reading_of
 
-    imported = read_csv(
-        log, desired=desired, robot=robot, rate=rate, mapping=map_ or (), degrees=degrees
+    reading = reading_of(
+        map_ or (),
+        saved=mapping,
+        robot=robot,
+        rate=rate,
+        units="degrees" if degrees else units,
+        joints=joints.split(",") if joints else None,
+        topics=topic,
+        offset=offset,
     )
-    imported.run.save(output, overwrite=overwrite)
-    for remark in imported.remarks:
-        typer.echo(f"  {remark}")
-    typer.echo(f"{output}: {imported.run.duration:.2f} s at {imported.run.rate:g} Hz")
+    if list_:
+        for line in (line for log in logs for line in listing(log, reading)):
+            typer.echo(line)
+        return
+    if output is None:
+        raise typer.BadParameter("say where the run goes", param_hint="'--output' / '-o'")
+    failed = False
+    for done in import_logs(
+        logs,
+        output,
+        reading,
+        desired=desired,
+        episodes=episode or (),
+        overwrite=overwrite,
+        watch=_watched,
+    ):
+        failed |= bool(done.problem)
+        if done.problem:
+            typer.echo(f"inspector: {done.problem}", err=True)
+            continue
+        for remark in done.remarks:
+            typer.echo(f"  {remark}")
+        typer.echo(f"{done.path}: {done.duration:.2f} s at {done.rate:g} Hz")
+    if save_mapping:
+        reading.save(save_mapping, overwrite=overwrite)
+    if failed:
+        raise typer.Exit(3)
+
+
+def _watched(items: Iterable[Any], total: int) -> Iterator[Any]:
+    from inspector.progress import progress
+
+    return progress(items, "import", total=total)

@@ -1,0 +1,119 @@
+"""Logs become run files: one, or a folder of them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from inspector.errors import InspectorError
+from inspector.logs.importing import Imported
+from inspector.logs.library import Job, jobs_of
+from inspector.logs.opened import Watch, unwatched
+from inspector.logs.reading import Reading
+from noisemodel import NoiseModelError
+from noisemodel.atomic import refuse_existing, replacing
+
+
+@dataclass(frozen=True)
+class Written:
+    """What became of one log, or of one of its episodes.
+
+    Attributes:
+        path: The run file; of a log that could not be read, the log.
+        duration: Of the run, in [s].
+        rate: Of the run, in [Hz].
+        remarks: What was decided on the way.
+        problem: Why there is no run; empty if there is.
+    """
+
+    path: Path
+    duration: float = 0.0
+    rate: float = 0.0
+    remarks: tuple[str, ...] = ()
+    problem: str = ""
+
+
+def import_logs(
+    logs: Sequence[Path],
+    output: Path,
+    reading: Reading,
+    *,
+    desired: Path | None = None,
+    episodes: Sequence[str] = (),
+    overwrite: bool = False,
+    watch: Watch,
+) -> Iterator[Written]:
+    """Read logs and write a run file for each run.
+
+    Args:
+        logs: The logs.
+        output: A run file; a folder, which is made, for several logs or episodes.
+        reading: What a person said of the logs.
+        desired: A log with the desired motion, for a single log.
+        episodes: Which episodes to read, all unless given.
+        overwrite: Whether files that exist may be replaced.
+        watch: Is told how reading goes on.
+
+    Yields:
+        What became of each; a log that cannot be read does not stop the others.
+
+    Raises:
+        InspectorError: If the output does not fit the logs, or a single log cannot be read.
+        NoiseModelError: If an output exists, or a single log makes no run.
+    """
+    if desired and len(logs) > 1:
+        raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
+    many = len(logs) > 1
+    jobs: list[Job] = []
+    failed: list[Written] = []
+    for log in logs:
+        try:
+            inner = unwatched if many else watch  # there is one bar at a time
+            jobs += jobs_of(log, reading, desired=desired, episodes=episodes or None, watch=inner)
+        except (InspectorError, NoiseModelError) as error:
+            if not many:
+                raise
+            failed.append(Written(log, problem=str(error)))
+    targets = _targets(jobs, output, many=many, overwrite=overwrite)
+    yield from failed
+    for job, target in watch(zip(jobs, targets, strict=True), len(jobs)):
+        try:
+            yield _written(job.read(), target, overwrite=overwrite)
+        except (InspectorError, NoiseModelError) as error:
+            if len(targets) == 1 and not many:
+                raise
+            yield Written(target, problem=str(error))
+
+
+def _targets(jobs: Sequence[Job], output: Path, *, many: bool, overwrite: bool) -> tuple[Path, ...]:
+    """Name the run files, before any work is done for them."""
+    if len(jobs) == 1 and not many and not output.is_dir():
+        refuse_existing(output, overwrite=overwrite)
+        return (output,)
+    if output.suffix == ".npz" or output.is_file():
+        raise InspectorError(
+            f"{output}: {len(jobs)} runs do not fit into one file; name a folder, or choose one"
+            " (--episode)"
+        )
+    targets = tuple(output / f"{job.name}.npz" for job in jobs)
+    twice = [path for place, path in enumerate(targets) if path in targets[:place]]
+    if twice:
+        raise InspectorError(f"{twice[0]}: two logs would be written there; import them one by one")
+    try:
+        output.mkdir(exist_ok=True)
+    except OSError as error:
+        raise InspectorError(f"{output}: cannot be made ({error.strerror})") from error
+    for target in targets:
+        refuse_existing(target, overwrite=overwrite)
+    return targets
+
+
+def _written(imported: Imported, target: Path, *, overwrite: bool) -> Written:
+    run, remarks = imported.run, list(imported.remarks)
+    if imported.urdf:
+        urdf = target.with_suffix(".urdf")
+        with replacing(urdf, overwrite=overwrite) as temporary:
+            temporary.write_text(imported.urdf, encoding="utf-8")
+        run = replace(run, robot=str(urdf))
+        remarks.append(f"{urdf.name}: the robot, as the log describes it")
+    run.save(target, overwrite=overwrite)
+    return Written(target, run.duration, run.rate, tuple(remarks))

@@ -1,0 +1,91 @@
+"""Which format a log has, by its content."""
+
+from collections.abc import Callable
+from importlib import import_module
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TypeAlias
+
+from inspector.errors import InspectorError, LogError
+from inspector.logs.opened import Opened
+from inspector.logs.reading import Reading
+
+OpenLog: TypeAlias = Callable[[Path, Reading], Opened]
+
+MAGIC = {
+    b"\x89MCAP0\r\n": "ros.reader",
+    b"SQLite format 3\x00": "ros.reader",
+    b"#ROSBAG V": "ros.reader",
+    b"PAR1": "parquet",
+    b"\x89HDF\r\n\x1a\n": "hdf5",
+    b"PK\x03\x04": "npz",
+    b"PK\x05\x06": "npz",
+}
+"""The first bytes of a file, and the module here that reads it; what has none of them is CSV."""
+
+NEEDS = {"ros.reader": ("rosbags", "ros"), "hdf5": ("h5py", "hdf5")}
+"""The library that a reader needs, and the extra that installs it."""
+
+
+class MissingReaderError(InspectorError):
+    """A log whose reader is not installed.
+
+    Args:
+        path: The log.
+        library: What reads it.
+        extra: The extra of this package that installs that.
+    """
+
+    def __init__(self, path: Path, library: str, extra: str) -> None:
+        self.path, self.library, self.extra = path, library, extra
+        super().__init__(
+            f"{path}: {library} reads such logs and is not installed;"
+            f" pip install 'noise-inspector[{extra}]'"
+        )
+
+
+def open_log(path: Path, reading: Reading) -> Opened:
+    """Recognise a log by its first bytes, or by what a folder holds.
+
+    Args:
+        path: A file, or the folder of a bag or a data set.
+        reading: What a person said of it.
+
+    Raises:
+        LogError: If there is no such file, or it cannot be read.
+        MissingReaderError: If the library that reads such logs is not installed.
+    """
+    module = _of_folder(path) if path.is_dir() else _of_file(path)
+    library, extra = NEEDS.get(module, ("", ""))
+    if library and find_spec(library) is None:
+        raise MissingReaderError(path, library, extra)
+    reader: OpenLog = import_module(f"inspector.logs.{module}").open_log
+    return reader(path, reading)
+
+
+def _of_file(path: Path) -> str:
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(16)
+    except OSError as error:
+        raise LogError(path, f"cannot be read ({error.strerror})") from error
+    if head.startswith(b"PAR1") and _info_above(path):
+        return "lerobot"
+    return next((module for magic, module in MAGIC.items() if head.startswith(magic)), "csvlog")
+
+
+def _of_folder(path: Path) -> str:
+    if (path / "meta" / "info.json").is_file():
+        return "lerobot"
+    bags = (path / "metadata.yaml", *path.glob("*.mcap"), *path.glob("*.db3"))
+    if any(each.is_file() for each in bags):
+        return "ros.reader"
+    raise LogError(
+        path,
+        "a folder that is neither a ROS 2 bag (metadata.yaml) nor a LeRobot data set"
+        " (meta/info.json); name its files one by one",
+    )
+
+
+def _info_above(path: Path) -> bool:
+    return any((folder / "meta" / "info.json").is_file() for folder in path.resolve().parents[:3])

@@ -1,0 +1,204 @@
+"""How a person says that a log is to be read: options and mapping, kept as TOML."""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from math import isfinite
+from pathlib import Path
+from typing import Any, Self
+
+from inspector.errors import InspectorError
+from inspector.logs.columns import BASE_SIGNALS, JOINT_SIGNALS
+from noisemodel.atomic import replacing
+
+FORMAT = "noise-mapping/1"
+UNITS = ("radians", "degrees", "normalised")
+
+CONVENTIONS = {
+    "base_pose": ("xyzw", "wxyz"),
+    "base_velocity": ("body", "world", "mujoco"),
+}
+"""How a base may be written: the order of its quaternion; the axes of its velocity, where MuJoCo's
+are the world's for the linear part and the body's for the angular one. The first is ours."""
+
+PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
+
+
+@dataclass(frozen=True)
+class Entry:
+    """What a person said of one column or array.
+
+    Attributes:
+        signal: One of ``inspector.logs.columns.SIGNALS``, or "time".
+        joint: The joint, for a single column; for a base the convention that it is written in;
+            empty for an array of all joints.
+        source: The column or array, perhaps with a part of it: ``qpos[7:]``, ``qvel[6]``.
+    """
+
+    signal: str
+    joint: str
+    source: str
+
+    @property
+    def target(self) -> str:
+        """What is left of the equals sign."""
+        return f"{self.signal}.{self.joint}" if self.joint else self.signal
+
+    def part(self) -> tuple[str, slice]:
+        """Split the source into the name of an array and its columns."""
+        match = PART.fullmatch(self.source)
+        if match is None or not (match["first"] or match["colon"]):
+            return self.source, slice(None)
+        first = int(match["first"] or 0)
+        if not match["colon"]:
+            return match["name"], slice(first, first + 1)
+        return match["name"], slice(first, int(match["last"]) if match["last"] else None)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How a log is to be read, as far as it does not say so itself.
+
+    Attributes:
+        robot: Listed name or URDF of the robot; joints are checked against it, and columns that
+            are only numbered get its joints in order.
+        rate: The log's rate, if it is known, in [Hz].
+        units: "radians", "degrees" or "normalised" (-100 to 100 of each joint's range, 0 to 100
+            of a gripper's); empty for what the log says.
+        joints: Names of the columns of arrays, in order.
+        topics: The topics to read, all unless given.
+        offset: What to add to the desired motion's stamps, in [s]; estimated unless given.
+        entries: What a person said of columns and arrays.
+    """
+
+    robot: str = ""
+    rate: float | None = None
+    units: str = ""
+    joints: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
+    offset: float | None = None
+    entries: tuple[Entry, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check what a person said."""
+        if self.rate is not None and not (isfinite(self.rate) and self.rate > 0):
+            raise InspectorError(f"the rate is {self.rate:g} Hz; expected a number above 0")
+        if self.offset is not None and not isfinite(self.offset):
+            raise InspectorError(f"the offset is {self.offset:g} s; expected a finite number")
+        if self.units and self.units not in UNITS:
+            raise InspectorError(f"no units {self.units!r}; there are {', '.join(UNITS)}")
+
+    @property
+    def time(self) -> str:
+        """The column that was said to hold the stamps, or empty."""
+        return next((entry.source for entry in self.entries if entry.signal == "time"), "")
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Read a mapping that was saved.
+
+        Raises:
+            InspectorError: If it cannot be read, or says what is not known.
+        """
+        try:
+            saved = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InspectorError(f"{path}: not a mapping in TOML ({error})") from error
+        if saved.pop("format", None) != FORMAT:
+            raise InspectorError(f'{path}: not a mapping; expected format = "{FORMAT}"')
+        entries = saved.pop("map", {})
+        known = {field.name for field in fields(cls)} - {"entries"}
+        if unknown := sorted(set(saved) - known):
+            raise InspectorError(
+                f"{path}: unknown setting {unknown[0]!r}; there are {', '.join(sorted(known))}, map"
+            )
+        try:
+            for target, source in entries.items():
+                _setting(target, source)
+            said = parse_mapping(f"{target}={source}" for target, source in entries.items())
+            return cls(
+                **{name: _setting(name, value) for name, value in saved.items()}, entries=said
+            )
+        except (InspectorError, AttributeError, TypeError) as error:
+            raise InspectorError(f"{path}: {error}") from error
+
+    def save(self, path: Path, *, overwrite: bool = False) -> None:
+        """Write the mapping as TOML, to be used again.
+
+        Raises:
+            OutputError: If the file exists or cannot be written.
+        """
+        lines = [f'format = "{FORMAT}"']
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name != "entries" and value not in (None, "", ()):
+                lines.append(f"{field.name} = {_toml(value)}")
+        if self.entries:
+            lines += ["", "[map]"]
+            lines += [f"{_toml(each.target)} = {_toml(each.source)}" for each in self.entries]
+        with replacing(path, overwrite=overwrite) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
+    """Read what a person says of columns and arrays that have names of their own.
+
+    Args:
+        entries: ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN`` each. The column may
+            hold any character, the joint any but "="; of an array ``[3]``, ``[7:]`` or ``[:7]``
+            names a part. Signals of the base may say how they are written, as ``CONVENTIONS`` has
+            it: ``base_pose.wxyz=root_pose``.
+
+    Returns:
+        The entries.
+
+    Raises:
+        InspectorError: If an entry is not of that form, or a column or target is named twice.
+    """
+    said: list[Entry] = []
+    for text in entries:
+        target, _, source = text.partition("=")
+        signal, dot, joint = target.partition(".")
+        known = signal in (*JOINT_SIGNALS, *BASE_SIGNALS) or target == "time"
+        if not source or not known or (dot and not joint):
+            raise InspectorError(
+                f"mapping {text!r}: expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2,"
+                " SIGNAL=ARRAY, such as position=qpos[7:], or time=COLUMN; signals are"
+                f" {', '.join((*JOINT_SIGNALS, *BASE_SIGNALS))}"
+            )
+        if joint and joint not in CONVENTIONS.get(signal, (joint,)):
+            raise InspectorError(
+                f"mapping {text!r}: a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
+            )
+        if any(entry.source == source for entry in said):
+            raise InspectorError(f"mapping {text!r}: column {source!r} is mapped twice")
+        if any(entry.target == target for entry in said):
+            raise InspectorError(f"mapping {text!r}: {target} is mapped twice")
+        said.append(Entry(signal, joint, source))
+    return tuple(said)
+
+
+def _setting(name: str, value: Any) -> Any:
+    """Check the type of a saved setting."""
+    if name in ("joints", "topics"):
+        wanted = isinstance(value, list) and all(isinstance(each, str) for each in value)
+        value = tuple(value) if wanted else value
+    elif name in ("rate", "offset"):
+        wanted = isinstance(value, int | float) and not isinstance(value, bool)
+    else:
+        wanted = isinstance(value, str)
+    if not wanted:
+        raise InspectorError(f"{name} = {value!r} is of another kind than expected")
+    return value
+
+
+def _toml(value: str | float | tuple[str, ...]) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, str):  # JSON's strings are TOML's, but for one character
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return repr(float(value))

@@ -1,0 +1,217 @@
+"""Signals with clocks of their own, brought onto one uniform time base."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from inspector.logs.floatingbase import interpolated
+from inspector.logs.log import Track
+from noisemodel.types import Array, Indices, Mask, Real
+
+ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Round rates are these times a power of ten, in [Hz]."""
+
+NEAR = 0.05
+"""Share by which the nominal rate may miss a round one that is taken for it."""
+
+UNIFORM = 1e-3
+"""Share by which the steps of a uniform clock may differ from each other."""
+
+GAP = 5.0
+"""Nominal steps above which a step is a gap."""
+
+BLOCK = 500_000
+"""Values that are interpolated at a time; it takes some ten times their memory."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """How samples lie in time.
+
+    Attributes:
+        nominal: Inverse of the median step, in [Hz].
+        rate: The rate that the samples are taken to have, in [Hz].
+        uniform: Whether the stamps are regular already.
+        jitter_rms: Deviation of the steps from that rate's, gaps left out, in [s].
+        jitter_max: The same at its largest, in [s].
+        gaps: Start and end of each gap, in [s].
+        stretches: The samples between gaps.
+    """
+
+    nominal: float
+    rate: float
+    uniform: bool
+    jitter_rms: float
+    jitter_max: float
+    gaps: tuple[tuple[float, float], ...]
+    stretches: tuple[slice, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Clocked:
+    """A track on the clock that all tracks share.
+
+    Attributes:
+        track: The signal as it was logged.
+        time: Rising, shape (samples,), in [s].
+        clock: How ``time`` lies.
+        angles: Which columns are angles, that may wrap.
+    """
+
+    track: Track
+    time: Array
+    clock: Clock
+    angles: Sequence[bool]
+
+
+def clock_of(time: Array, rate: float | None = None, *, held: bool = False) -> Clock:
+    """Look at the stamps of a log.
+
+    Args:
+        time: Rising, shape (samples,), in [s].
+        rate: The rate, if it is known, in [Hz].
+        held: Whether values hold between stamps however far apart, so that there are no gaps.
+
+    Returns:
+        The clock. Unless given, its rate is the nominal one of uniform stamps, and of others the
+        round one that this is near to.
+    """
+    steps = np.diff(time)
+    step = float(np.median(steps))
+    nominal = float(f"{1 / step:.9g}")
+    uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
+    if rate is None:
+        rate = nominal if uniform else _round(nominal)
+    uniform = uniform and abs(rate * step - 1) <= UNIFORM
+    wide = np.flatnonzero(steps > GAP / rate) if not held else np.empty(0, dtype=np.int64)
+    deviations = np.delete(steps, wide) - 1 / rate
+    edges = [0, *(wide + 1), len(time)]
+    return Clock(
+        nominal=nominal,
+        rate=rate,
+        uniform=uniform,
+        jitter_rms=float(np.sqrt(np.mean(deviations**2))),
+        jitter_max=float(np.abs(deviations).max()),
+        gaps=tuple((float(time[before]), float(time[before + 1])) for before in wide),
+        stretches=tuple(slice(start, stop) for start, stop in pairwise(edges)),
+    )
+
+
+def common_time(tracks: Sequence[Clocked], main: Clocked) -> tuple[Array, Mask]:
+    """Make the uniform time base of a run, where all tracks reach.
+
+    Args:
+        tracks: All tracks.
+        main: The one whose rate the run has, its time from 0.
+
+    Returns:
+        Time, shape (instants,), in [s], and whether each instant lies outside of all gaps. Where
+        tracks do not overlap there are no instants.
+    """
+    slack = UNIFORM / main.clock.rate  # an instant may miss a last sample by rounding
+    time = grid(main.time, main.clock)
+    starts = max(track.time[0] for track in tracks) - slack
+    stops = min(track.time[-1] for track in tracks) + slack
+    time = time[(time >= starts) & (time <= stops)]
+    valid = np.ones(len(time), dtype=bool)
+    for track in {id(track.track.stamps): track for track in tracks}.values():
+        valid &= _reached(time, track, slack)
+    return time, valid
+
+
+def grid(time: Array, clock: Clock) -> Array:
+    """Make the uniform time base of a track: its own stamps where these are uniform already.
+
+    Args:
+        time: The track's stamps, from 0, shape (samples,), in [s].
+        clock: How they lie.
+
+    Returns:
+        Time base, shape (instants,), in [s].
+    """
+    if clock.uniform:
+        return time
+    return np.arange(int(time[-1] * clock.rate + UNIFORM) + 1) / clock.rate
+
+
+def onto(instants: Array, valid: Mask, track: Clocked, *, slack: float) -> Real:
+    """Bring a track onto a time base.
+
+    Samples are taken as they are where all instants fall on one, within ``slack``; else they are
+    interpolated. Between samples values are monotonic, so that nothing overshoots.
+
+    Args:
+        instants: The time base, shape (instants,), in [s].
+        valid: False in gaps, shape (instants,).
+        track: The track.
+        slack: How far an instant may miss a sample that is taken for it, in [s].
+
+    Returns:
+        Values, 0 in gaps, shape (instants, columns).
+    """
+    places = _places(instants, track, slack)
+    if places is not None:
+        if valid.all() and places[-1] - places[0] == len(places) - 1:
+            return track.track.values[places[0] : places[-1] + 1]  # no copy of a long log
+        return np.where(valid[:, None], track.track.values[places], 0.0)
+    if track.track.signal == "base_pose":
+        pose = np.asarray(track.track.values, dtype=np.float64)
+        found = interpolated(pose, lambda values: _between(instants, track, values, slack))
+    else:
+        found = np.empty((len(instants), track.track.values.shape[1]))
+        block = max(1, BLOCK // len(track.time))
+        for first in range(0, found.shape[1], block):
+            part = slice(first, first + block)
+            values = np.asarray(track.track.values[:, part], dtype=np.float64)
+            angles = track.angles[part]
+            if any(angles):
+                values = np.where(angles, np.unwrap(values, axis=0), values)
+            found[:, part] = _between(instants, track, values, slack)
+    found[~valid] = 0.0
+    return found
+
+
+def _places(instants: Array, track: Clocked, slack: float) -> Indices | None:
+    """Find the sample on which each instant falls; None if one falls on none."""
+    if not track.clock.uniform:
+        return None
+    places = np.searchsorted(track.time, instants - slack).clip(max=len(track.time) - 1)
+    return places if (np.abs(track.time[places] - instants) <= slack).all() else None
+
+
+def _reached(instants: Array, track: Clocked, slack: float) -> Mask:
+    if _places(instants, track, slack) is not None:
+        return np.ones(len(instants), dtype=bool)
+    reached = np.zeros(len(instants), dtype=bool)
+    for part, _ in _parts(instants, track, slack):
+        reached[part] = True
+    return reached
+
+
+def _between(instants: Array, track: Clocked, values: Real, slack: float) -> Array:
+    from scipy.interpolate import PchipInterpolator
+
+    found = np.zeros((len(instants), values.shape[1]))
+    for part, stretch in _parts(instants, track, slack):
+        if part.stop > part.start:
+            known = PchipInterpolator(track.time[stretch], values[stretch], axis=0)
+            found[part] = known(instants[part])
+    return found
+
+
+def _parts(instants: Array, track: Clocked, slack: float) -> Iterator[tuple[slice, slice]]:
+    """Go through the instants that lie in each stretch between gaps, and the stretch's samples."""
+    for stretch in track.clock.stretches:
+        known = track.time[stretch]
+        if len(known) > 1:
+            edges = np.searchsorted(instants, [known[0] - slack, known[-1] + slack])
+            yield slice(int(edges[0]), int(edges[1])), stretch
+
+
+def _round(rate: float) -> float:
+    """Find the round rate that a rate is near to, or leave it."""
+    power = 10.0 ** np.floor(np.log10(rate))
+    near = float(power * min(ROUND, key=lambda digit: abs(digit * power / rate - 1)))
+    return near if abs(near / rate - 1) <= NEAR else rate

@@ -1,0 +1,1 @@
+"""ROS bags, of both generations and all storages, without a ROS installation."""

@@ -1,0 +1,62 @@
+"""Bags that are whole, read by rosbags."""
+
+from collections.abc import Collection, Iterator
+from pathlib import Path
+from typing import Any
+
+from inspector.logs.ros.bag import Bag, Message, Topic, storage_of
+
+
+class DamagedError(Exception):
+    """A bag that rosbags does not read; something may still be had of it."""
+
+
+def open_bag(path: Path) -> Bag:
+    """Open a bag.
+
+    Args:
+        path: The folder of a ROS 2 bag, one of its files, or a ROS 1 bag.
+
+    Raises:
+        DamagedError: If rosbags cannot open it.
+    """
+    from rosbags.rosbag1 import Reader as Reader1
+    from rosbags.rosbag2 import Reader as Reader2
+
+    ros1 = path.is_file() and storage_of(path) == "ROS 1"
+    try:
+        reader: Any = (Reader1 if ros1 else Reader2)(path)
+        reader.open()
+    except Exception as error:  # rosbags lets struct's, SQLite's and its own errors through
+        raise DamagedError(_one_line(error)) from error
+    topics: dict[str, Topic] = {}
+    for connection in reader.connections:
+        before = topics.get(connection.topic)
+        count = connection.msgcount + (before.count if before else 0)
+        topics[connection.topic] = Topic(
+            connection.topic, connection.msgtype, connection.msgdef.data, count
+        )
+    seconds = reader.duration * 1e-9 if any(topic.count for topic in topics.values()) else 0.0
+    kind = "ROS 1 bag" if ros1 else "ROS 2 bag"
+    bag = Bag(kind, ros1, topics, lambda names: iter(()), reader.close, seconds)
+    bag.messages = lambda names: _messages(reader, bag, names)
+    return bag
+
+
+def _messages(reader: Any, bag: Bag, names: Collection[str]) -> Iterator[Message]:
+    """Go through messages until the end, or to where the bag is damaged."""
+    wanted = [each for each in reader.connections if each.topic in names]
+    expected, count = sum(each.msgcount for each in wanted), 0
+    try:
+        if wanted:
+            for connection, received, data in reader.messages(wanted):
+                yield connection.topic, received, data
+                count += 1
+    except Exception as error:
+        raise DamagedError(
+            f"{count} of {expected} messages can be read ({_one_line(error)})"
+        ) from error
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()).rstrip(".") or type(error).__name__

@@ -1,0 +1,142 @@
+"""Desired and measured motion with clocks of their own."""
+
+import numpy as np
+import pytest
+from csvlogs import write
+from samplelogs import JOINTS, TIMES, Talk, joint_states, motion, numbers, write_bag
+
+from inspector import read_log
+from inspector.errors import LogError
+from inspector.logs.twoclocks import ClockError
+
+
+def csv(path, time, velocity, suffix=""):
+    columns = {f"{joint}.velocity{suffix}": velocity[:, n] for n, joint in enumerate(JOINTS)}
+    return write(path, {"time": [repr(float(each)) for each in time]} | columns)
+
+
+def pair(tmp_path, *, offset, drift=0.0, lag=0.0, seconds=60, rate=250, desired_rate=100):
+    """A measured log, and a desired one whose clock is off; what the two share begins at 5 s."""
+    time = np.arange(seconds * rate) / rate
+    measured = motion(time - lag)[1]
+    measured += 0.02 * np.random.default_rng(1).standard_normal(measured.shape)
+    meant = 5 + np.arange((seconds - 10) * desired_rate) / desired_rate
+    stamps = 5 - offset + (meant - 5) / (1 + drift)
+    return (
+        csv(tmp_path / "measured.csv", time, measured),
+        csv(tmp_path / "desired.csv", stamps, motion(meant)[1]),
+    )
+
+
+@pytest.mark.parametrize(
+    ("offset", "drift"),
+    [(0.7, 0.0), (-0.4, 2e-4), (1234.5, 0.0), (12.0, -1e-4), (0.0, 1e-4)],
+)
+def test_offset_and_drift_are_found_and_taken_away(tmp_path, offset, drift):
+    measured, desired = pair(tmp_path, offset=offset, drift=drift)
+    imported = read_log(measured, desired=desired)
+    found = imported.run.meta["offset"]
+    assert found["seconds"] == pytest.approx(offset, abs=1e-3)
+    assert found["drift"] == pytest.approx(drift, abs=1e-5)
+    difference = imported.run.velocity - imported.run.velocity_desired
+    assert np.sqrt(np.mean(difference**2)) < 0.03  # the measured one's noise is 0.02
+    assert any(remark.startswith("desired.csv: offset ") for remark in imported.remarks)
+    assert imported.run.duration == pytest.approx(50, abs=0.1)
+
+
+def test_a_controllers_lag_is_said_and_left(tmp_path):
+    measured, desired = pair(tmp_path, offset=0.0, lag=0.02)
+    imported = read_log(measured, desired=desired)
+    assert "offset" not in imported.run.meta
+    (said,) = [each for each in imported.remarks if "a controller's lag" in each]
+    assert said.startswith("desired.csv: offset +0.0200 s (correlation 1.00")
+
+
+def test_positions_tell_the_offset_where_there_are_no_velocities(tmp_path):
+    time = np.arange(6000) / 100
+    for name, since, shift in (("measured", time, 0.0), ("desired", time[500:5000], 77.7)):
+        position = motion(since)[0]
+        columns = {f"{joint}.position": position[:, n] for n, joint in enumerate(JOINTS)}
+        write(tmp_path / f"{name}.csv", {"time": since - shift} | columns)
+    imported = read_log(tmp_path / "measured.csv", desired=tmp_path / "desired.csv")
+    assert imported.run.meta["offset"]["seconds"] == pytest.approx(77.7, abs=1e-3)
+
+
+def test_a_motion_that_repeats_tells_nothing(tmp_path):
+    time = np.arange(6000) / 100
+    swing = np.cos(2 * np.pi * time)[:, None] * np.ones(3)
+    measured = csv(tmp_path / "measured.csv", time, swing)
+    desired = csv(tmp_path / "desired.csv", time + 1e6, swing)
+    message = (
+        r"desired.csv: the stamps from 1000000(\.0)? s to .* share no time with .*, and the motions"
+        r" do not tell \(offset .*\); say --offset SECONDS, to be added to the desired stamps"
+    )
+    with pytest.raises(ClockError, match=message) as caught:
+        read_log(measured, desired=desired)
+    assert not caught.value.offset.is_sure
+    imported = read_log(measured, desired=desired, offset=-1e6)
+    assert np.allclose(imported.run.velocity_desired, imported.run.velocity, atol=1e-3)
+    assert "desired.csv: offset -1e+06 s, as given" in imported.remarks
+
+
+def test_strangers_do_not_agree(tmp_path):
+    time = np.arange(6000) / 100
+    measured = csv(tmp_path / "measured.csv", time, motion(time)[1])
+    for shift in (0.005, 1e6):
+        desired = csv(tmp_path / "desired.csv", time + shift, motion(time, seed=9)[1])
+        if shift > 1:
+            with pytest.raises(ClockError, match="the motions do not tell"):
+                read_log(measured, desired=desired)
+        else:
+            remarks = read_log(measured, desired=desired).remarks
+            assert any("is taken for the measured one's, the motions do not" in r for r in remarks)
+
+
+def test_standstill_tells_no_offset(tmp_path):
+    time = np.arange(1000) / 100
+    measured = csv(tmp_path / "measured.csv", time, np.zeros((1000, 3)))
+    desired = csv(tmp_path / "desired.csv", time + 100, np.zeros((1000, 3)))
+    with pytest.raises(ClockError, match="no joint moves in both; say --offset"):
+        read_log(measured, desired=desired)
+
+
+def test_topics_of_two_machines_come_together(tmp_path):
+    talk = Talk()
+    since = np.arange(4000) / 100
+    times = TIMES[0] + 10_000_000 * np.arange(4000)
+    away = times[500:3500] - 5_000_000_000 + 4_000_000
+    topics = {
+        "/joint_states": joint_states(talk, times, velocity=motion(since)[1]),
+        "/joint_commands": joint_states(talk, away, velocity=motion(since[500:3500])[1]),
+    }
+    run = read_log(write_bag(tmp_path / "bag", talk, topics)).run
+    assert run.meta["offset"]["seconds"] == pytest.approx(4.996, abs=1e-3)
+    assert np.abs(run.velocity - run.velocity_desired).max() < 0.01
+
+
+def test_gaps_of_either_side_are_gaps_after_the_clocks_are_one(tmp_path):
+    measured, desired = pair(tmp_path, offset=1234.5)
+    lines = desired.read_text().splitlines()
+    desired.write_text("\n".join(lines[:2000] + lines[2200:]) + "\n")
+    run = read_log(measured, desired=desired).run
+    gap = run.time[~run.mask]
+    assert gap[0] == pytest.approx(20, abs=0.1)
+    assert np.ptp(gap) == pytest.approx(2.0, abs=0.05)
+    assert not run.velocity_desired[~run.mask].any()
+
+
+def test_duplicate_and_backward_stamps_are_left_out_and_counted(tmp_path):
+    time = np.arange(1000) / 100
+    time[[100, 101]] = time[99]  # twice the same
+    time[500] = time[490]
+    imported = read_log(csv(tmp_path / "log.csv", time, numbers(samples=1000) / 10))
+    said = "2 duplicate and 1 backward stamps left out, the first 0.99 s into the log"
+    assert f"log.csv: {said}" in imported.remarks
+    assert imported.run.meta["stamps"] == {"duplicates": 2, "backward": 1}
+    assert np.all(np.diff(imported.run.time) > 0)
+
+
+def test_two_logs_in_one_are_refused(tmp_path):
+    time = np.concatenate((np.arange(500), np.arange(500))) / 100
+    with pytest.raises(LogError, match="row 502: time runs backwards: 0.0 comes after 4.99"):
+        read_log(csv(tmp_path / "log.csv", time, numbers(samples=1000)))

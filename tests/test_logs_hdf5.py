@@ -1,0 +1,102 @@
+"""HDF5 as robomimic and Isaac Lab write it, by h5py."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from samplelogs import cut, numbers
+
+from inspector import read_log, read_logs
+from inspector.errors import LogError
+
+POSITION, VELOCITY = numbers(7), numbers(7, seed=1)
+TURN = np.array([np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)])
+"""A quarter turn about z, w first."""
+
+
+def write(path, episodes, env_args=None):
+    with h5py.File(path, "w") as file:
+        home = file.create_group("data")
+        if env_args is not None:
+            home.attrs["env_args"] = json.dumps(env_args)
+        for episode, arrays in episodes.items():
+            for name, values in arrays.items():
+                home[f"{episode}/{name}"] = values
+    return path
+
+
+def robomimic(tmp_path, count=2):
+    demo = {
+        "actions": np.zeros((400, 7)),
+        "obs/robot0_joint_pos": POSITION,
+        "obs/robot0_joint_vel": VELOCITY,
+        "obs/robot0_joint_pos_cos": np.cos(POSITION),
+        "obs/agentview_image": np.zeros((400, 8, 8, 3), dtype=np.uint8),
+    }
+    episodes = {f"demo_{n}": demo for n in range(count)}
+    args = {"env_name": "Lift", "env_kwargs": {"control_freq": 20}}
+    return write(tmp_path / "lift.hdf5", episodes, args)
+
+
+def test_robomimics_demonstrations_are_runs_in_their_order(tmp_path):
+    found = list(read_logs(robomimic(tmp_path, 11)))
+    assert [each.name for each in found] == [f"lift-demo_{n}" for n in range(11)]
+    run = found[10].run
+    assert np.array_equal(run.position, POSITION)
+    assert np.array_equal(run.velocity, VELOCITY)
+    assert run.rate == 20.0
+    assert run.position_desired is None  # actions are no joint positions
+
+
+def test_isaac_labs_states_go_before_its_observations_and_bring_the_base(tmp_path):
+    pose = np.column_stack((numbers(3), np.tile(TURN, (400, 1))))
+    twist = np.tile([1.0, 0.0, 0.0, 0.0, 2.0, 3.0], (400, 1))
+    home = "states/articulation/robot"
+    demo = {
+        "obs/joint_pos": POSITION - 1,
+        "obs/joint_vel": VELOCITY,
+        f"{home}/joint_position": POSITION,
+        f"{home}/joint_velocity": VELOCITY,
+        f"{home}/root_pose": pose,
+        f"{home}/root_velocity": twist,
+    }
+    args = {"env_name": "Isaac-Velocity", "type": 2, "sim_args": {"dt": 0.005, "decimation": 4}}
+    run = read_log(write(tmp_path / "isaac.hdf5", {"demo_0": demo}, args)).run
+    assert np.array_equal(run.position, POSITION)
+    assert run.rate == pytest.approx(50.0)
+    assert np.allclose(run.base_pose[:, 3:], [0, 0, np.sqrt(0.5), np.sqrt(0.5)])
+    # The body looks along the world's y: what goes along x goes to its right.
+    assert np.allclose(run.base_velocity, [0.0, -1.0, 0.0, 2.0, 0.0, 3.0])
+
+
+def test_any_file_is_read_by_mapping(tmp_path):
+    with h5py.File(tmp_path / "own.h5", "w") as file:
+        file["log/clock"] = np.arange(400) / 250
+        file["log/q_arm"] = POSITION
+        file["log/other"] = np.zeros((3, 3))
+    mapping = ["time=log/clock", "position=log/q_arm[0:6]", "velocity.tool=log/q_arm[6]"]
+    run = read_log(tmp_path / "own.h5", mapping=mapping, joints=[*"abcdef"]).run
+    assert run.rate == 250.0
+    assert np.array_equal(run.velocity[:, run.joint_names.index("tool")], POSITION[:, 6])
+
+
+def test_what_is_missing_is_one_line(tmp_path):
+    path = write(tmp_path / "log.hdf5", {"demo_0": {"obs/joint_pos": POSITION}})
+    with pytest.raises(LogError, match="there are no stamps; say the log's rate"):
+        read_log(path)
+    said = "log.hdf5: obs/joint_pos may be relative to a default pose (Isaac Lab)"
+    assert said in read_log(path, rate=50).remarks
+    path = write(tmp_path / "other.hdf5", {"demo_0": {"obs/eef": POSITION}})
+    message = "demo_0 holds no known joint positions or velocities; say which do, .* obs/eef"
+    with pytest.raises(LogError, match=message):
+        read_log(path, rate=50)
+
+
+@pytest.mark.parametrize("share", [0.001, 0.5, 0.95])
+def test_a_file_that_was_cut_off_is_one_line(tmp_path, share):
+    path = cut(robomimic(tmp_path), share)
+    with pytest.raises(LogError) as caught:
+        list(read_logs(path))
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)

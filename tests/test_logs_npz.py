@@ -1,0 +1,157 @@
+"""NumPy archives: the run file itself, MuJoCo's state, Isaac's, one's own."""
+
+import mujoco
+import numpy as np
+import pytest
+from samplelogs import JOINTS, numbers
+
+from inspector import read_log
+from inspector.errors import LogError
+from noisemodel import Block, Run
+
+POSITION, VELOCITY = numbers(), numbers(seed=1)
+TIME = np.arange(400) / 100
+
+
+def save(tmp_path, **arrays):
+    np.savez(tmp_path / "log.npz", **arrays)
+    return tmp_path / "log.npz"
+
+
+def test_a_run_file_is_taken_as_it_is(tmp_path):
+    blocks = (Block(0.0, 1.0, "ok"),)
+    run = Run(time=TIME, velocity=VELOCITY, joint_names=JOINTS, blocks=blocks, meta={"seed": 3})
+    run.save(tmp_path / "run.npz")
+    imported = read_log(tmp_path / "run.npz")
+    assert imported.run.blocks == blocks
+    assert imported.run.meta == {"seed": 3}
+    assert imported.remarks == ("a run file, taken as it is",)
+
+
+def test_a_run_file_whose_time_is_not_uniform_is_resampled(tmp_path):
+    time = TIME + np.random.default_rng(0).uniform(-0.002, 0.002, 400)
+    path = save(tmp_path, time=time, velocity=np.sin(time)[:, None], joint_names=["a"])
+    run = read_log(path).run
+    assert run.rate == 100.0
+    assert run.joint_names == ("a",)
+    since = run.time + float(run.meta["start"])
+    assert np.allclose(run.velocity[:, 0], np.sin(since), atol=1e-4)
+
+
+FREE = """<mujoco><worldbody><body><freejoint/><geom size="0.1"/>
+<body pos="0.2 0 0"><joint name="arm" axis="0 0 1"/><geom size="0.05"/></body>
+</body></worldbody></mujoco>"""
+
+
+def test_mujocos_state_becomes_a_base_in_its_own_axes_and_joints(tmp_path):
+    model = mujoco.MjModel.from_xml_string(FREE)
+    data = mujoco.MjData(model)
+    data.qvel[:] = [0.3, -0.2, 1.0, 0.5, 1.0, -2.0, 4.0]
+    qpos, qvel, local = [], [], []
+    for _ in range(300):
+        qpos.append(data.qpos.copy())
+        qvel.append(data.qvel.copy())
+        twist = np.zeros(6)  # MuJoCo's own word for it: angular, then linear
+        mujoco.mj_forward(model, data)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, 1, twist, 1)
+        local.append(np.concatenate((twist[3:], twist[:3])))
+        mujoco.mj_step(model, data)
+    time = np.arange(300) * model.opt.timestep
+    run = read_log(save(tmp_path, time=time, qpos=qpos, qvel=qvel)).run
+    assert np.allclose(run.base_velocity, local, atol=1e-9)
+    assert np.array_equal(run.base_pose[:, :3], np.array(qpos)[:, :3])
+    assert np.array_equal(run.base_pose[:, 3:], np.array(qpos)[:, [4, 5, 6, 3]])
+    assert np.array_equal(run.position, np.array(qpos)[:, 7:])
+    assert np.array_equal(run.velocity, np.array(qvel)[:, 6:])
+
+
+def test_mujocos_state_without_a_free_base_is_all_joints(tmp_path):
+    run = read_log(save(tmp_path, t=TIME, qpos=POSITION, qvel=VELOCITY), joints=JOINTS).run
+    assert run.joint_names == JOINTS
+    assert np.array_equal(run.position, POSITION)
+    assert run.base_pose is None
+
+
+def test_isaacs_arrays_are_known_and_its_root_is_mapped(tmp_path):
+    turn = [np.cos(0.3), np.sin(0.3), 0.0, 0.0]
+    root = np.column_stack(
+        (numbers(3), np.tile(turn, (400, 1)), np.tile([0, 0, 1, 0, 0, 2], (400, 1)))
+    )
+    path = save(tmp_path, dof_pos=POSITION, dof_vel=VELOCITY, root_state=root)
+    mapping = ["base_pose.wxyz=root_state[0:7]", "base_velocity.world=root_state[7:13]"]
+    run = read_log(path, mapping=mapping, rate=200).run
+    assert np.array_equal(run.velocity, VELOCITY)
+    up = [0.0, np.sin(0.6), np.cos(0.6)]  # the world's z, seen from a body tilted about x
+    assert np.allclose(run.base_velocity, np.concatenate((up, np.multiply(2, up))))
+    with pytest.raises(LogError, match="is turned into the body's by a base_pose of the same"):
+        read_log(path, mapping=mapping[1:], rate=200)
+    wrong = ["base_pose=root_state[1:8]"]
+    with pytest.raises(LogError, match="a quaternion has another length than 1"):
+        read_log(path, mapping=wrong, rate=200)
+
+
+def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
+    path = save(tmp_path, t=TIME, dof_vel=numbers(9))
+    run = read_log(path, robot="panda").run
+    assert run.joint_names[0] == "panda_joint1"
+    path = save(tmp_path, t=TIME, dof_vel=numbers(12))
+    message = r"'dof_vel' has 12 columns, robot 'panda' has 9; take a part of it \(--map vel"
+    with pytest.raises(LogError, match=message):
+        read_log(path, robot="panda")
+
+
+@pytest.mark.parametrize(
+    ("arrays", "mapping", "message"),
+    [
+        (
+            {"dof_vel": VELOCITY},
+            [],
+            r"there are no stamps; say the log's rate \(--rate\), or",
+        ),
+        (
+            {"speed": VELOCITY, "t": TIME},
+            [],
+            "holds no known joint positions or velocit.* speed",
+        ),
+        (
+            {"dof_vel": VELOCITY.T, "t": TIME},
+            [],
+            r"'dof_vel' has shape \(3, 400\), there are 400 stamps; .* is it transposed\?",
+        ),
+        (
+            {"dof_vel": VELOCITY, "t": TIME},
+            ["position=dof_pos"],
+            "no column 'dof_pos' to map; it",
+        ),
+        ({"dof_vel": VELOCITY, "t": TIME}, ["velocity=dof_vel[2:9]"], r"'dof_vel' has 3 columns"),
+        (
+            {"dof_vel": VELOCITY, "t": TIME},
+            ["velocity.elbow=dof_vel"],
+            r"'dof_vel' has 3 columns, velocity.elbow is one; name it as dof_vel\[0\]",
+        ),
+        ({"dof_vel": VELOCITY, "t": TIME}, ["base_pose=dof_vel"], "3 columns, a base_pose has 7"),
+        (
+            {"dof_vel": VELOCITY, "t": np.where(TIME == 1, np.nan, TIME)},
+            [],
+            r"column 't' holds nan \(sample 101\)",
+        ),
+        (
+            {"dof_vel": np.array([{}], dtype=object), "t": TIME},
+            [],
+            "not an archive of plain arrays",
+        ),
+    ],
+)
+def test_arrays_that_do_not_fit_are_one_line(tmp_path, arrays, mapping, message):
+    path = save(tmp_path, **arrays)
+    with pytest.raises(LogError, match=message) as caught:
+        read_log(path, mapping=mapping)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_damaged_archive_is_one_line(tmp_path):
+    path = save(tmp_path, t=TIME, dof_vel=VELOCITY)
+    data = path.read_bytes()
+    path.write_bytes(data[:-100])
+    with pytest.raises(LogError, match="not an archive of plain arrays"):
+        read_log(path)

@@ -1,0 +1,171 @@
+"""Parquet, wide and as LeRobot has it, written by pyarrow."""
+
+import json
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from samplelogs import JOINTS, TIMES, cut, motion, numbers, write_lerobot
+
+from inspector import read_log, read_logs
+from inspector.errors import LogError
+
+POSITION, VELOCITY = numbers(), numbers(seed=1)
+SINCE = np.arange(90) / 30
+STATE = motion(SINCE)[0]
+
+
+def wide(tmp_path, **columns):
+    pq.write_table(pa.table(columns), tmp_path / "log.parquet")
+    return tmp_path / "log.parquet"
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        TIMES,
+        (TIMES - TIMES[0]) * 1e-9,
+        pa.array(TIMES, pa.timestamp("ns")),
+    ],
+)
+def test_wide_columns_come_back_bit_for_bit(tmp_path, stamps):
+    columns = {f"{joint}.velocity": VELOCITY[:, n] for n, joint in enumerate(JOINTS)}
+    imported = read_log(wide(tmp_path, time=stamps, note=["fine"] * 400, **columns))
+    assert imported.run.joint_names == JOINTS
+    assert np.array_equal(imported.run.velocity, VELOCITY)
+    assert imported.run.rate == 100.0
+    assert "log.parquet: 1 column not read: note" in imported.remarks
+
+
+def test_columns_of_lists_are_arrays_of_joints(tmp_path):
+    path = wide(tmp_path, time=TIMES, joint_pos=list(POSITION), qd_logged=list(VELOCITY))
+    run = read_log(path, mapping=["velocity=qd_logged"], joints=JOINTS).run
+    assert run.joint_names == JOINTS
+    assert np.array_equal(run.position, POSITION)
+    assert np.array_equal(run.velocity, VELOCITY)
+
+
+def test_what_does_not_fit_is_one_line(tmp_path):
+    ragged = [row[: 2 + n % 2] for n, row in enumerate(POSITION)]
+    with pytest.raises(LogError, match="column 'joint_pos' has lists of different lengths"):
+        read_log(wide(tmp_path, time=TIMES, joint_pos=ragged))
+    path = wide(tmp_path, joint_pos=list(POSITION))
+    with pytest.raises(LogError, match=r"there are no stamps; say the log's rate \(--rate\)"):
+        read_log(path)
+    assert read_log(path, rate=100).run.rate == 100.0
+    message = r"'joint_pos' has 3 columns, --joints names 2; take a part of it .*\[0:2\]"
+    with pytest.raises(LogError, match=message):
+        read_log(path, rate=100, joints=["a", "b"])
+    with pytest.raises(LogError, match=r"log.parquet: damaged or cut off \("):
+        read_log(cut(path, 0.5))
+
+
+@pytest.mark.parametrize("v3", [True, False])
+def test_a_lerobot_data_set_is_a_run_per_episode(tmp_path, v3):
+    states = [STATE, STATE[:60] * 2, STATE[:70] * 3]
+    folder = write_lerobot(tmp_path / "set", states, names=list(JOINTS), v3=v3)
+    runs = {imported.name: imported.run for imported in read_logs(folder)}
+    assert list(runs) == ["set-0", "set-1", "set-2"]
+    for run, state in zip(runs.values(), states, strict=True):
+        assert run.joint_names == JOINTS
+        assert np.array_equal(run.position, state.astype(np.float32))
+        assert np.array_equal(run.position_desired, np.roll(state, -1, axis=0).astype(np.float32))
+        assert run.rate == 30.0
+        assert set(run.meta["differentiated"]) == {"velocity", "velocity_desired"}
+        assert run.meta["robot_type"] == "so101"
+
+
+def test_one_episode_is_chosen_by_its_number(tmp_path):
+    folder = write_lerobot(tmp_path / "set", [STATE, STATE[:60]], names=list(JOINTS))
+    assert len(read_log(folder, episode="1").run.time) == 60
+    with pytest.raises(LogError, match=r"holds 2 episodes \(0, 1\); choose one \(episode\)"):
+        read_log(folder)
+    with pytest.raises(LogError, match="there is no episode '7'; it has 0, 1"):
+        read_log(folder, episode="7")
+
+
+def test_a_lone_file_of_a_data_set_knows_its_info(tmp_path):
+    folder = write_lerobot(tmp_path / "set", [STATE], names={"motors": list(JOINTS)}, v3=False)
+    file = folder / "data" / "chunk-000" / "episode_000000.parquet"
+    assert read_log(file).run.joint_names == JOINTS
+
+
+def test_stamps_of_float32_do_not_make_a_long_episode_jitter(tmp_path):
+    state = motion(np.arange(60_000) / 30)[0]
+    run = read_log(write_lerobot(tmp_path / "set", [state], names=list(JOINTS))).run
+    assert np.array_equal(run.position, state.astype(np.float32))
+
+
+def test_units_that_nobody_said_are_not_taken_for_radians(tmp_path):
+    names = [f"{joint}.pos" for joint in JOINTS]
+    folder = write_lerobot(tmp_path / "set", [STATE * 30], names=names)
+    message = "LeRobot does not log the unit of its '.pos' features: say --units degrees, normal"
+    with pytest.raises(LogError, match=message):
+        read_log(folder)
+    run = read_log(folder, units="degrees").run
+    assert np.allclose(run.position, np.deg2rad(STATE * 30), rtol=1e-6)
+    assert run.meta["units"] == "degrees"
+    with pytest.raises(LogError, match=r"say which robot \(--robot\)"):
+        read_log(folder, units="normalised")
+    older = write_lerobot(tmp_path / "older", [STATE * 30], names=list(JOINTS))
+    with pytest.raises(LogError, match="too much for radians; if it is in degrees, say --degrees"):
+        read_log(older)
+
+
+def test_normalised_units_are_shares_of_the_robots_ranges(tmp_path):
+    state = np.tile(np.linspace(-100, 100, 90)[:, None], 2)
+    state[:, 1] = np.linspace(0, 100, 90)
+    names = ["panda_joint1.pos", "panda_finger_joint1.pos"]
+    folder = write_lerobot(tmp_path / "set", [state], names=names)
+    position = read_log(folder, robot="panda", units="normalised").run.position
+    assert np.allclose(position[[0, -1], 0], [-2.8973, 2.8973], atol=1e-4)
+    assert np.allclose(position[[0, -1], 1], [0.0, 0.04], atol=1e-6)
+
+
+def test_a_gripper_of_a_data_set_in_degrees_is_no_angle(tmp_path):
+    names = ["shoulder.pos", "gripper.pos"]
+    folder = write_lerobot(tmp_path / "set", [STATE[:, :2] * 30], names=names)
+    imported = read_log(folder, units="degrees")
+    assert imported.run.joint_names == ("shoulder",)
+    said = "set: in 0 to 100 of its range, no angle, left out without a robot: gripper"
+    assert said in imported.remarks
+
+
+def test_the_pose_of_an_end_effector_is_no_joint(tmp_path):
+    folder = write_lerobot(tmp_path / "set", [STATE], names=["x", "y", "yaw"])
+    with pytest.raises(LogError, match="holds x, y, yaw: the pose of an end effector, not joints"):
+        read_log(folder)
+    run = read_log(folder, mapping=["position=observation.state[2:3]"], joints=["j"]).run
+    assert np.array_equal(run.position[:, 0], STATE[:, 2].astype(np.float32))
+    assert run.position_desired is None
+
+
+def test_a_data_set_without_names_says_what_it_was_taken_for(tmp_path):
+    imported = read_log(write_lerobot(tmp_path / "set", [STATE], names=None))
+    assert imported.run.joint_names == ("joint_0", "joint_1", "joint_2")
+    said = "set: observation.state has no names; it is taken for joint positions"
+    assert said in imported.remarks
+
+
+@pytest.mark.parametrize(
+    ("info", "message"),
+    [
+        ("{", "cannot be read"),
+        ("[]", "names no features"),
+        ('{"features": 3}', "names no features"),
+    ],
+)
+def test_a_broken_info_file_is_one_line(tmp_path, info, message):
+    folder = write_lerobot(tmp_path / "set", [STATE], names=None)
+    (folder / "meta" / "info.json").write_text(info)
+    with pytest.raises(LogError, match=message):
+        read_log(folder)
+
+
+def test_damaged_data_is_one_line(tmp_path):
+    folder = write_lerobot(tmp_path / "set", [STATE], names=None)
+    cut(folder / "data" / "chunk-000" / "file-000.parquet", 0.7)
+    with pytest.raises(LogError, match="damaged or cut off"):
+        read_log(folder)
+    assert json.loads((folder / "meta" / "info.json").read_text())

@@ -1,0 +1,388 @@
+"""ROS bags, written by rosbags."""
+
+import tracemalloc
+
+import numpy as np
+import pytest
+from samplelogs import EPOCH, JOINTS, TIMES, Talk, joint_states, motion, numbers, write_bag
+
+from inspector import read_log
+from inspector.errors import LogError
+from noisemodel import Robot, Run
+
+TALK, OLD = Talk(), Talk(ros1=True)
+POSITION, VELOCITY, EFFORT = (numbers(seed=seed) for seed in range(3))
+
+
+def bag(tmp_path, topics, *, talk=TALK, name="bag", **how):
+    return write_bag(tmp_path / (f"{name}.bag" if talk.ros1 else name), talk, topics, **how)
+
+
+def states(talk=TALK, **how):
+    return joint_states(talk, position=POSITION, velocity=VELOCITY, effort=EFFORT, **how)
+
+
+@pytest.mark.parametrize(
+    ("talk", "how"),
+    [
+        (TALK, {"storage": "sqlite3"}),
+        (TALK, {"storage": "sqlite3", "compression": "message"}),
+        (TALK, {"storage": "mcap"}),
+        (TALK, {"storage": "mcap", "compression": "storage"}),
+        (TALK, {"storage": "mcap", "compression": "file"}),
+        (OLD, {}),
+        (OLD, {"compression": "lz4"}),
+        (OLD, {"compression": "bz2"}),
+    ],
+)
+def test_every_value_of_a_bag_comes_back_bit_for_bit(tmp_path, talk, how):
+    run = read_log(bag(tmp_path, {"/joint_states": states(talk)}, talk=talk, **how)).run
+    assert run.joint_names == JOINTS
+    assert np.array_equal(run.position, POSITION)
+    assert np.array_equal(run.velocity, VELOCITY)
+    assert np.array_equal(run.effort, EFFORT)
+    assert run.rate == 100.0
+    assert run.meta["start"] == "1700000000"
+    assert run.meta["topics"] == ["/joint_states"]
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_lone_file_of_a_bag_is_enough(tmp_path, storage):
+    folder = bag(tmp_path, {"/joint_states": states()}, storage=storage)
+    (file,) = [each for each in folder.iterdir() if each.name != "metadata.yaml"]
+    assert np.array_equal(read_log(file).run.position, POSITION)
+
+
+def test_the_stamps_are_those_of_the_messages_not_of_the_recorder(tmp_path):
+    late = TIMES + np.random.default_rng(3).integers(0, 4_000_000, len(TIMES))
+    run = read_log(bag(tmp_path, {"/joint_states": states(received=late)})).run
+    assert np.array_equal(run.position, POSITION)
+
+
+def test_messages_without_stamps_have_those_of_the_recorder(tmp_path):
+    messages = states(times=np.zeros(len(TIMES), dtype=int), received=TIMES)
+    imported = read_log(bag(tmp_path, {"/joint_states": messages}))
+    assert np.array_equal(imported.run.position, POSITION)
+    assert "bag: the messages have no stamps, those of the recorder are taken" in imported.remarks
+
+
+def test_velocities_that_were_not_logged_are_differentiated_and_it_is_said(tmp_path):
+    position, velocity = motion((TIMES - EPOCH) * 1e-9)
+    path = bag(tmp_path, {"/joint_states": joint_states(TALK, position=position)})
+    run = read_log(path).run
+    assert np.abs(run.velocity - velocity)[4:-4].max() < 0.01 * np.abs(velocity).max()
+    assert "velocity" in run.meta["differentiated"]
+
+
+def test_the_order_of_the_joints_may_change_from_message_to_message(tmp_path):
+    messages = [
+        (at, TALK.joint_state(at, names, POSITION[n, order], VELOCITY[n, order]))
+        for n, at in enumerate(TIMES)
+        for order in ([0, 1, 2] if n % 2 else [2, 0, 1],)
+        for names in ([JOINTS[place] for place in order],)
+    ]
+    run = read_log(bag(tmp_path, {"/joint_states": messages})).run
+    order = [run.joint_names.index(joint) for joint in JOINTS]
+    assert np.array_equal(run.position[:, order], POSITION)
+    assert np.array_equal(run.velocity[:, order], VELOCITY)
+
+
+def test_an_arm_and_a_gripper_may_share_a_topic(tmp_path):
+    arm = states()
+    gripper = joint_states(
+        TALK, TIMES + 3_000_000, ["finger"], position=POSITION[:, :1] / 50, velocity=VELOCITY[:, :1]
+    )
+    run = read_log(bag(tmp_path, {"/joint_states": arm + gripper})).run
+    assert run.joint_names == (*JOINTS, "finger")
+    assert np.array_equal(run.position[:, :3], POSITION[1 : len(run.time) + 1])
+
+
+def test_a_set_of_joints_that_changes_is_refused(tmp_path):
+    more = joint_states(TALK, TIMES + 4_000_000_000, ["elbow", "hand"], position=POSITION[:, :2])
+    message = (
+        "/joint_states: the set of joints changes 4 s into the log, from shoulder, elbow, wrist to"
+        " elbow, hand; split the log there"
+    )
+    with pytest.raises(LogError, match=message):
+        read_log(bag(tmp_path, {"/joint_states": states() + more}))
+
+
+def test_of_two_robots_one_is_chosen_by_its_topic(tmp_path):
+    other = joint_states(TALK, position=VELOCITY, velocity=POSITION)
+    path = bag(tmp_path, {"/left/joint_states": states(), "/right/joint_states": other})
+    message = (
+        "/left/joint_states and /right/joint_states both hold position of joint 'shoulder'; choose"
+        " with --topic"
+    )
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+    run = read_log(path, topics=["/right/joint_states"]).run
+    assert np.array_equal(run.position, VELOCITY)
+    with pytest.raises(LogError, match="there is no topic '/up'; the bag has /left/joint_states"):
+        read_log(path, topics=["/up"])
+
+
+def test_joint_states_that_are_commands_are_desired_motion(tmp_path):
+    commands = joint_states(TALK, position=VELOCITY, velocity=POSITION)
+    run = read_log(bag(tmp_path, {"/joint_states": states(), "/joint_commands": commands})).run
+    assert np.array_equal(run.position, POSITION)
+    assert np.array_equal(run.velocity_desired, POSITION)
+    assert np.array_equal(run.position_desired, VELOCITY)
+
+
+def test_what_a_topic_holds_can_be_said(tmp_path):
+    path = bag(
+        tmp_path,
+        {
+            "/joint_states": states(),
+            "/mpc": joint_states(TALK, position=VELOCITY, velocity=POSITION),
+        },
+    )
+    mapping = ["position_desired=/mpc/position", "velocity_desired=/mpc/velocity"]
+    run = read_log(path, mapping=mapping).run
+    assert np.array_equal(run.position_desired, VELOCITY)
+    assert np.array_equal(run.position, POSITION)
+
+
+def controller_states(talk, kind, stages):
+    messages = []
+    for n, at in enumerate(TIMES):
+        points = {stage: talk.point() for stage in stages}
+        points[stages[0]] = talk.point(VELOCITY[n], POSITION[n])
+        points[stages[1]] = talk.point(POSITION[n], VELOCITY[n], EFFORT[n])
+        header = talk.header(int(at))
+        message = talk.make(
+            f"control_msgs/{kind}", header=header, joint_names=list(JOINTS), **points
+        )
+        messages.append((at, message))
+    return messages
+
+
+@pytest.mark.parametrize("talk", [TALK, OLD])
+def test_a_controllers_state_holds_both_sides_under_its_old_names(tmp_path, talk):
+    stages = ("desired", "actual", "error")
+    messages = controller_states(talk, "JointTrajectoryControllerState", stages)
+    run = read_log(bag(tmp_path, {"/arm/state": messages}, talk=talk)).run
+    assert np.array_equal(run.position, POSITION)
+    assert np.array_equal(run.velocity, VELOCITY)
+    assert np.array_equal(run.effort, EFFORT)
+    assert np.array_equal(run.position_desired, VELOCITY)
+    assert np.array_equal(run.velocity_desired, POSITION)
+
+
+def test_joint_states_go_before_a_controllers_feedback(tmp_path):
+    stages = ("desired", "actual", "error")
+    state = controller_states(TALK, "JointTrajectoryControllerState", stages)
+    own = joint_states(TALK, position=EFFORT, velocity=EFFORT)
+    imported = read_log(bag(tmp_path, {"/joint_states": own, "/arm/state": state}))
+    assert np.array_equal(imported.run.position, EFFORT)
+    assert np.array_equal(imported.run.position_desired, VELOCITY)
+    assert any("not read: /arm/state/actual/positions" in each for each in imported.remarks)
+
+
+def test_trajectories_are_desired_motion_and_hold_between_their_points(tmp_path):
+    def trajectory(at, start, stop):
+        points = [
+            TALK.point([start + (stop - start) * n / 10] * 3, [stop - start] * 3, after=n / 10)
+            for n in range(11)
+        ]
+        header = TALK.header(int(at))
+        return at, TALK.make(
+            "trajectory_msgs/JointTrajectory",
+            header=header,
+            joint_names=list(JOINTS),
+            points=points,
+        )
+
+    plans = [trajectory(EPOCH, 0.0, 1.0), trajectory(EPOCH + 2_000_000_000, 1.0, 0.0)]
+    run = read_log(bag(tmp_path, {"/joint_states": states(), "/arm/joint_trajectory": plans})).run
+    assert run.mask.all()
+    held = (run.time > 1) & (run.time < 2)
+    assert np.allclose(run.position_desired[held], 1.0)
+    moving = (run.time > 0.2) & (run.time < 0.9)
+    assert np.allclose(run.position_desired[moving, 0], run.time[moving], atol=1e-9)
+
+
+def test_odometry_is_the_base_in_its_own_axes(tmp_path):
+    robot = Talk()
+    messages = []
+    for n, at in enumerate(TIMES):
+        half = 0.001 * n
+        turn = robot.make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=np.sin(half), w=np.cos(half))
+        place = robot.make("geometry_msgs/Point", x=POSITION[n, 0], y=0.0, z=0.5)
+        pose = robot.make("geometry_msgs/Pose", position=place, orientation=turn)
+        linear = robot.make("geometry_msgs/Vector3", x=VELOCITY[n, 0], y=0.0, z=0.0)
+        angular = robot.make("geometry_msgs/Vector3", x=0.0, y=0.0, z=VELOCITY[n, 1])
+        twist = robot.make("geometry_msgs/Twist", linear=linear, angular=angular)
+        blank = np.zeros(36)
+        message = robot.make(
+            "nav_msgs/Odometry",
+            header=robot.header(int(at), "odom"),
+            child_frame_id="base_link",
+            pose=robot.make("geometry_msgs/PoseWithCovariance", pose=pose, covariance=blank),
+            twist=robot.make("geometry_msgs/TwistWithCovariance", twist=twist, covariance=blank),
+        )
+        messages.append((at, message))
+    run = read_log(bag(tmp_path, {"/joint_states": states(), "/odom": messages})).run
+    assert np.array_equal(run.base_pose[:, 0], POSITION[:, 0])
+    assert np.array_equal(run.base_velocity[:, 0], VELOCITY[:, 0])
+    assert np.array_equal(run.base_velocity[:, 5], VELOCITY[:, 1])
+
+
+def test_tf_gives_the_bases_pose_and_its_velocity_is_differentiated(tmp_path):
+    messages = []
+    for at in TIMES[::2]:
+        since = (at - EPOCH) * 1e-9
+        turn = TALK.make("geometry_msgs/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+        pairs = (("odom", "base_link", 0.3 * since), ("base_link", "camera", 1.0))
+        transforms = [
+            TALK.make(
+                "geometry_msgs/TransformStamped",
+                header=TALK.header(int(at), parent),
+                child_frame_id=child,
+                transform=TALK.make(
+                    "geometry_msgs/Transform",
+                    translation=TALK.make("geometry_msgs/Vector3", x=x, y=0.0, z=0.0),
+                    rotation=turn,
+                ),
+            )
+            for parent, child, x in pairs
+        ]
+        messages.append((at, TALK.make("tf2_msgs/TFMessage", transforms=transforms)))
+    run = read_log(bag(tmp_path, {"/joint_states": states(), "/tf": messages})).run
+    assert np.allclose(run.base_velocity[:, 0], 0.3)
+    assert np.allclose(run.base_pose[:, 6], 1.0)
+    assert "base_velocity" in run.meta["differentiated"]
+
+
+URDF = """<robot name="toy"><link name="base"/>
+{}</robot>"""
+JOINT = """<link name="{0}_link"/><joint name="{0}" type="{1}"><parent link="base"/>
+<child link="{0}_link"/><axis xyz="0 0 1"/><limit lower="0" upper="1" effort="1" velocity="1"/>
+</joint>"""
+
+
+def described(kinds):
+    return URDF.format("\n".join(JOINT.format(name, kind) for name, kind in kinds.items()))
+
+
+def test_the_robot_comes_with_the_bag(tmp_path):
+    kinds = {"shoulder": "revolute", "elbow": "continuous", "wrist": "prismatic"}
+    text = TALK.make("std_msgs/String", data=described(kinds))
+    position = POSITION.copy()
+    position[:, 1:] += 100.0  # turns without end, and slides far
+    topics = {
+        "/joint_states": joint_states(TALK, position=position, velocity=VELOCITY),
+        "/robot_description": [(EPOCH, text)],
+    }
+    imported = read_log(bag(tmp_path, topics))
+    assert np.array_equal(imported.run.position, position)
+    assert imported.urdf == described(kinds)
+
+
+def test_a_joint_that_the_robot_lacks_is_left_out_and_named(tmp_path):
+    text = TALK.make(
+        "std_msgs/String", data=described({"shoulder": "revolute", "elbow": "revolute"})
+    )
+    topics = {"/joint_states": states(), "/robot_description": [(EPOCH, text)]}
+    imported = read_log(bag(tmp_path, topics))
+    assert imported.run.joint_names == ("shoulder", "elbow")
+    assert np.array_equal(imported.run.position, POSITION[:, :2])
+    assert "bag: left out, not joints of 'robot_description': wrist" in imported.remarks
+
+
+def test_a_description_that_is_no_robot_does_no_harm(tmp_path):
+    text = TALK.make("std_msgs/String", data="<robot name='x'><joint/></robot>")
+    topics = {"/joint_states": states(), "/robot_description": [(EPOCH, text)]}
+    imported = read_log(bag(tmp_path, topics))
+    assert imported.run.joint_names == JOINTS
+    assert imported.remarks[-1].endswith("joints are not checked")
+    assert imported.urdf == ""
+
+
+def test_topics_that_are_not_read_are_listed(tmp_path):
+    flag = [(at, TALK.make("std_msgs/Bool", data=True)) for at in TIMES[:3]]
+    topics = {"/joint_states": states(), "/stop": flag, "/odom": "nav_msgs/msg/Odometry"}
+    imported = read_log(bag(tmp_path, topics))
+    said = "bag: 2 columns not read: /stop (std_msgs/msg/Bool), /odom (no messages)"
+    assert said in imported.remarks
+
+
+@pytest.mark.parametrize(
+    ("topics", "message"),
+    [
+        (
+            {"/joint_states": "sensor_msgs/msg/JointState"},
+            "no topic holds joints; the bag has /join",
+        ),
+        (
+            {"/stop": [(EPOCH, TALK.make("std_msgs/Bool", data=True))]},
+            r"no topic holds joints; the bag has /stop \(std_msgs/msg/Bool\)",
+        ),
+        (
+            {"/joint_states": joint_states(TALK, TIMES[:1], position=POSITION)},
+            "bag: 1 sample; a run needs at least 2",
+        ),
+        ({"/joint_states": joint_states(TALK, names=[])}, "no message holds joints"),
+        ({"/joint_states": joint_states(TALK, effort=EFFORT)}, "no message holds joints"),
+    ],
+)
+def test_a_bag_without_motion_is_one_line(tmp_path, topics, message):
+    path = bag(tmp_path, topics)
+    with pytest.raises(LogError, match=message) as caught:
+        read_log(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_one_nan_is_named_but_what_was_never_logged_is_left_out(tmp_path):
+    never = np.full_like(EFFORT, np.nan)
+    topics = {
+        "/joint_states": joint_states(TALK, position=POSITION, velocity=VELOCITY, effort=never)
+    }
+    imported = read_log(bag(tmp_path, topics))
+    assert imported.run.effort is None
+    assert any("nothing but nan, left out: /joint_states/effort of" in r for r in imported.remarks)
+    broken = VELOCITY.copy()
+    broken[123, 1] = np.nan
+    topics = {"/joint_states": joint_states(TALK, position=POSITION, velocity=broken)}
+    message = (
+        r"column '/joint_states/velocity of elbow' holds nan \(sample 124, 1.23 s into the log\)"
+    )
+    with pytest.raises(LogError, match=message):
+        read_log(bag(tmp_path, topics, name="broken"))
+
+
+def test_an_imported_bag_is_saved_and_loaded(tmp_path):
+    run = read_log(bag(tmp_path, {"/joint_states": states()})).run
+    run.save(tmp_path / "run.npz")
+    assert Run.load(tmp_path / "run.npz").meta == run.meta
+
+
+def test_a_long_bag_is_held_little_more_than_once(tmp_path):
+    times = EPOCH + 1_000_000 * np.arange(8000)
+    times += np.random.default_rng(0).integers(-100_000, 100_000, len(times))
+    names = [f"joint_{n}" for n in range(60)]
+    arrays = {
+        name: np.tile(numbers(10, 8000, seed) / 10, 6)
+        for seed, name in enumerate(("position", "velocity", "effort"))
+    }
+    path = bag(tmp_path, {"/joint_states": joint_states(TALK, times, names, **arrays)})
+    read_log(path)  # what is imported on the way does not count
+    tracemalloc.start()
+    run = read_log(path).run
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    numbers_of = 3 * run.velocity.nbytes
+    assert numbers_of == pytest.approx(8000 * 180 * 8, rel=0.01)
+    assert peak < 1.8 * numbers_of + 40e6
+
+
+def test_a_part_of_a_robots_joints_is_enough_mimic_joints_among_them(tmp_path):
+    names = ["panda_finger_joint2", "panda_joint7", "panda_finger_joint1", "panda_joint2"]
+    position = np.abs(numbers(4)) / 100
+    path = bag(tmp_path, {"/joint_states": joint_states(TALK, TIMES, names, position=position)})
+    run = read_log(path, robot="panda").run
+    assert run.joint_names == tuple(names)
+    q, _ = Robot.load("panda", mimic=True).configuration(run)
+    assert np.array_equal(q[:, [6, 7, 1]], position[:, [1, 2, 3]])
