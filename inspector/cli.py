@@ -5,12 +5,14 @@ import sys
 import typer
 
 from inspector.commands import (
+    auditing,
     comparing,
     judging,
     learning,
     logs,
     looking,
     simulating,
+    travelling,
 )
 
 app = typer.Typer(
@@ -22,6 +24,9 @@ app.command()(looking.view)
 app.command()(judging.classify)
 app.command()(looking.noise)
 app.command("import")(logs.import_)
+app.command()(auditing.audit)
+app.command()(travelling.labels)
+app.command()(travelling.export)
 app.command()(simulating.simulate)
 app.command()(learning.train)
 app.command()(learning.evaluate)

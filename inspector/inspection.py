@@ -7,6 +7,7 @@ from pathlib import Path
 
 import models
 import noisemodel as nm
+from inspector.audit import audit, summary
 from inspector.errors import InspectorError
 from inspector.labelling import CannotTellError, Library, label_run
 from inspector.linknoise import LinkNoise, link_noise
@@ -80,6 +81,7 @@ def inspect(
     else:
         labels, model = labelled.labels, labelled.model
         remarks += [labelled.remark] if labelled.remark else []
+    remarks += summary(audit(run, library))
     links = None
     if robot and robot_known(run) and run.position is not None:
         try:

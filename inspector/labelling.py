@@ -52,7 +52,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         Labels on the time axis of the run.
 
     Raises:
-        CannotTellError: If the run is slower than every model.
+        CannotTellError: If the run is slower than every model, or no frame is free of gaps.
         SignalError: If the run is too short for a frame.
     """
     name, classifier = _choose(library, run.rate)
@@ -62,6 +62,11 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
     noise = nm.simplified(run.motion, run.velocity_desired)
     labels = classifier.classify(noise, rate, start=float(run.time[0]), valid=run.mask)
+    if not len(labels):
+        raise CannotTellError(
+            f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
+            " takes to tell anything"
+        )
     return Labelled(labels, name, remark)
 
 

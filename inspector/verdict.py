@@ -8,6 +8,7 @@ from pathlib import Path
 
 import models
 import noisemodel as nm
+from inspector.audit import audit, shortcomings, summary
 from inspector.errors import InspectorError
 from inspector.labelling import CannotTellError, Labelled, Library, label_noise, label_run
 from inspector.parallel import each
@@ -59,15 +60,12 @@ def judge(path: Path, library: Library) -> Verdict:
         The verdict.
     """
     try:
-        labelled = _labelled(path, library)
+        return _verdict(path, library)
     except CannotTellError as error:
         return Verdict(path, Status.CANNOT_TELL, message=str(error))
     except EXPECTED as error:
         message = str(error).removeprefix(f"{path}: ")
         return Verdict(path, Status.BAD_INPUT, message=message)
-    events = labelled.labels.events()
-    status = Status.FINDINGS if events else Status.OK
-    return Verdict(path, status, labelled.model, events, labelled.remark)
 
 
 def exit_status(verdicts: Iterable[Verdict]) -> int:
@@ -90,7 +88,18 @@ def judge_all(paths: Sequence[Path], library: Library, *, jobs: int = 1) -> Iter
     return each(partial(judge, library=library), paths, jobs=jobs)
 
 
-def _labelled(path: Path, library: Library) -> Labelled:
+def _verdict(path: Path, library: Library) -> Verdict:
     if path.suffix == ".log":
-        return label_noise(*models.read_log(path), library)
-    return label_run(nm.Run.load(path), library)
+        return _heard(path, label_noise(*models.read_log(path), library))
+    run = nm.Run.load(path)
+    labelled, seen = label_run(run, library), audit(run, library)
+    if seen.blind and not labelled.labels.events():
+        return Verdict(path, Status.CANNOT_TELL, labelled.model, message=" ".join(summary(seen)))
+    return _heard(path, labelled, shortcomings(seen))
+
+
+def _heard(path: Path, labelled: Labelled, remarks: Sequence[str] = ()) -> Verdict:
+    events = labelled.labels.events()
+    status = Status.FINDINGS if events else Status.OK
+    message = " ".join(filter(None, (labelled.remark, *remarks)))
+    return Verdict(path, status, labelled.model, events, message)

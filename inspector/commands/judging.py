@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles
+from inspector.commands.options import ModelFiles, Overwrite
 
 
 class Format(StrEnum):
@@ -25,17 +25,30 @@ def classify(
     format: Annotated[Format, typer.Option("--format", help="How to print.")] = Format.TEXT,  # noqa: A002
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Runs at once.")] = 1,
     model: ModelFiles = None,
+    labels_to: Annotated[
+        Path | None, typer.Option(help="Write findings into this folder, a file per run.")
+    ] = None,
+    labels_format: Annotated[
+        str, typer.Option(help="Of those files: noisytest, csv or audacity.")
+    ] = "audacity",
+    overwrite: Overwrite = False,
 ) -> None:
     """Label runs; exit 0 if all are quiet, 1 findings, 3 bad input, 4 cannot tell."""
     from inspector import assets
     from inspector.formats import FORMATS
+    from inspector.labelfiles.findings import label_paths, write_findings
     from inspector.labelling import load_library
     from inspector.progress import progress
     from inspector.verdict import exit_status, judge_all
 
     library = load_library(model or assets.model_files())
+    targets = {}
+    if labels_to:
+        targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)
     verdicts = list(progress(judge_all(runs, library, jobs=jobs), "classify", total=len(runs)))
     typer.echo(FORMATS[format](verdicts))
+    if targets:
+        write_findings(verdicts, targets, format_name=labels_format, overwrite=overwrite)
     for bad in verdicts:
         if bad.status == "bad-input":
             typer.echo(f"inspector: {bad.path}: {bad.message}", err=True)

@@ -1,0 +1,115 @@
+"""Velocities that nobody measured: positions, differentiated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from noisemodel import Run
+from noisemodel.differentiate import ORDER, WINDOW
+from noisemodel.types import Array, Mask
+
+EXACT = 1e-12
+"""Share of the largest velocity by which a difference of positions may miss it."""
+
+COARSE = 1e-4
+"""If rounding alone explains more than this share of a velocity, nothing is told from it."""
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How velocities were had from positions.
+
+    Attributes:
+        name: The method.
+        weights: Of the positions before and after, evenly about the middle, times the rate;
+            shape (taps,).
+    """
+
+    name: str
+    weights: tuple[float, ...]
+
+    def response(self, frequency: Array, rate: float) -> Array:
+        """Tell what the method makes of a position's vibration.
+
+        Args:
+            frequency: Shape (frequency,), in [Hz].
+            rate: Sample rate, in [Hz].
+
+        Returns:
+            Amplitude of the velocity by that of the position, shape (frequency,), in [1/s].
+        """
+        taps = np.arange(len(self.weights)) - (len(self.weights) - 1) / 2
+        turns = np.exp(2j * np.pi * np.outer(frequency, taps) / rate)
+        return np.asarray(rate * np.abs(turns @ np.array(self.weights)))
+
+    def corner(self, rate: float) -> float:
+        """Tell the frequency from which the method loses more than 3 dB of a velocity, in [Hz]."""
+        frequency = np.linspace(0.0, rate / 2, 1001)[1:]
+        kept = self.response(frequency, rate) / (2 * np.pi * frequency)
+        lost = kept < np.sqrt(0.5)
+        return float(frequency[np.argmax(lost)] if lost.any() else rate / 2)
+
+
+def _savitzky_golay() -> tuple[float, ...]:
+    """Weights of the polynomial's slope in the middle, as `noisemodel.differentiate` takes it."""
+    places = np.arange(WINDOW) - WINDOW // 2
+    fit = np.linalg.pinv(np.vander(places, ORDER + 1, increasing=True).astype(np.float64))
+    return tuple(fit[1].tolist())
+
+
+BACKWARD = Slope("difference to the sample before", (-1.0, 1.0))
+FORWARD = Slope("difference to the sample after", (-1.0, 1.0))
+CENTRAL = Slope("difference of the samples before and after", (-0.5, 0.0, 0.5))
+SMOOTH = Slope(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savitzky_golay())
+
+
+def derived(run: Run, signal: str) -> bool:
+    """Whether a run's ``meta`` says that a signal was differentiated on the way in.
+
+    Args:
+        run: The run.
+        signal: Its name, say "velocity".
+    """
+    differentiated = run.meta.get("differentiated")
+    return isinstance(differentiated, Mapping) and signal in differentiated
+
+
+def slope_of(run: Run) -> Slope | None:
+    """Tell whether a run's velocities are its positions, differentiated.
+
+    Args:
+        run: The run.
+
+    Returns:
+        How they were had: as the run's ``meta`` says, or as a difference that holds in 99 of 100
+        samples; None where velocities were measured, or nobody can tell.
+    """
+    if derived(run, "velocity"):
+        return SMOOTH
+    if run.position is None or len(run.time) < 3:
+        return None
+    inner = run.mask[:-2] & run.mask[1:-1] & run.mask[2:]
+    moves = np.ptp(run.velocity[run.mask], axis=0) > 0
+    if not (inner.any() and moves.any()):
+        return None
+    before, here, after = (
+        run.position[start : len(run.time) - 2 + start, moves].astype(np.float64)
+        for start in range(3)
+    )
+    velocity = run.velocity[1:-1, moves].astype(np.float64)
+    grain = max(np.finfo(run.position.dtype).eps, np.finfo(run.velocity.dtype).eps)
+    rounding = 4.0 * grain * max(np.abs(run.position).max() * run.rate, np.abs(velocity).max())
+    tolerance = rounding + EXACT * np.abs(velocity).max()
+    if tolerance > COARSE * np.sqrt(np.mean(np.square(velocity))):
+        return None
+    found = {
+        BACKWARD: (here - before) * run.rate,
+        FORWARD: (after - here) * run.rate,
+        CENTRAL: (after - before) * run.rate / 2,
+    }
+    return next((how for how, v in found.items() if _same(v - velocity, tolerance, inner)), None)
+
+
+def _same(difference: Array, tolerance: float, mask: Mask) -> bool:
+    return bool(np.mean(np.abs(difference[mask]) <= tolerance) >= 0.99)

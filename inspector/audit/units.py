@@ -1,0 +1,101 @@
+"""Numbers that look like another unit than radians and seconds."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from inspector.audit.slopes import derived
+from noisemodel import Run
+from noisemodel.types import Array
+
+TURNS = 4 * np.pi
+"""What a joint that does not turn without end hardly reaches, in [rad]."""
+
+FAST = 100.0
+"""What a robot's joint hardly reaches, in [rad/s]."""
+
+ROUND_ENDS = (1.0, 100.0)
+"""Ends of the ranges that positions are normalised to."""
+
+FACTORS = {
+    180 / np.pi: "velocities look like degrees per second beside positions in radians",
+    np.pi / 180: "positions look like degrees beside velocities in radians per second",
+    30 / np.pi: "velocities look like turns per minute beside positions in radians",
+    1 / 6: "velocities look like turns per minute beside positions in degrees",
+    1 / (2 * np.pi): "velocities look like turns per second beside positions in radians",
+}
+"""What is said if velocities are so many times the slope of positions."""
+
+NEAR = 0.02
+"""Share by which a factor may be missed, less than half of what lies between two of them."""
+
+STRETCH = 0.2
+"""Time over which velocities are summed up and held against positions, in [s]."""
+
+
+def unit_doubts(run: Run) -> Iterator[str]:
+    """Say what looks like another unit, a clause each.
+
+    Args:
+        run: The run.
+    """
+    factor = _factor(run)
+    for known, said in FACTORS.items():
+        if factor is not None and abs(factor / known - 1) <= NEAR:
+            yield f"{said} ({factor:.4g} times their slope)"
+    if run.position is not None:
+        yield from _angles(run, np.abs(run.position[run.mask]).max(axis=0))
+    speeds = np.abs(run.velocity[run.mask]).max(axis=0)
+    fast = int(np.argmax(speeds))
+    if speeds[fast] > FAST:
+        yield (
+            f"velocities look like degrees or turns per minute"
+            f" ({run.joint_names[fast]} reaches {speeds[fast]:.4g})"
+        )
+
+
+def _angles(run: Run, reach: Array) -> Iterator[str]:
+    """Doubt positions that reach too far, or round ends that no joint has."""
+    largest = float(reach.max())
+    if largest in ROUND_ENDS and _stops_at(run, largest) >= 2:
+        yield f"positions look normalised: several joints stop at {largest:g}"
+        return
+    moving = np.ptp(run.velocity[run.mask], axis=0) > 0
+    far = reach > TURNS
+    if 2 * np.sum(far & moving) >= max(1, np.sum(moving)):
+        other = " or normalised" if largest <= max(ROUND_ENDS) else ""
+        joint = run.joint_names[int(np.argmax(reach))]
+        yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
+
+
+def _stops_at(run: Run, end: float) -> int:
+    """Count the joints that are at one position, to the bit, for two samples in a row."""
+    assert run.position is not None
+    there = np.abs(run.position) == end
+    return int(np.sum((there[1:] & there[:-1]).any(axis=0)))
+
+
+def _factor(run: Run) -> float | None:
+    """Compare velocities, summed up, with the way of the positions; None if there is no telling."""
+    if run.position is None or derived(run, "velocity"):
+        return None
+    length = max(2, round(STRETCH * run.rate))
+    starts = np.arange(0, len(run.time) - length, length)
+    gaps = np.concatenate(([0], np.cumsum(~run.mask)))
+    starts = starts[gaps[starts + length + 1] == gaps[starts]]
+    if not len(starts):
+        return None
+    way = run.position[starts + length].astype(np.float64) - run.position[starts]
+    area = np.concatenate((np.zeros((1, way.shape[1])), np.cumsum(_means(run), axis=0)))
+    summed = (area[starts + length] - area[starts]) / run.rate
+    clear = np.square(way).sum(axis=0) > 0
+    if not clear.any():
+        return None
+    factors = (summed * way).sum(axis=0)[clear] / np.square(way).sum(axis=0)[clear]
+    return float(np.median(factors))
+
+
+def _means(run: Run) -> Array:
+    """Mean velocity from each sample to the next, shape (samples - 1, joints)."""
+    velocity = run.velocity.astype(np.float64)
+    return np.asarray((velocity[1:] + velocity[:-1]) / 2)

@@ -1,0 +1,118 @@
+"""One wide table: a row for each sample, with the frame and the block that it lies in."""
+
+import csv
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import models
+from inspector.export.content import Content
+from noisemodel.types import Array
+
+UNITS = {
+    "time": "s",
+    "simplified": "rad/s",
+    "extended": "W",
+    "frame_start": "s",
+    "frame_stop": "s",
+}
+"""Units of the columns that have one."""
+
+
+def arrow_table(content: Content) -> Any:
+    """Lay out what is exported as a table of Arrow.
+
+    Columns are time, simplified, extended (with a robot), annotated (with blocks), and with labels
+    frame_start, frame_stop, label and a score_<class> each: those of the frame whose middle is
+    nearest, nothing before the first frame's and after the last one's share.
+
+    Args:
+        content: What is exported.
+
+    Returns:
+        A ``pyarrow.Table``, whose fields have their unit as metadata.
+    """
+    import pyarrow as pa
+
+    columns = dict(_columns(content))
+    fields = [
+        pa.field(name, pa.array(values).type, metadata=_unit(name))
+        for name, values in columns.items()
+    ]
+    about = {"format": "noise-export/1", "model": content.model, "extended": content.kind}
+    return pa.table(
+        [pa.array(values) for values in columns.values()], pa.schema(fields, metadata=about)
+    )
+
+
+def write_parquet(content: Content, path: Path) -> None:
+    """Write the table as Parquet.
+
+    Args:
+        content: What is exported.
+        path: The file to write.
+    """
+    from pyarrow import parquet
+
+    parquet.write_table(arrow_table(content), path, compression="zstd")
+
+
+def write_csv(content: Content, path: Path) -> None:
+    """Write the table as CSV, numbers with all digits that they have.
+
+    Args:
+        content: What is exported.
+        path: The file to write.
+    """
+    import pyarrow.csv
+
+    table = arrow_table(content)
+    with path.open("w", newline="", encoding="utf-8") as file:
+        # Arrow would put all names in quotes, and not every reader of CSV takes them off.
+        csv.writer(file, lineterminator="\n").writerow(table.column_names)
+    with path.open("ab") as stream:
+        pyarrow.csv.write_csv(table, stream, pyarrow.csv.WriteOptions(include_header=False))
+
+
+def _unit(name: str) -> dict[str, str] | None:
+    return {"unit": UNITS[name]} if name in UNITS else None
+
+
+def _columns(content: Content) -> Iterator[tuple[str, Any]]:
+    yield "time", content.time
+    yield "simplified", content.simplified
+    if content.extended is not None:
+        yield "extended", content.extended
+    if content.run.blocks:
+        yield "annotated", _annotated(content)
+    if content.labels is not None:
+        yield from _framed(content.time, content.labels)
+
+
+def _annotated(content: Content) -> list[str | None]:
+    labels: list[str | None] = [None] * len(content.time)
+    for block in content.run.blocks:
+        first, last = np.searchsorted(content.time, (block.start, block.stop))
+        labels[first:last] = [block.label] * int(last - first)
+    return labels
+
+
+def _framed(time: Array, labels: models.Labels) -> Iterator[tuple[str, Any]]:
+    """Give each sample the frame whose middle is nearest, if that is near."""
+    import pyarrow as pa
+
+    middles = (labels.start + labels.stop) / 2
+    share = np.median(np.diff(middles)) if len(middles) > 1 else labels.stop[0] - labels.start[0]
+    nearest = np.searchsorted((middles[1:] + middles[:-1]) / 2, time)
+    outside = np.abs(time - middles[nearest]) > share / 2
+
+    def column(values: Any) -> Any:
+        return pa.array(values[nearest], mask=outside)
+
+    yield "frame_start", column(labels.start)
+    yield "frame_stop", column(labels.stop)
+    yield "label", column(labels.label.astype(object))
+    for place, name in enumerate(labels.classes):
+        yield f"score_{name}", column(labels.scores[:, place])

@@ -1,0 +1,232 @@
+import numpy as np
+import pytest
+from scipy.signal import butter, savgol_filter, sosfilt
+
+from inspector.audit.bandwidth import ENCODERS, bandwidth
+from inspector.audit.holding import held_for
+from inspector.audit.rounding import step_of
+from inspector.audit.slopes import CENTRAL, SMOOTH, slope_of
+from inspector.audit.spectrum import spectrum
+from noisemodel import Run
+
+RATES = [200.0, 1000.0, 10_000.0]
+WIDTHS = np.array([0.3, 0.41, 0.53, 0.27, 0.6, 0.35])
+
+
+def motion(rate, seconds=10.0):
+    """Time, and smooth positions and velocities of six joints."""
+    time = np.arange(round(seconds * rate)) / rate
+    angle = 2 * np.pi * np.outer(time, WIDTHS) + np.arange(6)
+    return time, 1.1 * np.sin(angle), 2.2 * np.pi * WIDTHS * np.cos(angle)
+
+
+def noise(shape, level=0.003, seed=0):
+    return np.random.default_rng(seed).normal(0, level, shape)
+
+
+def run_of(velocity, rate, **signals):
+    names = tuple(f"joint{number}" for number in range(velocity.shape[1]))
+    time = np.arange(len(velocity)) / rate
+    return Run(time=time, velocity=velocity, joint_names=names, **signals)
+
+
+def low_passed(signal, cutoff, rate, order):
+    return sosfilt(butter(order, cutoff, fs=rate, output="sos"), signal, axis=0)
+
+
+# --- the spectrum
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_the_power_of_white_noise_is_spread_evenly_and_adds_up(rate):
+    velocity = noise((40_000, 3), level=0.1)
+    found = spectrum(velocity, rate, np.ones(40_000, dtype=bool))
+    width = found.frequency[1] - found.frequency[0]
+    assert found.total.sum() * width == pytest.approx(3 * 0.1**2, rel=0.05)
+    low, high = np.array_split(found.total, 2)
+    assert low.mean() == pytest.approx(high.mean(), rel=0.1)
+
+
+def test_a_sine_has_its_power_at_its_frequency():
+    time = np.arange(20_000) / 1000
+    velocity = 0.2 * np.sin(2 * np.pi * 50 * time)[:, None]
+    found = spectrum(velocity, 1000.0, np.ones(20_000, dtype=bool))
+    assert found.frequency[found.total.argmax()] == pytest.approx(50.0)
+    near = np.abs(found.frequency - 50) < 10
+    width = found.frequency[1] - found.frequency[0]
+    assert found.total[near].sum() * width == pytest.approx(0.2**2 / 2, rel=0.01)
+
+
+def test_no_segment_reaches_over_a_gap():
+    valid = np.ones(4000, dtype=bool)
+    valid[2000] = False
+    velocity = noise((4000, 1))
+    velocity[2000] = 1e6
+    assert spectrum(velocity, 1000.0, valid).total.max() < 1e-3
+    assert spectrum(velocity[1990:2200], 1000.0, valid[1990:2200]) is None
+
+
+# --- filters
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize("share", [0.15, 0.2, 0.4])
+def test_the_corner_of_a_filter_is_found(rate, order, share):
+    _, _, velocity = motion(rate)
+    cutoff = share * rate
+    found = bandwidth(
+        run_of(low_passed(velocity + noise(velocity.shape), cutoff, rate, order), rate)
+    )
+    assert found.corner == pytest.approx(cutoff, rel=0.2)
+    assert found.usable == found.corner
+    assert found.limit == "the log looks filtered"
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("level", [0.0, 3e-4, 3e-3, 3e-2])
+def test_plain_sensor_noise_is_no_filter(rate, level):
+    _, position, velocity = motion(rate)
+    found = bandwidth(run_of(velocity + noise(velocity.shape, level), rate, position=position))
+    assert (found.corner, found.slope, found.held, found.drowned) == (None, None, 1.0, None)
+    assert found.usable == rate / 2
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("band", [(0.1, 0.15), (0.05, 0.15), (0.1, 0.3)])
+def test_a_vibration_in_one_band_is_no_filter(rate, band):
+    _, _, velocity = motion(rate)
+    sections = butter(4, np.array(band) * rate, "bandpass", fs=rate, output="sos")
+    rattle = sosfilt(sections, noise(velocity.shape, 0.5, seed=1), axis=0)
+    found = bandwidth(run_of(velocity + noise(velocity.shape) + rattle, rate))
+    assert found.corner is None
+
+
+def test_an_encoder_filter_of_first_order_is_no_reason_for_doubt():
+    _, _, velocity = motion(10_000.0)
+    noisy = velocity + low_passed(noise(velocity.shape), 500.0, 10_000.0, 1)
+    assert bandwidth(run_of(noisy, 10_000.0)).corner is None
+
+
+# --- rounding
+
+
+def test_the_step_of_rounded_values_is_found():
+    values = np.random.default_rng(0).normal(size=5000)
+    for step in (0.1, 1e-3, 2 * np.pi / 4096):
+        assert step_of(np.round(values / step) * step) == pytest.approx(step)
+    assert step_of(values) == 0.0
+    assert step_of(np.zeros(100)) == 0.0
+    assert step_of(np.arange(3.0)) == 0.0
+
+
+def test_a_signal_drowns_where_rounding_is_louder():
+    _, _, velocity = motion(1000.0)
+    fast = 0.01 * np.sin(2 * np.pi * 60 * np.arange(len(velocity)) / 1000)[:, None]
+    step = 1e-3
+    rounded = bandwidth(run_of(np.round((velocity + fast) / step) * step, 1000.0))
+    assert rounded.step == pytest.approx(step)
+    assert rounded.drowned == pytest.approx(80, abs=25)
+    # step² / 12 over half the rate and six joints, a 10 Hz band of it, as an amplitude
+    assert rounded.hidden == pytest.approx(np.sqrt(2 * 10 * 6 * step**2 / 12 / 500), rel=1e-6)
+    assert rounded.usable == 500.0
+
+
+def test_rounding_below_the_sensor_noise_hides_nothing():
+    _, _, velocity = motion(1000.0)
+    noisy = np.round((velocity + noise(velocity.shape)) / 1e-3) * 1e-3
+    assert bandwidth(run_of(noisy, 1000.0)).drowned is None
+    assert bandwidth(run_of(noisy.astype(np.float32), 1000.0)).drowned is None
+
+
+def test_rounded_positions_drown_their_differences():
+    _, position, _ = motion(1000.0)
+    coarse = np.round(position / 1e-3) * 1e-3
+    found = bandwidth(run_of(np.gradient(coarse, 1e-3, axis=0), 1000.0, position=coarse))
+    assert found.slope is CENTRAL
+    assert found.step == pytest.approx(1e-3)
+    assert found.drowned < 20.0
+
+
+def test_what_no_encoder_is_that_quiet_for_is_said():
+    _, _, velocity = motion(1000.0)
+    assert bandwidth(run_of(velocity, 1000.0)).quiet == pytest.approx(35, abs=15)
+    assert bandwidth(run_of(velocity + noise(velocity.shape), 1000.0)).quiet is None
+    assert ENCODERS == 3e-5
+
+
+def test_standstill_has_no_flaw():
+    found = bandwidth(run_of(np.zeros((5000, 2)), 1000.0))
+    assert (found.corner, found.drowned, found.quiet, found.usable) == (None, None, None, 500.0)
+
+
+# --- held values
+
+
+@pytest.mark.parametrize("length", [2, 8, 33])
+def test_held_values_are_told_with_their_length(length):
+    _, _, velocity = motion(1000.0)
+    held = np.repeat(velocity[::length], length, axis=0)[: len(velocity)]
+    found = bandwidth(run_of(held, 1000.0))
+    assert found.held == pytest.approx(length)
+    assert found.usable == pytest.approx(500.0 / length)
+    assert found.corner is None
+
+
+def test_values_held_for_a_broken_number_of_samples_are_told():
+    _, _, velocity = motion(1000.0)
+    places = (np.arange(len(velocity)) * 30 // 1000) * 1000 // 30
+    assert held_for(velocity[places], np.ones(len(velocity), dtype=bool)) == pytest.approx(
+        33.3, 0.02
+    )
+
+
+def test_rounding_and_rest_hold_nothing():
+    _, _, velocity = motion(1000.0)
+    everywhere = np.ones(len(velocity), dtype=bool)
+    assert held_for(np.round(velocity, 2), everywhere) == 1.0
+    assert held_for(np.round(velocity[:, :1], 1), everywhere) == 1.0
+    velocity[2000:8000] = velocity[2000]
+    assert held_for(velocity, everywhere) == 1.0
+
+
+# --- differentiated positions
+
+
+def test_the_slope_of_a_sine_is_told_right_where_the_method_is_good():
+    low = np.array([1.0])
+    for slope in (CENTRAL, SMOOTH):
+        assert slope.response(low, 1000.0) == pytest.approx(2 * np.pi, rel=1e-3)
+    assert CENTRAL.corner(1000.0) == pytest.approx(221.5, abs=1)  # sin(x) / x = sqrt(1 / 2)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_differences_of_positions_are_recognised(dtype):
+    _, position, _ = motion(100.0)
+    position = (position + noise(position.shape, 1e-4)).astype(dtype)
+    differences = np.diff(position, axis=0, append=position[-1:]) * dtype(100)
+    assert "after" in slope_of(run_of(differences, 100.0, position=position)).name
+    backward = np.vstack((differences[:1], differences[:-1]))
+    assert "before" in slope_of(run_of(backward, 100.0, position=position)).name
+    central = np.gradient(position, 0.01, axis=0).astype(dtype)
+    assert slope_of(run_of(central, 100.0, position=position)) is CENTRAL
+
+
+def test_measured_velocities_are_not_taken_for_differences():
+    _, position, velocity = motion(1000.0)
+    assert slope_of(run_of(velocity, 1000.0, position=position)) is None
+    assert slope_of(run_of(velocity, 1000.0)) is None
+
+
+def test_what_was_differentiated_on_the_way_in_is_known(tmp_path):
+    time, position, _ = motion(1000.0)
+    position += noise(position.shape, 1e-5)
+    np.savez(tmp_path / "run.npz", time=time, position=position)
+    run = Run.load(tmp_path / "run.npz")
+    assert slope_of(run) is SMOOTH
+    assert bandwidth(run).usable == pytest.approx(194.5, abs=1)
+    expected = savgol_filter(position, 7, 3, deriv=1, delta=1e-3, axis=0)
+    inner = slice(10, -10)
+    weights = np.array(SMOOTH.weights) * 1000
+    ours = np.apply_along_axis(lambda x: np.convolve(x, weights[::-1], mode="same"), 0, position)
+    np.testing.assert_allclose(ours[inner], expected[inner], atol=1e-9)

@@ -1,0 +1,95 @@
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+
+from inspector.assets import demo_run
+
+PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
+
+
+@pytest.fixture
+def episode(tmp_path):
+    """A 30 Hz episode of six joints in degrees, as LeRobot keeps them: positions and actions."""
+    time = np.arange(600) / 30
+    angle = np.outer(time, [0.7, 0.5, 0.9, 1.3, 0.4, 1.1]) + np.arange(6)
+    position = np.rad2deg(0.9 * np.sin(angle)) + np.array([10, -50, 70, 30, 0, 20])
+    position += np.random.default_rng(1).normal(0, 0.02, position.shape)
+    path = tmp_path / "episode.npz"
+    np.savez(path, time=time, position=position, position_desired=np.roll(position, -1, axis=0))
+    return path
+
+
+def test_an_episode_of_30_hz_in_degrees_is_told_what_it_cannot_show(episode):
+    status, out, err = call("audit", episode)
+    assert (status, err) == (4, "")
+    assert "30 Hz" in out
+    assert "positions look like degrees (joint3" in out
+    assert "measured position of all joints is the desired one, 1 sample later" in out
+    assert "velocities are differentiated positions" in out
+    assert "impact: cannot tell: 30 Hz is slower than every model; needs 1000 Hz" in out
+
+
+def test_the_demo_shows_all(tmp_path):
+    status, out, err = call("audit", demo_run())
+    assert (status, err) == (0, "")
+    assert "oscillations: observable, 20 to 1000 Hz" in out
+    assert "looks wrong" not in out
+
+
+def test_audits_as_json(episode):
+    status, out, _ = call("audit", demo_run(), episode, "--format", "json")
+    assert status == 4
+    found = json.loads(out)
+    assert found["format"] == "noise-audit/1"
+    demo, slow = found["runs"]
+    assert demo["bandwidth"]["usable"] == 5000
+    assert {each["sight"] for each in demo["classes"]} == {"observable"}
+    assert {each["needed"] for each in slow["classes"]} == {1000}
+    assert slow["doubts"][0].startswith("positions look like degrees")
+
+
+def test_one_bad_file_does_not_stop_the_rest(tmp_path):
+    (tmp_path / "bad.npz").write_bytes(b"PK\x03\x04 not really")
+    status, out, err = call("audit", tmp_path / "bad.npz", tmp_path / "none.npz", demo_run())
+    assert status == 3
+    assert "impact: observable" in out
+    bad, none = err.splitlines()
+    assert bad.startswith(f"inspector: {tmp_path / 'bad.npz'}: not a run file")
+    assert "cannot be read" in none
+    status, out, _ = call("audit", tmp_path / "bad.npz", "--format", "json")
+    assert status == 3
+    assert "not a run file" in json.loads(out)["runs"][0]["message"]
+
+
+def test_a_csv_log_is_audited_as_it_is_imported(tmp_path):
+    time = np.arange(3000) / 1000
+    table = np.column_stack((time, np.sin(3 * time), 3 * np.cos(3 * time)))
+    header = "time,elbow.position,elbow.velocity"
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
+    status, out, err = call("audit", tmp_path / "log.csv")
+    assert (status, err) == (0, "")
+    assert "1000 Hz" in out
+
+
+def test_view_says_it_in_a_line_or_two(episode, tmp_path):
+    status, out, _ = call("view", episode, "--save", tmp_path / "run.rrd")
+    assert status == 0
+    assert "Impact, highaccelerations and oscillations cannot be told" in out
+    assert "Looks wrong: positions look like degrees" in out
+
+
+@pytest.mark.skipif(not PANDA.is_dir(), reason="needs ../shared/data/panda")
+def test_the_log_of_a_real_panda(tmp_path):
+    logs = [PANDA / "measured.csv", "--desired", PANDA / "desired.csv", "--robot", "panda"]
+    status, _, err = call("import", *logs, "-o", tmp_path / "panda.npz")
+    assert status == 0, err
+    status, out, _ = call("audit", tmp_path / "panda.npz")
+    assert status == 0
+    assert "stamps were off by 0.165 ms rms" in out
+    assert "missing: 4 gaps" in out
+    assert "impact: observable" in out
+    assert "oscillations: partly, 20 to 440 Hz" in out
+    assert "looks wrong" not in out

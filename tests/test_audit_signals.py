@@ -1,0 +1,136 @@
+import numpy as np
+import pytest
+from test_audit_bandwidth import motion, noise, run_of
+
+from inspector.audit.copying import copies
+from inspector.audit.excerpt import excerpt
+from inspector.audit.gaps import gaps_of
+from inspector.audit.units import unit_doubts
+
+
+def doubts(velocity, position=None, rate=1000.0):
+    return list(unit_doubts(run_of(velocity, rate, position=position)))
+
+
+# --- units
+
+
+@pytest.mark.parametrize("rate", [50.0, 1000.0])
+@pytest.mark.parametrize("level", [0.0, 0.01])
+def test_radians_are_not_doubted(rate, level):
+    _, position, velocity = motion(rate)
+    assert doubts(velocity + noise(velocity.shape, level), position, rate) == []
+    assert doubts(velocity, None, rate) == []
+
+
+@pytest.mark.parametrize(
+    ("by_position", "by_velocity", "said"),
+    [
+        (1, 180 / np.pi, "degrees per second beside positions in radians"),
+        (180 / np.pi, 1, "positions look like degrees beside velocities in radians"),
+        (1, 30 / np.pi, "turns per minute beside positions in radians"),
+        (180 / np.pi, 30 / np.pi, "turns per minute beside positions in degrees"),
+        (1, 1 / (2 * np.pi), "turns per second"),
+    ],
+)
+def test_velocities_in_another_unit_than_positions_are_told(by_position, by_velocity, said):
+    _, position, velocity = motion(1000.0)
+    velocity = velocity + noise(velocity.shape, 0.01)
+    assert said in doubts(by_velocity * velocity, by_position * position)[0]
+
+
+def test_degrees_throughout_are_told_by_how_far_they_reach():
+    _, position, velocity = motion(30.0)
+    (said, *_) = doubts(np.rad2deg(velocity), np.rad2deg(position), 30.0)
+    assert said == "positions look like degrees or normalised (joint0 reaches 63.03)"
+    (said, *_) = doubts(np.rad2deg(velocity), 2 * np.rad2deg(position), 30.0)
+    assert "or normalised" not in said
+
+
+def test_positions_that_stop_at_round_ends_look_normalised():
+    _, position, velocity = motion(30.0)
+    assert any(
+        "normalised: several joints stop at 100" in said
+        for said in doubts(velocity, np.clip(120 * position, -100, 100), 30.0)
+    )
+    assert any(
+        "stop at 1" in said for said in doubts(velocity, np.clip(1.2 * position, -1, 1), 30.0)
+    )
+
+
+def test_one_wheel_among_many_joints_is_no_reason_for_doubt():
+    time, position, velocity = motion(1000.0)
+    position[:, 0], velocity[:, 0] = 9 * time, 9.0
+    velocity[::2, 0] += 1e-3
+    assert doubts(velocity, position) == []
+
+
+def test_velocities_that_no_robot_reaches_are_doubted():
+    _, _, velocity = motion(1000.0)
+    (said,) = doubts(np.rad2deg(velocity))
+    assert "degrees or turns per minute (joint4 reaches" in said
+
+
+# --- copies
+
+
+@pytest.mark.parametrize("lag", [0, 1, 5, -3])
+def test_a_desired_signal_that_is_the_measured_one_is_told_with_its_lag(lag):
+    _, _, velocity = motion(30.0)
+    measured = velocity + noise(velocity.shape)
+    desired = np.roll(measured, -lag, axis=0)
+    (copy,) = copies(run_of(measured, 30.0, velocity_desired=desired))
+    assert (copy.signal, copy.lag, len(copy.joints)) == ("velocity", lag, 6)
+
+
+def test_a_robot_that_follows_well_is_no_copy():
+    _, _, velocity = motion(30.0)
+    following = velocity + noise(velocity.shape, 1e-6)
+    assert copies(run_of(following, 30.0, velocity_desired=velocity)) == ()
+    still = np.zeros_like(velocity)
+    assert copies(run_of(still, 30.0, velocity_desired=still)) == ()
+    assert copies(run_of(velocity, 30.0)) == ()
+
+
+def test_copies_are_found_by_name():
+    _, _, velocity = motion(30.0)
+    run = run_of(
+        velocity,
+        30.0,
+        velocity_desired=velocity[:, [3, 1]],
+        desired_joint_names=("joint3", "joint0"),
+    )
+    assert [copy.joints for copy in copies(run)] == [("joint3",)]
+
+
+# --- gaps
+
+
+def test_gaps_are_counted_and_measured():
+    valid = np.ones(1000, dtype=bool)
+    assert str(gaps_of(run_of(np.zeros((1000, 1)), 100.0))) == "no gaps"
+    valid[:10] = valid[500:530] = valid[999] = False
+    found = gaps_of(run_of(np.zeros((1000, 1)), 100.0, valid=valid))
+    assert (found.count, found.total, found.longest) == (3, pytest.approx(0.41), pytest.approx(0.3))
+    assert str(found) == "3 gaps, 0.41 s in all, 0.3 s the longest"
+
+
+# --- long runs
+
+
+def test_of_a_long_run_the_fastest_part_is_looked_at():
+    rate, samples = 1000.0, 500_000
+    time = np.arange(samples) / rate
+    velocity = np.cos(time)[:, None] * np.where(time < 400, 0.01, 1.0)[:, None]
+    valid = np.ones(samples, dtype=bool)
+    valid[-5:] = False
+    velocity[~valid] = 0.0
+    run = run_of(velocity, rate, valid=valid, velocity_desired=velocity)
+    part = excerpt(run)
+    assert len(part.time) == 60_000
+    assert np.abs(part.velocity).max() == np.abs(velocity).max()
+    assert part.time[0] >= 370.0
+    (copy,) = copies(part)
+    assert copy.lag == 0
+    short = run_of(velocity[:1000], rate)
+    assert excerpt(short) is short

@@ -1,0 +1,186 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+
+from inspector.assets import demo_run
+from inspector.errors import InspectorError
+from inspector.labelfiles import LabelFileError, read_labels, write_labels
+from noisemodel import Block, OutputError, Run
+
+TIME = np.arange(1000) / 100
+RUN = Run(time=TIME, velocity=np.zeros((1000, 1)), joint_names=("elbow",))
+
+
+def reading(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_labels(path, RUN)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("l.txt", "0\t1\tok\n1\tok\n", "line 2: expected start, stop and label between tabs"),
+        ("l.txt", "0\t1\tok\n\n2,5\t3\tok\n", r"line 3: '2,5' is no time in seconds"),
+        ("l.txt", "nan\t1\tok\n", "line 1: 'nan' is no time"),
+        ("l.txt", "0\tinf\tok\n", "line 1: 'inf' is no time"),
+        ("l.txt", "3\t2\tok\n", "line 1: 'ok' from 3 s to 2 s stops before it starts"),
+        ("l.txt", "3\t3\tclick\n", "line 1: 'click' from 3 s to 3 s .* lasts no time"),
+        ("l.txt", "3\t4\t\n", "line 1: '' is no label; it is empty"),
+        ("l.txt", "3\t4\ta\tb\n", r"line 1: 'a\\tb' is no label; .* cannot be printed"),
+        ("l.txt", "3\t12\tok\n", "line 1: 'ok' from 3 s to 12 s lies outside of the run"),
+        ("l.txt", "-1\t2\tok\n", "line 1: 'ok' from -1 s to 2 s lies outside of the run"),
+        ("l.txt", "3\t5\tb\n1\t4\ta\n", "line 1: 'b' starts at 3 s, before 'a' stops at 4 s"),
+        ("l.txt", b"\xff\xfe\x00", "no text in UTF-8"),
+        ("l.csv", "", "line 1: there is no column 'start'; expected start, stop, label"),
+        ("l.csv", "start,end,label\n", "line 1: there is no column 'stop'"),
+        ("l.csv", "start,stop,label\n1,2\n", "line 2: 2 cells where the header names 3 columns"),
+        ("l.csv", 'start,stop,label\n1,2,"a\nb"\n', "line 3: .* cannot be printed"),
+        ("l.csv", 'start,stop,label\n1,2,"a\n', "line 2: not CSV"),
+        ("l.csv", "start,stop,label\n1,2,a\n1.5,3,b\n", "line 3: 'b' starts at 1.5 s, before 'a'"),
+        ("l.toml", "[data\n", r"not TOML \(.*line 1"),
+        ("l.toml", "", "lacks the lists chunk_ranges and chunk_labels"),
+        ("l.toml", "data = 3\n", "lacks the lists"),
+        ("l.toml", "[data]\nchunk_ranges = 3\nchunk_labels = []\n", "lacks the lists"),
+        (
+            "l.toml",
+            '[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]\n',
+            "1 chunk_ranges and 2 chunk_labels",
+        ),
+        (
+            "l.toml",
+            '[data]\nchunk_ranges = [[0, 1], [2]]\nchunk_labels = ["ok", "ok"]\n',
+            r"chunk 2: \[2\] with label 'ok', expected \[start, stop\]",
+        ),
+        (
+            "l.toml",
+            f'[data]\nchunk_ranges = [[0, {10**400}]]\nchunk_labels = ["ok"]\n',
+            "chunk 1: .* expected",
+        ),
+        (
+            "l.toml",
+            '[data]\nchunk_ranges = [[nan, true]]\nchunk_labels = ["ok"]\n',
+            "chunk 1: .* expected",
+        ),
+        (
+            "l.toml",
+            '[data]\nchunk_ranges = [[0, 5], [4, -1]]\nchunk_labels = ["ok", "impact"]\n',
+            "chunk 2: 'impact' starts at 4 s, before 'ok' stops at 5 s",
+        ),
+    ],
+)
+def test_damaged_labels_are_refused_with_their_place(tmp_path, name, content, message):
+    with pytest.raises(LabelFileError, match=message) as caught:
+        reading(tmp_path, name, content)
+    assert "\n" not in str(caught.value)
+    assert str(caught.value).startswith(str(tmp_path / name))
+
+
+def test_a_file_that_is_not_there_is_said(tmp_path):
+    with pytest.raises(LabelFileError, match="cannot be read .No such file"):
+        read_labels(tmp_path / "none.csv", RUN)
+
+
+def test_unknown_formats_are_refused_with_the_known_ones(tmp_path):
+    with pytest.raises(InspectorError, match=r"no format of labels ends so; there are \.toml"):
+        read_labels(tmp_path / "labels.xlsx", RUN)
+    with pytest.raises(InspectorError, match="no format 'excel' of labels; there are noisytest"):
+        write_labels((), tmp_path / "labels.csv", format_name="excel")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_written_over_and_nothing_half(tmp_path):
+    path = tmp_path / "labels.csv"
+    path.write_text("mine")
+    with pytest.raises(OutputError, match="exists already"):
+        write_labels([Block(0.0, 1.0, "ok")], path)
+    assert path.read_text() == "mine"
+    with pytest.raises(LabelFileError, match="the recording's end to NoisyTest"):
+        write_labels([Block(-2.0, -1.0, "ok")], tmp_path / "labels.toml")
+    assert list(tmp_path.iterdir()) == [path]
+    write_labels([Block(0.0, 1.0, "ok")], path, overwrite=True)
+    assert path.read_text() == "start,stop,label\n0.0,1.0,ok\n"
+
+
+# --- the commands
+
+
+def test_labels_travel_out_and_in_by_the_command_line(tmp_path):
+    status, out, err = call("labels", demo_run(), "--to", tmp_path / "labels.txt")
+    assert (status, err) == (0, "")
+    assert "labels.txt: 4 labels" in out
+    bare = Run.load(demo_run())
+    Run(time=bare.time, velocity=bare.velocity, joint_names=bare.joint_names).save(
+        tmp_path / "bare.npz"
+    )
+    status, _, err = call(
+        "labels", tmp_path / "bare.npz", "--from", tmp_path / "labels.txt", "-o", tmp_path / "n.npz"
+    )
+    assert (status, err) == (0, "")
+    assert Run.load(tmp_path / "n.npz").blocks == bare.blocks
+    status, out, _ = call("labels", tmp_path / "n.npz")
+    assert status == 0
+    assert len(out.splitlines()) == 4
+
+
+def test_bad_input_is_one_line_and_exit_3(tmp_path):
+    RUN.save(tmp_path / "run.npz")
+    (tmp_path / "late.csv").write_text("start,stop,label\n9,11,ok\n")
+    for arguments, said in [
+        (["run.npz"], "has no labels"),
+        (["run.npz", "--to", tmp_path / "x.csv"], "has no labels"),
+        (["run.npz", "--from", tmp_path / "late.csv", "-o", tmp_path / "x.npz"], "outside of the"),
+        (["none.npz"], "cannot be read"),
+    ]:
+        status, out, err = call("labels", tmp_path / arguments[0], *arguments[1:])
+        assert (status, out) == (3, "")
+        assert said in err
+        assert len(err.splitlines()) == 1
+    assert {path.name for path in tmp_path.iterdir()} == {"run.npz", "late.csv"}
+
+
+def test_wrong_usage_is_exit_2(tmp_path):
+    run = demo_run()
+    assert call("labels", run, "--from", "a.csv")[0] == 2
+    assert call("labels", run, "-o", "a.npz")[0] == 2
+    assert call("labels", run, "--to", "a.csv", "--from", "b.csv", "-o", "c.npz")[0] == 2
+
+
+def test_findings_are_written_beside_the_verdicts(tmp_path):
+    found, still = tmp_path / "found", tmp_path / "still.npz"
+    time = np.arange(3000) / 1000
+    Run(time=time, velocity=np.zeros((3000, 1)), joint_names=("elbow",)).save(still)
+    (tmp_path / "bad.npz").write_bytes(b"")
+    runs = [demo_run(), still, tmp_path / "bad.npz"]
+    status, out, _ = call("classify", *runs, "--labels-to", found)
+    assert status == 3
+    assert {path.name for path in found.iterdir()} == {"demo.txt", "still.txt"}
+    assert (found / "still.txt").read_text() == ""
+    lines = (found / "demo.txt").read_text().splitlines()
+    assert len(lines) == out.count(" from ") - out.count("only from")
+    assert {line.split("\t")[2] for line in lines} >= {"impact"}
+    status, _, err = call("classify", *runs, "--labels-to", found)
+    assert status == 3
+    assert "exists already" in err
+    status, _, _ = call("classify", *runs, "--labels-to", found, "--overwrite")
+    assert status == 3
+
+
+def test_where_findings_go_is_checked_before_the_work(tmp_path):
+    twin = tmp_path / "a" / "demo.npz"
+    twin.parent.mkdir()
+    twin.write_bytes(Path(demo_run()).read_bytes())
+    status, out, err = call("classify", demo_run(), twin, "--labels-to", tmp_path / "found")
+    assert (status, out) == (3, "")
+    assert "would both be" in err
+    status, _, err = call("classify", twin, "--labels-to", twin)
+    assert status == 3
+    assert "cannot be made a folder" in err
+    status, _, err = call(
+        "classify", twin, "--labels-to", tmp_path / "found", "--labels-format", "excel"
+    )
+    assert status == 3
+    assert "no format 'excel' of labels" in err
+    assert not (tmp_path / "found").exists()
