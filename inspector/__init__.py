@@ -1,17 +1,19 @@
-"""Commands, recordings and reports for people; ``read_log`` for programs."""
+"""Commands, recordings and reports for people; ``read_log`` and ``show`` for programs."""
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from inspector.logs.importing import Imported
     from inspector.logs.library import read_log, read_logs
+    from inspector.notebook import show
 
-__all__ = ["Imported", "read_log", "read_logs"]
+__all__ = ["Imported", "read_log", "read_logs", "show"]
 
 _HOMES = {
     "Imported": "inspector.logs.importing",
     "read_log": "inspector.logs.library",
     "read_logs": "inspector.logs.library",
+    "show": "inspector.notebook",
 }
 
 

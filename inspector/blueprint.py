@@ -3,9 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import rerun.blueprint as rrb
+from rerun.blueprint import Blueprint
 
+from inspector import unstable
+from inspector.details import Detail
+from inspector.jointplots import Plot
 from inspector.series import TIMELINE, TOP_HZ
+from inspector.unstable import Part
 
 
 @dataclass(frozen=True)
@@ -13,152 +17,114 @@ class Contents:
     """What a recording holds, as far as the layout goes.
 
     Attributes:
-        joints: Title and entity paths of each plot of joint signals.
+        joints: Plots of joint signals.
+        details: Moments that were logged sample by sample.
         root: Frame that the robot is seen from; None without a robot.
         links: Whether there is noise of links.
         terms: Whether there are the paper's terms A, B and C.
+        lanes: How many lanes of classes there are, found and annotated.
+        events: Whether any of them is listed.
         scores: Whether there are scores.
-        lanes: Whether there are found or annotated classes.
+        sound: Whether there is a sound to listen to.
         rate: Samples per second, in [Hz].
+        loop: Stretch of time that playing repeats, in [s].
     """
 
-    joints: Sequence[tuple[str, Sequence[str]]]
+    joints: Sequence[Plot]
+    details: Sequence[Detail]
     root: str | None
     links: bool
     terms: bool
+    lanes: int
+    events: bool
     scores: bool
-    lanes: bool
+    sound: bool
     rate: float
+    loop: tuple[float, float] | None
 
 
-def layout(contents: Contents) -> rrb.Blueprint:
+def layout(contents: Contents) -> Blueprint:
     """Lay out a recording.
 
     Args:
         contents: What there is to show.
 
     Returns:
-        The blueprint; all time axes are linked.
+        The blueprint; all time axes are linked but those of the details.
     """
-    over_time: list[tuple[rrb.View | rrb.Container, float]] = []
+    over_time: list[tuple[Part, float]] = []
     if contents.lanes:
-        over_time.append((_lanes(), 2.6))
-    over_time.append((_noise(), 2.2))
+        over_time.append((unstable.lanes("Classes", "/class"), 0.8 + 0.8 * contents.lanes))
+    over_time += [(_noise(contents), 2.4), (_spectrogram(contents), 2.8)]
     if contents.links:
-        over_time.append((_power(contents), 2.2))
-    over_time += [(_spectrogram(contents), 2.8), (_details(contents), 4.2)]
-    right = rrb.Vertical(
-        *(part for part, _ in over_time), row_shares=[share for _, share in over_time]
-    )
-    text = rrb.Tabs(
-        rrb.TextDocumentView(origin="/report", name="Report"),
-        rrb.TextLogView(origin="/events", name="Events"),
-    )
-    left: rrb.Container = text
+        over_time.append((_links(), 4.4))
+    over_time.append((_joints(contents), 2.8))
+    left = _text(contents)
     if contents.root is not None:
-        left = rrb.Vertical(_robot(contents.root, coloured=contents.links), text, row_shares=[3, 2])
-    return rrb.Blueprint(
-        rrb.Horizontal(left, right, column_shares=[2, 3]),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=TIMELINE, play_state="paused"),
-        auto_views=False,
-        auto_layout=False,
-    )
+        title = "Robot, coloured by vibration" if contents.links else "Robot"
+        robot = unstable.robot(title, "/robot", contents.root)
+        left = unstable.above((robot, 3.0), (left, 2.0))
+    whole = unstable.beside((left, 2.0), (unstable.above(*over_time), 3.0))
+    return unstable.blueprint(whole, TIMELINE, contents.loop)
 
 
-def _time_axis() -> rrb.TimeAxis:
-    return rrb.TimeAxis(link="LinkToGlobal")
+def _text(contents: Contents) -> Part:
+    report = unstable.text("Report", "/report")
+    if not contents.events:
+        return report
+    return unstable.tabs(report, unstable.events("Events", "/events"))
 
 
-def _robot(root: str, *, coloured: bool) -> rrb.Spatial3DView:
-    return rrb.Spatial3DView(
-        origin="/",
-        contents=["/robot/**"],
-        name="Robot, coloured by vibration" if coloured else "Robot",
-        spatial_information=rrb.SpatialInformation(target_frame=root),
-        background=rrb.Background(color=(24, 26, 30)),
-        line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=(70, 74, 82, 130)),
-    )
-
-
-def _lanes() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(origin="/class", name="Classes", time_view=_time_axis())
-
-
-def _noise() -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin="/noise",
-        name="Noise, simplified estimate [rad/s]",
-        plot_legend=rrb.PlotLegend(visible=False),
-        axis_x=_time_axis(),
-    )
-
-
-def _power(contents: Contents) -> rrb.Tabs:
-    def plot(name: str, *paths: str) -> rrb.TimeSeriesView:
-        return rrb.TimeSeriesView(
-            origin="/power",
-            contents=list(paths),
-            name=name,
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-            axis_x=_time_axis(),
+def _noise(contents: Contents) -> Part:
+    parts = [unstable.plot("Noise, simplified estimate [rad/s]", "/noise")]
+    if contents.links:
+        parts.append(
+            unstable.plot("Sound power, extended [dB re 1 pW]", "/power", ["/power/total"])
         )
-
-    plots = [
-        plot("Sound power, extended estimate [dB re 1 pW]", "/power/total"),
-        plot("loudest links", "/power/links/**"),
-    ]
     if contents.terms:
-        plots.append(plot("terms A, B, C", "/power/terms/**", "/power/total"))
-    return rrb.Tabs(*plots, active_tab=0)
+        terms = ["/power/terms/**", "/power/total"]
+        parts.append(unstable.plot("terms A, B, C", "/power", terms, legend=True))
+    if contents.sound:
+        parts.append(unstable.audio("Listen", "/sound"))
+    return unstable.tabs(*parts)
 
 
-def _levels() -> rrb.StateTimelineView:
-    return rrb.StateTimelineView(
-        origin="/level", name="Loudest links, above 10 Hz", time_view=_time_axis()
-    )
-
-
-def _spectrogram(contents: Contents) -> rrb.Tabs:
+def _spectrogram(contents: Contents) -> Part:
     top = min(TOP_HZ, contents.rate / 2)
-    return rrb.Tabs(
-        rrb.TimeSeriesView(
-            origin="/spectrogram/bands",
-            name=f"Spectrogram of the noise, 0-{top:.0f} Hz",
-            plot_legend=rrb.PlotLegend(visible=False),
-            axis_x=_time_axis(),
-            axis_y=rrb.ScalarAxis(range=(0.0, top), zoom_lock=True),
-        ),
-        rrb.TensorView(
-            origin="/spectrogram/levels",
-            name=f"to {contents.rate / 2:.0f} Hz [dB]",
-            scalar_mapping=rrb.TensorScalarMapping(colormap="inferno", mag_filter="Linear"),
-            view_fit="fill",
-        ),
-        active_tab=0,
+    strip = unstable.plot(
+        f"Spectrogram of the noise, 0-{top:.0f} Hz",
+        "/spectrogram/bands",
+        between=(0.0, top),
+        fixed=True,
     )
+    whole = unstable.tensor(f"to {contents.rate / 2:.0f} Hz [dB]", "/spectrogram/levels")
+    now = unstable.bars(f"Spectrum at the cursor, 0-{top:.0f} Hz [dB]", "/spectrogram/now")
+    return unstable.tabs(strip, whole, now)
 
 
-def _details(contents: Contents) -> rrb.Tabs:
-    plots: list[rrb.View] = [_levels()] if contents.links else []
-    plots += [
-        rrb.TimeSeriesView(
-            origin="/joints",
-            contents=list(paths),
-            name=title,
-            plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-            axis_x=_time_axis(),
-        )
-        for title, paths in contents.joints
-    ]
-    if contents.scores:
-        plots.append(
-            rrb.TimeSeriesView(
-                origin="/score",
-                name="Scores",
-                plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop),
-                axis_x=_time_axis(),
-            )
-        )
-    return rrb.Tabs(*plots, active_tab=0)
+def _links() -> Part:
+    levels = unstable.lanes("Loudest links, above 10 Hz", "/level")
+    power = unstable.plot("Their sound power [dB re 1 pW]", "/power/links", legend=True)
+    return unstable.tabs(levels, power)
+
+
+def _joints(contents: Contents) -> Part:
+    """Scores, then each limb's signals, then the details."""
+    parts = [unstable.plot("Scores", "/score", legend=True)] if contents.scores else []
+    for limb in dict.fromkeys(plot.limb for plot in contents.joints):
+        plots = [
+            unstable.plot(plot.title, "/joints", plot.paths, legend=True)
+            for plot in contents.joints
+            if plot.limb == limb
+        ]
+        parts.append(unstable.tabs(*plots, name=limb))
+    parts += [_detail(detail) for detail in contents.details]
+    return unstable.tabs(*parts)
+
+
+def _detail(detail: Detail) -> Part:
+    noise = unstable.plot("noise, raw [rad/s]", f"{detail.path}/noise", during=detail.during)
+    velocity = unstable.plot(
+        "velocity, raw [rad/s]", f"{detail.path}/velocity", legend=True, during=detail.during
+    )
+    return unstable.tabs(noise, velocity, name=detail.title)

@@ -8,7 +8,8 @@ import rerun as rr
 from inspector import colors, series
 from inspector.inspection import Inspection
 from inspector.report import sentence
-from models import Labels
+from models import Event, Labels
+from noisemodel import Block
 
 
 def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
@@ -26,10 +27,10 @@ def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
         shown = {name: colours[name] for name in known}
         series.log_lane(recording, "/class/found", list(_stretches(labels)), shown)
         _log_scores(recording, labels, colours)
-        _log_events(recording, inspection, colours)
     if run.blocks:
         lane = [(block.start, block.stop, block.label) for block in run.blocks]
         series.log_lane(recording, "/class/annotated", lane, colours)
+    _log_events(recording, inspection, colours)
 
 
 def _stretches(labels: Labels) -> Iterator[tuple[float, float, str]]:
@@ -62,15 +63,21 @@ def _log_scores(
 def _log_events(
     recording: rr.RecordingStream, inspection: Inspection, colours: dict[str, colors.Color]
 ) -> None:
-    events = inspection.events
-    if not events:
-        return
-    recording.send_columns(
-        "/events",
-        indexes=[series.at(np.array([event.start for event in events]))],
-        columns=rr.TextLog.columns(
-            text=[sentence(inspection, event) for event in events],
-            level=["WARN"] * len(events),
-            color=np.array([(*colours[event.label], 255) for event in events], dtype=np.uint8),
-        ),
-    )
+    """List the failures that were found and annotated, by time: findings are warnings."""
+    found: list[tuple[str, str, Event | Block]] = [
+        ("WARN", "found", event) for event in inspection.events
+    ]
+    found += [
+        ("INFO", "annotated", block) for block in inspection.run.blocks if block.label != "ok"
+    ]
+    rows = sorted(found, key=lambda row: row[2].start)
+    if rows:
+        recording.send_columns(
+            "/events",
+            indexes=[series.at(np.array([event.start for _, _, event in rows]))],
+            columns=rr.TextLog.columns(
+                text=[f"{how}: {sentence(inspection, event)}" for _, how, event in rows],
+                level=[level for level, _, _ in rows],
+                color=np.array([(*colours[event.label], 255) for *_, event in rows], np.uint8),
+            ),
+        )

@@ -7,10 +7,12 @@ import typer
 from inspector.commands import (
     auditing,
     comparing,
+    hearing,
     judging,
     learning,
     logs,
     looking,
+    showing,
     simulating,
     travelling,
 )
@@ -23,6 +25,9 @@ app = typer.Typer(
 app.command()(looking.view)
 app.command()(judging.classify)
 app.command()(looking.noise)
+app.command()(hearing.listen)
+app.command()(showing.shot)
+app.command()(showing.report)
 app.command("import")(logs.import_)
 app.command()(auditing.audit)
 app.command()(travelling.labels)

@@ -5,16 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.colors import Color
+from inspector import colors
 from inspector.linknoise import LinkNoise
 from noisemodel.types import Array
 
-STATES: dict[str, Color] = {
-    "quiet": (55, 60, 68),
-    "elevated": (240, 228, 66),
-    "high": (230, 159, 0),
-    "critical": (213, 94, 0),
-}
+STATES = colors.LOUDNESS
 """From below -20 dB to above -6 dB of the loudest link's peak."""
 THRESHOLDS_DB = (-20.0, -12.0, -6.0)
 HYSTERESIS_DB = 3.0
@@ -80,7 +75,7 @@ def states(level: Array) -> list[str]:
 
 
 def shades(level: Array) -> NDArray[np.uint8]:
-    """Colour levels from grey over amber to red, in few shades so that few changes are logged.
+    """Colour levels from slate over amber to pale yellow, in few shades: few changes are logged.
 
     Args:
         level: Any shape, in [dB].
@@ -90,6 +85,7 @@ def shades(level: Array) -> NDArray[np.uint8]:
     """
     place = np.clip(1.0 + level / RANGE_DB, 0.0, 1.0)
     place = np.round(place * (SHADES - 1)) / (SHADES - 1)
-    scale = np.array([[150, 155, 165], STATES["high"], (229, 40, 40)], dtype=np.float64)
-    channels = [np.interp(place, [0.0, 0.6, 1.0], scale[:, channel]) for channel in range(3)]
+    scale = np.array(list(STATES.values()), dtype=np.float64)
+    places = np.linspace(0.0, 1.0, len(scale))
+    channels = [np.interp(place, places, scale[:, channel]) for channel in range(3)]
     return np.stack([*channels, np.full(place.shape, 255.0)], axis=-1).astype(np.uint8)

@@ -2,16 +2,14 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 import noisemodel as nm
+from inspector.linkpower import QUADRATIC, Index, by_moments, by_samples, second_moments
 from models import Event
 from noisemodel.differentiate import stretches
-from noisemodel.kinematics import CHUNK
-from noisemodel.types import Array, Mask
+from noisemodel.types import Array, Mask, Real
 
 BIN = 0.01
 """Shortest bin, in [s]."""
@@ -107,33 +105,35 @@ def link_noise(
     floating = True if run.base_pose is not None else None
     robot = nm.Robot.load(run.robot, floating_base=floating)
     surface = nm.Surface.of(robot, geometry)
-    motion = Motion(*robot.configuration(run), robot.desired(run))
-    vibration = Motion(motion.q, vibrating(motion.v, run.mask, run.rate), None)
     bins = _edges(run)
+    middles = _middles(run, bins)
 
-    def power(motion: Motion, kind: str) -> Array:
-        return _binned(robot, surface, motion, kind, run.mask, bins)
-
+    q, wanted = robot.configuration(middles)[0], robot.desired(middles)
+    fast = _moments(robot, run, vibrating(run.motion, run.mask, run.rate), bins)
+    motions = [("normal", fast)]
+    if kind in QUADRATIC:
+        motions.append((kind, _moments(robot, run, run.motion, bins)))
+    vibration, *power = by_moments(robot, surface, q, motions)
+    if kind not in QUADRATIC:
+        power = [by_samples(robot, surface, run, kind, bins)]
+    elif wanted is not None and run.velocity_desired is not None:
+        moments = _moments(robot, run, run.velocity_desired, bins, desired=True)
+        power += by_moments(robot, surface, wanted[0], [(kind, moments)])
     return LinkNoise(
         kind=kind,
         links=surface.names,
         time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
-        power=power(motion, kind),
-        vibration=power(vibration, "normal"),
-        terms={term: power(motion, term).sum(axis=1) for term in "ABC"} if terms else {},
+        power=np.sum(power, axis=0),
+        vibration=vibration,
+        terms={
+            term: by_samples(robot, surface, run, term, bins).sum(axis=1)
+            for term in ("ABC" if terms else "")
+        },
         remarks=tuple(_remarks(run, robot, surface)),
     )
 
 
-class Motion(NamedTuple):
-    """A motion in Pinocchio's order, and the desired one that is added."""
-
-    q: Array
-    v: Array
-    desired: tuple[Array, Array] | None
-
-
-def vibrating(velocity: Array, valid: Mask, rate: float) -> Array:
+def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
     """Leave the slow part of a motion out: its running mean over a tenth of a second.
 
     Args:
@@ -147,52 +147,65 @@ def vibrating(velocity: Array, valid: Mask, rate: float) -> Array:
     fast = np.zeros(velocity.shape[::-1])
     half = max(1, round(rate / FAST / 2))
     for stretch in stretches(valid, len(velocity)):
-        part = velocity[stretch].T
-        sums = np.cumsum(np.pad(part, ((0, 0), (1, 0))), axis=1)
-        centre = np.arange(part.shape[1])
+        centre = np.arange(stretch.stop - stretch.start)
         # Towards the ends the mean is taken over less, so that it stays in the middle.
         reach = np.minimum(np.minimum(centre, centre[::-1]), half)
         first, last = centre - reach, centre + reach + 1
-        whole = np.take(sums, last, axis=1) - np.take(sums, first, axis=1)
-        fast[:, stretch] = part - whole / (last - first)
+        for joint in range(len(fast)):  # one by one they stay in the cache
+            part = velocity[stretch, joint].astype(np.float64)
+            sums = np.concatenate(([0.0], np.cumsum(part)))
+            fast[joint, stretch] = part - (sums[last] - sums[first]) / (last - first)
     return fast.T
 
 
-def _edges(run: nm.Run) -> NDArray[np.intp]:
-    """First sample of each bin, and the end."""
-    size = max(1, round(BIN * run.rate), -(-len(run.time) // BINS))
-    return np.append(np.arange(0, len(run.time), size), len(run.time))
+def _edges(run: nm.Run) -> Index:
+    """First sample of each bin, and the end; there are two bins or more."""
+    samples = len(run.time)
+    size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
+    return np.append(np.arange(0, samples, size), samples)
 
 
-def _binned(
-    robot: nm.Robot,
-    surface: nm.Surface,
-    motion: Motion,
-    kind: str,
-    valid: Mask,
-    bins: NDArray[np.intp],
-) -> Array:
-    """Mean power of each link in each bin, shape (bins, links); gaps count as silent."""
-    size = int(bins[1])
-    q_desired, v_desired = motion.desired or (None, None)
-    chunks = nm.extended_chunks(
-        robot,
-        surface,
-        motion.q,
-        motion.v,
-        kind,
-        q_desired=q_desired,
-        v_desired=v_desired,
-        chunk=size * max(1, CHUNK // size),
+def _middles(run: nm.Run, bins: Index) -> nm.Run:
+    """Take one sample of each bin: the middle one of those that are valid."""
+    samples = (bins[:-1] + bins[1:]) // 2
+    for index in np.flatnonzero(~run.mask[samples]):
+        valid = bins[index] + np.flatnonzero(run.mask[bins[index] : bins[index + 1]])
+        if len(valid):
+            samples[index] = valid[len(valid) // 2]
+
+    def at(signal: Real | None) -> Real | None:
+        return None if signal is None else signal[samples]
+
+    return nm.Run(
+        time=np.arange(len(samples)) * int(bins[1]) / run.rate,
+        velocity=run.velocity[samples],
+        joint_names=run.joint_names,
+        position=at(run.position),
+        velocity_desired=at(run.velocity_desired),
+        position_desired=at(run.position_desired),
+        desired_joint_names=run.desired_joint_names,
+        valid=run.mask[samples],
+        base_pose=at(run.base_pose),
+        robot=run.robot,
     )
-    means, start = [], 0
-    for chunk in chunks:
-        heard = valid[start : start + len(chunk.power), None]
-        firsts = np.arange(0, len(heard), size)
-        energy = np.add.reduceat(chunk.power * heard, firsts, axis=0)
-        means.append(energy / np.maximum(np.add.reduceat(heard.astype(float), firsts), 1.0))
-        start += len(heard)
-    return np.concatenate(means)
+
+
+def _moments(
+    robot: nm.Robot, run: nm.Run, velocity: Real, bins: Index, *, desired: bool = False
+) -> Array:
+    """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
+    first = {joint.name: joint.first_v for joint in robot.joints}
+    names = run.desired_joint_names if desired else run.joint_names
+    entries = [first[name] for name in names]
+    if not desired and run.base_velocity is not None:
+        if robot.floating_base:
+            entries = [*range(6), *entries]
+        else:
+            velocity = velocity[:, 6:]
+    products = second_moments(velocity, run.mask, size=int(bins[1]))
+    moments = np.zeros((len(bins) - 1, robot.nv, robot.nv))
+    moments[:, np.array(entries)[:, None], entries] = products
+    return moments
 
 
 def _remarks(run: nm.Run, robot: nm.Robot, surface: nm.Surface) -> Iterator[str]:

@@ -12,7 +12,8 @@ from inspector.linknoise import LinkNoise
 from noisemodel.noise import REFERENCE_POWER
 from noisemodel.types import Array
 
-LANES = 10
+LANES = 5
+LINES = 8
 FLOOR_DB = -20.0
 """Sound power below this is drawn at it, in [dB re 1 pW]."""
 
@@ -28,9 +29,9 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise) -> None
     found = levels(noise)
     for index in sorted(noise.loudest[:LANES]):
         _log_lane(recording, noise.links[index], found, index)
-    _log_power(recording, "/power/total", noise, noise.total, (255, 255, 255))
-    for place, index in enumerate(noise.loudest[:LANES]):
-        color = colors.of_series(LANES)[place]
+    _log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
+    for place, index in enumerate(noise.loudest[:LINES]):
+        color = colors.of_series(LINES)[place]
         path = f"/power/links/{noise.links[index]}"
         _log_power(recording, path, noise, noise.power[:, index], color)
     for place, (term, power) in enumerate(noise.terms.items()):
@@ -58,14 +59,18 @@ def _log_power(
 def _log_colours(
     recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise, found: Levels
 ) -> None:
-    groups, shapes = scene.moving_links(tree), scene.shapes(tree)
-    rgba = shades(found.level)
-    for index, link in enumerate(noise.links):
+    shapes, rgba = scene.shapes(tree), shades(found.level)
+    for link, members in scene.moving_links(tree).items():
+        paths = [path for member in members for path in tree.get_visual_geometry_paths(member)]
+        if link not in noise.links:
+            for path in paths:  # the base of an arm: it never moves
+                resting = {scene.COLOURED[shapes[path]]: shades(np.array([-np.inf]))}
+                recording.log(path, getattr(rr, shapes[path]).from_fields(**resting), static=True)
+            continue
+        index = noise.links.index(link)
         changed = np.concatenate(([True], (rgba[1:, index] != rgba[:-1, index]).any(axis=1)))
         times = [series.at(found.time[changed])]
-        for member in groups.get(link, ()):
-            for path in tree.get_visual_geometry_paths(member):
-                shape = shapes[path]
-                colour = {scene.COLOURED[shape]: rgba[changed, index]}
-                columns = getattr(rr, shape).columns(**colour)
-                recording.send_columns(path, indexes=times, columns=columns)
+        for path in paths:
+            colour = {scene.COLOURED[shapes[path]]: rgba[changed, index]}
+            columns = getattr(rr, shapes[path]).columns(**colour)
+            recording.send_columns(path, indexes=times, columns=columns)

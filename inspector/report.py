@@ -48,7 +48,7 @@ def report(inspection: Inspection) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def sentence(inspection: Inspection, event: Event) -> str:
+def sentence(inspection: Inspection, event: Event | Block) -> str:
     """Say what an event is, when, and in which links it shows."""
     links = culprits(inspection, event)
     return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{links and f': {links}'}"

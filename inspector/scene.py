@@ -1,6 +1,5 @@
 """The moving robot in a recording, from its URDF."""
 
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -8,7 +7,7 @@ import rerun as rr
 from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
 
-from inspector import meshes, series
+from inspector import meshes, series, unstable
 from noisemodel import robot, urdf
 from noisemodel.errors import UnknownJointError
 from noisemodel.run import Run
@@ -26,11 +25,13 @@ COLOURED = {
 """The shapes that a URDF becomes, and what colours each."""
 
 
-def load(name: str) -> UrdfTree:
+def load(name: str, folder: Path) -> UrdfTree:
     """Read the robot that a run names, for drawing.
 
     Args:
         name: A listed robot, or the path of a URDF.
+        folder: Takes what rerun reads in place of the robot's own files, as late as when the tree
+            is logged: it has to stay until then.
 
     Returns:
         Rerun's tree of its links and joints.
@@ -42,12 +43,11 @@ def load(name: str) -> UrdfTree:
     path = robot.locate(name)
     urdf.read(path)
     roots = robot.package_roots(name)
-    with tempfile.TemporaryDirectory() as folder:
-        copy = Path(folder) / path.name
-        copy.write_text(meshes.drawable(path, roots), encoding="utf-8")
-        return UrdfTree.from_file_path(
-            copy, entity_path_prefix="robot", static_transform_entity_path="/robot/fixed"
-        )
+    copy = folder / path.name
+    copy.write_text(meshes.drawable(path, roots, folder), encoding="utf-8")
+    return UrdfTree.from_file_path(
+        copy, entity_path_prefix="robot", static_transform_entity_path="/robot/fixed"
+    )
 
 
 def check_joints(tree: UrdfTree, run: Run) -> None:
@@ -85,6 +85,16 @@ def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
     return groups
 
 
+def entities(tree: UrdfTree) -> dict[str, str]:
+    """Name, for each link that moves and is drawn, the entity to select."""
+    found = {}
+    for link, members in moving_links(tree).items():
+        drawn = [path for member in members for path in tree.get_visual_geometry_paths(member)]
+        if drawn:
+            found[link] = drawn[0].rpartition("/")[0]
+    return found
+
+
 def shapes(tree: UrdfTree) -> dict[str, str]:
     """Tell the shape of each entity that is drawn, a key of ``COLOURED``."""
     found = {}
@@ -106,7 +116,7 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
         coloured: Whether colours over time will follow: the URDF's own, which are static and
             would hide them, are left out then.
     """
-    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    unstable.log_up(recording)
     drawn = tree.stream()
     if coloured:
         drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])

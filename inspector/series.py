@@ -1,21 +1,21 @@
 """Columns of a rerun recording: lines, lanes, heat strips. Never row by row."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from inspector import colors
+from inspector import colors, unstable
 from inspector.colors import Color
-from inspector.spectrogram import Spectrogram
+from inspector.spectrogram import RANGE_DB, Spectrogram
 from noisemodel.types import Array, Real
 
 TIMELINE = "time"
 BANDS = 48
+BARS = 60
 TOP_HZ = 2000.0
-LINE_WIDTH = 4.0
+LINE_WIDTH = 5.0
 
 
 def at(time: Array) -> rr.TimeColumn:
@@ -106,17 +106,21 @@ def log_heat_strip(recording: rr.RecordingStream, path: str, spectrum: Spectrogr
 
     Args:
         recording: Where to.
-        path: Entity path below which each band has its own.
+        path: Entity path below which each of 48 bands has its own; of a slow run, which has fewer
+            frequencies, some show the same one.
         spectrum: What to show, up to 2 kHz.
     """
-    shown = spectrum.frequency <= TOP_HZ
-    bands = min(BANDS, int(shown.sum()))
-    edges = np.linspace(0, int(shown.sum()), bands + 1).astype(int)
-    levels = np.maximum.reduceat(spectrum.level[shown], edges[:-1], axis=0)
+    shown = spectrum.frequency <= max(TOP_HZ, spectrum.frequency[0])
+    edges = np.linspace(0, int(shown.sum()), BANDS + 1)
+    firsts, lasts = np.floor(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int)
+    levels = np.stack(
+        [spectrum.level[first:last].max(axis=0) for first, last in zip(firsts, lasts, strict=True)]
+    )
     low, high = np.percentile(levels, [5, 99.8])
     rgba = colors.heat((levels - low) / max(high - low, 1e-9))
-    for band, (first, last) in enumerate(pairwise(edges)):
-        centre = float(spectrum.frequency[first:last].mean())
+    step = spectrum.frequency[0]  # the bins lie at whole multiples of the first
+    centres = step * ((edges[:-1] + edges[1:]) / 2 + 0.5)
+    for band, centre in enumerate(centres.tolist()):
         _log_band(recording, f"{path}/{band:02d}", spectrum.time, centre, rgba[band])
 
 
@@ -140,4 +144,25 @@ def _log_band(
             *rr.Scalars.columns(scalars=np.full(int(kept.sum()), hertz)),
             *rr.SeriesLines.columns(colors=rgba[kept]),
         ],
+    )
+
+
+def log_bars(recording: rr.RecordingStream, path: str, spectrum: Spectrogram) -> None:
+    """Log the spectrum of each moment as bars.
+
+    Args:
+        recording: Where to.
+        path: Entity path.
+        spectrum: What to show, up to 2 kHz; every other of many columns.
+    """
+    shown = spectrum.frequency <= max(TOP_HZ, spectrum.frequency[0])
+    step = -(-len(spectrum.time) // BARS)
+    bars = spectrum.level[shown, ::step].T + RANGE_DB  # bars grow from the floor
+    unstable.log_bars(
+        recording,
+        path,
+        at(spectrum.time[::step]),
+        bars.astype(np.float32),
+        places=spectrum.frequency[shown],
+        color=colors.NOISE,
     )

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft
 
 from noisemodel.types import Array, Mask
 
@@ -46,7 +45,7 @@ def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spe
     whole = np.lib.stride_tricks.sliding_window_view(valid, length)[::hop].all(axis=1)
     hann = np.hanning(length + 1)[:-1]
     centred = windows - windows.mean(axis=1, keepdims=True)
-    amplitude = np.abs(fft.rfft(centred * hann, axis=1)).T[1:] * whole
+    amplitude = np.abs(np.fft.rfft(centred * hann, axis=1)).T[1:] * whole
     loudest = amplitude.max(initial=0.0) or 1.0
     floor = 10 ** (-RANGE_DB / 20)
     columns = np.arange(len(windows), dtype=np.float64)

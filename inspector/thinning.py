@@ -21,8 +21,11 @@ def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
         return time, np.asarray(values, dtype=np.float64)
     size = -(-len(time) // (points // 2))
     starts = np.arange(0, len(time), size)
+    whole = len(time) // size * size
+    parts = [values[:whole].reshape(-1, size, values.shape[1]), values[None, whole:]]
+    parts = [part for part in parts if part.size]
     thin = np.empty((2 * len(starts), values.shape[1]))
-    thin[0::2] = np.minimum.reduceat(values, starts, axis=0)
-    thin[1::2] = np.maximum.reduceat(values, starts, axis=0)
+    thin[0::2] = np.concatenate([part.min(axis=1) for part in parts])
+    thin[1::2] = np.concatenate([part.max(axis=1) for part in parts])
     halves = np.minimum(starts + size // 2, len(time) - 1)
     return time[np.stack((starts, halves), axis=1).ravel()], thin

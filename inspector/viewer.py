@@ -2,13 +2,28 @@
 
 import hashlib
 import os
+import re
 import shlex
+import signal
 import subprocess
 import sys
+import tempfile
+import time
+from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
+
+from inspector.errors import InspectorError
 
 SETTLE = 2.0
 """How long a viewer that cannot start takes to say so, in [s]."""
+PORT = "9876"
+"""Where rerun's viewer listens; one that does already takes the recording over."""
+HOST = "127.0.0.1"
+
+
+class ViewerError(InspectorError):
+    """A viewer that is missing, cannot start, or does not answer."""
 
 
 def has_display() -> bool:
@@ -31,29 +46,80 @@ def scratch_path(run: Path) -> Path:
     return folder / f"{run.stem}-{key}.rrd"
 
 
+def command(*arguments: str) -> list[str]:
+    """Write the command line of rerun's viewer; it listens on loopback only.
+
+    Args:
+        arguments: What it is told beyond that.
+
+    Raises:
+        ViewerError: If the viewer is not installed.
+    """
+    if find_spec("rerun_cli") is None:
+        raise ViewerError("rerun's viewer is missing; `pip install rerun-sdk` brings it")
+    return [sys.executable, "-m", "rerun", "--bind", HOST, *arguments]
+
+
 def open_window(recording: Path) -> str:
-    """Start rerun's viewer on a recording, without waiting for it to end.
+    """Show a recording in the viewer that runs, or start one and do not wait for it to end.
 
     Args:
         recording: A ``*.rrd`` file.
 
     Returns:
         What went wrong, or nothing.
+
+    Raises:
+        ViewerError: If the viewer is not installed.
     """
-    command = [sys.executable, "-m", "rerun", "--bind", "127.0.0.1", "--port", "auto"]
-    command += ["--hide-welcome-screen", str(recording)]
-    viewer = subprocess.Popen(
-        command,
-        start_new_session=True,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-    try:
-        code = viewer.wait(timeout=SETTLE)
-    except subprocess.TimeoutExpired:
+    if not _started(recording, PORT):
         return ""
-    return "" if code == 0 else f"the viewer ended with status {code}"
+    return _started(recording, "auto")  # another program listens where viewers do
+
+
+def _started(recording: Path, port: str) -> str:
+    start = command("--port", port, "--hide-welcome-screen", str(recording))
+    with tempfile.TemporaryFile() as complaints:
+        viewer = subprocess.Popen(
+            start,
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=complaints,
+        )
+        try:
+            code = viewer.wait(timeout=SETTLE)
+        except subprocess.TimeoutExpired:
+            return ""
+        complaints.seek(0)
+        return "" if code == 0 else ended(code, complaints.read())
+
+
+def ended(code: int, complaints: bytes) -> str:
+    """Say how a viewer ended, in a line.
+
+    Args:
+        code: Its exit status.
+        complaints: What it wrote to stderr.
+    """
+    plain = re.sub(r"\x1b\[[0-9;]*m", "", complaints.decode(errors="replace"))
+    errors = [line for line in plain.splitlines() if re.search(r"\b(Error|ERROR|WARN)\b", line)]
+    reason = re.sub(r"^.*?(Error|ERROR|WARN)[: ]+", "", errors[-1]).strip() if errors else ""
+    return f"the viewer ended with status {code}{reason and f' ({reason})'}"
+
+
+def end(process: "subprocess.Popen[bytes]") -> None:
+    """End a viewer that was started in a session of its own, with all its children."""
+    # `rerun` is a script that starts the viewer: ending it alone would leave that, and its port.
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    # The viewer itself is no child of ours to wait for; its ports are free once it is gone.
+    until = time.monotonic() + SETTLE
+    with suppress(ProcessLookupError):
+        while time.monotonic() < until:
+            os.killpg(process.pid, 0)
+            time.sleep(0.02)
 
 
 def how_to_open(recording: Path) -> str:
@@ -62,5 +128,5 @@ def how_to_open(recording: Path) -> str:
     rerun = shlex.quote(str(Path(sys.executable).with_name("rerun")))
     return (
         f"open it in the viewer:  {rerun} {path}\n"
-        f"or in a browser:        {rerun} --serve-web --bind 127.0.0.1 {path}"
+        f"or in a browser:        {rerun} --serve-web --bind {HOST} {path}"
     )

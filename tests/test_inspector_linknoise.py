@@ -34,8 +34,9 @@ def test_bins_hold_the_mean_power_of_the_extended_noise():
     robot = Robot.load("ur5")
     noise = extended(robot, Surface.of(robot, "auto"), *robot.configuration(run), "normal")
     found = link_noise(run)
-    np.testing.assert_allclose(found.power.mean(axis=0), noise.power.mean(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(found.total[7], noise.total[70:80].mean(), rtol=1e-12)
+    # Within a bin the robot is taken to stand still: 1e-3 is 0.004 dB.
+    np.testing.assert_allclose(found.power.mean(axis=0), noise.power.mean(axis=0), rtol=1e-3)
+    np.testing.assert_allclose(found.total[7], noise.total[70:80].mean(), rtol=1e-3)
     assert found.time[7] == pytest.approx(0.075)
     assert found.links == noise.names
 
@@ -113,10 +114,10 @@ def test_states_do_not_flicker_around_a_threshold():
     assert states(np.array([-np.inf])) == ["quiet"]
 
 
-def test_shades_go_from_grey_to_red_in_few_steps():
+def test_shades_go_from_quiet_to_critical_in_few_steps():
     rgba = shades(np.linspace(-60, 0, 1000))
-    assert rgba[0].tolist() == [150, 155, 165, 255]
-    assert rgba[-1].tolist() == [229, 40, 40, 255]
+    assert rgba[0].tolist() == [*STATES["quiet"], 255]
+    assert rgba[-1].tolist() == [*STATES["critical"], 255]
     assert len(np.unique(rgba, axis=0)) <= 16
-    assert shades(np.array([-np.inf]))[0].tolist() == [150, 155, 165, 255]
+    assert shades(np.array([-np.inf]))[0].tolist() == [*STATES["quiet"], 255]
     assert list(STATES) == ["quiet", "elevated", "high", "critical"]

@@ -1,9 +1,12 @@
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 
-from inspector.meshes import MeshError, drawable
+from inspector import scene
+from inspector.meshes import FACET, MeshError, drawable
+from noisemodel import meshfile
 
 TRIANGLE = b"\0" * 80 + (1).to_bytes(4, "little") + b"\0" * 50
 
@@ -23,7 +26,7 @@ def test_meshes_get_absolute_addresses_and_what_is_not_drawn_goes(tmp_path):
     (tmp_path / "pkg").mkdir()
     (tmp_path / "pkg" / "part.stl").write_bytes(TRIANGLE)
     path = robot(tmp_path, "package://pkg/part.stl")
-    tree = ET.fromstring(drawable(path, (tmp_path,)))
+    tree = ET.fromstring(drawable(path, (tmp_path,), tmp_path))
     assert tree.find(".//mesh").get("filename") == f"file://{tmp_path}/pkg/part.stl"
     assert tree.find(".//collision") is None
     assert tree.find(".//texture") is None
@@ -31,12 +34,12 @@ def test_meshes_get_absolute_addresses_and_what_is_not_drawn_goes(tmp_path):
 
 def test_three_slashes_after_package_are_taken_as_two(tmp_path):
     (tmp_path / "part.stl").write_bytes(TRIANGLE)
-    assert "part.stl" in drawable(robot(tmp_path, "package:///part.stl"), (tmp_path,))
+    assert "part.stl" in drawable(robot(tmp_path, "package:///part.stl"), (tmp_path,), tmp_path)
 
 
 def test_a_path_is_relative_to_the_urdf(tmp_path):
     (tmp_path / "part.stl").write_bytes(TRIANGLE)
-    assert "part.stl" in drawable(robot(tmp_path, "../part.stl"), (tmp_path,))
+    assert "part.stl" in drawable(robot(tmp_path, "../part.stl"), (tmp_path,), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -52,12 +55,12 @@ def test_a_path_is_relative_to_the_urdf(tmp_path):
 def test_a_mesh_that_cannot_be_read_is_named(tmp_path, name, content, problem):
     (tmp_path / name).write_bytes(content)
     with pytest.raises(MeshError, match=f"mesh package://{name}: .*{problem}.*--no-robot"):
-        drawable(robot(tmp_path, f"package://{name}"), (tmp_path,))
+        drawable(robot(tmp_path, f"package://{name}"), (tmp_path,), tmp_path)
 
 
 def test_a_missing_mesh_is_named_with_the_places_that_were_looked_at(tmp_path):
     with pytest.raises(MeshError, match=f"gone.stl: not found in {tmp_path}"):
-        drawable(robot(tmp_path, "package://gone.stl"), (tmp_path,))
+        drawable(robot(tmp_path, "package://gone.stl"), (tmp_path,), tmp_path)
 
 
 @pytest.mark.parametrize("address", ["package://../../secret.stl", "file:///{outside}/secret.stl"])
@@ -67,4 +70,55 @@ def test_no_mesh_is_read_outside_of_the_robots_folders(tmp_path, address):
     (tmp_path / "secret.stl").write_bytes(TRIANGLE)
     path = robot(inner, address.format(outside=tmp_path))
     with pytest.raises(MeshError, match="lies outside of"):
-        drawable(path, (inner,))
+        drawable(path, (inner,), tmp_path)
+
+
+COLLADA = """<COLLADA version="{version}"><asset><up_axis>{up}</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="12">0 0 0 1 0 0 1 1 0 0 1 0</float_array>
+<technique_common><accessor source="#a" count="4" stride="3"/></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+{faces}</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node>
+</visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+TRIANGLES = """<triangles count="2"><input semantic="VERTEX" source="#v" offset="0"/>
+<p>0 1 2 0 2 3</p></triangles>"""
+POLYGON = """<polylist count="1"><input semantic="VERTEX" source="#v" offset="0"/>
+<vcount>4</vcount><p>0 1 2 3</p></polylist>"""
+
+
+@pytest.mark.parametrize(
+    ("version", "up", "faces", "kept"),
+    [
+        ("1.4.1", "Z_UP", TRIANGLES, True),
+        ("1.4.1", "Z_UP", POLYGON, False),
+        ("1.4.1", "Y_UP", TRIANGLES, False),
+        ("1.4.0", "Z_UP", TRIANGLES, False),
+    ],
+)
+def test_collada_that_rerun_cannot_draw_is_drawn_by_our_own_triangles(
+    tmp_path, version, up, faces, kept
+):
+    part = tmp_path / "part.dae"
+    part.write_text(COLLADA.format(version=version, up=up, faces=faces))
+    written = tmp_path / "written"
+    written.mkdir()
+    tree = ET.fromstring(drawable(robot(tmp_path, "package://part.dae"), (tmp_path,), written))
+    drawn = Path(tree.find(".//mesh").get("filename").removeprefix("file://"))
+    assert (drawn == part) is kept
+    np.testing.assert_allclose(meshfile.read(drawn), meshfile.read(part))
+    if not kept:
+        facets = np.frombuffer(drawn.read_bytes()[84:], FACET)
+        np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [0, 0, 1]])
+
+
+def test_a_robot_of_such_meshes_is_in_its_recording(tmp_path):
+    tree = scene.load("romeo", tmp_path)
+    drawn = scene.shapes(tree)
+    assert set(drawn.values()) == {"Asset3D"}
+    assert len(drawn) == sum(
+        len(tree.get_visual_geometry_paths(link))
+        for members in scene.moving_links(tree).values()
+        for link in members
+    )

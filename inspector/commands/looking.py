@@ -23,28 +23,42 @@ def view(
     terms: Annotated[
         bool, typer.Option("--terms", help="Show the paper's terms A, B and C one by one.")
     ] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Show it in a browser on this machine, until Ctrl-C.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Of --web; 0 takes a free one.")
+    ] = 0,
     overwrite: Overwrite = False,
 ) -> None:
     """Show a run in rerun: joints, noise, spectrogram, classes, the moving robot."""
-    from inspector import assets, viewer
+    from inspector import assets, viewer, webview
     from inspector.inspection import inspect
     from inspector.labelling import load_library
     from inspector.recording import write
     from inspector.report import sentence, verdict
+    from inspector.sound.clip import of_recording
     from noisemodel.atomic import refuse_existing
 
+    if web and save:
+        raise typer.BadParameter("name one of --web and --save")
+    if port:
+        webview.free_port(port)
     path = run or assets.demo_run()
     target = save or viewer.scratch_path(path)
     overwrite = overwrite or save is None
     refuse_existing(target, overwrite=overwrite)
     library = load_library(model or assets.model_files())
     found = inspect(path, library, robot=robot, kind=kind, terms=terms)
-    write(found, target, overwrite=overwrite)
+    write(found, target, overwrite=overwrite, sound=of_recording(found))
     typer.echo(f"{path}: {verdict(found)}")
     for event in found.events:
         typer.echo(f"  {sentence(found, event)}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")
+    if web:
+        webview.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
+        return
     if save is None and viewer.has_display():
         problem = viewer.open_window(target)
         if not problem:

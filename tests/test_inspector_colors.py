@@ -1,0 +1,82 @@
+"""Colours stay apart for those who see no red or no green."""
+
+import numpy as np
+import pytest
+
+from inspector import colors
+
+# Machado, Oliveira and Fernandes 2009, Table 1, severity 1.0, on linear RGB.
+EYES = {
+    "all cones": np.eye(3),
+    "no red cones": [
+        [0.152286, 1.052583, -0.204868],
+        [0.114503, 0.786281, 0.099216],
+        [-0.003882, -0.048116, 1.051998],
+    ],
+    "no green cones": [
+        [0.367322, 0.860646, -0.227968],
+        [0.280085, 0.672501, 0.047413],
+        [-0.011820, 0.042940, 0.968881],
+    ],
+}
+XYZ = np.array(
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.0721750],
+        [0.0193339, 0.1191920, 0.9503041],
+    ]
+)
+WHITE = np.array([0.95047, 1.0, 1.08883])
+
+
+def lab(rgb, eyes):
+    """CIE L*a*b* of colours as some eyes see them, shape (colours, 3)."""
+    share = np.asarray(rgb, dtype=float) / 255
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    seen = np.clip(linear @ np.transpose(EYES[eyes]), 0.0, 1.0) @ XYZ.T / WHITE
+    f = np.where(seen > 0.008856, np.cbrt(seen), 7.787 * seen + 16 / 116)
+    x, y, z = f.T
+    return np.stack((116 * y - 16, 500 * (x - y), 200 * (y - z)), axis=1)
+
+
+def nearest(rgb, eyes):
+    """Distance of the two colours that are hardest to tell apart; 2.3 can just be seen."""
+    places = lab(rgb, eyes)
+    apart = np.linalg.norm(places[:, None] - places, axis=2)
+    return apart[~np.eye(len(places), dtype=bool)].min()
+
+
+def test_the_measure_knows_red_from_green_as_eyes_do():
+    red, green = (200, 60, 0), (105, 105, 0)
+    assert nearest([red, green], "all cones") > 60
+    assert nearest([red, green], "no green cones") < 30
+    np.testing.assert_allclose(lab([(255, 255, 255)], "all cones")[0], [100, 0, 0], atol=0.1)
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_classes_stay_apart(eyes):
+    assert nearest(list(colors.CLASSES.values()), eyes) > 30
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_levels_stay_apart_and_the_louder_is_the_lighter(eyes):
+    levels = list(colors.LOUDNESS.values())
+    assert nearest(levels, eyes) > 30
+    assert (np.diff(lab(levels, eyes)[:, 0]) > 5).all()
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_lines_of_a_plot_stay_apart(eyes):
+    assert nearest(list(colors.SERIES), eyes) > 15
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_heat_only_ever_gets_lighter(eyes):
+    heat = colors.heat(np.linspace(0, 1, 50))[:, :3]
+    assert (np.diff(lab(heat, eyes)[:, 0]) > 0).all()
+
+
+def test_unknown_classes_take_colours_of_their_own():
+    found = colors.of_classes(("ok", "rattle", "squeak"))
+    assert len(set(found.values())) == 3
+    assert found["ok"] == colors.CLASSES["ok"]

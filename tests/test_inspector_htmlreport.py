@@ -1,0 +1,187 @@
+import base64
+import dataclasses
+import io
+import re
+import struct
+import wave
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from inspector import htmlreport
+from inspector.assets import demo_run, model_files
+from inspector.cli import main
+from inspector.errors import InspectorError
+from inspector.inspection import inspect
+from inspector.labelling import load_library
+from models import Event
+from noisemodel import Block, OutputError, Run
+
+VOID = {"meta", "img", "br", "hr", "link", "input"}
+
+
+class Page(HTMLParser):
+    """A page as a browser has to read it: every element closed in its turn."""
+
+    def __init__(self, text):
+        super().__init__(convert_charrefs=True)
+        self.open, self.tags, self.text, self.addresses = [], [], [], []
+        self.feed(text)
+        self.close()
+        assert self.open == [], f"never closed: {self.open}"
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        self.addresses += [value for name, value in attrs if name in ("src", "href", "data")]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open[-1] == tag, f"</{tag}> within {self.open}"
+        self.open.pop()
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] != "style":
+            self.text.append(data)
+
+    @property
+    def words(self):
+        return " ".join(" ".join(self.text).split())
+
+
+def short_run(**changes):
+    time = np.arange(6000) / 1000
+    velocity = np.stack((np.sin(300 * time), 0.2 * np.sin(900 * time)), axis=1)
+    fields = {"time": time, "velocity": velocity, "joint_names": ("elbow", "wrist")}
+    return Run(**(fields | changes))
+
+
+def inspected(run, tmp_path, **changes):
+    run.save(tmp_path / "run.npz", overwrite=True)
+    return dataclasses.replace(inspect(tmp_path / "run.npz", {}), **changes)
+
+
+@pytest.fixture(scope="module")
+def demo():
+    return htmlreport.page(inspect(demo_run(), load_library(model_files())), audit="rate: 10 kHz")
+
+
+def test_the_page_of_the_demo_is_valid_and_has_everything(demo):
+    page = Page(demo)
+    assert demo.startswith('<!DOCTYPE html>\n<html lang="en">')
+    for tag in ("html", "head", "title", "body", "h1", "img", "audio"):
+        assert page.tags.count(tag) == 1, tag
+    titles = ("Findings", "Annotated", "Over time", "To be heard", "Links", "Joints")
+    for title in (*titles, "What the log can show", "Remarks"):
+        assert title in page.words
+    assert "panda_link7" in page.words
+    assert "panda_joint6" in page.words
+
+
+def test_the_page_fetches_nothing_from_anywhere(demo):
+    page = Page(demo)
+    assert [address.partition(",")[0] for address in page.addresses] == [
+        "data:image/png;base64",
+        "data:audio/wav;base64",
+    ]
+    rest = re.sub(r"base64,[A-Za-z0-9+/=]+", "", demo)
+    assert not re.search(r"https?:|//|url\(|@import|<script|<link|<iframe", rest)
+    assert "default-src 'none'" in demo
+
+
+def test_the_page_of_the_demo_is_small(demo):
+    assert len(demo.encode()) <= 5_000_000
+
+
+def test_the_picture_and_the_sound_are_whole(demo):
+    picture, sound = (
+        base64.b64decode(address.partition(",")[2]) for address in Page(demo).addresses
+    )
+    assert picture.startswith(b"\x89PNG")
+    width, height = struct.unpack(">II", picture[16:24])
+    assert width > 1000
+    assert height > 600
+    with wave.open(io.BytesIO(sound)) as file:
+        assert file.getnframes() / file.getframerate() == pytest.approx(4.0, abs=0.01)
+
+
+def test_a_run_without_robot_labels_and_findings_has_a_page_too(tmp_path):
+    page = Page(htmlreport.page(inspected(short_run(), tmp_path)))
+    assert "Cannot tell" in page.words
+    assert "No 3D robot: the run names none." in page.words
+    assert "Links" not in page.words
+    assert "Findings" not in page.words
+
+
+def test_joints_are_ordered_by_what_vibrates_in_them(tmp_path):
+    words = Page(htmlreport.page(inspected(short_run(), tmp_path))).words
+    # Amplitudes of 1 and 0.2: powers of 25 to 1.
+    assert re.search(r"elbow 96\.\d% .* wrist 3\.\d%", words)
+
+
+def test_names_cannot_smuggle_anything_into_the_page(tmp_path):
+    evil = "<script>alert(1)</script>\"'&$\\frac{$"
+    run = short_run(joint_names=(evil, "wrist"), blocks=(Block(1.0, 2.0, f"<b>{evil}"),))
+    found = inspected(run, tmp_path, name=evil)
+    text = htmlreport.page(found, audit=f"{evil}\x00\x1b[31m")
+    page = Page(text)
+    assert "script" not in page.tags
+    assert "b" not in page.tags
+    assert "<script>alert(1)</script>" in page.words
+    assert not re.search(r"[\x00-\x08\x0b-\x1f]", text)
+
+
+def test_a_log_too_slow_for_ears_has_no_sound(tmp_path):
+    time = np.arange(600) / 30
+    run = short_run(time=time, velocity=np.sin(np.stack((time, 2 * time), axis=1)))
+    page = Page(htmlreport.page(inspected(run, tmp_path)))
+    assert "audio" not in page.tags
+    assert "too slow for ears" in page.words
+
+
+def test_gaps_and_silence_are_drawn(tmp_path):
+    valid = np.ones(6000, dtype=bool)
+    valid[2000:4000] = False
+    still = short_run(velocity=np.zeros((6000, 2)), valid=valid)
+    page = Page(htmlreport.page(inspected(still, tmp_path)))
+    assert "img" in page.tags
+    assert "silent: nothing reaches 1e-06 rad/s" in page.words
+
+
+def test_findings_are_listed_with_their_scores(tmp_path):
+    events = (Event("impact", 1.0, 1.5, 0.9), Event("wobble", 3.0, 3.5, 0.7))
+    words = Page(htmlreport.page(inspected(short_run(), tmp_path, events=events))).words
+    assert "impact 1.00 1.50 0.90" in words
+    assert "wobble 3.00 3.50 0.70" in words
+
+
+def test_many_joints_are_cut_to_the_loudest_and_that_is_said(tmp_path):
+    names = tuple(f"joint{i}" for i in range(30))
+    run = short_run(velocity=np.ones((6000, 30)), joint_names=names)
+    words = Page(htmlreport.page(inspected(run, tmp_path))).words
+    assert "10 quieter ones are left out." in words
+
+
+def test_a_page_that_exists_is_kept(tmp_path):
+    (tmp_path / "out.html").write_text("precious")
+    with pytest.raises(OutputError, match="exists already"):
+        htmlreport.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
+    assert (tmp_path / "out.html").read_text() == "precious"
+
+
+def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(htmlreport, "find_spec", lambda _: None)
+    with pytest.raises(InspectorError, match=r'pip install "noise-inspector\[report\]"'):
+        htmlreport.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
+
+
+def test_the_command_line_writes_a_page(tmp_path, monkeypatch, capsys):
+    short_run().save(tmp_path / "run.npz")
+    arguments = ["report", str(tmp_path / "run.npz"), "-o", str(tmp_path / "out.html")]
+    monkeypatch.setattr("sys.argv", ["inspector", *arguments])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert not end.value.code
+    assert f"{tmp_path}/out.html: " in capsys.readouterr().out
+    assert "rate: 1000 Hz" in Page((tmp_path / "out.html").read_text()).words

@@ -1,0 +1,343 @@
+import io
+import struct
+import subprocess
+import sys
+import wave
+
+import numpy as np
+import pytest
+from chains import chain
+
+import noisemodel as nm
+from inspector import listening
+from inspector.cli import main
+from inspector.errors import InspectorError
+from inspector.listening import Settings, common_gain, listen, said, save
+from inspector.loudness import estimate
+from inspector.sound.clip import clip
+from inspector.sound.mixing import mix
+from noisemodel import OutputError, Run
+
+RATE = 10_000.0
+
+
+def times(seconds=2.0, rate=RATE):
+    return np.arange(round(seconds * rate)) / rate
+
+
+def swinging(*columns, rate=RATE, **fields):
+    """A run of joints that move as given, each a signal of its own."""
+    velocity = np.column_stack(columns)
+    names = tuple(f"joint{i}" for i in range(velocity.shape[1]))
+    time = times(len(velocity) / rate, rate)
+    return Run(**({"time": time, "velocity": velocity, "joint_names": names} | fields))
+
+
+def tone(hertz, seconds=2.0, rate=RATE):
+    return np.sin(2 * np.pi * hertz * times(seconds, rate))
+
+
+def pitch(data):
+    """The loudest frequency of a WAV file, in [Hz], and the file's rate."""
+    samples, rate = read(data)
+    spectrum = np.abs(np.fft.rfft(samples * np.hanning(len(samples))))
+    return spectrum.argmax() * rate / len(samples), rate
+
+
+def read(data):
+    with wave.open(io.BytesIO(data)) as file:
+        assert (file.getnchannels(), file.getsampwidth()) == (1, 2)
+        frames = file.readframes(file.getnframes())
+        return np.frombuffer(frames, dtype="<i2") / 32767, file.getframerate()
+
+
+def middle(signal):
+    """What a sound is like away from its ends, where it is faded."""
+    return signal[len(signal) // 4 : -len(signal) // 4]
+
+
+def rms(signal):
+    return float(np.sqrt(np.mean(np.square(middle(signal)))))
+
+
+def test_an_oscillation_of_440_hz_sounds_at_440_hz():
+    sound = listen(swinging(0.01 * tone(440)))
+    heard, rate = pitch(sound.file(common_gain([sound])))
+    assert rate == 48_000
+    assert heard == pytest.approx(440, abs=0.5)
+
+
+def test_an_oscillation_about_a_steady_motion_sounds_the_same():
+    still, moving = (listen(swinging(base + 0.01 * tone(440))) for base in (0.0, 2.0))
+    np.testing.assert_allclose(middle(still.signal), middle(moving.signal), atol=1e-8)
+
+
+def test_a_joint_that_is_alone_sounds_as_it_swings():
+    velocity = 0.01 * tone(440)
+    sound = listen(swinging(velocity))
+    np.testing.assert_allclose(middle(sound.signal), middle(velocity), atol=1e-7)
+
+
+def test_joints_that_swing_against_each_other_are_heard_by_the_sum_of_their_powers():
+    velocity = 0.01 * tone(300)
+    alone = listen(swinging(velocity))
+    against = listen(swinging(velocity, -velocity))
+    assert rms(against.signal) == pytest.approx(np.sqrt(2) * rms(alone.signal), rel=1e-6)
+
+
+def test_joints_at_different_pitches_add_their_powers():
+    both = listen(swinging(0.03 * tone(200), 0.04 * tone(1500)))
+    assert rms(both.signal) == pytest.approx(0.05 / np.sqrt(2), rel=0.01)
+
+
+def test_the_power_that_is_heard_is_that_of_the_noise_estimate():
+    velocity = np.random.default_rng(0).normal(size=(20_000, 3))
+    run = swinging(*velocity.T, velocity_desired=0.5 * velocity)
+    whole = np.sqrt(np.mean(nm.simplified(run.motion, run.velocity_desired) ** 2))
+    # Windows that overlap do not quite agree where many joints rattle at random.
+    assert 20 * np.log10(rms(listen(run).signal) / whole) == pytest.approx(0, abs=1.0)
+
+
+def test_twice_the_noise_is_6_db_more_at_equal_gain():
+    quiet, loud = listen(swinging(0.01 * tone(440))), listen(swinging(0.02 * tone(440)))
+    gain = common_gain([quiet, loud])
+    levels = [20 * np.log10(rms(read(sound.file(gain))[0])) for sound in (quiet, loud)]
+    assert levels[1] - levels[0] == pytest.approx(20 * np.log10(2), abs=0.01)
+
+
+def test_a_gain_is_what_it_says():
+    sound = listen(swinging(0.01 * tone(440)))
+    assert rms(read(sound.file(20.0))[0]) == pytest.approx(0.1 / np.sqrt(2), rel=5e-3)
+
+
+def test_standstill_is_silent_and_says_so():
+    sound = listen(swinging(np.zeros(20_000), np.zeros(20_000)))
+    assert sound.silent
+    assert common_gain([sound]) == 0.0
+    assert not read(sound.file(60.0))[0].any()
+    assert "silent: nothing reaches 1e-06 rad/s" in said(sound, 0.0)
+    assert str(sound).startswith("simplified noise: silent")
+
+
+def test_slow_motion_is_not_heard_even_where_the_log_breaks_off():
+    sound = listen(swinging(np.cos(2 * np.pi * 0.5 * times()), times()))
+    assert sound.peak < 1e-4
+
+
+def test_the_gain_that_is_chosen_clips_nothing_and_wastes_little():
+    sound = listen(swinging(0.01 * tone(440)))
+    gain = common_gain([sound])
+    assert sound.clipped(gain) == 0.0
+    assert "clipped" not in said(sound, gain)
+    assert 0.85 < np.abs(read(sound.file(gain))[0]).max() < 0.9  # 1 dB of headroom
+
+
+def test_nothing_clips_without_being_said():
+    sound = listen(swinging(0.01 * tone(440)))
+    assert np.abs(read(sound.file(46.0))[0]).max() == 1.0
+    assert "% of it is beyond full scale, by 6.1 dB at most" in said(sound, 46.0)
+
+
+def test_a_sound_file_says_what_it_holds_and_at_which_gain():
+    data = listen(swinging(0.01 * tone(440))).file(20.0)
+    assert struct.unpack("<I", data[4:8])[0] == len(data) - 8
+    assert b"simplified noise, gain +20.0 dB: full scale is 0.1 rad/s" in data
+    assert b"ISFT" in data
+
+
+def test_gaps_are_silent_and_nothing_rings_into_them():
+    valid = np.ones(20_000, dtype=bool)
+    valid[8000:12_000] = False
+    sound = listen(swinging(tone(440) * valid, valid=valid))
+    assert not sound.signal[~valid].any()
+    assert np.abs(np.diff(sound.signal)).max() < 0.3  # no click: the tone itself moves by 0.28
+    assert "Gaps are silent." in sound.remarks
+
+
+def test_an_impact_is_heard_when_it_happens():
+    still, hit = np.zeros(20_000), np.zeros(20_000)
+    hit[10_000:10_020] = 1.0
+    sound = listen(swinging(still + 1e-4 * tone(300), hit))
+    assert np.abs(sound.signal).argmax() == pytest.approx(10_010, abs=25)
+
+
+@pytest.mark.parametrize("rate", [100.0, 333.0, 1000.0, 9999.0, 48_000.0, 100_000.0])
+def test_a_log_of_any_rate_lasts_as_long_as_it_did(rate):
+    hertz = min(rate / 4, 440.0)
+    sound = listen(swinging(tone(hertz, rate=rate), rate=rate))
+    data = sound.file(-6.0)
+    assert len(read(data)[0]) / 48_000 == pytest.approx(2.0, abs=2 / rate)
+    assert pitch(data)[0] == pytest.approx(hertz, abs=1.0)
+
+
+def test_playing_faster_raises_what_no_ear_would_hear():
+    sound = listen(swinging(tone(12, 4.0, 100.0), rate=100.0), Settings(speed=10.0))
+    data = sound.file(-6.0)
+    assert len(read(data)[0]) / 48_000 == pytest.approx(0.4, abs=0.01)
+    assert pitch(data)[0] == pytest.approx(120, abs=3)
+    assert b"played 10 times as fast" in data
+
+
+def test_a_slow_log_says_what_cannot_be_heard():
+    sound = listen(swinging(tone(40, rate=250.0), rate=250.0))
+    assert "To be heard: 20 Hz to 125 Hz of the motion (half the rate of 250 Hz)." in sound.remarks
+    assert any("faster than 125 Hz is not in the log" in remark for remark in sound.remarks)
+
+
+def test_a_log_too_slow_for_ears_is_refused_and_told_how():
+    run = swinging(tone(5, rate=30.0), rate=30.0)
+    with pytest.raises(InspectorError, match="30 Hz holds nothing above 15 Hz.*--speed 6"):
+        listen(run)
+    assert not listen(run, Settings(speed=6.0)).silent
+
+
+def test_a_single_joint_can_be_heard():
+    run = swinging(tone(300), tone(700))
+    assert pitch(listen(run, Settings(joint="joint0")).file(-6.0))[0] == pytest.approx(300, abs=0.5)
+    assert pitch(listen(run, Settings(joint="joint1")).file(-6.0))[0] == pytest.approx(700, abs=0.5)
+
+
+@pytest.fixture
+def arm(tmp_path):
+    """A run of an arm of two links whose joints swing at 150 and 400 Hz."""
+    chain(tmp_path, "revolute", "revolute")
+    velocity = np.column_stack((0.1 * tone(150), 0.1 * tone(400)))
+    return Run(
+        time=times(),
+        velocity=velocity,
+        position=np.zeros_like(velocity),
+        joint_names=("joint1", "joint2"),
+        robot=str(tmp_path / "chain.urdf"),
+    )
+
+
+@pytest.mark.parametrize("kind", ["normal", "rms"])
+def test_the_power_of_a_link_that_is_heard_is_that_of_the_extended_noise(arm, kind):
+    expected = np.sqrt(estimate(arm, kind).power.mean(axis=0))
+    for link, power in zip(("link1", "link2"), expected, strict=True):
+        sound = listen(arm, Settings(kind=kind, link=link))
+        assert sound.unit == "√W"
+        assert rms(sound.signal) == pytest.approx(power, rel=0.01)
+    whole = np.sqrt(np.sum(expected**2))
+    assert rms(listen(arm, Settings(kind=kind)).signal) == pytest.approx(whole, rel=0.01)
+
+
+def test_a_link_is_heard_at_the_pitch_of_the_joints_that_move_it(arm):
+    gain = -20 * np.log10(listen(arm, Settings(link="link1")).peak) - 1
+    assert pitch(listen(arm, Settings(link="link1")).file(gain))[0] == pytest.approx(150, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("settings", "text"),
+    [
+        (Settings(kind="paper"), "'paper' has no sign that could be heard; there are simplified"),
+        (Settings(joint="knee"), "no joint 'knee' in the run; it has joint1, joint2"),
+        (Settings(link="knee"), "no link 'knee' that makes noise; there are link1, link2"),
+        (Settings(kind="normal", joint="joint1"), "heard by links, not by joints"),
+        (Settings(link="link1", joint="joint1"), "name no joint with it"),
+        (Settings(kind="simplified", link="link1"), "of the kinds normal and rms"),
+        (Settings(speed=0.0), "a speed of 0, expected 0.01 to 1000"),
+    ],
+)
+def test_what_cannot_be_listened_to_is_named(arm, settings, text):
+    with pytest.raises(InspectorError, match=text):
+        listen(arm, settings)
+
+
+def test_a_run_without_robot_has_no_links_to_hear():
+    with pytest.raises(nm.RobotError, match="'normal' needs a robot, the run names None"):
+        listen(swinging(tone(300)), Settings(link="link1"))
+
+
+def test_two_runs_become_two_files_at_one_gain(tmp_path):
+    paths = listening.outputs(tmp_path / "ab.wav", 2)
+    assert [path.name for path in paths] == ["ab.a.wav", "ab.b.wav"]
+    sounds = [listen(swinging(size * tone(440))) for size in (0.01, 0.05)]
+    save(dict(zip(paths, sounds, strict=True)), common_gain(sounds))
+    peaks = [np.abs(middle(read(path.read_bytes())[0])).max() for path in paths]
+    assert peaks[1] / peaks[0] == pytest.approx(5, rel=1e-3)
+
+
+def test_sounds_of_different_units_have_no_gain_in_common(arm, tmp_path):
+    sounds = {tmp_path / "a.wav": listen(arm), tmp_path / "b.wav": listen(arm, Settings("rms"))}
+    with pytest.raises(InspectorError, match="rad/s and √W have no gain in common"):
+        save(sounds, 0.0)
+
+
+def test_a_sound_file_that_exists_is_kept(tmp_path):
+    (tmp_path / "run.b.wav").write_text("precious")
+    with pytest.raises(OutputError, match=r"run.b.wav: exists already"):
+        listening.outputs(tmp_path / "run.wav", 2)
+
+
+@pytest.fixture
+def inspector(monkeypatch, capsys):
+    """Call the command line; returns exit status, what it printed, and what it complained."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["inspector", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out, printed.err
+
+    return call
+
+
+def test_the_command_line_compares_runs_by_ear(inspector, tmp_path):
+    for name, size in (("before", 0.01), ("after", 0.02)):
+        swinging(size * tone(440)).save(tmp_path / f"{name}.npz")
+    runs = [tmp_path / "before.npz", tmp_path / "after.npz"]
+    status, out, err = inspector("listen", *runs, "-o", tmp_path / "ab.wav")
+    assert (status, err) == (0, "")
+    assert out.count("gain +32.8 dB: full scale is 0.0229 rad/s") == 2
+    assert f"{tmp_path}/ab.b.wav: 2.00 s" in out
+    status, _, err = inspector("listen", *runs, "-o", tmp_path / "ab.wav")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "ab.a.wav: exists already" in err
+
+
+def test_the_command_line_says_what_cannot_be_heard_in_one_line(inspector, tmp_path):
+    swinging(tone(440)).save(tmp_path / "run.npz")
+    for wrong in (["--joint", "knee"], ["--kind", "A"], ["--link", "hand"], ["--speed", "0"]):
+        status, out, err = inspector(
+            "listen", tmp_path / "run.npz", "-o", tmp_path / "o.wav", *wrong
+        )
+        assert (status, out, err.count("\n")) == (3, "", 1)
+    assert not (tmp_path / "o.wav").exists()
+
+
+def test_a_clip_has_the_whole_run_or_what_is_around_its_worst_moment(monkeypatch):
+    run = swinging(0.01 * tone(440), 0.01 * tone(300))
+    whole = clip(run)
+    assert (whole.start, whole.stop) == (0.0, 2.0)
+    monkeypatch.setattr("inspector.sound.clip.MOST", 10_000)
+    part = clip(run, around=1.5)
+    assert (part.start, part.stop) == (1.25, 1.75)
+    samples, rate = read(part.data)
+    assert (len(samples), rate) == (8000, 16_000)
+    led, _ = read(clip(run, around=1.5, lead=True).data)
+    assert not led[:20_000].any()  # so that it starts with the run
+    np.testing.assert_array_equal(led[20_000:], samples)
+
+
+def test_a_run_too_slow_for_ears_has_no_clip():
+    assert clip(swinging(tone(5, rate=30.0), rate=30.0)) is None
+
+
+def test_listening_takes_no_library_that_is_slow_to_import():
+    code = "import sys, inspector.sound.clip; print('scipy.signal' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"
+
+
+def test_mixing_takes_signals_one_by_one():
+    made = []
+
+    def signals():
+        for hertz in (100, 200, 300):
+            made.append(hertz)
+            yield tone(hertz)
+
+    mix(signals(), valid=np.ones(20_000, dtype=bool), rate=RATE)
+    assert made == [100, 200, 300]

@@ -1,0 +1,118 @@
+import subprocess
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import inspector
+from inspector import notebook, viewer
+from inspector.viewer import ViewerError
+from noisemodel import Run, RunFileError
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def run():
+    time = np.arange(4000) / 1000
+    return Run(time=time, velocity=np.sin(300 * time)[:, None], joint_names=("elbow",))
+
+
+@pytest.fixture(autouse=True)
+def plain(monkeypatch, tmp_path):
+    """Plain Python with a display, and a cache of its own."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(viewer, "has_display", lambda: True)
+    monkeypatch.setattr(notebook, "in_notebook", lambda: False)
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """The recordings that a window was opened for."""
+    shown = []
+    monkeypatch.setattr(viewer, "open_window", lambda path: shown.append(path) or "")
+    return shown
+
+
+def test_plain_python_opens_a_window(run, opened):
+    inspector.show(run)
+    (recording,) = opened
+    assert recording.read_bytes().startswith(b"RRF2")
+
+
+def test_a_run_file_can_be_shown(run, opened, tmp_path):
+    run.save(tmp_path / "run.npz")
+    inspector.show(tmp_path / "run.npz")
+    inspector.show(str(tmp_path / "run.npz"))
+    assert len(set(opened)) == 1  # the same run replaces its own recording
+
+
+def test_without_a_display_the_recording_is_named(run, monkeypatch):
+    monkeypatch.setattr(viewer, "has_display", lambda: False)
+    with pytest.raises(ViewerError, match=r"no display; the recording is in .*\.rrd"):
+        inspector.show(run)
+
+
+def test_a_viewer_that_dies_is_said_and_the_recording_named(run, monkeypatch):
+    monkeypatch.setattr(viewer, "open_window", lambda _: "the viewer ended with status 101")
+    with pytest.raises(ViewerError, match=r"status 101; the recording is in .*\.rrd"):
+        inspector.show(run)
+
+
+def test_what_is_no_run_is_named(tmp_path, opened):
+    with pytest.raises(RunFileError, match="gone.npz: cannot be read"):
+        inspector.show(tmp_path / "gone.npz")
+    assert opened == []
+
+
+def test_a_notebook_without_the_widget_is_told_what_to_install(run, monkeypatch):
+    monkeypatch.setattr(notebook, "in_notebook", lambda: True)
+    monkeypatch.setattr(notebook, "find_spec", lambda _: None)
+    with pytest.raises(ViewerError, match=r'pip install "rerun-sdk\[notebook\]"'):
+        inspector.show(run)
+
+
+def test_a_notebook_gets_the_recording_and_fetches_nothing_from_outside(run, monkeypatch):
+    displayed, sent = [], []
+
+    class Widget:
+        def __init__(self, width, height):
+            self.size = (width, height)
+
+        def send_rrd(self, data):
+            sent.append(data)
+
+    widgets = types.SimpleNamespace(Viewer=Widget)
+    display = types.SimpleNamespace(display=displayed.append)
+    monkeypatch.setattr(notebook, "in_notebook", lambda: True)
+    monkeypatch.setattr(notebook, "find_spec", lambda _: object())
+    monkeypatch.setattr(
+        notebook, "import_module", {"rerun_notebook": widgets, "IPython.display": display}.get
+    )
+    monkeypatch.delenv("RERUN_NOTEBOOK_ASSET", raising=False)
+    inspector.show(run, size=(800, 500))
+    assert [widget.size for widget in displayed] == [(800, 500)]
+    assert [data[:4] for data in sent] == [b"RRF2"]
+    assert notebook.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
+
+
+def test_plain_python_is_no_notebook_and_a_kernel_is(monkeypatch):
+    monkeypatch.undo()
+    monkeypatch.delitem(sys.modules, "IPython", raising=False)
+    assert not notebook.in_notebook()
+    shell = types.SimpleNamespace(kernel=object())
+    ipython = types.SimpleNamespace(get_ipython=lambda: shell)
+    monkeypatch.setitem(sys.modules, "IPython", ipython)
+    assert notebook.in_notebook()
+    ipython.get_ipython = object  # a terminal's shell has no kernel
+    assert not notebook.in_notebook()
+
+
+def test_importing_the_package_loads_no_viewer():
+    code = "import sys, inspector; print('rerun' in sys.modules, callable(inspector.show))"
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == ["False", "True"]

@@ -1,0 +1,160 @@
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspector import viewer, webview
+from inspector.inspection import inspect
+from inspector.recording import write
+from inspector.viewer import ViewerError
+from noisemodel import Run
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def recording(tmp_path):
+    time_ = np.arange(4000) / 1000
+    run = Run(time=time_, velocity=np.sin(300 * time_)[:, None], joint_names=("elbow",))
+    run.save(tmp_path / "run.npz")
+    write(inspect(tmp_path / "run.npz", {}), tmp_path / "run.rrd")
+    return tmp_path / "run.rrd"
+
+
+def says(monkeypatch, script):
+    """Let a shell script take the place of the viewer; its arguments are the viewer's."""
+    monkeypatch.setattr(
+        viewer, "command", lambda *arguments: ["/bin/sh", "-c", script, "rerun", *arguments]
+    )
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it runs on
+def test_a_window_that_opens_is_not_waited_for(monkeypatch):
+    monkeypatch.setattr(viewer, "SETTLE", 0.1)
+    says(monkeypatch, "sleep 0.5")
+    assert viewer.open_window(Path("run.rrd")) == ""
+
+
+def test_a_viewer_that_runs_already_takes_the_recording_over(monkeypatch, tmp_path):
+    says(monkeypatch, f"echo $2 >> {tmp_path}/ports")  # `--port 9876`, and it ends at once
+    assert viewer.open_window(Path("run.rrd")) == ""
+    assert (tmp_path / "ports").read_text().split() == [viewer.PORT]
+
+
+def test_where_another_program_listens_a_free_port_is_taken(monkeypatch, tmp_path):
+    says(monkeypatch, f'echo $2 >> {tmp_path}/ports; [ "$2" = auto ]')
+    assert viewer.open_window(Path("run.rrd")) == ""
+    assert (tmp_path / "ports").read_text().split() == [viewer.PORT, "auto"]
+
+
+def test_a_viewer_that_dies_says_why_in_one_line(monkeypatch):
+    says(monkeypatch, "printf 'INFO fine\\n\\033[31mError: no \\033[0mdisplay\\n' >&2; exit 101")
+    problem = viewer.open_window(Path("run.rrd"))
+    assert problem == "the viewer ended with status 101 (no display)"
+
+
+def test_a_viewer_that_is_missing_is_said(monkeypatch):
+    monkeypatch.setattr(viewer, "find_spec", lambda _: None)
+    with pytest.raises(ViewerError, match="viewer is missing; `pip install rerun-sdk`"):
+        viewer.open_window(Path("run.rrd"))
+
+
+def printed(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def listening_on(pid):
+    """Local addresses that the children of a process listen on."""
+    children = printed("pgrep", "-P", str(pid)).split()
+    sockets = [line.split() for line in printed("ss", "-ltnpH").splitlines()]
+    return [s[3] for s in sockets if any(f"pid={child}," in s[-1] for child in children)]
+
+
+def test_a_recording_is_served_on_loopback_only_and_no_longer_than_asked(recording):
+    with webview.serving(recording) as served:
+        page, data = served.url.split("/?url=")
+        assert page.startswith("http://127.0.0.1:")
+        assert data.startswith("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A")
+        with urllib.request.urlopen(page) as answer:
+            assert b"rerun" in answer.read().lower()
+        if shutil.which("ss") and shutil.which("pgrep"):
+            addresses = listening_on(served.process.pid)
+            assert len(addresses) == 2
+            assert all(address.startswith("127.0.0.1:") for address in addresses)
+    port = int(page.rpartition(":")[2])
+    assert webview.free_port(port) == port
+
+
+def test_a_port_that_is_taken_is_one_line(recording):
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with (
+            pytest.raises(ViewerError, match=f"port {port} cannot be had .*name another, or none"),
+            webview.serving(recording, port=port),
+        ):
+            pass
+
+
+def test_a_server_that_dies_at_once_says_why(monkeypatch, recording):
+    says(monkeypatch, "echo Error: no memory >&2; exit 3")
+    with (
+        pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"),
+        webview.serving(recording),
+    ):
+        pass
+
+
+def test_a_server_that_dies_later_says_so(recording):
+    with webview.serving(recording) as served:
+        os.killpg(served.process.pid, signal.SIGKILL)
+        with pytest.raises(ViewerError, match="the viewer ended with status -9"):
+            served.wait()
+
+
+@pytest.mark.parametrize(
+    "stop", [signal.SIGTERM, pytest.param(signal.SIGINT, marks=pytest.mark.slow)]
+)
+def test_serving_ends_with_the_program_and_leaves_no_server(recording, stop):
+    command = [sys.executable, "-m", "inspector", "view", recording.with_suffix(".npz"), "--web"]
+    with subprocess.Popen(
+        command,
+        stdout=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
+    ) as program:
+        url = next(line for line in program.stdout if line.startswith("open ")).split()[1]
+        port = int(url.removeprefix("http://127.0.0.1:").partition("/")[0])
+        program.send_signal(stop)
+        assert program.wait(timeout=20) == 0
+    assert webview.free_port(port) == port
+
+
+@pytest.mark.slow
+def test_a_browser_draws_the_recording(recording, tmp_path):
+    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
+    browser = shutil.which("chromium") or shutil.which("google-chrome")
+    if browser is None:
+        pytest.skip("needs chromium")
+    software = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+    with webview.serving(recording) as served, playwright.sync_playwright() as driver:
+        window = driver.chromium.launch(executable_path=browser, args=["--no-sandbox", *software])
+        page = window.new_page(viewport={"width": 900, "height": 560})
+        page.goto(f"{served.url}&renderer=webgl")
+        until = time.monotonic() + 240
+        sizes = [0]
+        # The page grows from a spinner to the views, and then stays as it is.
+        while time.monotonic() < until and not (sizes[-1] > 40_000 and sizes[-1] == sizes[-2]):
+            page.wait_for_timeout(3000)
+            sizes.append(len(page.screenshot(path=tmp_path / "web.png", timeout=60_000)))
+        window.close()
+    assert sizes[-1] > 40_000
