@@ -3,14 +3,16 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from inspector.live import LiveSession
     from inspector.logs.importing import Imported
     from inspector.logs.library import read_log, read_logs
     from inspector.notebook import show
 
-__all__ = ["Imported", "read_log", "read_logs", "show"]
+__all__ = ["Imported", "LiveSession", "read_log", "read_logs", "show"]
 
 _HOMES = {
     "Imported": "inspector.logs.importing",
+    "LiveSession": "inspector.live",
     "read_log": "inspector.logs.library",
     "read_logs": "inspector.logs.library",
     "show": "inspector.notebook",

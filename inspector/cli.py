@@ -10,6 +10,7 @@ from inspector.commands import (
     hearing,
     judging,
     learning,
+    living,
     logs,
     looking,
     showing,
@@ -23,6 +24,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.command()(looking.view)
+app.command()(living.live)
 app.command()(judging.classify)
 app.command()(looking.noise)
 app.command()(hearing.listen)

@@ -1,0 +1,120 @@
+"""Rows of a CSV whose header names what each column holds."""
+
+from collections.abc import Iterator, Sequence
+from math import nan
+
+import numpy as np
+
+from inspector.live.block import SIGNALS
+from inspector.live.errors import LiveError
+from inspector.live.rows import Note, Rows
+from inspector.logs.columns import TIMES, listed, named
+from noisemodel.types import Array
+
+UNKNOWN = ["", "nan", "NaN", "NAN", "null"]
+"""Cells of what is not known."""
+
+
+class CsvReader:
+    """Reads rows under a header such as ``time,elbow.velocity,elbow.position``.
+
+    Args:
+        head: The header.
+        names: Names of the joints in the order that is wanted; by default that of the columns.
+
+    Raises:
+        LiveError: If the header names no velocity, or a joint lacks a signal that others have.
+    """
+
+    def __init__(self, head: bytes, names: tuple[str, ...]) -> None:
+        text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
+        self._delimiter = next((mark for mark in ",;\t" if mark in text), ",")
+        self._header = [cell.strip() for cell in text.split(self._delimiter)]
+        self._columns = [str(place) for place in range(len(self._header))]
+        found: dict[str, dict[str, int]] = {}
+        for place, column in enumerate(self._header):
+            if (meaning := named(column)) is not None and meaning[0] in SIGNALS:
+                joint = meaning[1]
+                known = joint if isinstance(joint, str) else _numbered(joint, names)
+                found.setdefault(meaning[0], {})[known] = place
+        if "velocity" not in found:
+            raise LiveError(
+                "the header names no velocity; expected columns such as elbow.velocity,"
+                f" they are {listed(self._header)}"
+            )
+        self.names = names or tuple(found["velocity"])
+        for signal, places in found.items():
+            if lacking := [name for name in self.names if name not in places]:
+                raise LiveError(f"the header has no {signal} of joint {lacking[0]!r}")
+        self._places = {
+            signal: _run([places[name] for name in self.names]) for signal, places in found.items()
+        }
+        lower = [column.lower() for column in self._header]
+        self._time = next((lower.index(name) for name in TIMES if name in lower), None)
+
+    def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
+        """Read whole lines; those that are no rows are told and counted.
+
+        Args:
+            lines: The lines.
+            first: Number of the first, for people.
+            note: Is told of rows that cannot be read.
+
+        Yields:
+            The rows at once.
+        """
+        table = self._fast(lines)
+        if table is None:
+            table = self._careful(lines, first, note)
+        if len(table):
+            signals = {name: table[:, places] for name, places in self._places.items()}
+            yield Rows(signals, None if self._time is None else table[:, self._time])
+
+    def _fast(self, lines: bytes) -> Array | None:
+        """Read rows that are all as they should be; None if one is not."""
+        import pyarrow as pa
+        from pyarrow import csv
+
+        try:
+            table = csv.read_csv(
+                pa.py_buffer(lines),
+                read_options=csv.ReadOptions(column_names=self._columns, use_threads=False),
+                parse_options=csv.ParseOptions(delimiter=self._delimiter),
+                convert_options=csv.ConvertOptions(
+                    column_types=dict.fromkeys(self._columns, pa.float64()), null_values=UNKNOWN
+                ),
+            )
+        except pa.ArrowInvalid:
+            return None
+        # Columns lie one after the other, as Arrow has them: turning them over costs a copy.
+        return np.array([column.to_numpy() for column in table.columns]).T
+
+    def _careful(self, lines: bytes, first: int, note: Note) -> Array:
+        rows = []
+        for number, line in enumerate(lines.splitlines(), start=first):
+            if not line.strip():
+                continue
+            try:
+                rows.append(self._row(line.decode(errors="replace").split(self._delimiter)))
+            except ValueError as error:
+                note("malformed rows", f"line {number}: {error}; such rows are left out")
+                if self._time is None:  # without stamps, the row alone keeps the time
+                    rows.append([nan] * len(self._header))
+        return np.array(rows).reshape(-1, len(self._header))
+
+    def _row(self, cells: Sequence[str]) -> list[float]:
+        if len(cells) != len(self._header):
+            raise ValueError(f"{len(cells)} cells where the header names {len(self._header)}")
+        return [nan if cell.strip() in UNKNOWN else float(cell) for cell in cells]
+
+
+def _numbered(number: str | int, names: tuple[str, ...]) -> str:
+    """Name a joint that a column knows by its number."""
+    number = int(number)
+    return names[number] if number < len(names) else f"joint{number + 1}"
+
+
+def _run(places: list[int]) -> list[int] | slice:
+    """Columns beside each other need not be copied together."""
+    first, stop = places[0], places[0] + len(places)
+    return slice(first, stop) if places == list(range(first, stop)) else places

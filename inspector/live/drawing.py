@@ -1,0 +1,177 @@
+"""What a live session draws: lines, spectrogram, lanes, events; in columns, thinned."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import rerun as rr
+
+from inspector import colors
+from inspector.live.lane import Change
+from inspector.live.strip import Columns
+from inspector.series import LINE_WIDTH, at
+from inspector.thinning import extremes
+from models import Labels
+from noisemodel.types import Array
+
+JOINT_POINTS = 400.0
+"""Points of a joint's line in a second, as a recording of ten seconds has."""
+NOISE_POINTS = 4000.0
+JOINTS_PER_PLOT = 8
+UNITS = {"velocity": "rad/s", "position": "rad"}
+
+
+class Drawing:
+    """Draws into a recording.
+
+    Args:
+        recording: Where to.
+        joint_names: Names of the joints.
+        signals: Which of velocity, velocity_desired and position there are.
+        classes: What can be heard; empty without a model.
+        hertz: Centres of the spectrogram's bands, shape (bands,).
+    """
+
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        joint_names: Sequence[str],
+        signals: Sequence[str],
+        classes: tuple[str, ...],
+        hertz: Array,
+    ) -> None:
+        self._recording, self._hertz = recording, hertz
+        self._colours = colors.of_classes(classes)
+        self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
+        self._slices = [
+            slice(first, min(first + JOINTS_PER_PLOT, len(joint_names)))
+            for first in range(0, len(joint_names), JOINTS_PER_PLOT)
+        ]
+        for kind in self._signals:
+            for plot, columns in enumerate(self._slices):
+                self._style_joints(kind, plot, joint_names[columns])
+        self._style_lines("/noise/simplified", ["simplified [rad/s]"], [colors.NOISE])
+        recording.log("/spectrogram/bands", _strip_style(hertz), static=True)
+        if classes:
+            self._style_lines("/score", list(classes), list(self._colours.values()))
+            states = rr.StateConfiguration(
+                values=list(classes), labels=list(classes), colors=list(self._colours.values())
+            )
+            recording.log("/class/found", states, static=True)
+
+    @property
+    def plots(self) -> list[tuple[str, list[str]]]:
+        """Title and entity paths of each plot of joint signals."""
+        found: dict[str, list[str]] = {}
+        for kind in self._signals:
+            measured = kind.removesuffix("_desired")
+            for plot in range(len(self._slices)):
+                number = f" {plot + 1}" if len(self._slices) > 1 else ""
+                title = f"{measured}{number} [{UNITS[measured]}]"
+                found.setdefault(title, []).append(_joints(kind, plot))
+        return list(found.items())
+
+    def lines(self, time: Array, noise: Array, signals: Mapping[str, Array], rate: float) -> None:
+        """Draw the next stretch of noise and joint signals.
+
+        Args:
+            time: Shape (samples,), in [s].
+            noise: Shape (samples,), in [rad/s].
+            signals: Each of shape (samples, joints); rows that are not finite are left out.
+            rate: Samples per second, in [Hz].
+        """
+        if not len(time):
+            return
+        seconds = len(time) / rate
+        shown, values = extremes(time, noise[:, None], points=_points(seconds * NOISE_POINTS))
+        self._send("/noise/simplified", [at(shown)], values)
+        for kind in self._signals:
+            finite = np.isfinite(signals[kind]).all(axis=1)
+            if not finite.any():
+                continue
+            rows = slice(None) if finite.all() else finite
+            points = _points(seconds * JOINT_POINTS)
+            shown, values = extremes(time[rows], signals[kind][rows], points=points)
+            index = [at(shown)]
+            for plot, columns in enumerate(self._slices):
+                self._send(_joints(kind, plot), index, values[:, columns])
+
+    def spectrogram(self, columns: Columns) -> None:
+        """Draw columns of the spectrogram."""
+        bands, count = columns.level.shape
+        rgba = colors.heat(columns.level.T).reshape(-1, 4)
+        self._recording.send_columns(
+            "/spectrogram/bands",
+            indexes=[at(columns.time)],
+            columns=[
+                *rr.Scalars.columns(scalars=np.tile(self._hertz, (count, 1))),
+                *rr.SeriesLines.columns(colors=rgba).partition([bands] * count),
+            ],
+        )
+
+    def labels(self, labels: Labels) -> None:
+        """Draw the scores of frames, at their centres."""
+        self._send("/score", [at((labels.start + labels.stop) / 2)], labels.scores)
+
+    def changes(self, changes: Sequence[Change]) -> None:
+        """Draw where the class changes, and list findings."""
+        if not changes:
+            return
+        self._recording.send_columns(
+            "/class/found",
+            indexes=[at(np.array([change.time for change in changes]))],
+            columns=rr.StateChange.columns(state=[change.state for change in changes]),
+        )
+        for change in changes:
+            if change.state not in ("", "ok"):
+                text = f"{change.state} from {change.time:.2f} s (score {change.score:.2f})"
+                self.event(change.time, text, (*self._colours[change.state], 255))
+
+    def event(
+        self, time: float, text: str, colour: tuple[int, int, int, int] = (200, 200, 200, 255)
+    ) -> None:
+        """Add a line to the list of events."""
+        self._recording.send_columns(
+            "/events",
+            indexes=[at(np.array([time]))],
+            columns=rr.TextLog.columns(text=[text], color=np.array([colour], dtype=np.uint8)),
+        )
+
+    def _send(self, path: str, index: list[rr.TimeColumn], values: Array) -> None:
+        scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values))
+        self._recording.send_columns(path, indexes=index, columns=scalars)
+
+    def _style_joints(self, kind: str, plot: int, names: Sequence[str]) -> None:
+        desired = kind.endswith("_desired")
+        labels = [f"{name} desired" if desired else name for name in names]
+        self._style_lines(_joints(kind, plot), labels, colors.of_series(len(names), dim=desired))
+
+    def _style_lines(
+        self, path: str, names: Sequence[str], colours: Sequence[colors.Color]
+    ) -> None:
+        # Rerun's default aggregation draws the mean of a pixel's extremes, which hides vibration.
+        style = rr.SeriesLines(
+            names=list(names),
+            colors=list(colours),
+            widths=[1.0] * len(names),
+            aggregation_policy="MinMax",
+        )
+        self._recording.log(path, style, static=True)
+
+
+def _points(wanted: float) -> int:
+    return max(2, round(wanted))
+
+
+def _strip_style(hertz: Array) -> rr.SeriesLines:
+    """Draw every band as a line of one entity: a line each would cost a message each."""
+    return rr.SeriesLines(
+        names=[f"{centre:.0f} Hz" for centre in hertz],
+        widths=[LINE_WIDTH] * len(hertz),
+        aggregation_policy="Off",
+        interpolation_mode="StepAfter",
+    )
+
+
+def _joints(kind: str, plot: int) -> str:
+    end = "_desired" if kind.endswith("_desired") else ""
+    return f"/joints/{kind.removesuffix('_desired')}/{plot}{end}"

@@ -1,0 +1,60 @@
+"""The lane of classes while labels come in: where it changes."""
+
+from typing import NamedTuple
+
+from models import Labels
+
+
+class Change(NamedTuple):
+    """A class that begins."""
+
+    time: float
+    """When, in [s]."""
+    state: str
+    """The class; empty where nothing is known."""
+    score: float
+    """How certain the class is in the frame that begins it."""
+
+
+class Lane:
+    """Gives each frame the time around its centre, as the recording of a whole run does.
+
+    Args:
+        hop: Time from one frame to the next, in [s].
+        length: Duration of a frame, in [s].
+    """
+
+    def __init__(self, hop: float, length: float) -> None:
+        self._hop, self._length = hop, length
+        self._state, self._end = "", 0.0
+
+    def take(self, labels: Labels) -> list[Change]:
+        """Say where the class changes.
+
+        Args:
+            labels: The next ones, in order of time.
+        """
+        changes = []
+        for index, label in enumerate(labels.label.tolist()):
+            begin = float(labels.start[index] + labels.stop[index]) / 2 - self._hop / 2
+            if begin > self._end + self._hop / 2:
+                changes += self.end()
+            if label != self._state:
+                score = float(labels.scores[index, labels.classes.index(label)])
+                changes.append(Change(begin, label, score))
+            self._state, self._end = label, begin + self._hop
+        return changes
+
+    def silent(self, now: float) -> list[Change]:
+        """End the lane if its next frame is overdue.
+
+        Args:
+            now: Time of the latest sample, in [s].
+        """
+        return self.end() if now > self._end + self._length + self._hop else []
+
+    def end(self) -> list[Change]:
+        """End what the lane shows."""
+        changes = [Change(self._end, "", 0.0)] if self._state else []
+        self._state = ""
+        return changes

@@ -1,0 +1,87 @@
+"""Rows of samples as text: CSV with a header, or a JSON object per line."""
+
+from collections.abc import Callable, Iterator, Mapping
+from time import perf_counter
+from typing import BinaryIO, NamedTuple, Protocol
+
+from inspector.live.errors import LiveError
+from noisemodel.types import Array
+
+AT_ONCE = 1 << 18
+"""Bytes that are read at once, if there are so many."""
+LONGEST = 1 << 24
+"""Bytes that a line may have."""
+
+
+class Rows(NamedTuple):
+    """Samples of some rows."""
+
+    signals: Mapping[str, Array]
+    """By name, each of shape (samples, columns)."""
+    time: Array | None
+    """Shape (samples,), in [s]; None if rows have no time."""
+
+
+class Note(Protocol):
+    """What is told of rows that cannot be read."""
+
+    def __call__(self, kind: str, line: str, count: int = 1) -> None:
+        """Count ``count`` things of a kind, and say the line if they are the first."""
+
+
+class Reader(Protocol):
+    """Reads one format."""
+
+    names: tuple[str, ...]
+    """Names of the joints; empty if the format does not say."""
+
+    def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
+        """Read whole lines, the first of which has a number."""
+
+
+def reader_of(head: bytes, names: tuple[str, ...]) -> tuple[Reader, bool]:
+    """Choose a format by the first line.
+
+    Args:
+        head: The line.
+        names: Names of the joints, as a person gave them.
+
+    Returns:
+        The reader, and whether the line was a header and no sample.
+
+    Raises:
+        LiveError: If the line is neither a JSON object nor a header that names velocities.
+    """
+    from inspector.live.csvrows import CsvReader
+    from inspector.live.jsonrows import JsonReader
+
+    if head.lstrip().startswith(b"{"):
+        return JsonReader(names), False
+    return CsvReader(head, names), True
+
+
+def blocks(stream: BinaryIO) -> Iterator[tuple[bytes, int, float]]:
+    """Go through what a stream brings, as it comes.
+
+    Args:
+        stream: Text in lines.
+
+    Yields:
+        Whole lines that are not blank at their beginning, the number of the first, and the reading
+        of ``time.perf_counter()`` when they came.
+
+    Raises:
+        LiveError: If a line does not end.
+    """
+    read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
+    rest, number = b"", 1
+    while chunk := read(AT_ONCE):
+        came = perf_counter()
+        lines, end, rest = (rest + chunk).rpartition(b"\n")
+        if end:
+            yield lines + end, number, came
+            number += lines.count(b"\n") + 1
+        elif len(rest) > LONGEST:
+            raise LiveError(f"line {number} is longer than {LONGEST} bytes: this is no CSV or JSON")
+    if rest.strip():
+        yield rest + b"\n", number, perf_counter()

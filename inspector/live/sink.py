@@ -1,0 +1,206 @@
+"""Where a live recording goes: a file, a viewer that runs, or one that is opened for it."""
+
+import os
+import re
+import socket
+import subprocess
+import tempfile
+import time
+from contextlib import ExitStack, suppress
+from http.client import HTTPConnection, HTTPException
+from pathlib import Path
+from threading import Thread
+
+import rerun as rr
+
+from inspector import viewer
+from inspector.live.errors import SinkError
+from inspector.viewer import HOST
+from noisemodel.atomic import replacing
+
+APPLICATION = "inspector-live"
+"""Not that of recordings of whole runs: the viewer keeps a layout for each application."""
+PORT = int(viewer.PORT)
+ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5})(?:/proxy)?")
+PATIENCE = 20.0
+"""How long a viewer may take to start, in [s]."""
+ANSWER = 2.0
+"""How long a viewer may take to answer, in [s]."""
+SERVICE = "/rerun.sdk_comms.v1alpha1.MessageProxyService/Knock"
+KNOCK = 1.0
+"""How often it is asked whether the viewer is still there, in [s]."""
+FLUSH = 5.0
+"""How long the last messages may take, in [s]."""
+MEMORY = "2GB"
+"""What a viewer that is opened here may keep; then it drops the oldest."""
+
+
+class Sink:
+    """A recording that goes somewhere.
+
+    Args:
+        save: File to write, whole when it is closed; None writes none.
+        connect: Address of a viewer: ``9876``, ``host:9876`` or a URL. Unless given, and without a
+            file, a viewer on this machine is used, and one is opened if none runs.
+        overwrite: Whether a file that exists may be replaced.
+
+    Attributes:
+        recording: What to log into.
+        where: Says where it goes.
+        gone: Whether there was a viewer that is there no more.
+
+    Raises:
+        SinkError: If there is no viewer and none can be opened.
+        OutputError: If the file exists or cannot be written.
+    """
+
+    def __init__(
+        self, save: Path | None = None, connect: str | None = None, *, overwrite: bool = False
+    ) -> None:
+        self._address: tuple[str, int] | None = None
+        self.gone = False
+        self._file, self._knocked = save is not None, time.monotonic()
+        sinks: list[rr.GrpcSink | rr.FileSink] = []
+        places = []
+        with ExitStack() as stack:
+            if save is not None:
+                sinks.append(rr.FileSink(stack.enter_context(replacing(save, overwrite=overwrite))))
+                places.append(f"written to {save}")
+            if connect is not None or save is None:
+                host, port = self._address = _viewer(connect)
+                sinks.append(rr.GrpcSink(f"rerun+http://{host}:{port}/proxy"))
+                places.append(f"shown by the viewer at {host}:{port}")
+            self._stack = stack.pop_all()
+        self.where = " and ".join(places)
+        self.recording = rr.RecordingStream(APPLICATION)
+        self.recording.set_sinks(*sinks)
+
+    @property
+    def alive(self) -> bool:
+        """Whether somebody takes what is logged: a file does when its viewer is gone."""
+        return self._file or not self.gone
+
+    def knock(self) -> bool:
+        """Ask once in a second whether the viewer is there, and remember that it is gone.
+
+        Returns:
+            Whether it answered now.
+        """
+        if self._address is None or self.gone or time.monotonic() - self._knocked < KNOCK:
+            return False
+        self._knocked = time.monotonic()
+        self.gone = not _listens(*self._address)
+        return not self.gone
+
+    def discard(self) -> None:
+        """End a recording in which there is nothing, and leave no file."""
+        with suppress(_Discarded), self._stack:
+            self.recording.disconnect()
+            raise _Discarded
+
+    def close(self) -> bool:
+        """Send what waits, and put the file in its place.
+
+        Returns:
+            Whether the viewer, if there is one, took everything.
+        """
+        taken = not self.gone
+        with self._stack:
+            try:
+                if self.alive:
+                    self.recording.flush(timeout_sec=FLUSH)
+            except RuntimeError:  # it is gone, or hangs
+                taken = False
+            # Rerun waits for a viewer that hangs, for good; we do not.
+            ending = Thread(target=self.recording.disconnect, daemon=True)
+            ending.start()
+            ending.join(FLUSH)
+        return taken
+
+
+class _Discarded(Exception):  # noqa: N818
+    """Leads out of the context in which a file is written."""
+
+
+def _viewer(connect: str | None) -> tuple[str, int]:
+    """Find a viewer, or open one."""
+    host, port = (HOST, PORT) if connect is None else _parsed(connect)
+    taken = _listens(host, port)
+    if taken and _is_viewer(host, port):
+        return host, port
+    if connect is not None:
+        state = "what listens there is no viewer of rerun" if taken else "nothing listens there"
+        raise SinkError(
+            f"no viewer at {host}:{port}, {state}; start one with"
+            f" `rerun --bind {HOST} --port PORT`, or use --save FILE.rrd"
+        )
+    if not viewer.has_display():
+        raise SinkError(
+            f"no viewer runs at {host}:{port}, and there is no display to open one on;"
+            " use --connect HOST:PORT or --save FILE.rrd"
+        )
+    return HOST, _opened(_free_port() if taken else PORT)
+
+
+def _parsed(address: str) -> tuple[str, int]:
+    match = ADDRESS.fullmatch(address)
+    if match is None or not 0 < int(match["port"]) < 65536:
+        raise SinkError(
+            f"{address!r} is no address of a viewer; expected PORT, HOST:PORT or"
+            " rerun+http://HOST:PORT/proxy"
+        )
+    return match["host"] or HOST, int(match["port"])
+
+
+def _listens(host: str, port: int) -> bool:
+    try:
+        socket.create_connection((host, port), timeout=ANSWER).close()
+    except OSError:
+        return False
+    return True
+
+
+def _is_viewer(host: str, port: int) -> bool:
+    """Ask for what no gRPC server has: one answers with a status, and others do not.
+
+    Rerun's client itself would wait for good for somebody else's server.
+    """
+    connection = HTTPConnection(host, port, timeout=ANSWER)
+    try:
+        connection.request("POST", SERVICE, headers={"content-type": "application/grpc-web+proto"})
+        return connection.getresponse().getheader("grpc-status") is not None
+    except (OSError, HTTPException):
+        return False
+    finally:
+        connection.close()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind((HOST, 0))
+        return int(probe.getsockname()[1])
+
+
+def _opened(port: int) -> int:
+    """Open a viewer on loopback."""
+    start = viewer.command("--port", str(port), "--hide-welcome-screen", "--expect-data-soon")
+    start += ["--memory-limit", MEMORY]
+    with tempfile.TemporaryFile() as complaints:
+        process = subprocess.Popen(
+            start,
+            env=os.environ | {"RUST_LOG": "error"},
+            start_new_session=True,  # Ctrl-C ends the session, and leaves the viewer open
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=complaints,
+        )
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            if (code := process.poll()) is not None:
+                complaints.seek(0)
+                raise SinkError(f"{viewer.ended(code, complaints.read())}; use --save FILE.rrd")
+            if _listens(HOST, port):
+                return port
+            time.sleep(0.1)
+    viewer.end(process)
+    raise SinkError(f"the viewer did not start within {PATIENCE:g} s; use --save FILE.rrd")

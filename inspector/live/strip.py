@@ -1,0 +1,101 @@
+"""Columns of the spectrogram while samples come in."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from inspector.spectrogram import WINDOW
+from noisemodel.types import Array, Mask
+
+BANDS = 48
+TOP_HZ = 2000.0
+QUIETEST_DB = -90.0
+"""What is darkest: 3e-5 rad/s, the best encoders' noise. Brightest is 1 rad/s, 0 dB."""
+TOGETHER = 4
+"""Columns that are handed out at once, every tenth of a second."""
+
+
+class Columns(NamedTuple):
+    """Columns of a spectrogram."""
+
+    time: Array
+    """Centres of the windows, shape (columns,), in [s]."""
+    level: Array
+    """From 0 to 1, shape (bands, columns)."""
+
+
+class Strip:
+    """Levels of frequency bands, on one scale at all times.
+
+    Args:
+        rate: Samples per second, in [Hz].
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._length = max(round(WINDOW * rate), 8)
+        self._hop = max(1, self._length // 4)
+        frequency = rate / self._length * np.arange(1, self._length // 2 + 1)
+        shown = int((frequency <= TOP_HZ).sum())
+        edges = np.linspace(0, shown, min(BANDS, shown) + 1).astype(int)
+        self._firsts, self._shown = edges[:-1], shown
+        self.hertz = np.add.reduceat(frequency[:shown], self._firsts) / np.diff(edges)
+        self._hann = np.hanning(self._length + 1)[:-1]
+        self._samples = np.empty(0)
+        self._valid = np.empty(0, dtype=bool)
+        self._dark = False
+        self._waiting: list[Columns] = []
+
+    def push(self, noise: Array, valid: Mask, end: float) -> Columns | None:
+        """Take samples.
+
+        Args:
+            noise: Shape (samples,), in [rad/s].
+            valid: False in gaps, shape (samples,); windows that touch one are dark.
+            end: Time after the last sample, in [s].
+
+        Returns:
+            Columns, once there are some.
+        """
+        samples = np.concatenate((self._samples, noise))
+        valid = np.concatenate((self._valid, valid))
+        count = max(0, (len(samples) - self._length) // self._hop + 1)
+        used = count * self._hop
+        if count:
+            if self._dark:
+                before = end - (len(samples) - self._length / 2 + self._hop) / self._rate
+                dark = np.zeros((len(self.hertz), 1))
+                self._waiting.append(Columns(np.array([before]), dark))
+                self._dark = False
+            starts = self._hop * np.arange(count)
+            times = np.asarray(end - (len(samples) - starts - self._length / 2) / self._rate)
+            self._waiting.append(Columns(times, self._levels(samples, valid, count)))
+        self._samples, self._valid = samples[used:], valid[used:]
+        if sum(len(columns.time) for columns in self._waiting) < TOGETHER:
+            return None
+        return self.flush()
+
+    def skip(self) -> None:
+        """Begin anew after a gap, and leave it dark."""
+        self._samples, self._valid = self._samples[:0], self._valid[:0]
+        self._dark = True
+
+    def flush(self) -> Columns | None:
+        """Hand out what waits."""
+        if not self._waiting:
+            return None
+        time = np.concatenate([columns.time for columns in self._waiting])
+        level = np.concatenate([columns.level for columns in self._waiting], axis=1)
+        self._waiting = []
+        return Columns(time, level)
+
+    def _levels(self, samples: Array, valid: Mask, count: int) -> Array:
+        view = np.lib.stride_tricks.sliding_window_view
+        windows = view(samples, self._length)[:: self._hop][:count]
+        whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
+        centred = windows - windows.mean(axis=1, keepdims=True)
+        spectrum = np.abs(np.fft.rfft(centred * self._hann, axis=1))[:, 1 : self._shown + 1]
+        amplitude = spectrum * (2.0 / self._hann.sum()) * whole[:, None]
+        loudest = np.maximum.reduceat(amplitude, self._firsts, axis=1).T
+        decibel = 20.0 * np.log10(np.maximum(loudest, 10.0 ** (QUIETEST_DB / 20.0)))
+        return np.asarray(1.0 - decibel / QUIETEST_DB)

@@ -1,0 +1,266 @@
+import numpy as np
+import pytest
+import rerun as rr
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import models
+import noisemodel as nm
+from inspector import assets, scene
+from inspector.labelling import load_library
+from inspector.live.clock import Clock
+from inspector.live.ear import Ear
+from inspector.live.lane import Lane
+from inspector.live.moving import Moving
+from inspector.live.slower import Slower
+from inspector.live.strip import QUIETEST_DB, Strip
+from inspector.live.troubles import Troubles
+
+CLASSES = ("ok", "impact")
+
+
+def troubles():
+    said = []
+    return Troubles(said.append), said
+
+
+# The clock.
+
+
+def test_even_stamps_lose_nothing_and_jitter_is_no_gap():
+    noted, said = troubles()
+    clock, random = Clock(1000.0, noted), np.random.default_rng(0)
+    stamps = np.arange(500) / 1000 + random.uniform(-2e-4, 2e-4, 500)
+    for block in np.split(stamps, 10):
+        kept, lost = clock.take(block)
+        assert kept.all()
+        assert not lost.any()
+    assert said == []
+
+
+def test_missing_samples_are_counted_where_they_are_missing():
+    noted, said = troubles()
+    clock = Clock(1000.0, noted)
+    clock.take(np.array([5.0, 5.001]))
+    kept, lost = clock.take(np.array([5.012, 5.013, 5.016]))
+    assert kept.all()
+    assert lost.tolist() == [10, 0, 2]
+    assert said == ["gap at 5.012 s: 10 samples are missing"]
+    assert noted.counts == {"missing samples": 12}
+
+
+def test_time_that_stands_still_runs_backwards_or_is_unknown_is_left_out():
+    noted, said = troubles()
+    clock = Clock(1000.0, noted)
+    stamps = np.array([1.0, 1.001, 1.001, 0.5, np.nan, 1.002])
+    kept, lost = clock.take(stamps)
+    assert kept.tolist() == [True, True, False, False, False, True]
+    assert not lost.any()
+    assert clock.take(np.array([0.7]))[0].tolist() == [False]
+    assert noted.counts == {"samples out of order": 3, "samples without time": 1}
+    assert said[0] == "time stands still or runs backwards at 1.001 s: left out"
+
+
+def test_another_rate_than_was_said_is_noticed():
+    noted, said = troubles()
+    Clock(1000.0, noted).take(np.arange(50) / 800)
+    assert said == [
+        "stamps come at 800 Hz, the rate was said to be 1000 Hz: labels and spectrogram are wrong,"
+        " say the right --rate"
+    ]
+
+
+# A lower rate.
+
+
+def walk(samples, rate, columns=3):
+    time, random = np.arange(samples)[:, None] / rate, np.random.default_rng(samples)
+    slow = np.cos(2 * np.pi * (0.3 + np.arange(columns)) * time)
+    return slow + 0.02 * random.standard_normal((samples, columns))
+
+
+@settings(max_examples=25, deadline=None)
+@given(ratio=st.integers(2, 10), data=st.data())
+def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
+    samples = data.draw(st.integers(40 * ratio, 3000))
+    velocity = walk(samples, 1000.0 * ratio)
+    run = nm.Run(
+        time=np.arange(samples) / (1000.0 * ratio), velocity=velocity, joint_names=("a", "b", "c")
+    )
+    slower = Slower(ratio, 3)
+    cuts = sorted(data.draw(st.lists(st.integers(0, samples), max_size=8)))
+    pieces = np.split(velocity, cuts)
+    parts = [slower.push(piece, np.ones(len(piece), dtype=bool)) for piece in pieces]
+    lower = np.concatenate([values for values, _ in parts])
+    valid = np.concatenate([valid for _, valid in parts])
+    whole = nm.lowered(run, 1000.0).velocity[: len(lower)]
+    assert not valid[:10].any()
+    assert valid[10:].all()
+    assert samples // ratio - len(lower) in (9, 10)
+    np.testing.assert_allclose(lower[10:], whole[10:], atol=1e-9)
+
+
+def test_what_is_too_fast_for_the_lower_rate_is_gone():
+    time = np.arange(10_000)[:, None] / 10_000
+    ones = np.ones(10_000, dtype=bool)
+    lower, valid = Slower(10, 1).push(np.sin(2 * np.pi * 1000 * time), ones)
+    assert np.abs(lower[valid]).max() < 1e-3
+    steady, valid = Slower(10, 1).push(np.full((10_000, 1), 0.7), ones)
+    np.testing.assert_allclose(steady[valid], 0.7, rtol=1e-12)
+
+
+# Labels.
+
+
+def heard(ear, motion, valid=None, size=77):
+    valid = np.ones(len(motion), dtype=bool) if valid is None else valid
+    parts = [
+        ear.hear(motion[i : i + size], nm.simplified(motion[i : i + size]), valid[i : i + size])
+        for i in range(0, len(motion), size)
+    ]
+    fields = ("start", "stop", "label", "scores")
+    joined = (np.concatenate([getattr(part, name) for part in parts]) for name in fields)
+    return models.Labels(*joined, parts[0].classes)
+
+
+@pytest.fixture(scope="module")
+def library():
+    return load_library(assets.model_files())
+
+
+def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
+    velocity = walk(6000, 2000.0)
+    velocity[3000:4500] += 0.05 * np.sin(2 * np.pi * 90 * np.arange(1500) / 2000)[:, None]
+    run = nm.Run(time=np.arange(6000) / 2000, velocity=velocity, joint_names=("a", "b", "c"))
+    lower = nm.lowered(run, 1000.0)
+    (model,) = (each for each in library.values() if each.rate == 1000.0)
+    batch = model.classify(nm.simplified(lower.velocity), 1000.0)
+    ear = Ear(library, 2000.0, 3)
+    labels = heard(ear, velocity)
+    assert ear.remark == "Labelled at 1000 Hz, the rate of model arm-1khz."
+    # The first frame and the last ones touch ends beyond which the whole run was guessed.
+    np.testing.assert_allclose(labels.start, batch.start[1:-1], atol=1e-9)
+    assert np.array_equal(labels.label, batch.label[1:-1])
+    np.testing.assert_allclose(labels.scores, batch.scores[1:-1], atol=1e-6)
+
+
+@pytest.mark.parametrize("rate", [1000.0, 2000.0])
+def test_after_a_gap_labels_know_what_time_it_is(library, rate):
+    second = round(rate)
+    ear = Ear(library, rate, 3)
+    heard(ear, walk(second, rate))
+    ear.skip(10 * second + 1)
+    labels = heard(ear, walk(second, rate))
+    assert ear.elapsed == pytest.approx(12 + 1 / rate)
+    assert len(labels) > 0
+    assert (labels.start >= 11.0).all()
+    assert (labels.stop <= 12.0 + 1 / rate).all()
+
+
+@pytest.mark.parametrize(
+    ("rate", "remark"),
+    [
+        (500.0, "No labels: rate of 500 Hz; the models' rates are 1000, 10000 Hz: too low"),
+        (1500.0, "No labels: 1500 Hz is no multiple of the 1000 Hz of the nearest model"),
+    ],
+)
+def test_rates_that_no_model_can_follow_have_no_labels_and_it_is_said(library, rate, remark):
+    ear = Ear(library, rate, 3)
+    assert ear.remark.startswith(remark)
+    assert ear.hear(walk(900, rate), np.zeros(900), np.ones(900, dtype=bool)) is None
+    ear.skip(100)
+    assert ear.classes == ()
+    assert ear.elapsed == 1000 / rate
+
+
+# The lane of classes.
+
+
+def labels_at(*frames):
+    start = np.array([start for start, _ in frames])
+    label = np.array([label for _, label in frames])
+    return models.Labels(start, start + 0.4, label, np.ones((len(frames), 2)), CLASSES)
+
+
+def test_a_lane_changes_halfway_between_frames_and_only_where_the_class_does():
+    lane = Lane(0.1, 0.4)
+    changes = lane.take(labels_at((0.0, "ok"), (0.1, "ok")))
+    changes += lane.take(labels_at((0.2, "impact")))
+    changes += lane.end()
+    assert [change.state for change in changes] == ["ok", "impact", ""]
+    assert [change.time for change in changes] == pytest.approx([0.15, 0.35, 0.45])
+    assert lane.end() == []
+
+
+def test_a_lane_ends_where_labels_are_missing():
+    lane = Lane(0.1, 0.4)
+    lane.take(labels_at((0.0, "ok")))
+    assert lane.silent(0.5) == []
+    changes = lane.take(labels_at((3.0, "ok")))
+    assert [(change.time, change.state) for change in changes] == [
+        (pytest.approx(0.25), ""),
+        (pytest.approx(3.15), "ok"),
+    ]
+    assert [change.state for change in lane.silent(4.0)] == [""]
+
+
+# The spectrogram.
+
+
+@pytest.mark.parametrize("size", [1, 50, 999])
+def test_a_hum_is_bright_in_its_band_whatever_the_blocks(size):
+    rate, hertz = 5000.0, 440.0
+    time = np.arange(5000) / rate
+    noise = 2.0 + 0.1 * np.sin(2 * np.pi * hertz * time)
+    strip, parts = Strip(rate), []
+    for first in range(0, len(noise), size):
+        piece = noise[first : first + size]
+        end = (first + len(piece)) / rate
+        parts.append(strip.push(piece, np.ones(len(piece), dtype=bool), end))
+    parts = [part for part in (*parts, strip.flush()) if part is not None]
+    level = np.concatenate([part.level for part in parts], axis=1)
+    centres = np.concatenate([part.time for part in parts])
+    assert (np.abs(strip.hertz[level.argmax(axis=0)] - hertz) < 25.0).all()
+    assert level.max() == pytest.approx(1.0 - 20.0 * np.log10(0.1) / QUIETEST_DB, abs=0.02)
+    np.testing.assert_allclose(centres, 0.0512 + 0.0256 * np.arange(len(centres)), atol=1e-9)
+    assert len(centres) == 1 + (5000 - 512) // 128
+
+
+def test_silence_and_gaps_are_dark():
+    strip, noise = Strip(1000.0), np.random.default_rng(0).standard_normal(500)
+    assert strip.push(np.zeros(500), np.ones(500, dtype=bool), 0.5).level.max() == 0.0
+    broken = strip.push(noise, np.arange(500) != 100, 1.0)
+    assert (broken.level.max(axis=0) == 0.0).sum() >= 4  # the windows that touch the gap
+    strip.skip()
+    columns = strip.push(noise, np.ones(500, dtype=bool), 9.0)
+    assert columns.level[:, 0].max() == 0.0  # what a viewer draws between before and after the gap
+    assert columns.level[:, 1:].max(axis=0).min() > 0.5
+    assert 8.5 < columns.time[0] < columns.time[1] < 8.56
+
+
+# The robot.
+
+
+@pytest.mark.parametrize("robot", ["panda", "talos", "tiago", "hyq"])
+def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
+    recording = rr.RecordingStream("test")
+    names = nm.Robot.load(robot).joint_names
+    moving = Moving(recording, robot, names, floating=False)
+    position = np.random.default_rng(1).uniform(-1.0, 1.0, len(names))
+    places, turns = moving.transforms(position)
+    joints = {joint.child_link: joint for joint in scene.load(robot, tmp_path).joints()}
+    checked = 0
+    for place, turn, child in zip(places, turns, moving.children, strict=True):
+        joint = joints[child]
+        leader = joint.mimic.joint if joint.mimic else joint.name
+        angle = position[names.index(leader)]
+        if joint.mimic:
+            angle = angle * joint.mimic.multiplier + joint.mimic.offset
+        wanted = joint.compute_transform(float(angle), clamp=False)
+        np.testing.assert_allclose(
+            place, wanted.translation.as_arrow_array().to_pylist()[0], atol=1e-6
+        )
+        expected = np.array(wanted.quaternion.as_arrow_array().to_pylist()[0])
+        assert abs(expected @ turn) == pytest.approx(1.0, abs=1e-6)
+        checked += 1
+    assert checked >= len(names)

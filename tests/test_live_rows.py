@@ -1,0 +1,220 @@
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspector.live import LiveError
+from inspector.live.csvrows import CsvReader
+from inspector.live.feeding import follow
+from inspector.live.jsonrows import JsonReader
+from inspector.live.rows import LONGEST, blocks, reader_of
+
+HEAD = b"time,elbow.velocity,wrist.velocity,elbow.position,wrist.position,load"
+
+
+def noting():
+    said = []
+
+    def note(kind, line, count=1):
+        said.append((kind, line))
+
+    return note, said
+
+
+def read(reader, lines, first=2):
+    note, said = noting()
+    return list(reader.read(lines, first, note)), said
+
+
+# CSV.
+
+
+def test_columns_are_found_by_their_names():
+    reader = CsvReader(HEAD, ())
+    (rows,), said = read(reader, b"0.5,1,2,3,4,9\n0.6,1.5,-2e-3,3,4,9\n")
+    assert reader.names == ("elbow", "wrist")
+    assert rows.time.tolist() == [0.5, 0.6]
+    assert rows.signals["velocity"].tolist() == [[1.0, 2.0], [1.5, -2e-3]]
+    assert rows.signals["position"].tolist() == [[3.0, 4.0], [3.0, 4.0]]
+    assert said == []
+
+
+def test_a_person_says_which_joints_come_in_which_order():
+    (rows,), _ = read(CsvReader(HEAD, ("wrist",)), b"0,1,2,3,4,9\n")
+    assert rows.signals["velocity"].tolist() == [[2.0]]
+    head = b"t;actual_qd_0;actual_qd_1;target_qd_0;target_qd_1"
+    reader = CsvReader(head, ("shoulder", "elbow"))
+    (rows,), _ = read(reader, b"0;1;2;3;4\r\n")
+    assert rows.signals["velocity_desired"].tolist() == [[3.0, 4.0]]
+    assert CsvReader(head, ()).names == ("joint1", "joint2")
+
+
+def test_empty_cells_and_nan_are_not_known():
+    (rows,), said = read(CsvReader(HEAD, ()), b"0,,nan,1,2,3\n")
+    assert np.isnan(rows.signals["velocity"]).all()
+    assert said == []
+
+
+def test_malformed_rows_are_told_by_their_line_and_left_out():
+    lines = b"0,1,2,3,4,9\n1,2,3\n\nx,1,2,3,4,9\n2,1,2,3,4,9\n"
+    (rows,), said = read(CsvReader(HEAD, ()), lines, first=100)
+    assert rows.time.tolist() == [0.0, 2.0]
+    assert [line for _, line in said] == [
+        "line 101: 3 cells where the header names 6; such rows are left out",
+        "line 103: could not convert string to float: 'x'; such rows are left out",
+    ]
+    assert {kind for kind, _ in said} == {"malformed rows"}
+
+
+def test_without_stamps_a_malformed_row_still_takes_its_time():
+    (rows,), said = read(CsvReader(b"a.velocity", ()), b"1\noops\n3\n")
+    np.testing.assert_array_equal(rows.signals["velocity"], [[1.0], [np.nan], [3.0]])
+    assert rows.time is None
+    assert len(said) == 1
+
+
+def test_both_ways_of_reading_agree():
+    random = np.random.default_rng(0)
+    table = random.normal(size=(50, 6)) * 10.0 ** random.integers(-9, 9, (50, 6))
+    lines = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
+    (fast,), said = read(CsvReader(HEAD, ()), lines)
+    (careful,), _ = read(CsvReader(HEAD, ()), lines + b"broken\n")
+    assert said == []
+    assert np.array_equal(fast.signals["velocity"], table[:, 1:3])
+    assert np.array_equal(careful.signals["velocity"], table[:, 1:3])
+    assert np.array_equal(careful.time, fast.time)
+
+
+@pytest.mark.parametrize(
+    ("head", "names", "reason"),
+    [
+        (b"hello", (), "the header names no velocity; .* they are hello"),
+        (b"a.velocity,b.velocity,a.position", (), "the header has no position of joint 'b'"),
+        (b"a.velocity", ("b",), "the header has no velocity of joint 'b'"),
+    ],
+)
+def test_headers_that_do_not_say_enough_are_refused(head, names, reason):
+    with pytest.raises(LiveError, match=reason):
+        CsvReader(head, names)
+
+
+# JSON.
+
+
+def test_objects_hold_arrays_as_a_run_file_names_them():
+    reader, is_header = reader_of(b' {"velocity": [1]}', ("a",))
+    assert not is_header
+    assert reader.names == ("a",)
+    samples = [{"time": 0.1, "velocity": [1, None], "position": [3, 4.5], "else": "?"}] * 2
+    (rows,), _ = read(reader, "\n".join(map(json.dumps, samples)).encode())
+    np.testing.assert_array_equal(rows.signals["velocity"], [[1.0, np.nan]] * 2)
+    assert rows.signals["position"].tolist() == [[3.0, 4.5]] * 2
+    assert rows.time.tolist() == [0.1, 0.1]
+    assert set(rows.signals) == {"velocity", "position"}
+
+
+def test_objects_of_other_widths_come_apart_and_bad_ones_are_told():
+    lines = b'{"velocity":[1,2]}\n{"velocity":[1]}\n{"velocity":[1\n[3]\n{"velocity":["a"]}\n'
+    lines += b'{"velocity":{}}\n'
+    parts, said = read(JsonReader(()), lines, first=1)
+    assert [rows.signals["velocity"].shape for rows in parts] == [(1, 2), (1, 1)]
+    assert [line.split(":")[0] for _, line in said] == ["line 3", "line 4", "line 5", "line 6"]
+    assert said[1][1] == "line 4: no JSON object with a velocity; such rows are left out"
+    assert said[3][1] == "line 6: velocity holds no numbers; such rows are left out"
+
+
+# The stream.
+
+
+class Trickle(io.RawIOBase):
+    """A pipe that brings a few bytes at a time."""
+
+    def __init__(self, content, size):
+        self.content, self.size = content, size
+
+    def read1(self, most):
+        piece, self.content = self.content[: self.size], self.content[self.size :]
+        return piece
+
+
+@pytest.mark.parametrize("size", [1, 3, 7, 1000])
+def test_lines_come_whole_and_know_their_number(size):
+    content = b"".join(b"line %d\n" % number for number in range(1, 30)) + b"line 30"
+    for lines, number, _ in blocks(Trickle(content, size)):
+        for offset, line in enumerate(lines.splitlines()):
+            assert line == b"line %d" % (number + offset)
+    assert number + offset == 30
+
+
+def test_a_line_that_never_ends_is_refused():
+    with pytest.raises(LiveError, match=f"line 1 is longer than {LONGEST} bytes"):
+        list(blocks(Trickle(b"x" * (LONGEST + 2), 1 << 20)))
+
+
+# The command.
+
+
+def live(*arguments, text="", **options):
+    command = [sys.executable, "-m", "inspector", "live", *map(str, arguments)]
+    environment = {key: value for key, value in os.environ.items() if "DISPLAY" not in key}
+    return subprocess.run(
+        command, input=text, capture_output=True, text=True, env=environment, **options
+    )
+
+
+def csv(samples, rate=1000.0):
+    rows = [f"{i / rate:.6f},{np.sin(i / rate):.7f},0.1" for i in range(samples)]
+    return "\n".join(["time,a.velocity,b.velocity", *rows, ""])
+
+
+def test_the_command_shows_rows_and_sums_up(tmp_path):
+    text = csv(1000).replace("0.500000,", "half,", 1) + "1.2,3\n"
+    done = live("--rate", 1000, "--save", tmp_path / "live.rrd", text=text)
+    assert done.returncode == 0, done.stderr
+    assert "line 502: could not convert string to float: 'half'" in done.stderr
+    assert "999 samples, 1.00 s at 1000 Hz, written to" in done.stdout
+    assert "labels by arm-1khz: 3 ok" in done.stdout
+    assert "2 malformed rows" in done.stdout
+    assert "1 missing samples" in done.stdout
+    assert (tmp_path / "live.rrd").stat().st_size > 10_000
+
+
+def test_input_without_samples_is_one_line_and_no_file(tmp_path):
+    done = live("--rate", 1000, "--save", tmp_path / "live.rrd", text="time,a.velocity\n")
+    assert done.returncode == 3
+    wanted = "expected a CSV header and rows, or a JSON object per line"
+    assert done.stderr == f"inspector: the input has no samples; {wanted}\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [(b"", "the input is empty; expected a CSV header"), (b"a,b\n1,2\n", "names no velocity")],
+)
+def test_input_that_cannot_begin_begins_no_session(content, reason):
+    with pytest.raises(LiveError, match=reason):
+        follow(io.BytesIO(content), (), lambda names: pytest.fail("a session began"))
+
+
+def test_ctrl_c_ends_with_the_summary_and_a_whole_file(tmp_path):
+    path = tmp_path / "live.rrd"
+    command = [sys.executable, "-m", "inspector", "live", "--rate", "1000", "--save", str(path)]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    process.stdin.write(csv(700) + "0.800,1\n")  # what it says of that line says that it is there
+    process.stdin.flush()
+    assert "line 702: 2 cells" in process.stderr.readline()
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "700 samples, 0.70 s at 1000 Hz" in out
+    assert "Traceback" not in err
+    assert path.stat().st_size > 10_000
+    assert [entry.name for entry in Path(tmp_path).iterdir()] == ["live.rrd"]

@@ -1,0 +1,375 @@
+import gc
+import sys
+from itertools import pairwise
+from pathlib import Path
+from types import FunctionType, ModuleType
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+import inspector
+import noisemodel as nm
+from inspector import assets
+from inspector.labelling import load_library
+from inspector.live import LiveError
+from inspector.live.session import BLOCK
+from noisemodel import OutputError, UnknownJointError
+
+RATE = 1000.0
+PANDA = tuple(f"panda_joint{i}" for i in range(1, 8))
+
+
+@pytest.fixture(autouse=True)
+def strict():
+    rr.set_strict_mode(True)
+
+
+@pytest.fixture(scope="module")
+def library():
+    return load_library(assets.model_files())
+
+
+def motion(seconds, joints=3, hum=(1.0, 2.0)):
+    """Joints that swing, and hum at 90 Hz for a while."""
+    time = np.arange(round(seconds * RATE)) / RATE
+    random = np.random.default_rng(0)
+    phase = 2 * np.pi * (0.2 + 0.1 * np.arange(joints)) * time[:, None]
+    hums = (time >= hum[0]) & (time < hum[1])
+    desired = 0.5 * np.cos(phase)
+    velocity = desired + 1e-3 * random.standard_normal(desired.shape)
+    velocity += 0.1 * (hums * np.sin(2 * np.pi * 90 * time))[:, None]
+    position = 0.3 * np.sin(phase)
+    return {
+        "time": time, "velocity": velocity, "velocity_desired": desired, "position": position,
+    }  # fmt: skip
+
+
+def part(signals, piece):
+    return {name: values[piece] for name, values in signals.items()}
+
+
+def shown(tmp_path, signals, cuts=(), **options):
+    """Push a motion in pieces; the recording, what was told, and the summary."""
+    path, said = tmp_path / "live.rrd", []
+    session = inspector.LiveSession(RATE, save=path, tell=said.append, overwrite=True, **options)
+    edges = [0, *sorted(cuts), len(signals["time"])]
+    with session:
+        for first, stop in pairwise(edges):
+            session.push(**part(signals, slice(first, stop)))
+    return path, said, session.summary
+
+
+def read(path: Path, entity: str, component: str):
+    """Read a component back in order of time: times in [s], values."""
+    rows = []
+    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names and not chunk.is_static:
+            times = batch.column("time").cast(pa.int64()).to_pylist()
+            rows += zip(times, batch.column(component).to_pylist(), strict=True)
+    rows.sort(key=lambda row: row[0])
+    return np.array([time for time, _ in rows]) / 1e9, [value for _, value in rows]
+
+
+def entities(path: Path):
+    return set(RrdReader(path).store().schema().entity_paths())
+
+
+def test_a_session_shows_everything(tmp_path, library):
+    path, said, summary = shown(
+        tmp_path, motion(3.0, 7), robot="panda", joint_names=PANDA, library=library
+    )
+    assert said == []
+    assert {
+        "/noise/simplified",
+        "/spectrogram/bands",
+        "/class/found",
+        "/score",
+        "/events",
+        "/joints/velocity/0",
+        "/joints/velocity/0_desired",
+        "/joints/position/0",
+        "/robot/motion",
+        "/robot/panda/visual_geometries/panda_link3/visual_0",
+    } <= entities(path)
+    assert len(RrdReader(path).blueprints()) == 1
+    assert summary.samples == 3000
+    assert summary.model == "arm-1khz"
+    assert sum(summary.labels.values()) == 27
+    assert summary.troubles == {}
+    assert "delay from a sample to its label: median" in str(summary)
+    assert all(0.0 < delay < 10.0 for delay in summary.delays)
+
+
+@pytest.mark.parametrize("size", [1, 7, 50, 1301])
+def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, library, size):
+    signals = motion(2.5)
+    path, _, _ = shown(tmp_path, signals, range(size, 2500, size), library=library)
+    noise = nm.simplified(signals["velocity"], signals["velocity_desired"])
+    batch = library["arm-1khz"].classify(noise, RATE)
+    time, scores = read(path, "/score", "Scalars:scalars")
+    np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
+    np.testing.assert_allclose(scores, batch.scores, atol=1e-9)
+    assert "oscillations" in batch.label
+    _, states = read(path, "/class/found", "StateChange:state")
+    changes = [
+        label for i, label in enumerate(batch.label) if i == 0 or label != batch.label[i - 1]
+    ]
+    assert [state[0] for state in states] == [*changes, ""]
+
+
+def test_no_peak_of_the_noise_is_lost(tmp_path, library):
+    signals = motion(2.0)
+    signals["velocity"][1234] += 3.0
+    path, _, _ = shown(tmp_path, signals, library=library)
+    noise = nm.simplified(signals["velocity"], signals["velocity_desired"])
+    time, values = read(path, "/noise/simplified", "Scalars:scalars")
+    assert np.max(values) == pytest.approx(noise.max())
+    assert time[np.argmax(values)] == pytest.approx(1.234, abs=1e-6)
+    _, velocity = read(path, "/joints/velocity/0", "Scalars:scalars")
+    assert len(velocity) <= 2.0 * 400
+    assert np.max(velocity) == pytest.approx(signals["velocity"].max())
+
+
+def test_the_robot_stands_as_its_joints_say(tmp_path, library):
+    signals = motion(1.0, 7)
+    path, _, _ = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
+    time, turns = read(path, "/robot/motion", "Transform3D:quaternion")
+    _, frames = read(path, "/robot/motion", "Transform3D:child_frame")
+    first = np.array([frame[0] == "panda_link1" for frame in frames])
+    assert first.sum() == round(1.0 / BLOCK)
+    angle = np.interp(time[first], signals["time"], signals["position"][:, 0])
+    turned = [turn[0][2] for turn, own in zip(turns, first, strict=True) if own]
+    np.testing.assert_allclose(turned, np.sin(angle / 2), atol=1e-5)
+
+
+def test_a_floating_base_makes_noise_and_moves(tmp_path, library):
+    signals = motion(1.0, 1, hum=(9.0, 9.0)) | {
+        "base_velocity": np.full((1000, 6), 2.0),
+        "base_pose": np.tile([1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0], (1000, 1)),
+    }
+    names = nm.Robot.load("hyq").joint_names[:1]
+    path, _, _ = shown(tmp_path, signals, robot="hyq", joint_names=names, library=library)
+    _, noise = read(path, "/noise/simplified", "Scalars:scalars")
+    assert min(noise)[0] > np.sqrt(6) * 2.0
+    _, places = read(path, "/robot/motion", "Transform3D:translation")
+    assert [1.0, 2.0, 3.0] in [place[0] for place in places]
+
+
+def test_missing_samples_end_the_lane_and_labels_go_on_after_them(tmp_path, library):
+    signals = motion(4.0, hum=(9.0, 9.0))
+    kept = np.ones(4000, dtype=bool)
+    kept[1000:2500] = False
+    path, said, summary = shown(tmp_path, part(signals, kept), [777, 1900], library=library)
+    assert said == ["gap at 2.500 s: 1500 samples are missing"]
+    assert summary.troubles == {"missing samples": 1500}
+    time, states = read(path, "/class/found", "StateChange:state")
+    assert [state[0] for state in states] == ["ok", "", "ok", ""]
+    np.testing.assert_allclose(time, [0.15, 0.85, 2.65, 3.85], atol=0.051)
+    valid = nm.Run(
+        time=signals["time"],
+        velocity=signals["velocity"] * kept[:, None],
+        velocity_desired=signals["velocity_desired"] * kept[:, None],
+        joint_names=("a", "b", "c"),
+        valid=kept,
+    )
+    noise = nm.simplified(valid.velocity, valid.velocity_desired)
+    batch = library["arm-1khz"].classify(noise, RATE, valid=kept)
+    time, scores = read(path, "/score", "Scalars:scalars")
+    np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
+    np.testing.assert_allclose(scores, batch.scores, atol=1e-9)
+
+
+def test_values_that_are_not_known_make_no_noise_and_no_label(tmp_path, library):
+    signals = motion(2.0, hum=(9.0, 9.0))
+    signals["velocity"][1000:1003, 1] = np.nan
+    signals["velocity"][1500, 0] = np.inf
+    path, said, summary = shown(tmp_path, signals, library=library)
+    assert said == [
+        "velocity or velocity_desired is not known at 1.000 s: such samples make no noise, frames"
+        " with one have no label"
+    ]
+    assert summary.troubles == {"samples without noise": 4}
+    _, noise = read(path, "/noise/simplified", "Scalars:scalars")
+    assert np.isfinite(noise).all()
+    centres, _ = read(path, "/score", "Scalars:scalars")
+    np.testing.assert_allclose(centres, [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.3, 1.8], atol=1e-6)
+
+
+def test_positions_that_are_not_known_only_stop_the_robot(tmp_path, library):
+    signals = motion(1.0, 7)
+    signals["position"][:] = np.nan
+    path, _, summary = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
+    assert "/robot/motion" not in entities(path)
+    assert sum(summary.labels.values()) == 7
+
+
+def test_another_number_of_joints_is_told_once_counted_and_not_labelled(tmp_path, library):
+    whole, said = motion(3.0), []
+    with inspector.LiveSession(
+        RATE, save=tmp_path / "live.rrd", library=library, tell=said.append
+    ) as session:
+        session.push(**part(whole, slice(0, 1000)))
+        for first in range(1000, 2000, 100):
+            narrow = part(whole, slice(first, first + 100))
+            session.push(**narrow | {"velocity": narrow["velocity"][:, :2]})
+        session.push(**part(whole, slice(2000, 3000)))
+    assert said[0].startswith("velocity of 2 columns from 1.000 s on, where it had 3: not shown")
+    assert session.summary.troubles["samples with another width of velocity"] == 1000
+    assert session.summary.troubles["samples without noise"] == 1000
+    assert sum(session.summary.labels.values()) == 14
+    time, _ = read(tmp_path / "live.rrd", "/noise/simplified", "Scalars:scalars")
+    assert not ((time >= 1.0) & (time < 2.0)).any()
+
+
+def test_signals_that_cease_or_appear_are_told(tmp_path, library):
+    whole, said = motion(1.0), []
+    with inspector.LiveSession(
+        RATE, save=tmp_path / "live.rrd", library=library, tell=said.append
+    ) as session:
+        session.push(velocity=whole["velocity"][:500], position=whole["position"][:500])
+        session.push(velocity=whole["velocity"][500:], base_pose=np.zeros((500, 7)))
+    assert sorted(said) == [
+        "base_pose from 0.500 s on was not there at first: not shown",
+        "no position from 0.500 s on: it was there at first",
+    ]
+    assert sum(session.summary.labels.values()) == 7
+
+
+def test_without_stamps_samples_follow_each_other(tmp_path, library):
+    velocity = motion(1.0)["velocity"]
+    with inspector.LiveSession(RATE, save=tmp_path / "live.rrd", library=library) as session:
+        for row in velocity:
+            session.push(velocity=row)
+    time, _ = read(tmp_path / "live.rrd", "/noise/simplified", "Scalars:scalars")
+    np.testing.assert_allclose(time, np.arange(1000) / RATE, atol=1e-9)
+
+
+def test_a_rate_without_a_model_shows_noise_and_says_that_there_are_no_labels(tmp_path, library):
+    said = []
+    with inspector.LiveSession(
+        250.0, save=tmp_path / "live.rrd", library=library, tell=said.append
+    ) as session:
+        session.push(velocity=np.ones((500, 2)))
+    assert said == [
+        "No labels: rate of 250 Hz; the models' rates are 1000, 10000 Hz: too low for any; log"
+        " faster."
+    ]
+    assert "no labels" in str(session.summary)
+    found = entities(tmp_path / "live.rrd")
+    assert "/noise/simplified" in found
+    assert not any(path.startswith(("/class", "/score")) for path in found)
+
+
+def test_a_robot_without_positions_is_not_drawn_and_that_is_said(tmp_path, library):
+    said = []
+    with inspector.LiveSession(
+        RATE, robot="panda", joint_names=PANDA, save=tmp_path / "a.rrd", library=library,
+        tell=said.append,
+    ) as session:  # fmt: skip
+        session.push(velocity=np.zeros((100, 7)))
+    assert said == ["no positions: the robot is not drawn"]
+    assert "/noise/simplified" in entities(tmp_path / "a.rrd")
+
+
+def test_joints_are_named_by_the_robot_if_they_are_all_there(tmp_path, library):
+    joints = nm.Robot.load("panda").joint_names
+    signals = motion(0.2, len(joints))
+    path, _, _ = shown(tmp_path, signals, robot="panda", library=library)
+    styles = RrdReader(path).store().stream().filter(content="/joints/velocity/0")
+    names = [
+        name
+        for chunk in styles
+        for batch in [chunk.to_record_batch()]
+        if "SeriesLines:names" in batch.schema.names
+        for name in batch.column("SeriesLines:names").to_pylist()[0]
+    ]
+    assert tuple(names) == joints[:8]
+    with (
+        pytest.raises(
+            LiveError, match="7 velocities, and panda has 9 joints: panda_joint1, .*--na"
+        ),
+        inspector.LiveSession(
+            RATE, robot="panda", save=tmp_path / "b.rrd", library=library
+        ) as session,
+    ):
+        session.push(velocity=np.zeros(7))
+    assert not (tmp_path / "b.rrd").exists()
+
+
+@pytest.mark.parametrize(
+    ("sample", "reason"),
+    [
+        ({"velocity": np.zeros((2, 2, 2))}, r"velocity: shape \(2, 2, 2\), expected \(joints,\)"),
+        ({"velocity": ["fast"]}, "velocity: holds no numbers"),
+        (
+            {"velocity": np.zeros((3, 2)), "position": np.zeros((2, 2))},
+            "samples differ in number: 3 of velocity, 2 of position",
+        ),
+        ({"velocity": np.zeros(2), "time": [1.0, 2.0]}, r"time: shape \(2,\), expected \(1,\)"),
+        ({"velocity": np.zeros(2), "base_pose": np.zeros(6)}, "base_pose: 6 columns .*expected 7"),
+        ({"velocity": np.zeros(2), "position": np.zeros(3)}, "position: 3 columns in the first"),
+    ],
+)
+def test_samples_that_are_none_are_refused(tmp_path, library, sample, reason):
+    session = inspector.LiveSession(RATE, save=tmp_path / "live.rrd", library=library)
+    with pytest.raises(LiveError, match=reason):
+        session.push(**sample)
+    session.close()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_joint_that_the_robot_lacks_is_named(tmp_path, library):
+    with (
+        pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'; it has panda_"),
+        inspector.LiveSession(
+            RATE, robot="panda", joint_names=["elbow"], save=tmp_path / "a.rrd", library=library
+        ) as session,
+    ):
+        session.push(velocity=[0.0], position=[0.0])
+
+
+def test_a_session_ends_once_and_takes_nothing_then(tmp_path, library):
+    session = inspector.LiveSession(RATE, save=tmp_path / "live.rrd", library=library)
+    session.push(velocity=np.zeros((10, 2)))
+    assert str(session.close()) == str(session.close())
+    with pytest.raises(LiveError, match="the session is closed; begin another one"):
+        session.push(velocity=np.zeros(2))
+
+
+def test_an_existing_recording_is_not_overwritten_unasked(tmp_path, library):
+    (tmp_path / "live.rrd").write_text("precious")
+    with pytest.raises(OutputError, match="exists already"):
+        inspector.LiveSession(RATE, save=tmp_path / "live.rrd", library=library)
+    with pytest.raises(LiveError, match="a rate of 0 Hz; expected 1 or more"):
+        inspector.LiveSession(0.0, save=tmp_path / "other.rrd", library=library)
+
+
+def test_memory_does_not_grow(tmp_path, library):
+    second = part(motion(1.0), slice(None)) | {"time": None}
+    with inspector.LiveSession(RATE, save=tmp_path / "live.rrd", library=library) as session:
+        session.push(**second)
+        session.push(**second)
+        early = size_of(session)
+        for _ in range(20):
+            session.push(**second)
+        # Delays of labels, ten floats a second up to a limit, and nothing else.
+        assert size_of(session) - early < 20 * 10 * 64
+
+
+def size_of(whole):
+    """Bytes of what is reachable from an object, code left out."""
+    seen, waiting, total = set(), [whole], 0
+    while waiting:
+        each = waiting.pop()
+        if id(each) in seen or isinstance(each, (type, ModuleType, FunctionType)):
+            continue
+        seen.add(id(each))
+        total += sys.getsizeof(each)
+        waiting += gc.get_referents(each)
+        if isinstance(each, np.ndarray) and each.base is not None:
+            waiting.append(each.base)
+    return total

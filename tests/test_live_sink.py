@@ -1,0 +1,149 @@
+import http.server
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from contextlib import closing, contextmanager
+
+import numpy as np
+import pytest
+
+import inspector
+from inspector import viewer
+from inspector.live import SinkError
+from inspector.live import sink as module
+from inspector.live.sink import Sink
+
+
+def free_port():
+    with closing(socket.socket()) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+@contextmanager
+def receiver(home):
+    """What receives recordings as a viewer does, without a window."""
+    port = free_port()
+    command = [sys.executable, "-m", "rerun", "--serve-grpc", "--bind", "127.0.0.1"]
+    process = subprocess.Popen(
+        [*command, "--port", str(port)],
+        env=os.environ | {"HOME": str(home)},
+        start_new_session=True,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+    try:
+        for _ in range(300):
+            if module._listens("127.0.0.1", port):
+                break
+            time.sleep(0.1)
+        yield port, lambda: viewer.end(process)
+    finally:
+        viewer.end(process)
+
+
+def second(first):
+    return {"velocity": np.ones((1000, 2)), "time": first + np.arange(1000) / 1000}
+
+
+def test_a_viewer_that_dies_is_told_once_and_labels_go_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "KNOCK", 0.0)
+    said = []
+    with receiver(tmp_path) as (port, end):
+        session = inspector.LiveSession(1000.0, connect=f"127.0.0.1:{port}", tell=said.append)
+        session.push(**second(0.0))
+        assert said == []
+        assert len(session.summary.delays) == 7
+        end()
+        started = time.monotonic()
+        for first in range(1, 4):
+            session.push(**second(first))
+        summary = session.close()
+        assert time.monotonic() - started < 20.0
+    (line,) = said
+    assert line.startswith("the viewer is gone or hangs, noticed at 1.")
+    assert line.endswith("s: samples are only labelled and counted")
+    assert summary.troubles == {"samples that the viewer may not have shown": 3000}
+    assert sum(summary.labels.values()) == 37
+    assert f"shown by the viewer at 127.0.0.1:{port}" in str(summary)
+
+
+def test_a_file_goes_on_when_the_viewer_beside_it_dies(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "KNOCK", 0.0)
+    path, said = tmp_path / "live.rrd", []
+    with receiver(tmp_path) as (port, end):
+        session = inspector.LiveSession(1000.0, connect=str(port), save=path, tell=said.append)
+        session.push(**second(0.0))
+        end()
+        session.push(**second(1.0))
+        summary = session.close()
+    assert summary.troubles == {"samples that the viewer may not have shown": 1000}
+    assert said[0].endswith("s: the file goes on")
+    assert len(summary.delays) == 17
+    assert path.stat().st_size > 10_000
+
+
+def test_what_is_no_viewer_is_told_from_one(tmp_path):
+    server = http.server.HTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    try:
+        with pytest.raises(SinkError, match="what listens there is no viewer of rerun; start one"):
+            Sink(connect=f"127.0.0.1:{server.server_port}")
+    finally:
+        server.shutdown()
+        server.server_close()
+
+
+def test_a_viewer_that_is_missing_is_told_with_what_to_do(tmp_path, monkeypatch):
+    port = free_port()
+    with pytest.raises(SinkError, match=f"no viewer at 127.0.0.1:{port}, nothing listens there"):
+        Sink(tmp_path / "live.rrd", str(port))
+    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(module, "PORT", port)
+    monkeypatch.setattr(module.viewer, "has_display", lambda: False)
+    with pytest.raises(SinkError, match="no display to open one on; use --connect .* or --save"):
+        Sink()
+
+
+@pytest.mark.parametrize("address", ["here", "1.2.3.4:", "99999", "0", "http://a:1/x"])
+def test_addresses_that_are_none_are_refused(address):
+    with pytest.raises(SinkError, match="is no address of a viewer; expected PORT, HOST:PORT or"):
+        Sink(connect=address)
+
+
+def test_addresses_may_be_short_or_whole():
+    assert module._parsed("9876") == ("127.0.0.1", 9876)
+    assert module._parsed("robot:80") == ("robot", 80)
+    assert module._parsed("rerun+http://127.0.0.1:9876/proxy") == ("127.0.0.1", 9876)
+
+
+def test_a_viewer_is_opened_on_loopback_and_on_another_port_if_its_own_is_taken(monkeypatch):
+    commands = []
+
+    class Viewer:
+        returncode = 1
+
+        def __init__(self, command, **options):
+            commands.append(command)
+
+        def poll(self):
+            return 1
+
+    with closing(socket.socket()) as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        monkeypatch.setattr(module, "PORT", port)
+        monkeypatch.setattr(module, "ANSWER", 0.2)
+        monkeypatch.setattr(module.viewer, "has_display", lambda: True)
+        monkeypatch.setattr(module.subprocess, "Popen", Viewer)
+        with pytest.raises(SinkError, match="the viewer ended with status 1; use --save"):
+            Sink()
+    (command,) = commands
+    assert command[command.index("--bind") + 1] == "127.0.0.1"
+    assert command[command.index("--port") + 1] != str(port)
+    assert "--memory-limit" in command

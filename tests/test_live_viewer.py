@@ -1,0 +1,55 @@
+import time
+
+import numpy as np
+import pytest
+
+import inspector
+
+picture = pytest.importorskip("picture")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING),
+]
+
+
+def test_a_viewer_follows_a_session_and_reports_no_error():
+    time_ = np.arange(3000) / 1000
+    swing = 0.5 * np.cos(time_[:, None] * np.arange(1, 8))
+    with picture.headless_viewer() as client:
+        port = client.url.rpartition(":")[2].partition("/")[0]
+        names = [f"panda_joint{i}" for i in range(1, 8)]
+        with inspector.LiveSession(
+            1000.0, robot="panda", joint_names=names, connect=port
+        ) as session:
+            for first in range(0, 3000, 50):
+                piece = slice(first, first + 50)
+                session.push(time=time_[piece], velocity=swing[piece], position=swing[piece])
+        state = until(client, lambda state: any(recording_end(state) > 2.9))
+        views = picture.settled(client).views
+        errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
+    assert session.summary.troubles == {}
+    assert recording_end(state).max() == pytest.approx(2.999, abs=1e-6)
+    (recording,) = state.recordings
+    assert recording.current_time / 1e9 > 2.0  # it follows
+    assert {"Robot", "Classes", "Noise, simplified estimate [rad/s]"} <= {v.name for v in views}
+    assert not [report for view in views for report in view.reports]
+    assert not errors
+
+
+def recording_end(state):
+    ends = [line.end for each in state.recordings for line in each.timelines if line.name == "time"]
+    return np.array(ends) / 1e9
+
+
+def until(client, holds, patience=60.0):
+    """Ask for the viewer's state until something holds; it answers late under load."""
+    limit = time.monotonic() + patience
+    while True:
+        try:
+            state = client.get_state()
+            if holds(state) or time.monotonic() > limit:
+                return state
+        except Exception:
+            if time.monotonic() > limit:
+                raise
+        time.sleep(0.3)
