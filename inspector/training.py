@@ -8,6 +8,8 @@ import models
 import noisemodel as nm
 from inspector.errors import InspectorError
 from noisemodel.atomic import refuse_existing
+from scenarios.sample import Sample, is_sample
+from scenarios.signals import WHOLE
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
     "logbands": lambda rate: models.LogBands().at(rate),
@@ -24,7 +26,7 @@ def train(
     """Train a model and write it.
 
     Args:
-        inputs: Run files with blocks, or NoisyTest folders.
+        inputs: Annotated run files, samples, folders of them, or NoisyTest folders.
         profile: One of ``PROFILES``.
         rate: Rate of the model, in [Hz]; faster runs are lowered to it.
         output: The model file to write.
@@ -54,7 +56,7 @@ def evaluate(model: Path, inputs: Sequence[Path]) -> models.Evaluation:
 
     Args:
         model: A model file.
-        inputs: Run files with blocks, or NoisyTest folders, that it was not trained on.
+        inputs: Annotated runs, samples or NoisyTest folders that it was not trained on.
 
     Returns:
         The paper's metrics and the honest ones.
@@ -65,23 +67,21 @@ def evaluate(model: Path, inputs: Sequence[Path]) -> models.Evaluation:
 
 
 def recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recording]:
-    """Read annotated noise from run files and NoisyTest folders.
+    """Read annotated noise from runs, samples and NoisyTest folders.
 
     Args:
-        inputs: Files and folders.
+        inputs: Files, and folders of them, however deep.
         rate: The rate to bring runs to, in [Hz].
 
     Yields:
-        One recording per run or log.
+        One recording per run, sample or log.
     """
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
             yield from models.noisytest.read_folder(path, rate=rate)
-        elif path.is_dir():
-            for file in sorted(path.glob("*.npz")):
-                yield of_run(file, rate)
-        else:
-            yield of_run(path, rate)
+            continue
+        for file in sorted(path.rglob("*.npz")) if path.is_dir() else [path]:
+            yield of_sample(file, rate) if is_sample(file) else of_run(file, rate)
 
 
 def of_run(path: Path, rate: float) -> models.Recording:
@@ -111,4 +111,36 @@ def of_run(path: Path, rate: float) -> models.Recording:
         start=float(slower.time[0]),
         valid=slower.mask,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+    )
+
+
+def of_sample(path: Path, rate: float) -> models.Recording:
+    """Read the annotated noise of a sample.
+
+    Args:
+        path: A sample, as `inspector simulate dataset` makes it.
+        rate: The rate that it must have, in [Hz]: noise cannot be lowered as velocities can.
+
+    Returns:
+        Its simplified noise with its blocks, named by robot, scenario and seed, with the hash of
+        the run that it was made of.
+
+    Raises:
+        InspectorError: If the sample has another rate, or no blocks.
+        SampleError: If it cannot be read.
+    """
+    sample = Sample.load(path, only=WHOLE[:2])
+    if abs(sample.rate / rate - 1) > 1e-3:
+        raise InspectorError(
+            f"{path}: keeps the noise at {sample.rate:g} Hz and no velocities, so that it cannot"
+            f" be brought to {rate:g} Hz; scenarios.again makes its run again"
+        )
+    if not sample.blocks:
+        raise InspectorError(f"{path}: has no annotated blocks")
+    return models.Recording(
+        name=sample.name,
+        signal=sample.noise,
+        rate=rate,
+        blocks=tuple(models.Block(b.start, b.stop, b.label) for b in sample.blocks),
+        sha256=str(sample.meta["sha256"]),
     )

@@ -1,7 +1,11 @@
 """Robots in simulation, with and without defects, as labelled runs."""
 
+from scenarios.again import again
 from scenarios.errors import (
+    ChangedRunError,
+    DatasetError,
     MissingSimulatorError,
+    SampleError,
     ScenarioError,
     SimulationError,
     UnknownScenarioError,
@@ -9,15 +13,19 @@ from scenarios.errors import (
     UnsuitedScenarioError,
     UnsupportedModelError,
 )
-from scenarios.robots import ROBOTS, Arm
+from scenarios.robots import ROBOTS
+from scenarios.sample import Sample
 from scenarios.simulation import simulate
 from scenarios.table import SCENARIOS, Scenario
 
 __all__ = [
     "ROBOTS",
     "SCENARIOS",
-    "Arm",
+    "ChangedRunError",
+    "DatasetError",
     "MissingSimulatorError",
+    "Sample",
+    "SampleError",
     "Scenario",
     "ScenarioError",
     "SimulationError",
@@ -25,5 +33,6 @@ __all__ = [
     "UnsimulatedRobotError",
     "UnsuitedScenarioError",
     "UnsupportedModelError",
+    "again",
     "simulate",
 ]

@@ -35,7 +35,7 @@ class Drives:
         stiffness: Position gains, shape (joints,), in [N m/rad].
         damping: Velocity gains, shape (joints,), in [N m s/rad].
         limit: Largest torques, shape (joints,), in [N m].
-        offset: What the encoders read too much, shape (joints,), in [rad].
+        offset: What the encoders are off by at rest, shape (joints,), in [rad].
         imperfections: Encoder, filter and delay.
         step: Time between two samples, in [s].
     """
@@ -52,7 +52,7 @@ class Drives:
         step: float,
     ) -> None:
         self._stiffness, self._damping = stiffness, damping
-        self._limit, self._offset = limit, offset
+        self._least, self._limit = -limit, limit
         self._count = imperfections.encoder_step
         self._step = step
         self._alpha, self._beta = tracking_gains(imperfections.encoder_bandwidth, step)
@@ -61,17 +61,17 @@ class Drives:
             [np.zeros_like(start)] * imperfections.torque_delay, imperfections.torque_delay
         )
 
-    def read(self, position: Array, noise: Array) -> tuple[Array, Array]:
+    def read(self, position: Array, error: Array) -> tuple[Array, Array]:
         """Read all encoders.
 
         Args:
             position: True joint positions, shape (joints,), in [rad].
-            noise: Noise of this sample, shape (joints,), in [rad].
+            error: What the encoders are off by, shape (joints,), in [rad].
 
         Returns:
             Positions, in [rad], and velocities, in [rad/s], as the drives report them.
         """
-        reading = np.rint((position + self._offset + noise) / self._count) * self._count
+        reading = np.rint((position + error) / self._count) * self._count
         predicted = self._tracked + self._step * self._velocity
         miss = reading - predicted
         self._tracked = predicted + self._alpha * miss
@@ -96,5 +96,5 @@ class Drives:
         wanted = feedforward + self._stiffness * (desired - position)
         wanted += self._damping * (rate - velocity)
         acting = self._waiting.popleft()
-        self._waiting.append(np.minimum(np.maximum(wanted, -self._limit), self._limit))
+        self._waiting.append(np.minimum(np.maximum(wanted, self._least), self._limit))
         return acting

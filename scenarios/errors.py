@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 
 
 class ScenarioError(ValueError):
@@ -82,14 +83,25 @@ class DivergedError(ScenarioError):
         super().__init__(f"{problem} at {time:.3f} s")
 
 
+class FallenError(DivergedError):
+    """A robot fell.
+
+    Args:
+        time: When, in [s].
+    """
+
+    def __init__(self, time: float) -> None:
+        super().__init__(time, "it fell")
+
+
 class SimulationError(ScenarioError):
-    """A run that diverged: it is no sample.
+    """A run that diverged, or in which the robot fell: it is no sample.
 
     Args:
         robot: The robot that moved.
         scenario: What happened to it.
         seed: The seed of the run.
-        time: When it diverged, in [s].
+        time: When that was, in [s].
         problem: What was seen.
     """
 
@@ -97,9 +109,43 @@ class SimulationError(ScenarioError):
         self.robot, self.scenario, self.seed = robot, scenario, seed
         self.time, self.problem = time, problem
         super().__init__(
-            f"{robot} in scenario {scenario!r} with seed {seed} diverged at {time:.3f} s"
+            f"{robot} in scenario {scenario!r} with seed {seed} went out of control at {time:.3f} s"
             f" ({problem}); such a run is no sample, take another seed"
         )
+
+
+class SampleError(ScenarioError):
+    """A file that is no sample, or a damaged one.
+
+    Args:
+        path: The file that was read.
+        problem: What is wrong with it, in one line.
+    """
+
+    def __init__(self, path: Path, problem: str) -> None:
+        self.path, self.problem = path, problem
+        super().__init__(f"{path}: {problem}")
+
+
+class ChangedRunError(ScenarioError):
+    """A run that does not come out as it once did.
+
+    Args:
+        name: The sample that was made of it.
+        made: What it was made with, in a few words.
+        here: What there is now.
+    """
+
+    def __init__(self, name: str, made: str, here: str) -> None:
+        self.name, self.made, self.here = name, made, here
+        super().__init__(
+            f"{name} comes out another way than before: it was made with {made}, here is {here};"
+            " the versions that made it make it again"
+        )
+
+
+class DatasetError(ScenarioError):
+    """A data set that cannot be made as it was asked for."""
 
 
 def _hint(name: str, known: Iterable[str]) -> str:

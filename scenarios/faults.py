@@ -5,24 +5,15 @@ from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from noisemodel.types import Array
 from scenarios.events import Event
 from scenarios.shapes import Box
 
+Integers: TypeAlias = NDArray[np.int64]
 Signal: TypeAlias = Callable[[Array], Array]
-
-
-def _no_shift(time: Array) -> Array:
-    return np.zeros((len(time), 3))
-
-
-def _no_overlay(time: Array) -> Array:
-    return np.zeros((len(time), 2))
-
-
-def _no_force(time: Array) -> Array:
-    return np.zeros(len(time))
+"""From times, shape (times,), in [s], to values, their first axis the times."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,46 +22,85 @@ class Faults:
 
     Attributes:
         boxes: What stands on the ground and was not expected.
+        ground: What the robot really stands on, if that is not what it plans with.
         decalibration: What the encoders of joints, by index, read too much, in [rad].
-        shift: Added to the planned place of the tool: time to shape (ticks, 3), in [m].
-        overlay: Height and its rate added to what the drives are to follow: time to shape
-            (samples, 2), in [m] and [m/s].
-        force: Added to the force sensor: time to shape (ticks,), in [N].
-        force_gain: Scale of the force control's gain.
+        shift: Added to the planned places of the effectors: time to shape
+            (ticks, effectors, 3), in [m].
+        overlay: Heights and their rates added to what the drives are to follow: time to shape
+            (samples, effectors, 2), in [m] and [m/s].
+        sensors: Added to what sensors say, by the sensor's name: time to shape (ticks, values).
+        gain: Scale of the force control's gains: time to shape (ticks,).
         events: What is known to go wrong before the robot moves.
         facts: What was drawn, for the record.
     """
 
     boxes: tuple[Box, ...] = ()
+    ground: tuple[Box, ...] | None = None
     decalibration: Mapping[int, float] = field(default_factory=dict)
-    shift: Signal = _no_shift
-    overlay: Signal = _no_overlay
-    force: Signal = _no_force
-    force_gain: float = 1.0
+    shift: Signal | None = None
+    overlay: Signal | None = None
+    sensors: Mapping[str, Signal] = field(default_factory=dict)
+    gain: Signal = np.ones_like
     events: tuple[Event, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
 
+    def offsets(self, joints: int) -> Array:
+        """What each of a number of encoders reads too much, shape (joints,), in [rad]."""
+        return np.array([self.decalibration.get(joint, 0.0) for joint in range(joints)])
 
-def ramps(time: Array, *, starts: Array, rises: Array, moves: Array) -> Array:
-    """Sum of movements at constant speed, shape (ticks, 3)."""
-    return np.clip((time[:, None] - starts) / rises, 0, 1) @ moves
+
+def ramps(
+    time: Array, *, starts: Array, rises: Array, moves: Array, effectors: Integers, count: int
+) -> Array:
+    """Sum of movements at constant speed, each of one effector, shape (times, count, 3)."""
+    share = np.clip((time[:, None] - starts) / rises, 0, 1)
+    out = np.zeros((len(time), count, 3))
+    for effector in range(count):
+        mine = effectors == effector
+        out[:, effector] = share[:, mine] @ moves[mine]
+    return out
 
 
 def pulses(time: Array, *, starts: Array, stops: Array, sizes: Array) -> Array:
-    """Sum of rectangular pulses, shape (ticks,)."""
+    """Sum of rectangular pulses of sizes (pulses, values), shape (times, values)."""
     return ((starts <= time[:, None]) & (time[:, None] < stops)) @ sizes
 
 
+def step(time: Array, *, start: float, factor: float) -> Array:
+    """Go from 1 to a factor at once, shape (times,)."""
+    return np.where(time < start, 1.0, factor)
+
+
 def sines(
-    time: Array, *, rates: Array, phases: Array, amplitude: float, start: float, stop: float
+    time: Array,
+    *,
+    rates: Array,
+    phases: Array,
+    amplitude: float,
+    start: float,
+    stop: float,
+    shares: Array,
 ) -> Array:
-    """Sum of sines that fades in and out over 0.1 s, and its rate, shape (samples, 2)."""
-    out = np.zeros((len(time), 2))
+    """Sum of sines that fades in and out over 0.1 s, and its rate.
+
+    Args:
+        time: Shape (times,), in [s].
+        rates: Of the sines, shape (sines,), in [rad/s].
+        phases: Of the sines, shape (sines,), in [rad].
+        amplitude: Of the one sine that would carry as much power.
+        start: When it sets in, in [s].
+        stop: When it ends, in [s].
+        shares: Which share of it each effector gets, shape (effectors,).
+
+    Returns:
+        Shape (times, effectors, 2).
+    """
+    out = np.zeros((len(time), len(shares), 2))
     inside = (start < time) & (time < stop)
     now = time[inside]
     envelope = np.minimum(1, np.minimum(now - start, stop - now) / 0.1)
     angles = np.outer(now, rates) + phases
     scale = amplitude / np.sqrt(len(rates)) * envelope
-    out[inside, 0] = scale * np.sin(angles).sum(axis=1)
-    out[inside, 1] = scale * (np.cos(angles) @ rates)
+    wave = np.stack((scale * np.sin(angles).sum(axis=1), scale * (np.cos(angles) @ rates)), axis=1)
+    out[inside] = shares[:, None] * wave[:, None]
     return out

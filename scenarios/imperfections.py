@@ -16,14 +16,14 @@ class Imperfections:
         stiffness: Scale of each drive's position gain.
         damping: Scale of each drive's velocity gain.
         force_gain: Scale of the force control's gain.
-        mass: Scale of each link's inertia; the controller does not know it.
-        payload: Mass at the tool that the controller does not know, in [kg].
+        mass: Scale of each moving body's inertia; the controller does not know it.
+        payload: Mass that it carries and the controller does not know, in [kg].
         friction: Scale of each joint's Coulomb friction.
         viscous: Scale of each joint's viscous friction.
         encoder_bits: Encoder counts per turn of a joint, as a power of two.
         encoder_noise: Standard deviation of the encoders' noise, in [rad].
         encoder_bandwidth: Natural frequency of the filter that reports velocities, in [Hz].
-        force_noise: Standard deviation of the force sensor's noise per millisecond, in [N].
+        force_noise: Standard deviation of the force sensors' noise per millisecond, in [N].
         torque_delay: Samples between a reading and the torque that answers it.
     """
 
@@ -41,33 +41,38 @@ class Imperfections:
     torque_delay: int
 
     @classmethod
-    def draw(cls, rng: np.random.Generator, joints: int) -> Self:
+    def draw(
+        cls, rng: np.random.Generator, joints: int, *, bodies: int, payload: float, force: float
+    ) -> Self:
         """Draw the imperfections of one robot.
 
         Args:
             rng: Source of chance.
-            joints: How many joints the robot has.
+            joints: How many drives the robot has.
+            bodies: How many moving bodies it has.
+            payload: Largest mass that nobody told the controller of, in [kg].
+            force: Largest standard deviation of the force sensors' noise, in [N].
 
         Returns:
             Gains and masses off by up to 5 %, frictions by up to half, an encoder of 21 to 23 bit
             (a motor's encoder behind its gear), 0.2 to 0.6 ms of delay.
         """
 
-        def scales(spread: float) -> tuple[float, ...]:
-            return tuple(rng.uniform(1 - spread, 1 + spread, joints).tolist())
+        def scales(spread: float, count: int = joints) -> tuple[float, ...]:
+            return tuple(rng.uniform(1 - spread, 1 + spread, count).tolist())
 
         return cls(
             stiffness=scales(0.05),
             damping=scales(0.05),
             force_gain=float(rng.uniform(0.95, 1.05)),
-            mass=scales(0.05),
-            payload=float(rng.uniform(0.0, 0.3)),
+            mass=scales(0.05, bodies),
+            payload=float(rng.uniform(0.0, payload)),
             friction=scales(0.5),
             viscous=scales(0.5),
             encoder_bits=int(rng.integers(21, 24)),
             encoder_noise=float(rng.uniform(0.2e-6, 1e-6)),
             encoder_bandwidth=float(rng.uniform(400, 700)),
-            force_noise=float(rng.uniform(0.1, 0.4)),
+            force_noise=float(rng.uniform(force / 4, force)),
             torque_delay=int(rng.integers(2, 7)),
         )
 

@@ -2,13 +2,20 @@
 
 A run is compared with its *twin*: the same seed without the defect, sample by sample the same
 until the defect acts. The difference of the measured joint velocities, less what is slower than
-`Rule.lowest`, is the *deviation*; the motion is *felt* to deviate while the root mean square of
-the deviation's norm over `Rule.smoothing` exceeds `Rule.felt` (gaps up to `Rule.gap` are bridged).
+`Rule.lowest`, is the *deviation*; its *loudness* is the root mean square of its norm over
+`Rule.smoothing`, and the motion is *felt* to deviate while that exceeds `Rule.felt` (gaps up to
+`Rule.gap` are bridged).
 
-An event becomes blocks of its class: the felt stretches between its start and `Rule.tail` after
-its stop, but not beyond the next event, each on the condition of its class:
+A walking robot that was disturbed once never meets its twin's steps again: two good walks deviate
+from each other at every touchdown. Therefore an event is held against the loudest of the
+`Rule.before` seconds in front of it, those of earlier events left out: it has to become
+`Rule.contrast` times as loud, and an oscillation counts only while it is louder at all. An
+oscillation that was commanded in a band is looked for in that band alone.
 
-- `impact`: the root mean square reaches `Rule.blow`;
+An event becomes blocks of its class: the stretches in which it is felt between its start and
+`Rule.tail` after its stop, but not beyond the next event, each on the condition of its class:
+
+- `impact`: the loudness reaches `Rule.blow`;
 - `highaccelerations`: a joint's deviation changes faster than `Rule.acceleration`;
 - `oscillations`: the joint that deviates most swings through `Rule.periods` periods or more.
 
@@ -42,10 +49,12 @@ class Rule:
     Attributes:
         lowest: Slower deviations are a matter of place, not of noise, in [Hz].
         smoothing: Time over which the root mean square is taken, in [s].
-        felt: Root mean square from which a deviation counts, in [rad/s].
+        felt: Loudness from which a deviation counts, in [rad/s].
+        contrast: How much louder than before it an event has to be.
+        before: The time before an event that it is held against, in [s].
         gap: Quiet time that is bridged, in [s].
         tail: How long an event lasts on after its cause has gone, in [s].
-        blow: Root mean square that an impact has to reach, in [rad/s].
+        blow: Loudness that an impact has to reach, in [rad/s].
         acceleration: What a high acceleration has to reach, in [rad/s²].
         periods: How many periods make an oscillation.
         margin: Unlabelled time around what is no ok, in [s].
@@ -55,6 +64,8 @@ class Rule:
     lowest: float = 10.0
     smoothing: float = 0.02
     felt: float = 0.03
+    contrast: float = 1.5
+    before: float = 0.4
     gap: float = 0.1
     tail: float = 0.15
     blow: float = 0.1
@@ -75,14 +86,16 @@ class Trace:
     Attributes:
         event: The event.
         labelled: Time that carries its label, in [s].
-        peak: Largest root mean square of the deviation, in [rad/s].
+        peak: Its largest loudness, in [rad/s].
         acceleration: Fastest change of a joint's deviation, in [rad/s²].
+        background: Loudest of the time that it was held against, in [rad/s].
     """
 
     event: Event
     labelled: float
     peak: float
     acceleration: float
+    background: float
 
     def record(self) -> dict[str, Any]:
         """Give the trace as plain data."""
@@ -91,25 +104,37 @@ class Trace:
             "labelled": round(self.labelled, 6),
             "peak": round(self.peak, 6),
             "acceleration": round(self.acceleration, 3),
+            "background": round(self.background, 6),
         }
 
 
-def deviation(velocity: Array, twin: Array, *, rate: float, rule: Rule = RULE) -> Array:
+def deviation(
+    velocity: Array,
+    twin: Array,
+    *,
+    rate: float,
+    band: tuple[float, float] | None = None,
+    rule: Rule = RULE,
+) -> Array:
     """Fast part of the difference between a run and its twin.
 
     Args:
         velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
         twin: Those of the twin, shape (samples, joints), in [rad/s].
         rate: Sample rate, in [Hz].
+        band: Frequencies to look at alone, in [Hz].
         rule: The labelling rule.
 
     Returns:
-        The difference after a causal high-pass of first order, which moves nothing ahead of its
-        cause, shape (samples, joints), in [rad/s].
+        The difference after a causal filter of first order (a high-pass, or the band's), which
+        moves nothing ahead of its cause, shape (samples, joints), in [rad/s].
     """
     from scipy.signal import butter, sosfilt
 
-    sections = butter(1, rule.lowest, "highpass", fs=rate, output="sos")
+    if band:
+        sections = butter(1, band, "bandpass", fs=rate, output="sos")
+    else:
+        sections = butter(1, rule.lowest, "highpass", fs=rate, output="sos")
     return np.asarray(sosfilt(sections, velocity - twin, axis=0), dtype=np.float64)
 
 
@@ -131,28 +156,42 @@ def annotate(
     events = _independent(events)
     fast = deviation(velocity, twin, rate=rate, rule=rule)
     loudness = _loudness(fast, rate, rule)
-    change = np.abs(np.diff(fast, axis=0, prepend=fast[:1])).max(axis=1) * rate
-    felt = _spans(loudness > rule.felt, round(rule.gap * rate))
     samples, blocks, traces = len(fast), [], []
     busy = np.zeros(samples, dtype=bool)
-    for first, end in felt:
+    for first, end in _spans(loudness > rule.felt, round(rule.gap * rate)):
         busy[first:end] = True
+    acting = np.zeros(samples, dtype=bool)
     starts = [round(event.start * rate) for event in events] + [samples]
     for event, first, following in zip(events, starts, starts[1:], strict=False):
         end = min(round((event.stop + rule.tail) * rate), following, samples)
+        heard, level = fast, loudness
+        if "band" in event.facts:
+            heard = deviation(velocity, twin, rate=rate, band=event.facts["band"], rule=rule)
+            level = _loudness(heard, rate, rule)
+        until = max(0, first - round(rule.smoothing * rate))  # the average looks ahead
+        earlier = slice(max(0, until - round(rule.before * rate)), until)
+        background = float(level[earlier][~acting[earlier]].max(initial=0.0))
+        least = max(rule.felt, background if event.label == "oscillations" else 0.0)
+        felt = _spans(level > least, round(rule.gap * rate))
+        change = np.abs(np.diff(heard[first:end], axis=0, prepend=heard[first : first + 1]))
+        change = change.max(axis=1, initial=0.0) * rate
         own = [
             (a, b)
             for a, b in _clipped(felt, first, end)
-            if _bears_out(event.label, fast[a:b], loudness[a:b], change[a:b], rule)
+            if level[a:b].max() > rule.contrast * background
+            and _bears_out(event.label, heard[a:b], level[a:b], change[a - first : b - first], rule)
         ]
         blocks += [Block(a / rate, b / rate, event.label) for a, b in own]
-        busy[first : round(event.stop * rate)] = True
+        for a, b in [*own, (first, round(event.stop * rate))]:
+            busy[a:b] = True
+        acting[until:end] = True
         traces.append(
             Trace(
                 event,
                 labelled=sum(b - a for a, b in own) / rate,
-                peak=float(loudness[first:end].max(initial=0.0)),
-                acceleration=float(change[first:end].max(initial=0.0)),
+                peak=float(level[first:end].max(initial=0.0)),
+                acceleration=float(change.max(initial=0.0)),
+                background=background,
             )
         )
     margin = 2 * round(rule.margin * rate) + 1

@@ -1,6 +1,7 @@
 """The loop that moves a robot: a tick of control, then ten samples of drives and physics."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
 from typing import Any, Protocol, Self
 
 import mujoco
@@ -9,7 +10,8 @@ import numpy as np
 from noisemodel.types import Array
 from scenarios.clock import STEPS, TICK
 from scenarios.drives import Drives
-from scenarios.errors import DivergedError
+from scenarios.errors import DivergedError, FallenError
+from scenarios.touching import put
 
 FASTEST = 50.0
 """A joint that is faster than this has diverged, in [rad/s] or [m/s]."""
@@ -39,7 +41,8 @@ class Reference:
         velocity: At the two ticks, shape (2, joints), in [rad/s].
         planned: Velocity that the plan alone asks for, at the two ticks, shape (2, joints).
         torque: What the model predicts to need, shape (joints,), in [N m].
-        lift: Movement of the joints per height of the tool, shape (joints,), in [rad/m].
+        lift: Movement of the joints per height of each effector, shape (effectors, joints),
+            in [rad/m].
     """
 
     position: Array
@@ -56,6 +59,35 @@ class Control(Protocol):
         """Advance by one tick, with the mean of each sensor over the tick before."""
         ...
 
+    def fallen(self, sensors: Array) -> bool:
+        """Tell whether the robot has fallen, by the sensors' means over the tick before."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A robot in its world, ready to be moved.
+
+    Attributes:
+        model: The ``mujoco.MjModel``; its actuators are the joints, the last ones of its
+            configuration; its first sensors are the contact forces of the effectors.
+        start: True configuration at first, as MuJoCo has it.
+        control: The robot's controller.
+        effectors: How many effectors there are.
+        settling: Ticks before the recording, in which the robot comes to rest.
+        noise: Standard deviation of each sensor's noise per tick, shape (sensors,).
+        changes: Boxes that come or go: geoms, and whether they are there, by ticks of the
+            recording.
+    """
+
+    model: Any
+    start: Array
+    control: Control
+    effectors: int
+    settling: int
+    noise: Array
+    changes: Mapping[int, Sequence[tuple[int, bool]]] = field(default_factory=dict)
+
 
 @dataclass(frozen=True, eq=False)
 class Motion:
@@ -69,7 +101,11 @@ class Motion:
         planned: Velocities of the plan alone, shape (samples, joints), in [rad/s].
         commanded: Velocities that the controller asks for, shape (samples, joints), in [rad/s].
         torque: Of the drives, shape (samples, joints), in [N m].
-        sensors: True values of the sensors, shape (samples, sensors).
+        contact: True contact force of each effector, shape (samples, effectors), in [N].
+        base_pose: True pose of a floating base, as MuJoCo has it (quaternion w, x, y, z),
+            shape (samples, 7), or (samples, 0).
+        base_velocity: Its velocity, as MuJoCo has it (linear in the world's axes, angular in its
+            own), shape (samples, 6), or (samples, 0).
     """
 
     position: Array
@@ -79,13 +115,15 @@ class Motion:
     planned: Array
     commanded: Array
     torque: Array
-    sensors: Array
+    contact: Array
+    base_pose: Array
+    base_velocity: Array
 
     @classmethod
-    def empty(cls, samples: int, joints: int, sensors: int) -> Self:
+    def empty(cls, samples: int, joints: int, effectors: int, *, floating: bool) -> Self:
         """Make room for a recording."""
-        widths = [joints] * (len(fields(cls)) - 1) + [sensors]
-        return cls(*(np.zeros((samples, width)) for width in widths))
+        base = [7, 6] if floating else [0, 0]
+        return cls(*(np.zeros((samples, width)) for width in [*[joints] * 7, effectors, *base]))
 
     def since(self, sample: int) -> "Motion":
         """Leave out what came before a sample."""
@@ -93,58 +131,69 @@ class Motion:
 
 
 def record(
-    model: Any,
-    start: Array,
+    scene: Scene,
     drives: Drives,
-    control: Control,
     *,
-    encoder_noise: Array,
+    encoder_error: Array,
     sensor_error: Array,
-    overlay: Array,
-    settling: int,
+    overlay: Array | None = None,
 ) -> Motion:
     """Move a robot.
 
     Args:
-        model: The ``mujoco.MjModel``; its actuators are the joints.
-        start: True joint positions at first, shape (joints,), in [rad].
+        scene: The robot in its world.
         drives: The robot's drives.
-        control: The robot's controller.
-        encoder_noise: Shape (samples, joints), in [rad].
+        encoder_error: What the encoders are off by, shape (samples, joints), in [rad].
         sensor_error: Added to what the sensors tell the controller, shape (ticks, sensors).
-        overlay: Height of the tool and its rate, added to what the drives follow,
-            shape (samples, 2), in [m] and [m/s].
-        settling: Ticks before the recording, in which the robot comes to rest.
+        overlay: Heights of the effectors and their rates, added to what the drives follow,
+            shape (samples, effectors, 2), in [m] and [m/s].
 
     Returns:
-        What was recorded.
+        What was recorded once the robot had come to rest.
 
     Raises:
         DivergedError: If a joint is too fast, or its position is no number any more.
+        FallenError: If the robot fell.
     """
+    model, control = scene.model, scene.control
     data = mujoco.MjData(model)
-    data.qpos[:] = start
-    motion = Motion.empty(len(encoder_noise), len(start), model.nsensordata)
+    data.qpos[:] = scene.start
+    samples, joints = encoder_error.shape
+    base = model.nq - joints
+    motion = Motion.empty(samples, joints, scene.effectors, floating=base > 0)
+    joint_position, joint_velocity = data.qpos[-joints:], data.qvel[-joints:]
+    base_pose, base_velocity = data.qpos[:base], data.qvel[:-joints]
+    effector_force, heard = data.sensordata[: scene.effectors], data.sensordata
+    told = np.zeros((STEPS, model.nsensordata))
     sensors = np.zeros(model.nsensordata)
     for tick, error in enumerate(sensor_error):
         now = slice(tick * STEPS, (tick + 1) * STEPS)
+        for geom, there in scene.changes.get(tick - scene.settling, ()):
+            put(model, geom, there=there)
         reference = control.tick(tick, sensors + error)
         ends = np.concatenate((reference.position, reference.velocity))
-        motion.commanded[now] = _VELOCITY @ ends
+        targets, rates = _POSITION @ ends, _VELOCITY @ ends
+        motion.commanded[now] = rates
         motion.planned[now] = (1 - _S) * reference.planned[0] + _S * reference.planned[1]
-        wave = overlay[now, :, None] * reference.lift
-        targets = motion.position_desired[now] = _POSITION @ ends + wave[:, 0]
-        rates = motion.velocity_desired[now] = motion.commanded[now] + wave[:, 1]
+        if overlay is not None:
+            wave = np.einsum("seo,ej->osj", overlay[now], reference.lift)
+            targets, rates = targets + wave[0], rates + wave[1]
+        motion.position_desired[now], motion.velocity_desired[now] = targets, rates
         for step, sample in enumerate(range(now.start, now.stop)):
-            position, velocity = drives.read(data.qpos, encoder_noise[sample])
+            position, velocity = drives.read(joint_position, encoder_error[sample])
             torque = drives.torque(position, velocity, targets[step], rates[step], reference.torque)
             data.ctrl[:] = torque
-            mujoco.mj_step(model, data)
             motion.position[sample], motion.velocity[sample] = position, velocity
-            motion.torque[sample], motion.sensors[sample] = torque, data.sensordata
-        sensors = motion.sensors[now].mean(axis=0)
-        fastest = np.abs(data.qvel).max()
+            motion.torque[sample] = torque
+            if base:
+                motion.base_pose[sample], motion.base_velocity[sample] = base_pose, base_velocity
+            mujoco.mj_step(model, data)
+            told[step], motion.contact[sample] = heard, effector_force
+        sensors = told.mean(axis=0)
+        time = (tick + 1 - scene.settling) * TICK
+        fastest = np.abs(joint_velocity).max()
         if not fastest < FASTEST:  # also true of no number
-            time = (tick + 1 - settling) * TICK
             raise DivergedError(time, f"a joint moved at {fastest:.3g} rad/s")
-    return motion.since(settling * STEPS)
+        if control.fallen(sensors):
+            raise FallenError(time)
+    return motion.since(scene.settling * STEPS)

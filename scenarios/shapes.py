@@ -1,19 +1,26 @@
 """The shapes that touch one another in a simulation."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
 
 @dataclass(frozen=True)
 class Box:
-    """A box that stands in the world, its edges along the world's axes.
+    """A box that stands in the world.
 
     Attributes:
         centre: x, y, z of its centre, in [m].
         half: Half of its edge lengths, in [m].
+        yaw: How far it is turned about the vertical, in [rad].
+        since: When it comes to be, in [s]: what lies where a foot stands would be inside of it.
+        until: When it is gone, in [s].
     """
 
     centre: tuple[float, float, float]
     half: tuple[float, float, float]
+    yaw: float = 0.0
+    since: float = 0.0
+    until: float = float("inf")
 
     @property
     def top(self) -> float:
@@ -34,3 +41,57 @@ class Rod:
     frame: str
     length: float
     radius: float
+
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """The point that the robot moves, in the frame's axes, in [m]."""
+        return (0.0, 0.0, self.length)
+
+    @property
+    def patch(self) -> tuple[float, float]:
+        """Half of the extent of what touches, in [m]."""
+        return (self.radius, self.radius)
+
+
+@dataclass(frozen=True)
+class Sole:
+    """A flat sole whose lower face has its middle at a point of a robot's frame.
+
+    Attributes:
+        frame: Name of the frame, its z axis pointing up.
+        patch: Half of its length and of its width, in [m].
+        point: Middle of the lower face, in the frame's axes, in [m].
+        thickness: In [m].
+    """
+
+    frame: str
+    patch: tuple[float, float]
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    thickness: float = 0.02
+
+
+@dataclass(frozen=True)
+class Ball:
+    """A ball around the origin of a robot's frame.
+
+    Attributes:
+        frame: Name of the frame.
+        radius: In [m].
+    """
+
+    frame: str
+    radius: float
+
+    @property
+    def point(self) -> tuple[float, float, float]:
+        """The point that the robot moves, in the frame's axes, in [m]."""
+        return (0.0, 0.0, 0.0)
+
+    @property
+    def patch(self) -> tuple[float, float]:
+        """Half of the extent of what touches, in [m]."""
+        return (self.radius, self.radius)
+
+
+Effector: TypeAlias = Rod | Sole | Ball
+"""What a robot touches the world with."""

@@ -2,14 +2,17 @@
 
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from noisemodel import Run
 from noisemodel.types import Array
-from scenarios.clock import RATE, STEP, times
-from scenarios.defects import NoDefect
+from scenarios.case import Case
+from scenarios.clock import RATE, STEP, STEPS, times
+from scenarios.contacts import unplanned
+from scenarios.defects import Plan
 from scenarios.errors import (
     DivergedError,
     MissingSimulatorError,
@@ -23,18 +26,16 @@ from scenarios.events import Event
 from scenarios.faults import Faults
 from scenarios.imperfections import Imperfections
 from scenarios.labels import RULE, annotate
-from scenarios.robots import ROBOTS, Arm
+from scenarios.robots import ROBOTS, Simulated
 from scenarios.table import SCENARIOS, Scenario
 
 if TYPE_CHECKING:
-    from scenarios.loop import Motion
+    from scenarios.loop import Motion, Scene
 
-RECIPE = 1
+RECIPE = 2
 """Version of all that makes a run; one more whenever a seed gives another run than before."""
-DURATION = 7.0
-"""How long a run lasts unless told otherwise, in [s]."""
 SHORTEST = 3.0
-"""Time for one approach and half a second of pressing, so that every defect can act, in [s]."""
+"""Time in which every defect can act, in [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,31 +48,33 @@ class Trial:
     imperfections: Imperfections
 
 
-def simulate(robot: str, scenario: str, seed: int, *, duration: float | None = None) -> Run:
+def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | None = None) -> Run:
     """Simulate a robot at 10 kHz in a scenario, and label what can be felt.
 
     The run without the defect and with the same seed, its twin, is simulated too; labels follow
-    from the difference by the rule in `scenarios.labels`. The twin is the ``ok`` run of the seed.
+    from the difference by the rule in `scenarios.labels`. The twin is a run in which the robot
+    does the same with nothing wrong; scenarios in which it does the same share it.
 
     Args:
         robot: A name in ``scenarios.ROBOTS``.
-        scenario: A name in ``scenarios.SCENARIOS``.
+        scenario: A name in ``scenarios.SCENARIOS``, or its number.
         seed: Draws the motion, what is imperfect about the robot, and the defect; at least 0.
-        duration: How long the run shall last, in [s]; 7 unless given.
+        duration: How long the run shall last, in [s]; the motion's own unless given.
 
     Returns:
         The run; the same call gives the same run, bit for bit. Stages ``planned`` and
-        ``commanded`` are the velocities before and after force control; ``meta`` tells what was
+        ``commanded`` are the velocities before and after feedback; ``meta`` tells what was
         drawn, and what each event left in the motion.
 
     Raises:
         ScenarioError: If the robot or the scenario is not known, one has no meaning on the
             other, the seed is negative, or the duration too short.
         MissingSimulatorError: If MuJoCo is not installed.
-        SimulationError: If the simulation diverged.
+        SimulationError: If the simulation diverged, or the robot fell.
     """
-    line, arm = _look_up(robot, scenario)
-    duration = DURATION if duration is None else duration
+    line, machine = look_up(robot, scenario)
+    case = line.cases[machine.family]
+    duration = case.motion.duration if duration is None else duration
     if seed < 0:
         raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
     if not SHORTEST <= duration < np.inf:
@@ -80,29 +83,47 @@ def simulate(robot: str, scenario: str, seed: int, *, duration: float | None = N
         import mujoco
     except ImportError as error:
         raise MissingSimulatorError from error
-    twin = _twin(robot, seed, duration)
-    healthy = isinstance(line.defect, NoDefect)
-    trial = twin if healthy else _try(arm, line, seed, duration)
+    import pinocchio
+
+    try:
+        twin = _twin(robot, Case(case.motion), seed, duration)
+        trial = twin if line.healthy else _try(machine, case, seed, duration)
+    except DivergedError as error:
+        raise SimulationError(robot, line.name, seed, error.time, error.problem) from error
     blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, trial.events, rate=RATE)
     motion = trial.motion
+    held = [joint for joint, angle in machine.held.items() if angle]
+    still = np.zeros((len(motion.velocity), len(held)))
+    posture = still + [machine.held[joint] for joint in held]
+
+    def whole(signal: Array, others: Array = still) -> Any:
+        return np.hstack((signal, others)).astype(np.float32)
+
     return Run(
         time=times(len(motion.velocity), STEP),
-        joint_names=arm.joints,
-        velocity=_single(motion.velocity),
-        position=_single(motion.position),
-        velocity_desired=_single(motion.velocity_desired),
-        position_desired=_single(motion.position_desired),
-        stages={"planned": _single(motion.planned), "commanded": _single(motion.commanded)},
-        effort=_single(motion.torque),
+        joint_names=(*machine.drives.joints, *held),
+        velocity=whole(motion.velocity),
+        position=whole(motion.position, posture),
+        velocity_desired=whole(motion.velocity_desired),
+        position_desired=whole(motion.position_desired, posture),
+        stages={"planned": whole(motion.planned), "commanded": whole(motion.commanded)},
+        effort=whole(motion.torque),
+        **_base(motion),
         robot=robot,
         blocks=blocks,
         meta={
             "source": "simulation",
-            "scenario": scenario,
+            "scenario": line.name,
+            "number": line.number,
             "seed": int(seed),
             "duration": float(duration),
             "recipe": RECIPE,
-            "mujoco": mujoco.__version__,
+            "versions": {
+                "mujoco": mujoco.__version__,
+                "pinocchio": pinocchio.__version__,
+                "numpy": np.__version__,
+            },
+            "motion": asdict(case.motion),
             "imperfections": asdict(trial.imperfections),
             "defect": dict(trial.faults.facts),
             "events": [trace.record() for trace in traces],
@@ -111,40 +132,108 @@ def simulate(robot: str, scenario: str, seed: int, *, duration: float | None = N
     )
 
 
-def _look_up(robot: str, scenario: str) -> tuple[Scenario, Arm]:
+def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
+    """Find a scenario and a robot that go together.
+
+    Args:
+        robot: A name in ``scenarios.ROBOTS``.
+        scenario: A name in ``scenarios.SCENARIOS``, or its number.
+
+    Returns:
+        Both.
+
+    Raises:
+        ScenarioError: If one is not known, or has no meaning on the other.
+    """
     if robot not in ROBOTS:
         raise UnsimulatedRobotError(robot, ROBOTS)
-    if scenario not in SCENARIOS:
-        raise UnknownScenarioError(scenario, SCENARIOS)
-    arm, line = ROBOTS[robot], SCENARIOS[scenario]
-    if arm.family not in line.families:
-        suited = [name for name, other in SCENARIOS.items() if arm.family in other.families]
-        raise UnsuitedScenarioError(scenario, robot, suited)
-    return line, arm
+    numbers = {str(line.number): name for name, line in SCENARIOS.items()}
+    name = numbers.get(str(scenario), str(scenario))
+    if name not in SCENARIOS:
+        raise UnknownScenarioError(name, SCENARIOS)
+    machine, line = ROBOTS[robot], SCENARIOS[name]
+    if machine.family not in line.cases:
+        suited = [name for name, other in SCENARIOS.items() if machine.family in other.cases]
+        raise UnsuitedScenarioError(name, robot, suited)
+    return line, machine
 
 
 @lru_cache(maxsize=1)
-def _twin(robot: str, seed: int, duration: float) -> Trial:
-    """Simulate the run without a defect; all scenarios of a seed share it."""
-    return _try(ROBOTS[robot], SCENARIOS["ok"], seed, duration)
+def _twin(robot: str, healthy: Case, seed: int, duration: float) -> Trial:
+    """Simulate the run without a defect; scenarios of one motion and seed share it."""
+    return _try(ROBOTS[robot], healthy, seed, duration)
 
 
-def _try(arm: Arm, scenario: Scenario, seed: int, duration: float) -> Trial:
+def _try(robot: Simulated, case: Case, seed: int, duration: float) -> Trial:
     """Simulate one run; each kind of chance has a stream of its own, so twins differ in one."""
-    from scenarios import arm as family
-
+    family = import_module(f"scenarios.{robot.family}.scene")
     streams = np.random.SeedSequence(seed).spawn(4)
-    motion, robot, sensors, defect = (np.random.default_rng(stream) for stream in streams)
-    plan = family.plan(arm, motion, duration)
-    imperfections = Imperfections.draw(robot, len(arm.joints))
-    faults = scenario.defect.draw(defect, plan)
-    try:
-        moved = family.move(arm, plan, faults, imperfections, sensors)
-    except DivergedError as error:
-        raise SimulationError(arm.name, scenario.name, seed, error.time, error.problem) from error
-    events = faults.events + family.unplanned_contacts(moved, plan)
-    return Trial(moved, events, faults, imperfections)
+    motion, machine, sensors, defect = (np.random.default_rng(stream) for stream in streams)
+    plan: Plan = family.plan(robot, case.motion, motion, duration)
+    imperfections = Imperfections.draw(
+        machine,
+        len(robot.drives.joints),
+        bodies=family.bodies(robot),
+        payload=robot.payload,
+        force=robot.force_noise,
+    )
+    faults = case.defect.draw(defect, plan)
+    scene = family.scene(robot, plan, faults, imperfections)
+    moved = _move(robot, scene, plan, faults, imperfections, sensors)
+    return Trial(
+        moved, faults.events + unplanned(moved.contact, plan.contacts), faults, imperfections
+    )
 
 
-def _single(signal: Array) -> Any:
-    return signal.astype(np.float32)
+def _move(
+    robot: Simulated,
+    scene: "Scene",
+    plan: Plan,
+    faults: Faults,
+    imperfections: Imperfections,
+    rng: np.random.Generator,
+) -> "Motion":
+    """Give the robot its drives and its sensors' errors, and let it move."""
+    from scenarios.drives import Drives
+    from scenarios.loop import record
+    from scenarios.sensing import sensors_of
+
+    given = robot.drives
+    joints = len(given.joints)
+    drives = Drives(
+        scene.start[-joints:],
+        stiffness=np.array(given.stiffness) * imperfections.stiffness,
+        damping=np.array(given.damping) * imperfections.damping,
+        limit=np.array(given.torque),
+        offset=faults.offsets(joints),
+        imperfections=imperfections,
+        step=STEP,
+    )
+    moving = len(plan.time)
+    ticks = scene.settling + moving
+    sensor_error = scene.noise * rng.standard_normal((ticks, len(scene.noise)))
+    where = sensors_of(scene.model)
+    for name, signal in faults.sensors.items():
+        sensor_error[scene.settling :, where[name]] += signal(plan.time)
+    overlay = None
+    if faults.overlay is not None:
+        overlay = np.zeros((ticks * STEPS, scene.effectors, 2))
+        overlay[scene.settling * STEPS :] = faults.overlay(times(moving * STEPS, STEP))
+    noise = rng.standard_normal((ticks * STEPS, joints))
+    return record(
+        scene,
+        drives,
+        encoder_error=imperfections.encoder_noise * noise + faults.offsets(joints),
+        sensor_error=sensor_error,
+        overlay=overlay,
+    )
+
+
+def _base(motion: "Motion") -> dict[str, Any]:
+    """Turn a floating base from MuJoCo's conventions to Pinocchio's; nothing if it is fixed."""
+    if not motion.base_pose.size:
+        return {}
+    from scenarios.base import pinocchio_base
+
+    pose, velocity = pinocchio_base(motion.base_pose, motion.base_velocity)
+    return {"base_pose": pose.astype(np.float32), "base_velocity": velocity.astype(np.float32)}

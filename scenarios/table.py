@@ -1,19 +1,17 @@
-"""The scenarios, as data: what goes wrong, on whom, and which labels may come of it."""
+"""The scenarios, as data: what a robot does, what goes wrong, and which labels may come of it.
+
+Numbers 1 to 24 are those of the paper's table (Sygulla & Rixen, Table I), with a humanoid's
+parameters as there; what follows was added. Where a family has an equivalent, it stands beside.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from scenarios.defects import (
-    Decalibration,
-    Defect,
-    ForceGain,
-    ForceJumps,
-    Multisine,
-    NoDefect,
-    Plates,
-    ReferenceJumps,
-)
+from scenarios.arm.cases import ARM
+from scenarios.case import BANDS, Case, multisine
+from scenarios.humanoid.cases import HUMANOID
+from scenarios.quadruped.cases import QUADRUPED
 
 
 @dataclass(frozen=True)
@@ -21,70 +19,75 @@ class Scenario:
     """One line of the table.
 
     Attributes:
+        number: Its number; up to 24 the paper's.
         name: What it is called.
         description: What happens, in one sentence.
-        families: The kinds of robot on which it has a meaning.
         labels: The classes that its runs may contain.
-        defect: What is wrong.
+        cases: What it is for each family of robots on which it has a meaning.
     """
 
+    number: int
     name: str
     description: str
-    families: tuple[str, ...]
     labels: tuple[str, ...]
-    defect: Defect
+    cases: Mapping[str, Case]
+
+    @property
+    def families(self) -> tuple[str, ...]:
+        """The families of robots on which it has a meaning."""
+        return tuple(self.cases)
+
+    @property
+    def healthy(self) -> bool:
+        """Whether nothing goes wrong in it."""
+        return self.labels == ("ok",)
 
 
-_TABLE = (
-    Scenario(
-        "ok",
-        "Picks from a table: nothing is wrong beyond what is imperfect about every robot.",
-        ("arm",),
-        ("ok",),
-        NoDefect(),
+_OK = ("ok",)
+_BLOW = ("ok", "impact", "highaccelerations")
+_FAST = ("ok", "highaccelerations", "oscillations", "impact")
+_SWING = ("ok", "oscillations", "impact")
+
+_LINES = (
+    (1, "straight", "Nothing is wrong: straight ahead, or from place to place.", _OK),
+    (2, "curve", "Nothing is wrong: in a curve.", _OK),
+    (3, "directions", "Nothing is wrong: sideways, backward, or any way.", _OK),
+    (4, "spot", "Nothing is wrong: on the spot.", _OK),
+    (5, "obstacle-full", "An undetected obstacle under the whole foot.", _BLOW),
+    (6, "obstacle-heel", "An undetected obstacle under the heel.", _BLOW),
+    (7, "obstacle-toe", "An undetected obstacle under the toe.", _BLOW),
+    (8, "obstacle-left", "An undetected obstacle under the left side of a foot.", _BLOW),
+    (9, "obstacle-right", "An undetected obstacle under the right side of a foot.", _BLOW),
+    (10, "decalibrated", "An encoder is off.", _BLOW),
+    *(
+        (
+            11 + index,
+            multisine(low, high),
+            f"Sines of {low} to {high} Hz are superposed on the height of feet or tool.",
+            _SWING,
+        )
+        for index, (low, high) in enumerate(BANDS)
     ),
+    (20, "early-height", "Repeated early contact, at varied heights of the motion.", _BLOW),
+    (21, "early-duration", "Repeated early contact, at varied durations of the motion.", _BLOW),
+    (22, "platform", "Ground that is not there: a partial contact at an edge, a step down.", _FAST),
+    (23, "force-jump", "The signal of a force sensor jumps.", _FAST),
+    (24, "torque-jump", "The signal of a torque sensor, or of an attitude, jumps.", _FAST),
+    (25, "limit-cycle", "Force control with too high gains becomes a limit cycle.", _SWING),
+    (26, "faint-oscillation", "Sines in any of the bands, of 0.01 to 2 mm.", _SWING),
+    (27, "reference-jump", "The planned motion jumps by millimetres.", _FAST),
+)
+
+_CASES = {"humanoid": HUMANOID, "quadruped": QUADRUPED, "arm": ARM}
+
+_TABLE = tuple(
     Scenario(
-        "table",
-        "The tool comes down on plates that nobody expected to lie on the table.",
-        ("arm",),
-        ("ok", "impact"),
-        Plates(),
-    ),
-    Scenario(
-        "decalibrated",
-        "A shoulder encoder is off, so that the tool hits the table before it should.",
-        ("arm",),
-        ("ok", "impact"),
-        Decalibration(),
-    ),
-    Scenario(
-        "jump",
-        "The planned motion jumps by millimetres, at once or within a few milliseconds.",
-        ("arm",),
-        ("ok", "highaccelerations", "impact"),
-        ReferenceJumps(),
-    ),
-    Scenario(
-        "sensor",
-        "The force sensor's signal jumps while the tool presses on the table.",
-        ("arm",),
-        ("ok", "highaccelerations"),
-        ForceJumps(),
-    ),
-    Scenario(
-        "chatter",
-        "The force control's gain is too high, so that pressing becomes a limit cycle.",
-        ("arm",),
-        ("ok", "oscillations"),
-        ForceGain(),
-    ),
-    Scenario(
-        "multisine",
-        "Sines in a band drawn by the seed are superposed on the height of the tool.",
-        ("arm",),
-        ("ok", "oscillations"),
-        Multisine(),
-    ),
+        *line,
+        MappingProxyType(
+            {family: cases[line[1]] for family, cases in _CASES.items() if line[1] in cases}
+        ),
+    )
+    for line in _LINES
 )
 
 SCENARIOS: Mapping[str, Scenario] = MappingProxyType({line.name: line for line in _TABLE})

@@ -293,19 +293,11 @@ def test_robots_are_listed(inspector):
     assert "talos " in out
 
 
-def test_scenarios_are_listed(inspector):
-    status, out, _ = inspector("simulate", "--list")
-    assert status == 0
-    assert {"ok", "table", "jump", "chatter", "multisine"} <= {
-        line.split()[0] for line in out.splitlines()
-    }
-
-
 def test_an_unknown_scenario_is_one_line(inspector, tmp_path):
     status, _, err = inspector("simulate", "panda", "--scenario", "dance", "-o", tmp_path / "r.npz")
     assert (status, err.count("\n")) == (3, 1)
     assert "dance" in err
-    assert "table" in err
+    assert "obstacle-full" in err
 
 
 def imported_by(*arguments):

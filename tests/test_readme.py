@@ -31,9 +31,11 @@ def test_the_first_screen_has_eight_lines_of_python():
 
 
 def test_every_command_of_the_readme_exists():
+    from typer.main import get_command
+
     from inspector.cli import app
 
-    known = {command.name or command.callback.__name__ for command in app.registered_commands}
+    known = set(get_command(app).commands)
     used = set(re.findall(r"^(?:\.venv/bin/)?inspector (\w+)", README, flags=re.MULTILINE))
     assert used <= known
     assert {"view", "classify", "import", "simulate", "train", "evaluate"} <= used

@@ -3,17 +3,21 @@
 import numpy as np
 import pytest
 
+from scenarios.arm.cases import ARM
+from scenarios.arm.picking import pick
 from scenarios.defects import (
     Decalibration,
     ForceGain,
-    ForceJumps,
+    GivingWay,
     Multisine,
     NoDefect,
-    Plates,
+    Obstacles,
     ReferenceJumps,
+    SensorJumps,
 )
-from scenarios.faults import pulses, ramps, sines
-from scenarios.picking import pick
+from scenarios.faults import pulses, ramps, sines, step
+from scenarios.motions import Picks
+from scenarios.shapes import Rod
 from scenarios.table import SCENARIOS
 
 TIME = np.arange(70_000) * 1e-4
@@ -22,42 +26,48 @@ TIME = np.arange(70_000) * 1e-4
 @pytest.fixture(scope="module")
 def plan():
     return pick(
+        Picks(),
         np.random.default_rng(0),
         start=np.array([0.46, 0.0, 0.43]),
+        tool=Rod("hand", length=0.08, radius=0.01),
         table=0.1,
         reach=((0.4, 0.58), (-0.2, 0.2)),
         duration=7.0,
     )
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
-def test_the_same_seed_draws_the_same_faults(scenario, plan):
-    one, two = (scenario.defect.draw(np.random.default_rng(4), plan) for _ in range(2))
+@pytest.mark.parametrize("name", ARM)
+def test_the_same_seed_draws_the_same_faults(name, plan):
+    one, two = (ARM[name].defect.draw(np.random.default_rng(4), plan) for _ in range(2))
     assert one.events == two.events
     assert one.facts == two.facts
     assert one.boxes == two.boxes
-    np.testing.assert_array_equal(one.shift(plan.time), two.shift(plan.time))
-    np.testing.assert_array_equal(one.force(plan.time), two.force(plan.time))
-    np.testing.assert_array_equal(one.overlay(TIME), two.overlay(TIME))
+    assert one.sensors.keys() == two.sensors.keys()
+    np.testing.assert_array_equal(one.gain(plan.time), two.gain(plan.time))
+    for signal, time in (("shift", plan.time), ("overlay", TIME)):
+        first, second = getattr(one, signal), getattr(two, signal)
+        assert (first is None) == (second is None)
+        if first is not None:
+            np.testing.assert_array_equal(first(time), second(time))
 
 
-@pytest.mark.parametrize("scenario", SCENARIOS.values(), ids=SCENARIOS)
-def test_a_defect_announces_only_labels_that_its_scenario_lists(scenario, plan):
-    faults = scenario.defect.draw(np.random.default_rng(0), plan)
-    assert {event.label for event in faults.events} <= set(scenario.labels)
+@pytest.mark.parametrize("name", ARM)
+def test_a_defect_announces_only_labels_that_its_scenario_lists(name, plan):
+    faults = ARM[name].defect.draw(np.random.default_rng(0), plan)
+    assert {event.label for event in faults.events} <= set(SCENARIOS[name].labels)
 
 
 def test_no_defect_changes_nothing(plan):
     faults = NoDefect().draw(np.random.default_rng(0), plan)
-    assert not faults.shift(plan.time).any()
-    assert not faults.overlay(TIME).any()
-    assert not faults.force(plan.time).any()
-    assert (faults.boxes, dict(faults.decalibration), faults.force_gain) == ((), {}, 1.0)
+    assert faults.shift is faults.overlay is faults.ground is None
+    assert (faults.boxes, dict(faults.decalibration), dict(faults.sensors)) == ((), {}, {})
+    assert (faults.gain(plan.time) == 1).all()
 
 
-def test_plates_lie_on_the_table_where_the_tool_comes_down(plan):
-    faults = Plates().draw(np.random.default_rng(1), plan)
-    places = [touch.place for touch in plan.touches]
+def test_obstacles_lie_on_the_table_where_the_tool_comes_down(plan):
+    defect = Obstacles((0.014, 0.025), (0.05, 0.05), share=0.7)
+    faults = defect.draw(np.random.default_rng(1), plan)
+    places = [contact.place for contact in plan.contacts]
     assert faults.boxes
     for box in faults.boxes:
         assert box.centre[2] - box.half[2] == pytest.approx(0.1)
@@ -65,31 +75,54 @@ def test_plates_lie_on_the_table_where_the_tool_comes_down(plan):
         assert (box.centre[0], box.centre[1]) in [place[:2] for place in places]
 
 
+def test_of_some_obstacles_only_so_many_are_drawn_and_they_are_offset_along_the_effector(plan):
+    defect = Obstacles((0.02, 0.02), (0.01, 0.01), offset=(3.0, -1.0), most=1)
+    (box,) = defect.draw(np.random.default_rng(1), plan).boxes
+    offsets = [np.subtract(box.centre[:2], contact.place[:2]) for contact in plan.contacts]
+    assert any(np.allclose(offset, [0.03, -0.01]) for offset in offsets)
+
+
+def test_ground_that_gives_way_is_as_high_as_before_until_it_does(plan):
+    faults = GivingWay((0.01, 0.01), (0.05, 0.05), (0.3, 0.5)).draw(np.random.default_rng(1), plan)
+    assert [box.top for box in faults.ground] == pytest.approx([0.09])
+    for box, contact in zip(faults.boxes, plan.contacts, strict=True):
+        assert box.top == pytest.approx(0.1)
+        assert contact.start + 0.3 <= box.until <= contact.start + 0.5
+    assert {event.label for event in faults.events} == {"highaccelerations"}
+
+
 def test_jumps_of_the_reference_go_away_and_come_back(plan):
     faults = ReferenceJumps().draw(np.random.default_rng(2), plan)
-    shift = np.linalg.norm(faults.shift(plan.time), axis=1)
+    shift = np.linalg.norm(faults.shift(plan.time)[:, 0], axis=1)
     assert not shift[: int(faults.events[0].start * 1e3)].any()
     assert 0.001 <= shift.max() <= 0.004
     after_second = int((faults.events[1].stop + 0.01) * 1e3)
     assert shift[after_second] == pytest.approx(0, abs=1e-12)
-    steps = np.linalg.norm(np.diff(faults.shift(plan.time), axis=0), axis=1)
+    steps = np.linalg.norm(np.diff(faults.shift(plan.time)[:, 0], axis=0), axis=1)
     assert steps.max() <= 2.0 * 1e-3 + 1e-9  # never faster than the settings say
 
 
 def test_the_force_signal_jumps_only_while_the_tool_presses(plan):
-    faults = ForceJumps().draw(np.random.default_rng(3), plan)
-    wrong = plan.time[faults.force(plan.time) != 0]
+    faults = SensorJumps((80.0, 160.0)).draw(np.random.default_rng(3), plan)
+    signal = faults.sensors["hand.touch"](plan.time)[:, 0]
+    wrong = plan.time[signal != 0]
+    assert np.abs(signal[signal != 0]).min() >= 80
     assert wrong.size
     assert all(
-        any(touch.start < time < touch.lift for touch in plan.touches) for time in wrong.tolist()
+        any(contact.start < time < contact.lift for contact in plan.contacts)
+        for time in wrong.tolist()
     )
 
 
 def test_a_gain_and_an_encoder_are_off_by_what_was_drawn(plan):
     gain = ForceGain(factor=(6.0, 7.0)).draw(np.random.default_rng(0), plan)
-    assert 6 <= gain.force_gain == gain.facts["factor"] <= 7
-    assert len(gain.events) == len(plan.touches)
-    encoder = Decalibration(joint=2, angle=(0.1, 0.2)).draw(np.random.default_rng(0), plan)
+    assert 6 <= gain.gain(plan.time)[0] == gain.facts["factor"] <= 7
+    later = ForceGain(factor=(6.0, 7.0), start=(0.5, 0.5), contacts=False)
+    gains = later.draw(np.random.default_rng(0), plan).gain(plan.time)
+    assert (gains[: len(gains) // 2] == 1).all()
+    assert (gains[len(gains) // 2 :] > 6).all()
+    assert len(gain.events) == len(plan.contacts)
+    encoder = Decalibration(joints=(2,), angle=(0.1, 0.2)).draw(np.random.default_rng(0), plan)
     assert 0.1 <= encoder.decalibration[2] <= 0.2
 
 
@@ -101,7 +134,8 @@ def test_a_multisine_has_one_line_per_hertz_of_its_band(plan):
         amplitude=1e-3,
         start=-1.0,
         stop=9.0,
-    )[10_000:60_000, 0]
+        shares=np.ones(1),
+    )[10_000:60_000, 0, 0]
     spectrum = np.abs(np.fft.rfft(wave))[::5]  # 5 s: every fifth bin is a whole hertz
     assert set(np.flatnonzero(spectrum > 0.1 * spectrum.max())) == set(range(40, 51))
     assert np.sqrt(2 * np.mean(wave**2)) == pytest.approx(1e-3, rel=1e-6)
@@ -109,8 +143,16 @@ def test_a_multisine_has_one_line_per_hertz_of_its_band(plan):
 
 def test_the_rate_of_a_multisine_is_its_slope():
     wave = sines(
-        TIME, rates=np.array([150.0]), phases=np.ones(1), amplitude=1e-3, start=1.0, stop=5.0
+        TIME,
+        rates=np.array([150.0]),
+        phases=np.ones(1),
+        amplitude=1e-3,
+        start=1.0,
+        stop=5.0,
+        shares=np.array([0.0, 1.0]),
     )
+    assert not wave[:, 0].any()
+    wave = wave[:, 1]
     inside = slice(12_000, 48_000)
     np.testing.assert_allclose(
         np.gradient(wave[:, 0], 1e-4)[inside], wave[inside, 1], rtol=0, atol=1e-4
@@ -120,7 +162,7 @@ def test_the_rate_of_a_multisine_is_its_slope():
 
 
 def test_high_bands_get_small_amplitudes(plan):
-    settings = Multisine(bands=((900, 1000),), amplitude=(0.002, 0.002))
+    settings = Multisine(bands=((900, 1000),), amplitude=(0.002, 0.002), fastest=1.0)
     faults = settings.draw(np.random.default_rng(0), plan)
     assert faults.facts["amplitude"] == pytest.approx(1.0 / (2 * np.pi * 1000))
 
@@ -128,10 +170,20 @@ def test_high_bands_get_small_amplitudes(plan):
 def test_ramps_and_pulses_add_up():
     time = np.array([0.0, 1.0, 1.5, 2.0, 3.0])
     moved = ramps(
-        time, starts=np.array([1.0]), rises=np.array([1.0]), moves=np.array([[0, 0, 2.0]])
+        time,
+        starts=np.array([1.0]),
+        rises=np.array([1.0]),
+        moves=np.array([[0, 0, 2.0]]),
+        effectors=np.array([1]),
+        count=2,
     )
-    np.testing.assert_allclose(moved[:, 2], [0, 0, 1, 2, 2])
+    np.testing.assert_allclose(moved[:, 1, 2], [0, 0, 1, 2, 2])
+    assert not moved[:, 0].any()
     pulse = pulses(
-        time, starts=np.array([1.0, 1.5]), stops=np.array([2.0, 2.5]), sizes=np.array([3.0, 4.0])
+        time,
+        starts=np.array([1.0, 1.5]),
+        stops=np.array([2.0, 2.5]),
+        sizes=np.array([[3.0], [4.0]]),
     )
-    np.testing.assert_allclose(pulse, [0, 3, 7, 4, 0])
+    np.testing.assert_allclose(pulse[:, 0], [0, 3, 7, 4, 0])
+    np.testing.assert_array_equal(step(time, start=1.5, factor=5.0), [1, 1, 5, 5, 5])

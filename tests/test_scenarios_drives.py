@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from scenarios.arm.control import ToolControl
+from scenarios.arm.picking import Plan
+from scenarios.arm.robots import PANDA
 from scenarios.clock import STEP, TICK
-from scenarios.control import ToolControl
 from scenarios.drives import Drives
 from scenarios.imperfections import Imperfections, real_model
-from scenarios.picking import Plan
-from scenarios.robots import PANDA
 
 
 def imperfections(**changes: float) -> Imperfections:
@@ -44,7 +44,7 @@ def drives(offset: float = 0.0, **changes: float) -> Drives:
 def test_a_joint_at_rest_reports_no_velocity():
     drive = drives(offset=0.05, encoder_bits=40)
     for _ in range(100):
-        position, velocity = drive.read(np.zeros(1), np.zeros(1))
+        position, velocity = drive.read(np.zeros(1), np.array([0.05]))
     assert position[0] == pytest.approx(0.05, abs=1e-9)
     assert abs(velocity[0]) < 1e-6
 
@@ -98,7 +98,7 @@ def test_a_robot_weighs_what_its_imperfections_say():
 
 
 def tool_control(plan: Plan) -> tuple[ToolControl, object]:
-    from scenarios.arm import reduced_model
+    from scenarios.reduced import reduced_model
 
     model = reduced_model(PANDA)
     control = ToolControl(
@@ -107,7 +107,7 @@ def tool_control(plan: Plan) -> tuple[ToolControl, object]:
         np.array([0, 0, PANDA.tool.length]),
         np.array(PANDA.rest),
         plan,
-        gain=1e-3,
+        gain=np.full(len(plan.time), 1e-3),
         time_constant=0.005,
     )
     return control, model
@@ -123,7 +123,7 @@ def tip(model, joints):
 
 def plan_from(position, force) -> Plan:
     ticks = len(position)
-    return Plan(position, np.zeros(ticks), np.full(ticks, force), np.zeros(ticks), ())
+    return Plan(position, np.zeros(ticks), np.full(ticks, force), np.zeros(ticks), (), (), ())
 
 
 def test_the_tool_goes_where_the_plan_says():

@@ -131,3 +131,31 @@ def test_the_deviation_moves_nothing_ahead_of_its_cause():
     fast = deviation(TWIN + knock(2.0, 1.0), TWIN, rate=RATE)
     assert not fast[: 2 * RATE].any()
     assert fast[2 * RATE + 1].any()
+
+
+def test_an_event_that_is_no_louder_than_the_time_before_it_is_not_felt():
+    parted = shake(0.5, 4.0, 0.2, hertz=15.0)  # a run that has long left its twin
+    event = Event("impact", "contact", 2.0, 2.02)
+    assert failures(label(parted, event)[0]) == []
+    blocks, (trace,) = label(parted + knock(2.0, 2.0), event)
+    (impact,) = failures(blocks)
+    assert impact.start == pytest.approx(2.0, abs=0.01)
+    assert impact.stop == pytest.approx(2.17, abs=1e-3)
+    assert 0.1 < trace.background < 0.3
+
+
+def test_what_earlier_events_did_is_no_background():
+    first, second = (Event("impact", "contact", at, at + 0.02) for at in (2.0, 2.4))
+    blocks, traces = label(knock(2.0, 3.0) + knock(2.4, 1.0), first, second)
+    assert len(failures(blocks)) == 2
+    assert traces[1].background < 0.2 * traces[0].peak
+
+
+def test_a_commanded_oscillation_is_looked_for_in_its_band():
+    event = Event("oscillations", "multi-sine", 1.0, 3.0, {"band": [60, 100]})
+    assert failures(label(shake(1.0, 3.0, 0.3, hertz=12.0), event)[0]) == []
+    blocks, _ = label(shake(1.0, 3.1, 0.3, hertz=80.0), event)
+    (block,) = failures(blocks)
+    assert (block.start, block.stop) == pytest.approx((1.0, 3.1), abs=0.05)
+    for before, after in pairwise(blocks):
+        assert after.start - before.stop >= 0.0499

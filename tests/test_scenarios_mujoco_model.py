@@ -6,9 +6,13 @@ import pinocchio as pin
 import pytest
 
 from noisemodel import Robot
+from scenarios.base import pinocchio_base
 from scenarios.errors import UnsupportedModelError
-from scenarios.mujoco_model import Physics, build
-from scenarios.shapes import Box, Rod
+from scenarios.mujoco_model import build
+from scenarios.physics import Physics
+from scenarios.sensing import sensors_of
+from scenarios.shapes import Ball, Box, Rod, Sole
+from scenarios.touching import changes_of, put
 
 ODD = """<robot name="odd"><link name="base"/>
 <link name="a"><inertial><origin xyz="0.1 0 0.2" rpy="0.3 0 0"/><mass value="2"/>
@@ -102,7 +106,7 @@ def test_a_rod_touches_with_its_tip_and_feels_the_weight_that_rests_on_it():
     built = build(
         pin.buildModelFromXML(urdf),
         physics(1),
-        rods=(Rod("tool", length=0.1, radius=0.01),),
+        effectors=(Rod("tool", length=0.1, radius=0.01),),
         boxes=(Box(centre=(0.0, 0.0, 0.15), half=(0.2, 0.2, 0.05)),),
     )
     data = mujoco.MjData(built)
@@ -115,13 +119,95 @@ def test_a_rod_touches_with_its_tip_and_feels_the_weight_that_rests_on_it():
     assert data.sensordata[0] == pytest.approx(2 * 9.81, rel=1e-3)
 
 
-def test_a_floating_base_is_refused_by_name():
+def test_a_floating_base_falls_freely_and_is_known_to_its_sensors():
     model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
+    model.inertias[1] = pin.Inertia.FromSphere(3.0, 0.1)
+    built = build(model, physics(model.nv - 6), effectors=(Ball("a", radius=0.01),))
+    data = mujoco.MjData(built)
+    mujoco.mj_forward(built, data)
+    start = data.sensordata.copy()
+    for _ in range(1000):
+        mujoco.mj_step(built, data)
+    mujoco.mj_forward(built, data)
+    where = sensors_of(built)
+    moved = (data.sensordata - start)[where["centre.place"]]
+    np.testing.assert_allclose(moved, [0, 0, -9.81 / 2 * 0.1**2], rtol=0, atol=1e-4)
+    speed = data.sensordata[where["centre.velocity"]]
+    np.testing.assert_allclose(speed, [0, 0, -0.981], rtol=0, atol=1e-6)
+    assert next(iter(where)) == "a.touch"
+    assert data.sensordata[where["a.touch"]] == 0
+    np.testing.assert_allclose(data.sensordata[where["base.place"]], data.qpos[:3])
+    np.testing.assert_allclose(data.sensordata[where["base.turn"]], data.qpos[3:7])
+
+
+def test_the_base_is_told_in_pinocchios_words():
+    rng = np.random.default_rng(3)
+    model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
+    model.inertias[1] = pin.Inertia.FromSphere(3.0, 0.1)
+    built = build(model, physics(model.nv - 6))
+    theirs, ours = mujoco.MjData(built), model.createData()
+    theirs.qpos[:7] = rng.normal(size=7)
+    theirs.qpos[3:7] /= np.linalg.norm(theirs.qpos[3:7])
+    theirs.qvel[:6] = rng.normal(size=6)
+    mujoco.mj_forward(built, theirs)
+    pose, velocity = pinocchio_base(theirs.qpos[None, :7], theirs.qvel[None, :6])
+    q, v = pin.neutral(model), np.zeros(model.nv)
+    q[:7], v[:6] = pose[0], velocity[0]
+    pin.forwardKinematics(model, ours, q, v)
+    twist = np.zeros(6)
+    body = built.body("root_joint").id
+    mujoco.mj_objectVelocity(built, theirs, mujoco.mjtObj.mjOBJ_XBODY, body, twist, 1)
+    np.testing.assert_allclose(ours.v[1].vector, [*twist[3:], *twist[:3]], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(ours.oMi[1].translation, theirs.qpos[:3], rtol=0, atol=1e-12)
+
+
+def test_a_sole_feels_the_weight_that_it_bears():
+    urdf = """<robot name="block"><link name="base"><inertial><mass value="4"/>
+      <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <link name="foot"><inertial><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="knee" type="prismatic"><parent link="base"/><child link="foot"/>
+      <origin xyz="0 0 -0.5"/><axis xyz="0 0 1"/>
+      <limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+    model = pin.buildModelFromXML(urdf, pin.JointModelFreeFlyer())
+    floor = Box(centre=(0.0, 0.0, -0.05), half=(1.0, 1.0, 0.05))
+    sole = Sole("foot", patch=(0.1, 0.05), point=(0.0, 0.0, -0.1))
+    stiff = Physics(
+        timestep=1e-4, armature=np.ones(1), damping=np.array([1e5]), friction=np.zeros(1)
+    )
+    built = build(model, stiff, effectors=(sole,), boxes=(floor,))
+    data = mujoco.MjData(built)
+    data.qpos[2] = 0.6001
+    for _ in range(8000):
+        mujoco.mj_step(built, data)
+    where = sensors_of(built)
+    weight = 5 * 9.81
+    assert data.sensordata[where["foot.touch"]] == pytest.approx(weight, rel=1e-2)
+    force = -data.sensordata[where["foot.force"]]  # of the ground on all that is below the site
+    assert force[2] == pytest.approx(4 * 9.81, rel=0.3)
+    assert data.sensordata[where["foot.place"]][2] == pytest.approx(0, abs=1e-3)
+
+
+def test_boxes_come_and_go():
+    boxes = (
+        Box((0, 0, 0), (1, 1, 1)),
+        Box((0, 0, 0), (1, 1, 1), since=0.5, until=0.8),
+    )
+    model = pin.buildModelFromXML(ODD)
+    built = build(model, physics(model.nv), boxes=boxes)
+    late = built.geom("box1").id
+    assert changes_of(built, boxes) == {500: [(late, True)], 800: [(late, False)]}
+    assert (built.geom_contype[late], built.geom_contype[built.geom("box0").id]) == (0, 2)
+    put(built, late, there=True)
+    assert built.geom_contype[late] == 2
+
+
+def test_an_effector_without_its_frame_is_answered_with_what_there_is():
+    model = pin.buildModelFromXML(ODD)
     with pytest.raises(
-        UnsupportedModelError,
-        match="joint 'root_joint' is floating; revolute, continuous, prismatic joints can be",
+        UnsupportedModelError, match="no frame 'sole' to touch with; it has .*slide"
     ):
-        build(model, physics(model.nv))
+        build(model, physics(model.nv), effectors=(Ball("sole", radius=0.01),))
 
 
 def test_a_body_without_mass_is_refused():

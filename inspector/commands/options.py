@@ -16,5 +16,6 @@ Kind = Annotated[
     str, typer.Option("--kind", help="Extended noise: normal, rms, mean, paper, A, B or C.")
 ]
 Inputs = Annotated[
-    list[Path], typer.Argument(help="Run files with annotated blocks, or NoisyTest folders.")
+    list[Path],
+    typer.Argument(help="Annotated runs, samples, folders of them, or NoisyTest folders."),
 ]

@@ -1,37 +1,19 @@
 """Pick-like motion of a tool: over a place, down, press, up; all drawn by a seed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from noisemodel.types import Array
 from scenarios.clock import TICK, times
+from scenarios.contacts import Contact
+from scenarios.defects.plan import Units
+from scenarios.motions import Picks
+from scenarios.paths import bump, minimum_jerk
+from scenarios.shapes import Box, Effector, Rod
 
-HOVER = 0.01
-"""Height over the table at which the tool slows down, in [m]."""
 NEAR = 0.002
 """Height over the table from which it presses, in [m]."""
-
-
-@dataclass(frozen=True)
-class Touch:
-    """A contact that is planned.
-
-    Attributes:
-        start: When the tool may first touch, in [s].
-        lift: When it is to leave, in [s].
-        stop: When it must have let go, in [s].
-        place: x, y, z of the surface there, in [m].
-    """
-
-    start: float
-    lift: float
-    stop: float
-    place: tuple[float, float, float]
-
-    def later(self, delay: float) -> "Touch":
-        """Move it in time."""
-        return Touch(self.start + delay, self.lift + delay, self.stop + delay, self.place)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,19 +25,28 @@ class Plan:
         yaw: Turn of the tool about the vertical since the start, shape (ticks,), in [rad].
         force: Force to press with; NaN while force control is off, shape (ticks,), in [N].
         keep: Share of the force control's last offset that is still kept, shape (ticks,).
-        touches: The planned contacts.
+        contacts: The planned contacts.
+        effectors: The tool.
+        ground: The table.
     """
 
     position: Array
     yaw: Array
     force: Array
     keep: Array
-    touches: tuple[Touch, ...]
+    contacts: tuple[Contact, ...]
+    effectors: tuple[Effector, ...]
+    ground: tuple[Box, ...]
 
     @property
     def time(self) -> Array:
         """Time of each tick, shape (ticks,), in [s]."""
         return times(len(self.yaw), TICK)
+
+    @property
+    def units(self) -> Units:
+        """Those of the arms' scenarios are metres and newtons."""
+        return Units()
 
     @property
     def duration(self) -> float:
@@ -64,30 +55,34 @@ class Plan:
 
     def after(self, ticks: int) -> "Plan":
         """Rest for some ticks before the plan begins."""
-        return Plan(
+        return replace(
+            self,
             position=np.pad(self.position, ((ticks, 0), (0, 0)), "edge"),
             yaw=np.pad(self.yaw, (ticks, 0), "edge"),
             force=np.pad(self.force, (ticks, 0), constant_values=np.nan),
             keep=np.pad(self.keep, (ticks, 0)),
-            touches=tuple(touch.later(ticks * TICK) for touch in self.touches),
+            contacts=tuple(contact.later(ticks * TICK) for contact in self.contacts),
         )
 
 
 @dataclass(frozen=True)
 class Segment:
-    """One straight movement, from rest to rest."""
+    """One movement from rest to rest, straight unless it is bent."""
 
     duration: float
     position: tuple[float, float, float]
     yaw: float
     force: float = np.nan
     release: bool = False
+    bend: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def pick(
+    motion: Picks,
     rng: np.random.Generator,
     *,
     start: Array,
+    tool: Rod,
     table: float,
     reach: tuple[tuple[float, float], tuple[float, float]],
     duration: float,
@@ -95,8 +90,10 @@ def pick(
     """Plan picks, one after the other, until the time is over.
 
     Args:
+        motion: How the tool moves.
         rng: Source of chance.
         start: Where the tip is at first, shape (3,), in [m].
+        tool: The tool.
         table: Height of the table, in [m].
         reach: Ranges of x and y on the table, in [m].
         duration: How long the plan shall last, in [s].
@@ -105,43 +102,69 @@ def pick(
         The plan; the beginning of a plan does not depend on its duration.
     """
     segments = [Segment(0.2, (float(start[0]), float(start[1]), float(start[2])), 0.0)]
-    touches = []
+    contacts = []
     now = segments[0].duration
+    spot = _place(rng, reach) if motion.way == "spot" else None
     while now < duration:
-        one = _one_pick(rng, table, reach)
-        press = now + sum(segment.duration for segment in one[:3])
-        place = (one[3].position[0], one[3].position[1], table)
-        lift = press + one[3].duration
-        touches.append(Touch(press, lift, lift + one[4].duration, place))
+        one = (
+            _one_flight(rng, table, reach)
+            if motion.way == "directions"
+            else _one_pick(motion, rng, table, spot or _place(rng, reach))
+        )
+        for segment in one:
+            if not np.isnan(segment.force):
+                lift = now + segment.duration
+                place = (segment.position[0], segment.position[1], table)
+                contacts.append(Contact(now, lift, lift + one[-1].duration, place))
+            now += segment.duration
         segments += one
-        now += sum(segment.duration for segment in one)
     ticks = round(duration / TICK)
     position, yaw, force, keep = (np.concatenate(part)[:ticks] for part in _sample(segments))
-    return Plan(position, yaw, force, keep, tuple(t for t in touches if t.start < duration))
+    return Plan(
+        position,
+        yaw,
+        force,
+        keep,
+        contacts=tuple(contact for contact in contacts if contact.start < duration),
+        effectors=(tool,),
+        ground=(Box(centre=(0.5, 0.0, table - 0.05), half=(0.6, 1.0, 0.05)),),
+    )
 
 
-def minimum_jerk(share: Array) -> Array:
-    """Path over time of the smoothest movement from rest to rest, both from 0 to 1."""
-    return share**3 * (10 - 15 * share + 6 * share**2)
+def _place(
+    rng: np.random.Generator, reach: tuple[tuple[float, float], tuple[float, float]]
+) -> tuple[float, float]:
+    return float(rng.uniform(*reach[0])), float(rng.uniform(*reach[1]))
 
 
 def _one_pick(
-    rng: np.random.Generator,
-    table: float,
-    reach: tuple[tuple[float, float], tuple[float, float]],
+    motion: Picks, rng: np.random.Generator, table: float, place: tuple[float, float]
 ) -> list[Segment]:
-    x, y = (float(rng.uniform(*span)) for span in reach)
+    x, y = place
     above = table + float(rng.uniform(0.1, 0.2))
     yaw = float(rng.uniform(-0.5, 0.5))
     pace = float(rng.uniform(0.8, 1.25))
+    hover = table + float(rng.uniform(*motion.hover))
+    bend = (0.0, 0.0, 0.0)
+    if motion.way == "curve":
+        bend = (float(rng.uniform(-0.1, 0.05)), float(rng.uniform(-0.1, 0.1)), 0.05)
     near = (x, y, table + NEAR)
     return [
-        Segment(1.1 * pace, (x, y, above), yaw),
-        Segment(0.5 * pace, (x, y, table + HOVER), yaw),
+        Segment(1.1 * pace, (x, y, above), yaw, bend=bend),
+        Segment(0.5 * pace, (x, y, hover), yaw),
         Segment(float(rng.uniform(0.15, 0.3)), near, yaw),
-        Segment(float(rng.uniform(0.7, 1.0)), near, yaw, force=float(rng.uniform(15, 30))),
+        Segment(float(rng.uniform(0.7, 1.0)), near, yaw, force=float(rng.uniform(*motion.force))),
         Segment(0.5 * pace, (x, y, above), yaw, release=True),
     ]
+
+
+def _one_flight(
+    rng: np.random.Generator, table: float, reach: tuple[tuple[float, float], tuple[float, float]]
+) -> list[Segment]:
+    """Go somewhere over the table, in any direction."""
+    position = (*_place(rng, reach), table + float(rng.uniform(0.05, 0.3)))
+    pause = Segment(float(rng.uniform(0.02, 0.3)), position, 0.0)
+    return [Segment(float(rng.uniform(0.5, 1.3)), position, 0.0), pause]
 
 
 def _sample(segments: list[Segment]) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
@@ -152,7 +175,10 @@ def _sample(segments: list[Segment]) -> tuple[list[Array], list[Array], list[Arr
         ticks = round(segment.duration / TICK)
         share = minimum_jerk(np.arange(ticks) / ticks)
         there = np.array(segment.position)
-        positions.append(here + np.outer(share, there - here))
+        path = here + np.outer(share, there - here)
+        if any(segment.bend):
+            path += np.outer(bump(np.arange(ticks) / ticks), segment.bend)
+        positions.append(path)
         yaws.append(turned + share * (segment.yaw - turned))
         onset = minimum_jerk(np.clip(np.arange(ticks) * TICK / 0.15, 0, 1))
         forces.append(segment.force * onset)

@@ -6,9 +6,9 @@ import numpy as np
 import pinocchio as pin
 
 from noisemodel.types import Array
+from scenarios.arm.picking import Plan
 from scenarios.clock import TICK
 from scenarios.loop import Reference
-from scenarios.picking import Plan
 
 HIGHEST_ACCELERATION = 30.0
 """The feed-forward does not answer jumps of the reference, in [rad/s²]."""
@@ -25,7 +25,8 @@ class ToolControl:
         point: The tip in the frame's axes, shape (3,), in [m].
         rest: Joint positions at first, shape (joints,), in [rad].
         plan: What the tool is to do.
-        gain: Speed of the tool per error of the contact force, in [m/(s N)].
+        gain: Speed of the tool per error of the contact force at each tick, shape (ticks,),
+            in [m/(s N)].
         time_constant: Low-pass on the contact force, in [s].
     """
 
@@ -37,7 +38,7 @@ class ToolControl:
         rest: Array,
         plan: Plan,
         *,
-        gain: float,
+        gain: Array,
         time_constant: float,
     ) -> None:
         self._model, self._data = model, model.createData()
@@ -79,10 +80,14 @@ class ToolControl:
                 velocity,
                 np.clip(acceleration, -HIGHEST_ACCELERATION, HIGHEST_ACCELERATION),
             ),
-            lift=inverse[:, 2],
+            lift=inverse[None, :, 2],
         )
         self._velocity, self._planned = velocity, planned
         return reference
+
+    def fallen(self, sensors: Array) -> bool:
+        """Tell that an arm does not fall."""
+        return False
 
     def _press(self, number: int, force: float) -> float:
         """Integrate the error of the contact force to a height of the tool."""
@@ -91,7 +96,7 @@ class ToolControl:
         if np.isnan(wanted):
             self._offset = self._left * self._plan.keep[number]
         else:
-            rise = TICK * self._gain * (self._force - wanted)
+            rise = TICK * float(self._gain[number]) * (self._force - wanted)
             self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
         return self._offset
 

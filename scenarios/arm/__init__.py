@@ -1,0 +1,1 @@
+"""Arms that pick from a table."""

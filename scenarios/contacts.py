@@ -1,0 +1,93 @@
+"""Contacts that are planned, and those that are not."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from noisemodel.types import Array
+from scenarios.clock import STEP
+from scenarios.events import Event
+
+APART = 0.05
+"""Contacts with a shorter pause between them are one, in [s]."""
+BLOW = 0.02
+"""Time over which the impulse of a contact is taken, in [s]."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A contact that is planned.
+
+    Attributes:
+        start: When the effector may first touch, in [s].
+        lift: When it is to leave, in [s].
+        stop: When it must have let go, in [s].
+        place: x, y, z of the surface there, in [m].
+        effector: Index of the effector.
+        yaw: Direction of the effector there, in [rad].
+        approach: From when on it is in the air over the place, in [s]; 0 if it always was.
+    """
+
+    start: float
+    lift: float
+    stop: float
+    place: tuple[float, float, float]
+    effector: int = 0
+    yaw: float = 0.0
+    approach: float = 0.0
+
+    def later(self, delay: float) -> "Contact":
+        """Move it in time."""
+        return Contact(
+            self.start + delay,
+            self.lift + delay,
+            self.stop + delay,
+            self.place,
+            self.effector,
+            self.yaw,
+            self.approach + delay,
+        )
+
+
+def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
+    """Find where a robot touched what it was not to touch.
+
+    Args:
+        force: Contact force of each effector, shape (samples, effectors), in [N].
+        planned: The contacts that were planned.
+
+    Returns:
+        One event per contact that begins outside of the planned ones of its effector, with its
+        impulse in [N s] and its largest force in [N].
+    """
+    events = []
+    for effector, felt in enumerate(force.T):
+        own = [contact for contact in planned if contact.effector == effector]
+        for first, last in _contacts(felt):
+            onset = first * STEP
+            if any(contact.start <= onset < contact.stop for contact in own):
+                continue
+            blow = felt[first : first + round(BLOW / STEP)]
+            facts = {
+                "effector": effector,
+                "impulse": float(blow.sum() * STEP),
+                "force": float(blow.max()),
+            }
+            # The blow is the cause; leaning on the obstacle afterwards is none.
+            stop = min(last * STEP, onset + BLOW)
+            events.append(
+                Event("impact", "unplanned contact", onset, max(stop, onset + STEP), facts)
+            )
+    return tuple(events)
+
+
+def _contacts(force: Array) -> list[tuple[int, int]]:
+    """First and last sample of each contact."""
+    touching = np.flatnonzero(force > 0)
+    if not touching.size:
+        return []
+    pauses = np.flatnonzero(np.diff(touching) > APART / STEP)
+    firsts = touching[np.concatenate(([0], pauses + 1))]
+    lasts = touching[np.concatenate((pauses, [-1]))]
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))

@@ -1,0 +1,1 @@
+"""Humanoids that walk."""

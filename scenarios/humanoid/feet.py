@@ -1,0 +1,105 @@
+"""What the feet of a walk do: their ways through the air, their contacts, and what they meet."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from noisemodel.types import Array
+from scenarios.contacts import Contact
+from scenarios.faults import Integers
+from scenarios.humanoid.footsteps import Step
+from scenarios.humanoid.robots import Humanoid
+from scenarios.paths import minimum_jerk
+from scenarios.shapes import Box
+
+TOP = 0.45
+"""When a swinging foot is highest, as a share of its swing."""
+EARLY = 0.13
+"""How early a foot may touch, as a share of its swing; it is down to some millimetres by then."""
+BRIM = 0.01
+"""How far a platform goes on before the last toe on it, in [m]."""
+NOBODY = -1
+"""The foot in the air while both are on the ground."""
+
+
+def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, Array, Integers]:
+    """Sample the ways of the soles.
+
+    Args:
+        robot: The humanoid, its feet side by side at x = 0.
+        steps: The footsteps.
+        time: Of each tick, shape (ticks,), in [s].
+
+    Returns:
+        Places, shape (ticks, feet, 3), in [m]; directions, shape (ticks, feet), in [rad]; the foot
+        in the air, or -1, shape (ticks,).
+    """
+    places, yaws = np.zeros((len(time), 2, 3)), np.zeros((len(time), 2))
+    places[:, :, 1] = robot.apart, -robot.apart
+    swinging = np.full(len(time), NOBODY)
+    for step in steps:
+        first, end = np.searchsorted(time, (step.start, step.stop))
+        if first == len(time):
+            break
+        share = (time[first:end] - step.start) / (step.stop - step.start)
+        before, after = places[first, step.foot].copy(), np.array(step.place)
+        turned = yaws[first, step.foot]
+        # Forwards, it leaves a little later and arrives earlier than in height: it lands straight,
+        # and its heel is past an edge before it comes down.
+        arrival = 0.9 if after[2] >= before[2] else 0.8
+        ahead = minimum_jerk(np.clip((share - 0.05) / (arrival - 0.05), 0, 1))
+        path = before + ahead[:, None] * (after - before)
+        top = max(before[2], after[2]) + step.height
+        rise, fall = minimum_jerk(share / TOP), minimum_jerk((share - TOP) / (1 - TOP))
+        path[:, 2] = np.where(
+            share < TOP, before[2] + rise * (top - before[2]), top + fall * (after[2] - top)
+        )
+        places[first:end, step.foot], places[end:, step.foot] = path, after
+        yaws[first:end, step.foot] = turned + ahead * (step.yaw - turned)
+        yaws[end:, step.foot] = step.yaw
+        swinging[first:end] = step.foot
+    return places, yaws, swinging
+
+
+def contacts(robot: Humanoid, steps: Sequence[Step], duration: float) -> tuple[Contact, ...]:
+    """List when each foot stands where.
+
+    Args:
+        robot: The humanoid, its feet side by side at x = 0.
+        steps: The footsteps.
+        duration: How long the plan lasts, in [s].
+
+    Returns:
+        The contacts in the order of time.
+    """
+    stands = []
+    for foot in (0, 1):
+        side = robot.apart if foot == 0 else -robot.apart
+        start, approach, place, yaw = 0.0, 0.0, (0.0, side, 0.0), 0.0
+        for step in (step for step in steps if step.foot == foot):
+            top = step.start + TOP * (step.stop - step.start)
+            stands.append(Contact(start, step.start, top, place, foot, yaw, approach))
+            start, approach = step.stop - EARLY * (step.stop - step.start), top
+            place, yaw = step.place, step.yaw
+        stands.append(Contact(start, np.inf, np.inf, place, foot, yaw, approach))
+    planned = (contact for contact in stands if contact.start < duration)
+    return tuple(sorted(planned, key=lambda contact: contact.start))
+
+
+def ground(robot: Humanoid, steps: Sequence[Step]) -> tuple[Box, ...]:
+    """Put a floor under the last step, and a platform under the first ones if they are higher.
+
+    Args:
+        robot: The humanoid, walking straight ahead if there is a platform.
+        steps: The footsteps.
+
+    Returns:
+        The platform, if there is one, and the floor.
+    """
+    floor = min([0.0, *(step.place[2] for step in steps)])
+    below = Box((0.0, 0.0, floor - 0.5), (10.0, 10.0, 0.5))
+    if not floor:
+        return (below,)
+    first = next(index for index, step in enumerate(steps) if step.place[2] == floor)
+    edge = steps[first - 1].place[0] + robot.effectors[0].patch[0] + BRIM
+    return (Box((edge - 1.0, 0.0, floor / 2), (1.0, 1.0, -floor / 2)), below)

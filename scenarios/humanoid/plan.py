@@ -1,0 +1,86 @@
+"""What a humanoid is to do, at every tick."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from noisemodel.types import Array
+from scenarios.clock import TICK, times
+from scenarios.contacts import Contact
+from scenarios.defects.plan import Units
+from scenarios.faults import Integers
+from scenarios.shapes import Box, Effector
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What a humanoid is to do, at every tick.
+
+    Attributes:
+        places: Of the soles, shape (ticks, feet, 3), in [m].
+        yaws: Directions of the soles, shape (ticks, feet), in [rad].
+        swinging: The foot in the air, or -1, shape (ticks,).
+        zmp: Zero-moment point, x and y, shape (ticks, 2), in [m].
+        centre: Centre of mass, shape (ticks, 3), in [m].
+        rate: Natural frequency of the inverted pendulum, in [rad/s].
+        contacts: The planned contacts.
+        effectors: Left and right sole.
+        ground: What it plans to stand on.
+        size: Of the robot, relative to that for which scenarios name theirs.
+    """
+
+    places: Array
+    yaws: Array
+    swinging: Integers
+    zmp: Array
+    centre: Array
+    rate: float
+    contacts: tuple[Contact, ...]
+    effectors: tuple[Effector, ...]
+    ground: tuple[Box, ...]
+    size: float
+
+    @property
+    def time(self) -> Array:
+        """Time of each tick, shape (ticks,), in [s]."""
+        return times(len(self.zmp), TICK)
+
+    @property
+    def units(self) -> Units:
+        """What is 1 for a robot of size 1, if all are of one shape and one density."""
+        return Units(length=self.size, force=self.size**3, torque=self.size**4)
+
+    @property
+    def duration(self) -> float:
+        """How long it lasts, in [s]."""
+        return len(self.zmp) * TICK
+
+    @property
+    def heading(self) -> Array:
+        """Direction of the base, shape (ticks,), in [rad]."""
+        return np.asarray(self.yaws.mean(axis=1))
+
+    @property
+    def left(self) -> Array:
+        """Share of the weight that the left foot is to bear, shape (ticks,)."""
+        left, right = self.places[:, 0, :2], self.places[:, 1, :2]
+        apart = left - right
+        share = ((self.zmp - right) * apart).sum(axis=1) / np.square(apart).sum(axis=1)
+        share = np.clip(share, 0.0, 1.0)
+        return np.asarray(np.where(self.swinging < 0, share, self.swinging == 1))
+
+    def after(self, ticks: int) -> "Plan":
+        """Rest for some ticks before the plan begins."""
+
+        def later(signal: Array) -> Array:
+            return np.concatenate((np.repeat(signal[:1], ticks, axis=0), signal))
+
+        return replace(
+            self,
+            places=later(self.places),
+            yaws=later(self.yaws),
+            swinging=np.pad(self.swinging, (ticks, 0), "edge"),
+            zmp=later(self.zmp),
+            centre=later(self.centre),
+            contacts=tuple(contact.later(ticks * TICK) for contact in self.contacts),
+        )

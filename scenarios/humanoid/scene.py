@@ -1,0 +1,133 @@
+"""A humanoid, its ground and its controller, ready to be moved."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from noisemodel.types import Array
+from scenarios.clock import STEP
+from scenarios.faults import Faults
+from scenarios.humanoid.balance import Balance
+from scenarios.humanoid.control import WalkControl
+from scenarios.humanoid.footsteps import footsteps
+from scenarios.humanoid.plan import Plan
+from scenarios.humanoid.robots import Humanoid
+from scenarios.humanoid.walking import GRAVITY, walk
+from scenarios.imperfections import Imperfections, real_model
+from scenarios.loop import Scene
+from scenarios.motions import Walk
+from scenarios.mujoco_model import build
+from scenarios.physics import Physics
+from scenarios.reduced import reduced_model
+from scenarios.sensing import sensors_of
+from scenarios.touching import changes_of
+from scenarios.wholebody import WholeBody
+
+SETTLING = 500
+"""Ticks before the recording, in which the robot comes to rest on its feet."""
+LEVER = 0.05
+"""Noise of torque sensors per noise of force sensors, in [m]."""
+
+
+def plan(robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: float) -> Plan:
+    """Plan the motion of one run.
+
+    Args:
+        robot: The humanoid.
+        motion: How it is to walk.
+        rng: Source of chance.
+        duration: How long the run shall last, in [s].
+
+    Returns:
+        The plan.
+    """
+    return walk(robot, footsteps(robot, motion, rng, duration), duration)
+
+
+def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
+    """Set up one run.
+
+    Args:
+        robot: The humanoid.
+        plan: What it is to do.
+        faults: What is wrong.
+        imperfections: What is imperfect about it anyway.
+
+    Returns:
+        The scene; it begins when the robot stands still.
+    """
+    model = reduced_model(robot)
+    boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
+    world = _world(robot, model, boxes, imperfections)
+    where = sensors_of(world)
+    strength = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge") * imperfections.force_gain
+    asked = _shifted(plan, faults).after(SETTLING)
+    body = standing(robot, model, asked)
+    weight = float(pin.computeTotalMass(model)) * GRAVITY
+    balance = Balance(
+        asked, robot.effectors, robot.gains, strength=strength, weight=weight, where=where
+    )
+    return Scene(
+        model=world,
+        start=_mujoco_start(body.configuration, faults.offsets(len(robot.drives.joints))),
+        control=WalkControl(body, balance, asked, weight=weight, where=where),
+        effectors=len(robot.effectors),
+        settling=SETTLING,
+        noise=_noise(robot, world.nsensordata, where, imperfections),
+        changes=changes_of(world, boxes),
+    )
+
+
+def bodies(robot: Humanoid) -> int:
+    """How many moving bodies a humanoid has."""
+    return int(reduced_model(robot).njoints) - 1
+
+
+def standing(robot: Humanoid, model: Any, plan: Plan) -> WholeBody:
+    """Stand as a plan begins."""
+    start = pin.neutral(model)
+    start[2], start[7:] = robot.centre, robot.rest
+    body = WholeBody(model, robot.effectors, start)
+    level = np.eye(3)
+    body.follow(plan.places[0], [level, level], plan.centre[0], level, steps=20)
+    return body
+
+
+def _shifted(plan: Plan, faults: Faults) -> Plan:
+    if faults.shift is None:
+        return plan
+    return replace(plan, places=plan.places + faults.shift(plan.time))
+
+
+def _world(
+    robot: Humanoid, model: Any, boxes: tuple[Any, ...], imperfections: Imperfections
+) -> Any:
+    """Build the robot as it really is, and what it really stands on."""
+    drives = robot.drives
+    physics = Physics(
+        timestep=STEP,
+        armature=np.array(drives.armature),
+        damping=np.array(drives.viscous) * imperfections.viscous,
+        friction=np.array(drives.friction) * imperfections.friction,
+    )
+    real = real_model(model, robot.carrier, np.zeros(3), imperfections)
+    return build(real, physics, effectors=robot.effectors, boxes=boxes)
+
+
+def _mujoco_start(configuration: Array, offsets: Array) -> Array:
+    """Give a configuration as MuJoCo has it, such that the encoders read it."""
+    place, (x, y, z, w), joints = configuration[:3], configuration[3:7], configuration[7:]
+    return np.concatenate((place, (w, x, y, z), joints - offsets))
+
+
+def _noise(
+    robot: Humanoid, sensors: int, where: dict[str, slice], imperfections: Imperfections
+) -> Array:
+    """Standard deviations of the sensors; what the robot knows of its base is exact."""
+    noise = np.zeros(sensors)
+    for sole in robot.effectors:
+        noise[where[f"{sole.frame}.force"]] = imperfections.force_noise
+        noise[where[f"{sole.frame}.torque"]] = LEVER * imperfections.force_noise
+    return noise

@@ -1,0 +1,77 @@
+"""What robots do in the scenarios when nothing is wrong, as data.
+
+Each family plans its own: ``scenarios.arm``, ``scenarios.humanoid``, ``scenarios.quadruped``. A
+motion that is equal makes an equal plan of an equal seed, so that runs with different defects
+share their twin.
+"""
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+Range: TypeAlias = tuple[float, float]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Picks:
+    """An arm comes down on a table, presses, and goes up again.
+
+    Attributes:
+        way: How it moves: "straight" from place to place, in a "curve", in all "directions"
+            without ever touching, or up and down on one "spot".
+        hover: Height over the table at which it slows down, in [m].
+        force: What it presses with, in [N].
+        duration: How long a run lasts unless told otherwise, in [s].
+    """
+
+    way: str = "straight"
+    hover: Range = (0.01, 0.01)
+    force: Range = (15.0, 30.0)
+    duration: float = 6.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Walk:
+    """A humanoid walks.
+
+    Attributes:
+        way: Where it goes: "straight", in a "curve", in other "directions" (sideways or
+            backward), or on the "spot".
+        height: How high the feet are lifted, in [m].
+        single: Time on one foot, in [s].
+        double: Time on both, in [s].
+        jitter: By which share each step's time on one foot varies.
+        drop: Height of a platform that it walks down from, in [m]; 0 on flat ground.
+        duration: How long a run lasts unless told otherwise, in [s].
+    """
+
+    way: str = "straight"
+    height: Range = (0.05, 0.05)
+    single: Range = (0.6, 0.9)
+    double: Range = (0.12, 0.25)
+    jitter: float = 0.05
+    drop: float = 0.0
+    duration: float = 7.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trot:
+    """A quadruped trots.
+
+    Attributes:
+        way: Where it goes: "straight", in a "curve", in other "directions" (sideways or
+            backward), or on the "spot" (turning or not).
+        height: How high the feet are lifted, as a share of the robot's usual height.
+        period: Time of a cycle, as a share of the robot's usual period.
+        jitter: By which share each cycle's time varies.
+        duration: How long a run lasts unless told otherwise, in [s].
+    """
+
+    way: str = "straight"
+    height: Range = (1.0, 1.0)
+    period: Range = (0.8, 1.2)
+    jitter: float = 0.1
+    duration: float = 5.0
+
+
+Motion: TypeAlias = Picks | Walk | Trot
+"""What a robot of some family does."""

@@ -1,0 +1,129 @@
+"""Runs as NoisyTest 0.0.1 reads them: a ``.log`` of its noise, a ``.toml`` of its blocks.
+
+Its reader skips lines that begin with ``#`` and one line more, so that the first sample is lost to
+it; it takes one blank between two numbers, and only floats among the times of blocks. It learns
+from a folder ``training`` and measures on a folder ``validation``, 10 kHz both.
+"""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from noisemodel import Block, Run, simplified
+from noisemodel.atomic import replacing
+from scenarios.errors import SampleError
+from scenarios.sample import digest
+
+RATE = 10_000.0
+"""NoisyTest knows no other sample rate, in [Hz]."""
+VALIDATION = 4
+"""One seed in so many is for validation."""
+CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
+"""NoisyTest's classes; it cannot train if one of them has no block."""
+CONFIG = {
+    "import_preprocessor": {
+        "arguments": {
+            "keywords_to_target_data": {label: number for number, label in enumerate(CLASSES)}
+        }
+    },
+    "model": {"arguments": {"regularization": 1.1, "kernel_gamma": 5.7e-4}},
+    "feature_preprocessor": {"arguments": {"fft_stride_length": 834}},
+}
+"""A configuration for it: our classes, and the paper's optimum for its RBF kernel."""
+
+
+def part(seed: int) -> str:
+    """Say whether runs of a seed are for "training" or "validation"."""
+    return "validation" if seed % VALIDATION == VALIDATION - 1 else "training"
+
+
+def write_config(folder: Path) -> None:
+    """Write ``noisytest-config.json``, which NoisyTest takes with ``--config``.
+
+    Args:
+        folder: Where to; a file that exists is replaced.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    with replacing(folder / "noisytest-config.json", overwrite=True) as temporary:
+        temporary.write_text(json.dumps(CONFIG, indent=2) + "\n", encoding="ascii")
+
+
+def lacking(folder: Path) -> tuple[str, ...]:
+    """Say which classes have no block in a folder's ``training``.
+
+    Raises:
+        SampleError: If a ``.toml`` is damaged.
+    """
+    logs = sorted((folder / "training").glob("*.log"))
+    there = {block.label for log in logs for block in read(log)[0]}
+    return tuple(label for label in CLASSES if label not in there)
+
+
+def write(run: Run, log: Path) -> None:
+    """Write a run's simplified noise, and its blocks beside it; files that exist are replaced.
+
+    Args:
+        run: A run as ``scenarios.simulate`` makes it.
+        log: The ``.log``; the ``.toml`` gets the same name. It is written last, so that there is
+            no ``.log`` without its ``.toml``.
+
+    Raises:
+        SampleError: If the run has another rate than NoisyTest's.
+        OutputError: If a file cannot be written.
+    """
+    if run.rate != RATE:
+        raise SampleError(log, f"NoisyTest takes {RATE:g} Hz only, the run has {run.rate:g} Hz")
+    rows = np.column_stack((run.time, simplified(run.motion, run.velocity_desired)))
+    with replacing(log.with_suffix(".toml"), overwrite=True) as temporary:
+        temporary.write_text(_annotations(run), encoding="ascii")
+    with replacing(log, overwrite=True) as temporary:
+        np.savetxt(temporary, rows, fmt=("%.4f", "%.9g"), header="time [s], noise estimate [rad/s]")
+
+
+def read(log: Path) -> tuple[tuple[Block, ...], float]:
+    """Read what the ``.toml`` of a run says.
+
+    Args:
+        log: The ``.log``.
+
+    Returns:
+        The blocks, and how long the run lasts, in [s].
+
+    Raises:
+        SampleError: If it cannot be read, or is none of ours.
+    """
+    path = log.with_suffix(".toml")
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        ranges, labels = content["data"]["chunk_ranges"], content["data"]["chunk_labels"]
+        recipe = json.loads(content["simulation"]["recipe"])
+        blocks = tuple(
+            Block(float(start), float(stop), str(label))
+            for (start, stop), label in zip(ranges, labels, strict=True)
+        )
+        return blocks, float(recipe["duration"])
+    except FileNotFoundError as error:
+        raise SampleError(log, f"lacks its {path.name}") from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise SampleError(path, f"damaged ({' '.join(str(error).split())})") from error
+
+
+def _annotations(run: Run) -> str:
+    """Write the blocks, and the recipe to make the run again as a JSON text."""
+    recipe = json.dumps({**run.meta, "robot": run.robot, "sha256": digest(run)}, sort_keys=True)
+    ranges = [[float(block.start), float(block.stop)] for block in run.blocks]
+    return "\n".join(
+        (
+            "[data]",
+            f"chunk_ranges = {ranges}",
+            f"chunk_labels = {json.dumps([block.label for block in run.blocks])}",
+            "",
+            "[simulation]",
+            f"recipe = {json.dumps(recipe)}",  # JSON's escapes are TOML's too
+            "",
+        )
+    )

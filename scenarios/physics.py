@@ -1,0 +1,26 @@
+"""What a robot and its world are made of, beyond what a URDF says."""
+
+from dataclasses import dataclass
+
+from noisemodel.types import Array
+
+
+@dataclass(frozen=True, kw_only=True)
+class Physics:
+    """What a URDF does not say.
+
+    Attributes:
+        timestep: In [s].
+        armature: Inertia of each drive as its joint sees it, shape (joints,), in [kg m²] or [kg].
+        damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
+        friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
+        contact: Time constant of a contact, in [s].
+        grip: Coefficient of friction of a contact.
+    """
+
+    timestep: float
+    armature: Array
+    damping: Array
+    friction: Array
+    contact: float = 0.005
+    grip: float = 0.8

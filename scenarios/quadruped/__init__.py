@@ -1,0 +1,1 @@
+"""Quadrupeds that trot."""

@@ -1,0 +1,74 @@
+"""What a quadruped makes of its sensors: filtered errors against its plan."""
+
+from math import asin, atan2, cos, sin
+
+import numpy as np
+
+from noisemodel.types import Array
+from scenarios.clock import TICK
+from scenarios.quadruped.robots import Quadruped
+
+HOMING = 1.0
+"""Speed of correction per distance from the planned way, in [1/s]."""
+VELOCITY_FILTER = 0.05
+"""Time constant of the low-pass on the measured velocity, in [s]."""
+LOWEST, STEEPEST = 0.5, 0.7
+"""The robot has fallen at this share of its height, or when it tilts by more, in [rad]."""
+
+
+class Feeling:
+    """Follows the sensors, tick by tick.
+
+    Args:
+        robot: The robot.
+        sensors: Where each sensor's values are.
+
+    Attributes:
+        roll: Low-passed, in [rad].
+        pitch: Low-passed, in [rad].
+        slip: Low-passed velocity of the centre of mass less the planned one, shape (2,), in [m/s].
+        home: How the way is corrected so that the robot comes back to its plan, shape (2,), in [m].
+        turn: How its direction is corrected, in [rad].
+        force: Low-passed contact forces, shape (feet,), in [N].
+    """
+
+    def __init__(self, robot: Quadruped, sensors: dict[str, slice]) -> None:
+        self._where = sensors
+        self._tilt_share = _share(robot.attitude_filter)
+        self._force_share = _share(robot.force_filter)
+        self._slip_share = _share(VELOCITY_FILTER)
+        self.roll = self.pitch = self.turn = 0.0
+        self.slip, self.home = np.zeros(2), np.zeros(2)
+        self.force = np.zeros(len(robot.feet))
+
+    def hear(self, sensors: Array, *, place: Array, velocity: Array, yaw: float) -> None:
+        """Take in what the sensors say.
+
+        Args:
+            sensors: As `scenarios.sensing.sensors_of` has it.
+            place: Where the centre of mass is planned to be, shape (2,), in [m].
+            velocity: How fast it is planned to be, shape (2,), in [m/s].
+            yaw: The planned direction of the body, in [rad].
+        """
+        w, x, y, z = sensors[self._where["base.turn"]].tolist()
+        roll = atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+        pitch = asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
+        off = yaw - atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
+        self.roll += self._tilt_share * (roll - self.roll)
+        self.pitch += self._tilt_share * (pitch - self.pitch)
+        self.turn += TICK * HOMING * atan2(sin(off), cos(off))
+        self.home += TICK * HOMING * (place - sensors[self._where["centre.place"]][:2])
+        slip = sensors[self._where["centre.velocity"]][:2] - velocity
+        self.slip += self._slip_share * (slip - self.slip)
+        self.force += self._force_share * (sensors[: len(self.force)] - self.force)
+
+    def fallen(self, sensors: Array, height: float) -> bool:
+        """Tell whether the robot is too low for its height, or too much tilted."""
+        _, x, y, _ = sensors[self._where["base.turn"]].tolist()
+        low = float(sensors[self._where["centre.place"]][2]) < LOWEST * height
+        return low or 1 - 2 * (x * x + y * y) < cos(STEEPEST)
+
+
+def _share(time_constant: float) -> float:
+    """How far a low-pass goes in one tick."""
+    return TICK / (time_constant + TICK)

@@ -1,0 +1,123 @@
+"""A quadruped, its ground and its controller, ready to be moved."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from noisemodel.types import Array
+from scenarios.clock import STEP
+from scenarios.faults import Faults
+from scenarios.imperfections import Imperfections, real_model
+from scenarios.loop import Scene
+from scenarios.motions import Trot
+from scenarios.mujoco_model import build
+from scenarios.physics import Physics
+from scenarios.quadruped.control import TrotControl
+from scenarios.quadruped.robots import Quadruped
+from scenarios.quadruped.standing import Standing, stand
+from scenarios.quadruped.trotting import Plan, trot
+from scenarios.reduced import reduced_model
+from scenarios.sensing import sensors_of
+from scenarios.shapes import Box
+from scenarios.touching import changes_of
+
+SETTLING = 400
+"""Ticks before the recording, in which the robot comes to rest under its unknown load."""
+ATTITUDE_NOISE = 1e-4
+"""Standard deviation of the measured attitude per tick, in [rad]."""
+VELOCITY_NOISE = 5e-3
+"""Standard deviation of the measured velocity per tick, in [m/s]."""
+
+
+def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: float) -> Plan:
+    """Plan the motion of one run.
+
+    Args:
+        robot: The robot.
+        motion: What it is to do.
+        rng: Source of chance.
+        duration: How long the run shall last, in [s].
+
+    Returns:
+        The plan.
+    """
+    return trot(robot, stand(robot), motion, rng, duration)
+
+
+def scene(robot: Quadruped, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
+    """Set up one run.
+
+    Args:
+        robot: The robot.
+        plan: What it is to do.
+        faults: What is wrong.
+        imperfections: What is imperfect about it anyway.
+
+    Returns:
+        The scene; it begins when the robot has come to rest.
+    """
+    model, standing = reduced_model(robot), stand(robot)
+    boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
+    world = _world(robot, model, boxes, imperfections)
+    sensors = sensors_of(world)
+    gain = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge") * imperfections.force_gain
+    control = TrotControl(
+        robot,
+        model,
+        standing,
+        _shifted(plan, faults).after(SETTLING),
+        sensors=sensors,
+        gain=gain,
+    )
+    noise = np.zeros(world.nsensordata)
+    noise[: len(robot.feet)] = imperfections.force_noise
+    noise[sensors["base.turn"]] = ATTITUDE_NOISE / 2
+    noise[sensors["centre.velocity"]] = VELOCITY_NOISE
+    return Scene(
+        model=world,
+        start=_start(robot, model, standing, faults),
+        control=control,
+        effectors=len(robot.feet),
+        settling=SETTLING,
+        noise=noise,
+        changes=changes_of(world, boxes),
+    )
+
+
+def bodies(robot: Quadruped) -> int:
+    """How many moving bodies a quadruped has, its base being one."""
+    return int(reduced_model(robot).njoints) - 1
+
+
+def _shifted(plan: Plan, faults: Faults) -> Plan:
+    if faults.shift is None:
+        return plan
+    return replace(plan, feet=plan.feet + faults.shift(plan.time))
+
+
+def _world(
+    robot: Quadruped, model: Any, boxes: tuple[Box, ...], imperfections: Imperfections
+) -> Any:
+    """Build the robot as it really is, and the ground."""
+    physics = Physics(
+        timestep=STEP,
+        armature=np.array(robot.drives.armature),
+        damping=np.array(robot.drives.viscous) * imperfections.viscous,
+        friction=np.array(robot.drives.friction) * imperfections.friction,
+    )
+    real = real_model(model, model.frames[1].name, np.zeros(3), imperfections)
+    return build(real, physics, effectors=robot.feet, boxes=boxes)
+
+
+def _start(robot: Quadruped, model: Any, standing: Standing, faults: Faults) -> Array:
+    """Configuration whose encoders read the standing one, its lowest foot on the ground."""
+    configuration = standing.configuration.copy()
+    configuration[7:] -= faults.offsets(len(configuration) - 7)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, configuration)
+    lowest = min(data.oMf[model.getFrameId(foot.frame)].translation[2] for foot in robot.feet)
+    configuration[2] += robot.feet[0].radius - lowest
+    configuration[3:7] = configuration[[6, 3, 4, 5]]  # MuJoCo has w first
+    return np.asarray(configuration)

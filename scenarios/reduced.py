@@ -1,0 +1,51 @@
+"""A robot's Pinocchio model with only those joints that its scenarios move."""
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import pinocchio as pin
+
+from noisemodel import Robot
+from scenarios.errors import UnsupportedModelError
+
+if TYPE_CHECKING:
+    from scenarios.robots import Simulated
+
+
+def reduced_model(robot: "Simulated") -> Any:
+    """Read a robot's Pinocchio model, all joints locked that it does not move.
+
+    Args:
+        robot: The robot.
+
+    Returns:
+        A ``pinocchio.Model``; every call gives the same one.
+
+    Raises:
+        UnsupportedModelError: If the URDF lacks a joint.
+    """
+    return _reduced(robot.name, robot.drives.joints, tuple(sorted(robot.held.items())))
+
+
+@lru_cache(maxsize=8)
+def _reduced(name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...]) -> Any:
+    model = Robot.load(name).model
+    lacking = {*moved, *dict(held)} - set(model.names)
+    if lacking:
+        raise UnsupportedModelError(
+            f"{name} has no joint {', '.join(sorted(lacking))}; it has {', '.join(model.names[1:])}"
+        )
+    posture = pin.neutral(model)
+    for joint, position in held:
+        posture[model.joints[model.getJointId(joint)].idx_q] = position
+    fixed = [
+        model.getJointId(joint)
+        for joint in model.names[1:]
+        if joint not in moved and model.joints[model.getJointId(joint)].nv == 1
+    ]
+    reduced = pin.buildReducedModel(model, fixed, posture)
+    if tuple(reduced.names)[-len(moved) :] != moved:
+        raise UnsupportedModelError(
+            f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"
+        )
+    return reduced

@@ -1,0 +1,196 @@
+"""One compact sample: a run's noise signals, its blocks, and the recipe to make it again.
+
+A sample file is an archive of plain arrays: ``format`` ("noise-sample/1"), ``robot``, ``rate`` in
+[Hz], ``block_start``, ``block_stop`` and ``block_label`` as in a run file, ``meta`` (a JSON object:
+the run's own, and the ``sha256`` of its arrays), and each signal under its name, float32, of shape
+(samples,). What signals there are is said in `scenarios.signals`.
+"""
+
+import hashlib
+import json
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel import Block, Run, runfile
+from scenarios.errors import SampleError
+from scenarios.signals import WHOLE, Signals, signals
+
+FORMAT = "noise-sample/1"
+DAMAGE = (
+    OSError,
+    ValueError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    zipfile.BadZipFile,
+    *runfile.DAMAGE,
+)
+"""What reading raises if a file is damaged, or another one than it seems."""
+RECIPE = frozenset(("scenario", "seed", "duration", "sha256"))
+"""What ``meta`` cannot lack if the run is to be made again."""
+_FACTS = ("format", "robot", "rate", "meta", "block_start", "block_stop", "block_label")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Sample:
+    """What is kept of a simulated run.
+
+    Attributes:
+        robot: A name in ``scenarios.ROBOTS``.
+        rate: Sample rate, in [Hz].
+        signals: Noise signals by name, each of shape (samples,).
+        blocks: Annotated stretches.
+        meta: The recipe, and the hash of the run's arrays.
+    """
+
+    robot: str
+    rate: float
+    signals: Signals
+    blocks: tuple[Block, ...]
+    meta: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, run: Run) -> Self:
+        """Keep of a simulated run what a sample has."""
+        return cls(
+            robot=str(run.robot),
+            rate=run.rate,
+            signals=signals(run),
+            blocks=run.blocks,
+            meta={**run.meta, "sha256": digest(run)},
+        )
+
+    @property
+    def name(self) -> str:
+        """Robot, scenario and seed, as in the file's name."""
+        return f"{self.robot}/{self.meta['scenario']}-{self.meta['seed']:03d}"
+
+    @property
+    def noise(self) -> NDArray[np.float32]:
+        """The simplified noise, shape (samples,), in [rad/s]."""
+        # p_hat = sqrt(|qd|^2 + |qd_desired|^2), Sygulla & Rixen, Sec. II-A
+        return np.hypot(self.signals["measured"], self.signals["desired"])
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the sample, whole or not at all.
+
+        Args:
+            path: The file to write, ``*.npz``.
+            overwrite: Whether a file that exists may be replaced.
+
+        Raises:
+            OutputError: If the file exists or cannot be written.
+        """
+        arrays = {
+            "format": FORMAT,
+            "robot": self.robot,
+            "rate": self.rate,
+            "meta": json.dumps(dict(self.meta), sort_keys=True),
+            **_columns(self.blocks),
+            **self.signals,
+        }
+        runfile.write(Path(path), arrays, overwrite=overwrite)
+
+    @classmethod
+    def load(cls, path: str | Path, *, only: Iterable[str] | None = None) -> Self:
+        """Read a sample.
+
+        Args:
+            path: A sample file.
+            only: Names of the signals to read; all unless given.
+
+        Returns:
+            The sample.
+
+        Raises:
+            SampleError: If the file cannot be read, is no sample, or lacks a signal.
+        """
+        path = Path(path)
+        if not path.is_file():
+            raise SampleError(path, "there is no such file")
+        if not zipfile.is_zipfile(path):
+            raise SampleError(path, "no sample, or cut off: it is no whole archive")
+        try:
+            with np.load(path, allow_pickle=False) as archive:
+                return cls(**_fields(path, archive, only))
+        except SampleError:
+            raise
+        except DAMAGE as error:
+            raise SampleError(path, f"damaged ({_one_line(error)})") from error
+
+
+def is_sample(path: str | Path) -> bool:
+    """Tell whether a file says of itself that it is a sample, of whatever version."""
+    if not zipfile.is_zipfile(path):
+        return False
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            return str(archive["format"]).startswith("noise-sample/")
+    except DAMAGE:
+        return False
+
+
+def digest(run: Run) -> str:
+    """Hash the arrays of a run: names, shapes, every bit of every signal, and the blocks."""
+    arrays = {
+        "time": run.time,
+        "velocity": run.velocity,
+        "position": run.position,
+        "velocity_desired": run.velocity_desired,
+        "position_desired": run.position_desired,
+        "effort": run.effort,
+        "base_pose": run.base_pose,
+        "base_velocity": run.base_velocity,
+        **run.stages,
+        **_columns(run.blocks),
+    }
+    hashed = hashlib.sha256(repr((run.joint_names, run.desired_joint_names)).encode())
+    for name, array in arrays.items():
+        if array is not None:
+            hashed.update(f"{name}{array.dtype.str}{array.shape}".encode())
+            hashed.update(np.ascontiguousarray(array).tobytes())
+    return hashed.hexdigest()
+
+
+def _columns(blocks: tuple[Block, ...]) -> dict[str, NDArray[Any]]:
+    return {
+        "block_start": np.array([block.start for block in blocks], dtype=np.float64),
+        "block_stop": np.array([block.stop for block in blocks], dtype=np.float64),
+        "block_label": np.array([block.label for block in blocks], dtype=str),
+    }
+
+
+def _fields(path: Path, archive: Any, only: Iterable[str] | None) -> dict[str, Any]:
+    version = str(archive["format"]) if "format" in archive else "none"
+    if version != FORMAT:
+        raise SampleError(path, f"format {version!r}, expected {FORMAT!r}")
+    there = [name for name in archive.files if name not in _FACTS]
+    names = there if only is None else list(only)
+    lacking = [name for name in (*WHOLE, *names) if name not in there]
+    if lacking:
+        raise SampleError(path, f"has no signal {', '.join(lacking)}; it has {', '.join(there)}")
+    read = {name: archive[name] for name in names}
+    if len({signal.shape for signal in read.values()}) > 1:
+        shapes = ", ".join(f"{name} {signal.shape}" for name, signal in read.items())
+        raise SampleError(path, f"signals of different shapes: {shapes}")
+    columns = (archive[name].tolist() for name in ("block_start", "block_stop", "block_label"))
+    meta = json.loads(str(archive["meta"]))
+    if not meta.keys() >= RECIPE:
+        raise SampleError(path, f"its meta lacks {', '.join(sorted(RECIPE - meta.keys()))}")
+    return {
+        "robot": str(archive["robot"]),
+        "rate": float(archive["rate"]),
+        "signals": read,
+        "blocks": tuple(Block(*block) for block in zip(*columns, strict=True)),
+        "meta": meta,
+    }
+
+
+def _one_line(error: BaseException) -> str:
+    return " ".join(str(error).split()) or type(error).__name__

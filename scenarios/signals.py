@@ -1,0 +1,70 @@
+"""The noise signals that a sample keeps of a run."""
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel import GeometryError, Robot, Run, Surface, extended, simplified
+from noisemodel.types import Array
+from scenarios.limbs import limbs
+
+Signals: TypeAlias = Mapping[str, NDArray[np.float32]]
+"""Signals by name, each of shape (samples,)."""
+
+WHOLE = ("measured", "desired", "error")
+"""The signals that every sample has."""
+
+
+def signals(run: Run) -> Signals:
+    """Reduce a simulated run to noise signals.
+
+    Args:
+        run: A run as ``scenarios.simulate`` makes it.
+
+    Returns:
+        Norms of velocities, in [rad/s]: ``measured`` (a floating base's six count too),
+        ``desired`` and ``error``, their difference; the same of each limb as
+        ``measured_<effector>``, if there are several; of each stage under its name. Sound power,
+        kind normal, in [W]: ``power`` of the measured motion and ``power_desired`` of the desired
+        one, if the robot has a surface.
+    """
+    assert run.velocity_desired is not None
+    desired, error = run.velocity_desired, run.velocity_desired - run.velocity
+    found = {
+        "measured": simplified(run.motion),
+        "desired": simplified(desired),
+        "error": simplified(error),
+        **{name: simplified(stage) for name, stage in run.stages.items()},
+    }
+    for frame, joints in limbs(str(run.robot)).items():
+        mine = [run.joint_names.index(joint) for joint in joints]
+        for name, velocity in zip(WHOLE, (run.velocity, desired, error), strict=True):
+            found[f"{name}_{frame}"] = simplified(velocity[:, mine])
+    found |= _power(run)
+    return {name: signal.astype(np.float32) for name, signal in found.items()}
+
+
+def _power(run: Run) -> dict[str, Array]:
+    """Compute the total sound power; extended noise is the sum of both (paper, Sec. II-A)."""
+    robot, surface = _surface(str(run.robot))
+    desired = robot.desired(run)
+    if surface is None or desired is None:
+        return {}
+    motions = {"power": robot.configuration(run), "power_desired": desired}
+    return {
+        name: extended(robot, surface, *motion, kind="normal").total
+        for name, motion in motions.items()
+    }
+
+
+@lru_cache(maxsize=4)
+def _surface(name: str) -> tuple[Robot, Surface | None]:
+    robot = Robot.load(name)
+    try:
+        surface = Surface.of(robot, "auto")
+    except GeometryError:
+        return robot, None
+    return robot, surface if surface.area.any() else None

@@ -1,0 +1,177 @@
+"""Which runs make a data set, and in which order."""
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from typing import TypeAlias
+
+from scenarios.errors import DatasetError, UnsuitedScenarioError
+from scenarios.motions import Motion
+from scenarios.robots import ROBOTS
+from scenarios.simulation import look_up
+from scenarios.table import SCENARIOS
+
+Choice: TypeAlias = Mapping[str, tuple[str, ...]]
+"""Scenarios of each robot, by names."""
+
+LEAST = 20
+"""So many runs have to be known before it is said that too many fall."""
+
+
+@dataclass(frozen=True, order=True)
+class Task:
+    """A run that a data set is to have.
+
+    Attributes:
+        robot: A name in ``scenarios.ROBOTS``.
+        scenario: A name in ``scenarios.SCENARIOS`` that has a meaning on it.
+        seed: The seed.
+    """
+
+    robot: str
+    scenario: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Robot, scenario and seed, as samples are called."""
+        return f"{self.robot}/{self.scenario}-{self.seed:03d}"
+
+
+def choose(
+    robots: Sequence[str], scenarios: Sequence[str] = (), *, healthy: bool = False
+) -> dict[str, tuple[str, ...]]:
+    """Look up which scenarios each robot is to go through.
+
+    Args:
+        robots: Names in ``scenarios.ROBOTS``.
+        scenarios: Names or numbers; all unless given. Robots pass over what they have not.
+        healthy: Whether to keep only those in which nothing goes wrong.
+
+    Returns:
+        Scenarios of each robot, in the order of the table.
+
+    Raises:
+        ScenarioError: If a robot or a scenario is not known, or nothing is left for a robot.
+    """
+    if not robots:
+        raise DatasetError(f"no robot is named; there are {', '.join(ROBOTS)}")
+    chosen = {robot: _suited(robot, scenarios or tuple(SCENARIOS)) for robot in robots}
+    for robot, names in chosen.items():
+        chosen[robot] = tuple(name for name in names if SCENARIOS[name].healthy or not healthy)
+        if not chosen[robot]:
+            of_list = f"of {', '.join(scenarios)} " if scenarios else ""
+            ok = " in which nothing goes wrong" if healthy else ""
+            everything = ", ".join(_suited(robot, tuple(SCENARIOS)))
+            raise DatasetError(
+                f"no scenario {of_list}is left for {robot!r}{ok}; it has {everything}"
+            )
+    return chosen
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wish:
+    """What a data set is to have: some seeds, or some hours.
+
+    Attributes:
+        choice: Scenarios of each robot.
+        first: The first seed.
+        seeds: How many seeds; 8 unless hours are given.
+        hours: Time that all runs are to last together, in [h].
+
+    Raises:
+        DatasetError: If both are given, or a number cannot be.
+    """
+
+    choice: Choice
+    first: int = 0
+    seeds: int | None = None
+    hours: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.seeds is not None and self.hours is not None:
+            raise DatasetError(
+                f"{self.seeds} seeds and {self.hours:g} hours are asked for; name one of them"
+            )
+        if self.first < 0:
+            raise DatasetError(f"the first seed is {self.first}, expected 0 or more")
+        if self.seeds is not None and self.seeds < 1:
+            raise DatasetError(f"{self.seeds} seeds are asked for, expected 1 or more")
+        if self.hours is not None and not 0 < self.hours < float("inf"):
+            raise DatasetError(f"{self.hours:g} hours are asked for, expected more than 0")
+
+    def tasks(self, *, duration: float | None = None, fallen: Collection[Task] = ()) -> list[Task]:
+        """List the runs, seed by seed.
+
+        Args:
+            duration: How long each run lasts, in [s]; as its motion says unless given.
+            fallen: Runs that are known to fill no time.
+
+        Raises:
+            DatasetError: If a robot falls more often than not, so that no time is filled.
+        """
+        if self.hours is None:
+            last = self.first + (8 if self.seeds is None else self.seeds)
+            seeds = range(self.first, last)
+            return [
+                task for seed in seeds for robot in self.choice for task in self._seed(robot, seed)
+            ]
+        share = 3600 * self.hours / len(self.choice)
+        filling = [self._fill(robot, share, duration, set(fallen)) for robot in self.choice]
+        return sorted((task for tasks in filling for task in tasks), key=lambda task: task.seed)
+
+    def _seed(self, robot: str, seed: int) -> list[Task]:
+        return [Task(robot, scenario, seed) for scenario in self.choice[robot]]
+
+    def _fill(
+        self, robot: str, seconds: float, duration: float | None, fallen: set[Task]
+    ) -> list[Task]:
+        """List the runs of as many seeds as it takes to fill a time."""
+        tasks: list[Task] = []
+        filled, lost = 0.0, 0
+        for seed in count(self.first):
+            if filled >= seconds:
+                break
+            if lost > len(tasks) / 2 and len(tasks) >= LEAST:
+                raise DatasetError(
+                    f"{robot} fell in {lost} of {len(tasks)} runs, so that {seconds:.0f} s cannot"
+                    " be filled; take other scenarios"
+                )
+            for task in self._seed(robot, seed):
+                tasks.append(task)
+                if task in fallen:
+                    lost += 1
+                else:
+                    filled += duration or _motion(task).duration
+        return tasks
+
+
+def together(tasks: Iterable[Task]) -> list[tuple[Task, ...]]:
+    """Put runs together that share their twin: one robot, one seed, one motion.
+
+    Args:
+        tasks: Runs.
+
+    Returns:
+        Groups of them, in the order of their first runs.
+    """
+    groups: dict[object, list[Task]] = {}
+    for task in tasks:
+        groups.setdefault((task.robot, task.seed, _motion(task)), []).append(task)
+    return [tuple(group) for group in groups.values()]
+
+
+def _motion(task: Task) -> Motion:
+    return SCENARIOS[task.scenario].cases[ROBOTS[task.robot].family].motion
+
+
+def _suited(robot: str, scenarios: Sequence[str]) -> tuple[str, ...]:
+    """Names of those scenarios that have a meaning on a robot, in the order of the table."""
+    names = set()
+    for scenario in scenarios:
+        try:
+            names.add(look_up(robot, scenario)[0].name)
+        except UnsuitedScenarioError:
+            continue
+    return tuple(name for name in SCENARIOS if name in names)

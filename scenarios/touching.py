@@ -1,0 +1,118 @@
+"""What touches in a simulation: effectors of the robot, boxes of the world that come and go."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+
+from noisemodel.types import Array
+from scenarios.clock import TICK
+from scenarios.errors import UnsupportedModelError
+from scenarios.physics import Physics
+from scenarios.shapes import Ball, Box, Effector, Rod, Sole
+
+SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+ROBOT, WORLD = 1, 2
+"""Contact groups: the robot touches the world, never itself."""
+
+
+def add_effector(
+    spec: Any, bodies: Sequence[Any], model: Any, effector: Effector, physics: Physics
+) -> None:
+    """Add the shape of an effector, and a place that feels all of its contacts."""
+    if not model.existFrame(effector.frame):
+        known = ", ".join(frame.name for frame in model.frames)
+        raise UnsupportedModelError(
+            f"the robot has no frame {effector.frame!r} to touch with; it has {known}"
+        )
+    frame = model.frames[model.getFrameId(effector.frame)]
+    body = bodies[frame.parentJoint]
+    geom, size, middle, around = _solid(effector)
+    pose = frame.placement
+    shape = {"quat": quaternion(pose.rotation), **_surface(ROBOT, WORLD, physics)}
+    if isinstance(effector, Ball):
+        shape["condim"] = 4  # a foot of rubber does not spin on the spot
+    body.add_geom(name=effector.frame, type=geom, size=size, pos=pose.act(middle), **shape)
+    body.add_site(
+        name=effector.frame,
+        type=mujoco.mjtGeom.mjGEOM_BOX if isinstance(effector, Sole) else SPHERE,
+        pos=pose.act(np.array(effector.point)),
+        quat=shape["quat"],
+        size=around,
+    )
+
+
+def add_boxes(spec: Any, boxes: Sequence[Box], physics: Physics) -> None:
+    """Add the boxes of the world, all of them there."""
+    for number, box in enumerate(boxes):
+        spec.worldbody.add_geom(
+            name=_box(number),
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=box.centre,
+            size=box.half,
+            quat=[np.cos(box.yaw / 2), 0, 0, np.sin(box.yaw / 2)],
+            **_surface(WORLD, ROBOT, physics),
+        )
+
+
+def put(model: Any, geom: int, *, there: bool) -> None:
+    """Let a box be touched, or not."""
+    model.geom_contype[geom], model.geom_conaffinity[geom] = (WORLD, ROBOT) if there else (0, 0)
+
+
+def changes_of(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, bool]]]:
+    """Take away the boxes that are not there yet, and list which come and go.
+
+    Args:
+        model: The ``mujoco.MjModel``, made with these boxes.
+        boxes: The boxes.
+
+    Returns:
+        Geoms and whether they are there from then on, by ticks.
+    """
+    changes: dict[int, list[tuple[int, bool]]] = {}
+    for number, box in enumerate(boxes):
+        geom = model.geom(_box(number)).id
+        if box.since > 0:
+            put(model, geom, there=False)
+            changes.setdefault(round(box.since / TICK), []).append((geom, True))
+        if box.until < np.inf:
+            changes.setdefault(round(box.until / TICK), []).append((geom, False))
+    return changes
+
+
+def quaternion(rotation: Array) -> list[float]:
+    """Turn a rotation matrix into a quaternion in MuJoCo's order: w, x, y, z."""
+    q = pin.Quaternion(rotation)
+    return [q.w, q.x, q.y, q.z]
+
+
+def _box(number: int) -> str:
+    return f"box{number}"
+
+
+def _surface(own: int, other: int, physics: Physics) -> dict[str, Any]:
+    return {
+        "contype": own,
+        "conaffinity": other,
+        "friction": [physics.grip, 0.01, 0.001],
+        "solref": [physics.contact, 1.0],
+    }
+
+
+def _solid(effector: Effector) -> tuple[Any, list[float], Array, list[float]]:
+    """Geometry of an effector: type, size and middle, and the size of what surrounds contacts."""
+    if isinstance(effector, Rod):  # MuJoCo leaves the round ends out of a capsule's length
+        half = effector.length / 2
+        size = [effector.radius, half - effector.radius, 0.0]
+        capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+        return capsule, size, np.array([0, 0, half]), [2.5 * effector.radius] * 3
+    if isinstance(effector, Ball):
+        ball = [effector.radius, 0.0, 0.0]
+        return SPHERE, ball, np.zeros(3), [1.5 * effector.radius] * 3
+    half = effector.thickness / 2
+    size = [*effector.patch, half]
+    around = [*(1.2 * extent for extent in effector.patch), effector.thickness]
+    return mujoco.mjtGeom.mjGEOM_BOX, size, np.add(effector.point, (0, 0, half)), around

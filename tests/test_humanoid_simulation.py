@@ -1,0 +1,204 @@
+"""Humanoids in simulation stand, bear their weight, walk, and feel what they were not told of."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import scenarios
+from scenarios.clock import STEPS, TICK
+from scenarios.drives import Drives
+from scenarios.faults import Faults
+from scenarios.humanoid.footsteps import footsteps
+from scenarios.humanoid.robots import G1, TALOS
+from scenarios.humanoid.scene import SETTLING, bodies, plan, scene, standing
+from scenarios.humanoid.walking import walk
+from scenarios.imperfections import Imperfections, real_model
+from scenarios.loop import record
+from scenarios.motions import Walk
+from scenarios.reduced import reduced_model
+
+SEED, SHORT = 1, 4.0
+HUMANOIDS = pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)
+
+
+def imperfect(robot, seed=3):
+    rng = np.random.default_rng(seed)
+    return Imperfections.draw(
+        rng, 12, bodies=bodies(robot), payload=robot.payload, force=robot.force_noise
+    )
+
+
+def stood(robot, duration=0.3):
+    """A robot that does nothing but stand, and what it is like."""
+    like = imperfect(robot)
+    scenery = scene(robot, walk(robot, (), duration), Faults(), like)
+    given = robot.drives
+    drives = Drives(
+        scenery.start[-12:],
+        stiffness=np.array(given.stiffness),
+        damping=np.array(given.damping),
+        limit=np.array(given.torque),
+        offset=np.zeros(12),
+        imperfections=like,
+        step=TICK / STEPS,
+    )
+    ticks = SETTLING + round(duration / TICK)
+    quiet = np.zeros((ticks * STEPS, 12))
+    error = np.zeros((ticks, scenery.model.nsensordata))
+    return record(scenery, drives, encoder_error=quiet, sensor_error=error), like
+
+
+@HUMANOIDS
+def test_a_standing_robot_stands_still_and_the_ground_bears_its_weight(robot):
+    motion, like = stood(robot)
+    assert np.abs(motion.velocity).max() < 0.02
+    assert np.ptp(motion.base_pose[:, :3], axis=0).max() < 2e-3
+    real = real_model(reduced_model(robot), robot.carrier, np.zeros(3), like)
+    weight = pin.computeTotalMass(real) * 9.81
+    assert motion.contact.sum(axis=1).mean() == pytest.approx(weight, rel=0.01)
+    assert (motion.contact.min(axis=0) > 0.3 * weight).all()
+
+
+@HUMANOIDS
+def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk(robot):
+    model = reduced_model(robot)
+    way = plan(robot, Walk(way="curve"), np.random.default_rng(0), SHORT)
+    built = scene(robot, way, Faults(), imperfect(robot)).model
+    real = real_model(model, robot.carrier, np.zeros(3), imperfect(robot))
+    ours, theirs = real.createData(), mujoco.MjData(built)
+    body, before = standing(robot, model, way), None
+    for tick in range(0, len(way.time), 5):
+        turns = [pin.rpy.rpyToMatrix(0.0, 0.0, yaw) for yaw in way.yaws[tick]]
+        base = pin.rpy.rpyToMatrix(0.0, 0.0, way.heading[tick])
+        q = body.follow(way.places[tick], turns, way.centre[tick], base)
+        if before is not None and tick % 50 == 0:
+            v = pin.difference(model, before, q) / (5 * TICK)
+            pin.forwardKinematics(real, ours, q, v)
+            pin.centerOfMass(real, ours, q, v)
+            turn = pin.Quaternion(q[3:7]).matrix()
+            theirs.qpos[:] = np.concatenate((q[:3], q[[6, 3, 4, 5]], q[7:]))
+            theirs.qvel[:] = np.concatenate((turn @ v[:3], v[3:]))
+            mujoco.mj_forward(built, theirs)
+            for sole in robot.effectors:
+                frame = real.getFrameId(sole.frame)
+                pose = pin.updateFramePlacement(real, ours, frame)
+                site = built.site(sole.frame).id
+                place = pose.act(np.array(sole.point))
+                np.testing.assert_allclose(theirs.site_xpos[site], place, rtol=0, atol=1e-8)
+                twist = np.zeros(6)
+                mujoco.mj_objectVelocity(built, theirs, mujoco.mjtObj.mjOBJ_SITE, site, twist, 0)
+                given = pin.getFrameVelocity(real, ours, frame, pin.LOCAL_WORLD_ALIGNED)
+                speed = given.linear + np.cross(given.angular, pose.rotation @ sole.point)
+                np.testing.assert_allclose(twist[3:], speed, rtol=0, atol=1e-8)
+            root = built.body("root_joint").id
+            np.testing.assert_allclose(theirs.subtree_com[root], ours.com[0], rtol=0, atol=1e-8)
+            mujoco.mj_subtreeVel(built, theirs)
+            moving = theirs.subtree_linvel[root]
+            np.testing.assert_allclose(moving, ours.vcom[0], rtol=0, atol=1e-8)
+        before = q
+
+
+@pytest.fixture(scope="module")
+def straight():
+    return scenarios.simulate("talos", "straight", SEED, duration=SHORT)
+
+
+@pytest.fixture(scope="module")
+def obstacle(straight):
+    return scenarios.simulate("talos", "obstacle-full", SEED, duration=SHORT)
+
+
+def test_a_healthy_walk_is_ok_all_the_time(straight):
+    assert [(block.start, block.stop, block.label) for block in straight.blocks] == [
+        (0.0, SHORT, "ok")
+    ]
+    assert straight.meta["events"] == []
+
+
+def test_it_walks_upright_to_where_its_steps_lead(straight):
+    rng = np.random.default_rng(np.random.SeedSequence(SEED).spawn(4)[0])
+    steps = footsteps(TALOS, Walk(), rng, SHORT)
+    place, turn = straight.base_pose[-1, :3], straight.base_pose[-1, 3:]
+    start = straight.base_pose[0, :3]
+    assert place[0] - start[0] == pytest.approx(steps[-1].place[0], abs=0.03)
+    assert steps[-1].place[0] > 0.05
+    assert place[2] == pytest.approx(start[2], abs=0.02)
+    assert np.abs(turn[:3]).max() < 0.03
+
+
+def test_the_drives_stay_far_from_their_limits(straight):
+    assert np.abs(straight.effort).max() < 0.6 * max(TALOS.drives.torque)
+    error = straight.velocity - straight.velocity_desired
+    assert error.std() < 0.02
+
+
+def test_an_obstacle_is_met_early_and_felt_as_an_impact(obstacle):
+    (event, *_) = obstacle.meta["events"]
+    assert event["label"] == "impact"
+    assert event["facts"]["force"] > 300
+    blocks = [block for block in obstacle.blocks if block.label == "impact"]
+    assert blocks
+    assert blocks[0].start == pytest.approx(event["start"], abs=0.03)
+
+
+def test_runs_are_the_same_until_the_obstacle_is_met(straight, obstacle):
+    onset = int(obstacle.meta["events"][0]["start"] * 10_000) - 1
+    np.testing.assert_array_equal(obstacle.velocity[:onset], straight.velocity[:onset])
+
+
+def test_an_obstacle_is_answered_by_the_controller_and_was_not_planned(straight, obstacle):
+    planned, commanded = (
+        np.abs(obstacle.stages[stage] - straight.stages[stage]).max()
+        for stage in ("planned", "commanded")
+    )
+    assert planned < 0.05  # the plan is the same, the posture that follows it is not quite
+    assert commanded > 10 * planned
+
+
+def test_planned_velocities_are_those_that_drives_follow_where_nothing_disturbs(straight):
+    quiet = straight.time < 0.5
+    planned, desired = straight.stages["planned"], straight.velocity_desired
+    assert np.abs(planned[quiet] - desired[quiet]).max() < 0.02
+    share = np.square(planned - desired).sum() / np.square(desired).sum()
+    assert share < 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["talos", "g1"])
+@pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
+def test_humanoids_walk_every_way_without_an_event(robot, way):
+    run = scenarios.simulate(robot, way, 2)
+    assert [block.label for block in run.blocks] == ["ok"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("side", ["full", "heel", "toe", "left", "right"])
+def test_obstacles_under_any_part_of_a_sole_are_felt(side):
+    run = scenarios.simulate("talos", f"obstacle-{side}", 2)
+    assert "impact" in {block.label for block in run.blocks}
+
+
+@pytest.mark.slow
+def test_too_high_gains_end_in_oscillations():
+    run = scenarios.simulate("talos", "limit-cycle", 2)
+    assert "oscillations" in {block.label for block in run.blocks}
+
+
+@pytest.mark.slow
+def test_a_platform_that_is_left_with_a_partial_contact_is_felt():
+    run = scenarios.simulate("talos", "platform", 2)
+    assert {"ok", "highaccelerations"} <= {block.label for block in run.blocks}
+    assert run.base_pose[-1, 2] == pytest.approx(run.base_pose[0, 2] - 0.06, abs=0.02)
+
+
+def test_a_robot_that_lies_on_its_side_has_fallen():
+    like = imperfect(TALOS)
+    scenery = scene(TALOS, walk(TALOS, (), 0.3), Faults(), like)
+    data = mujoco.MjData(scenery.model)
+    data.qpos[:] = scenery.start
+    mujoco.mj_forward(scenery.model, data)
+    assert not scenery.control.fallen(data.sensordata)
+    data.qpos[3:7] = (np.cos(0.5), np.sin(0.5), 0.0, 0.0)
+    mujoco.mj_forward(scenery.model, data)
+    assert scenery.control.fallen(data.sensordata)

@@ -1,0 +1,260 @@
+"""The commands that simulate: one run, or a data set that can be stopped and goes on."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scenarios
+from inspector.cli import main
+from inspector.training import recordings
+from noisemodel import Block, Run
+from scenarios import dataset
+from scenarios.sample import Sample, is_sample
+
+ROOT = Path(__file__).parents[1]
+JOINTS = scenarios.ROBOTS["panda"].drives.joints
+
+
+@pytest.fixture
+def inspector(monkeypatch, capsys):
+    """Call the command line; returns exit status, what it printed, and what it complained."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["inspector", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out, printed.err
+
+    return call
+
+
+@pytest.fixture
+def simulated(monkeypatch):
+    """Let nothing be simulated, and list what would have been."""
+    calls, falls = [], set()
+
+    def simulate(robot, scenario, seed, *, duration=None):
+        line, _ = scenarios.simulation.look_up(robot, scenario)
+        calls.append((robot, line.name, seed))
+        if (line.name, seed) in falls:
+            raise scenarios.SimulationError(robot, line.name, seed, 1.25, "it fell")
+        return stub(robot, line.name, seed, duration or 7.0)
+
+    simulate.calls, simulate.falls = calls, falls
+    monkeypatch.setattr(dataset, "simulate", simulate)
+    monkeypatch.setattr(scenarios, "simulate", simulate)
+    return simulate
+
+
+def stub(robot: str, scenario: str, seed: int, duration: float) -> Run:
+    """A run of two seconds that swings in the second one."""
+    generator = np.random.default_rng(seed)
+    when = np.arange(20_000) * 1e-4
+    speed = 1 + 0.01 * generator.normal(size=(20_000, len(JOINTS)))
+    speed[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * when[10_000:, None])
+    speed = speed.astype(np.float32)
+    return Run(
+        time=when,
+        joint_names=JOINTS,
+        velocity=speed,
+        position=speed,
+        velocity_desired=speed,
+        robot="panda",
+        blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 2.0, "oscillations")),
+        meta={"scenario": scenario, "seed": seed, "duration": duration},
+    )
+
+
+def many(*arguments):
+    return ("simulate", "dataset", "--robots", "panda", *arguments)
+
+
+def test_help_explains_one_run_and_many(inspector):
+    status, out, _ = inspector("simulate", "--help")
+    assert status == 0
+    assert "dataset" in out
+    assert "inspector simulate talos --scenario 7 --seed 1 -o run.npz" in " ".join(out.split())
+    status, out, _ = inspector("simulate", "dataset", "--help")
+    assert {"--robots", "--hours", "--only", "--first-seed"} <= set(out.split())
+
+
+def test_scenarios_are_listed_with_numbers_and_families(inspector):
+    status, out, _ = inspector("simulate", "--list")
+    assert status == 0
+    *lines, robots = out.splitlines()
+    assert [line.split()[:2] for line in lines] == [
+        [str(line.number), name] for name, line in scenarios.SCENARIOS.items()
+    ]
+    assert all(any(family in line for family in ("humanoid", "arm")) for line in lines)
+    assert "panda" in robots
+
+
+@pytest.mark.parametrize("command", [["simulate"], ["simulate", "run"]])
+@pytest.mark.parametrize("scenario", ["7", "obstacle-toe"])
+def test_one_run_is_made_by_name_or_number(inspector, simulated, tmp_path, command, scenario):
+    output = tmp_path / "run.npz"
+    status, out, err = inspector(
+        *command, "panda", "--scenario", scenario, "--seed", 3, "-o", output
+    )
+    assert (status, err) == (0, "")
+    assert "oscillations from 1.00 s to 2.00 s" in out
+    assert simulated.calls == [("panda", "obstacle-toe", 3)]
+    assert Run.load(output).meta["seed"] == 3
+
+
+def test_a_data_set_is_made_and_told_and_not_made_twice(inspector, simulated, tmp_path):
+    simulated.falls.add(("obstacle-toe", 5))
+    call = many("--seeds", 2, "--first-seed", 4, "--scenarios", "1,7", "-o", tmp_path)
+    status, out, err = inspector(*call)
+    assert (status, err) == (0, "")
+    assert [*out.splitlines()[4].split()] == ["7", "obstacle-toe", "1/2"]
+    assert "4 runs, 1 of which fell" in out
+    assert inspector(*call)[1] == out
+    assert len(simulated.calls) == 4
+    status, out, _ = inspector(*call, "--json")
+    assert json.loads(out)["upright"]["panda"]["obstacle-toe"] == {"upright": 1, "runs": 2}
+    assert len(simulated.calls) == 4
+
+
+def test_hours_of_ok_motion_are_made_and_falls_made_up_for(inspector, simulated, tmp_path):
+    simulated.falls.add(("curve", 0))
+    call = many("--only", "ok", "--hours", 100 / 3600, "--duration", 5, "-o", tmp_path, "--json")
+    status, out, _ = inspector(*call)
+    upright = json.loads(out)["upright"]["panda"]
+    assert status == 0
+    assert set(upright) == {"straight", "curve", "directions", "spot"}
+    assert sum(runs["upright"] for runs in upright.values()) * 5 >= 100
+    assert upright["curve"] == {"upright": 5, "runs": 6}
+
+
+def test_noisytests_form_tells_which_classes_it_lacks(inspector, simulated, tmp_path):
+    status, _, err = inspector(
+        *many("--seeds", 4, "--scenarios", 1, "--format", "noisytest", "-o", tmp_path)
+    )
+    assert status == 0
+    assert err == "NoisyTest cannot train without blocks of impact, highaccelerations\n"
+    assert (tmp_path / "noisytest-config.json").exists()
+    assert len(list(recordings([tmp_path / "training"], 10_000.0))) == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (["--robots", "panda,baxter"], "robot 'baxter' cannot be simulated"),
+        (["--robots", ","], "no robot is named; there are talos"),
+        (["--scenarios", "1,dance"], "no scenario 'dance'"),
+        (["--scenarios", "99"], "no scenario '99'"),
+        (["--scenarios", "torque-jump"], "no scenario of torque-jump is left for 'panda'"),
+        (["--scenarios", "7", "--only", "ok"], "is left for 'panda' in which nothing goes wrong"),
+        (["--seeds", "0"], "0 seeds are asked for"),
+        (["--first-seed", "-1"], "the first seed is -1"),
+        (["--seeds", "1", "--hours", "1"], "name one of them"),
+        (["--duration", "1"], "duration 1 s: expected at least 3 s"),
+    ],
+)
+def test_what_cannot_be_is_one_line_and_begins_nothing(
+    inspector, simulated, tmp_path, arguments, problem
+):
+    status, out, err = inspector(*many(*arguments, "-o", tmp_path / "data"))
+    assert (status, out, err.count("\n")) == (3, "", 1)
+    assert problem in err
+    assert not (tmp_path / "data").exists()
+    assert simulated.calls == []
+
+
+def test_outputs_that_cannot_be_are_one_line(inspector, simulated, tmp_path):
+    (tmp_path / "file").write_text("precious")
+    status, _, err = inspector(*many("-o", tmp_path / "file"))
+    assert (status, err.count("\n")) == (3, 1)
+    assert "file: is a file; name a folder" in err
+    status, _, err = inspector(*many("-o", tmp_path))
+    assert (status, err.count("\n")) == (3, 1)
+    assert "holds something else" in err
+    assert (tmp_path / "file").read_text() == "precious"
+
+
+def test_a_damaged_sample_is_named_and_made_again_if_told(inspector, simulated, tmp_path):
+    call = many("--seeds", 2, "--scenarios", 1, "-o", tmp_path)
+    inspector(*call)
+    (tmp_path / "panda/straight-001.npz").write_bytes(b"PK")
+    status, _, err = inspector(*call)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "straight-001.npz: no sample, or cut off" in err
+    status, out, _ = inspector(*call, "--overwrite")
+    assert status == 0
+    assert "2 runs" in out
+    assert len(simulated.calls) == 3
+
+
+def test_without_the_simulator_one_line_says_what_to_install(inspector, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    for call in (("simulate", "panda", "-o", tmp_path / "r.npz"), many("-o", tmp_path / "data")):
+        status, _, err = inspector(*call)
+        assert (status, err.count("\n")) == (3, 1)
+        assert "pip install 'noise-inspector[sim]'" in err
+    assert not (tmp_path / "r.npz").exists()
+
+
+def test_a_model_learns_from_a_folder_of_samples(inspector, simulated, tmp_path):
+    data, model = tmp_path / "data", tmp_path / "m.npz"
+    inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
+    status, out, _ = inspector("train", data, "-o", model)
+    assert status == 0
+    assert "Subset accuracy" in out
+    status, out, _ = inspector("evaluate", model, data / "panda", "--json")
+    assert status == 0
+    confusion = np.array(json.loads(out)["confusion"])
+    assert confusion.sum() == 3 * 2 * 7
+    status, out, _ = inspector("evaluate", model, data / "panda/straight-002.npz", "--json")
+    assert np.array(json.loads(out)["confusion"]).sum() == 2 * 7
+
+
+def test_samples_and_their_runs_are_heard_alike(simulated, inspector, tmp_path):
+    inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
+    stub("panda", "straight", 0, 7.0).save(tmp_path / "run.npz")
+    sample, run = recordings([tmp_path / "data", tmp_path / "run.npz"], 10_000.0)
+    np.testing.assert_allclose(sample.signal, run.signal, rtol=2e-7)
+    assert sample.blocks == run.blocks
+    assert sample.name == "panda/straight-000"
+    assert sample.sha256 == Sample.load(tmp_path / "data/panda/straight-000.npz").meta["sha256"]
+
+
+def test_samples_cannot_be_lowered_to_another_rate(simulated, inspector, tmp_path):
+    inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
+    status, _, err = inspector("train", tmp_path / "data", "--rate", 1000, "-o", tmp_path / "m.npz")
+    assert (status, err.count("\n")) == (3, 1)
+    assert "keeps the noise at 10000 Hz and no velocities" in err
+
+
+@pytest.mark.slow
+def test_a_data_set_that_is_killed_goes_on_where_it_was(tmp_path):
+    data = tmp_path / "data"
+    call = [
+        *(sys.executable, "-m", "inspector"),
+        *many("--seeds", "1", "--scenarios", "1,2,7,8", "--duration", "3"),
+        *("-j", "2", "-o", str(data), "--json"),
+    ]
+    settings = {"cwd": ROOT, "env": {**os.environ, "PYTHONPATH": str(ROOT)}}
+    killed = subprocess.Popen(call, start_new_session=True, **settings)
+    end = time.monotonic() + 240
+    while not list(data.glob("panda/*.npz")) and time.monotonic() < end:
+        time.sleep(0.05)
+    os.killpg(killed.pid, signal.SIGKILL)
+    killed.wait(timeout=60)
+    there = {path: path.stat().st_mtime_ns for path in data.glob("panda/*.npz")}
+    assert 1 <= len(there) < 4
+    assert all(is_sample(path) and Sample.load(path) for path in there)
+    done = subprocess.run(call, capture_output=True, check=True, timeout=300, **settings)
+    upright = json.loads(done.stdout)["upright"]["panda"]
+    assert all(runs == {"upright": 1, "runs": 1} for runs in upright.values())
+    assert len(upright) == 4
+    assert {path: path.stat().st_mtime_ns for path in there} == there
+    assert len([path for path in data.glob("panda/*") if not path.name.startswith(".")]) == 4

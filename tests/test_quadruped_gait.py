@@ -1,0 +1,107 @@
+"""A trot is timed and placed so that a body can be carried by two feet at a time."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from scenarios.clock import TICK, times
+from scenarios.quadruped import steps
+from scenarios.quadruped.gait import DUTY, PAIRS, beats, loads, swings
+from scenarios.quadruped.robots import GO2
+from scenarios.quadruped.steering import CHANGE, steer
+
+TIME = times(6000, TICK)
+
+
+@pytest.fixture
+def timing():
+    rng = np.random.default_rng(3)
+    return beats(rng, begin=0.5, end=5.5, period=0.5, jitter=0.1)
+
+
+def test_pairs_swing_in_turn_and_never_together(timing):
+    assert [beat.pair for beat in timing] == [0, 1] * (len(timing) // 2)
+    for one, two in pairwise(timing):
+        assert one.touch == two.begin < two.lift < two.touch
+    assert timing[0].begin == 0.5
+    assert 5.5 - 0.55 <= timing[-1].touch <= 5.5
+
+
+def test_cycles_vary_as_much_as_they_are_told(timing):
+    cycles = np.diff([beat.begin for beat in timing[::2]])
+    assert cycles.min() >= 0.45
+    assert cycles.max() <= 0.55
+    assert np.ptp(cycles) > 0.02
+    stands = [two.lift - one.touch for one, two in zip(timing, timing[2:], strict=False)]
+    assert np.mean(stands) / cycles.mean() == pytest.approx(DUTY, abs=0.02)
+
+
+def test_the_feet_share_the_weight_and_none_bears_in_the_air(timing):
+    load, share = loads(TIME, timing), swings(TIME, timing)
+    np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
+    assert load.min() == 0
+    assert not load[share < 1].any()
+    np.testing.assert_array_equal(load[[0, -1]], 0.25)
+    assert np.abs(np.diff(load, axis=0)).max() < 0.02  # weight goes over, it does not jump
+    np.testing.assert_array_equal(load[:, 0], load[:, PAIRS.index(0, 1)])
+
+
+def test_a_foot_goes_up_and_comes_down_softly():
+    share = np.linspace(0, 1, 10001)
+    height = steps.height(share)
+    slope = np.gradient(height, share)
+    assert height[[0, -1]] == pytest.approx([0, 0], abs=1e-12)
+    assert height.max() == pytest.approx(1, abs=1e-12)
+    assert np.argmax(height) == pytest.approx(steps.TOP * 10000, abs=1)
+    assert slope[-1] == pytest.approx(-steps.LANDING / (1 - steps.TOP), rel=1e-2)
+    assert slope.min() < 10 * slope[-1]
+    assert np.abs(np.diff(slope)).max() < 0.01
+
+
+def test_a_foot_is_over_its_place_before_it_may_touch():
+    assert steps.progress(np.array([0.0, steps.ACROSS, 1.0])) == pytest.approx([0, 1, 1])
+    assert steps.height(np.array([steps.NEAR]))[0] < 0.35
+
+
+def test_feet_come_down_at_the_neutral_point(timing):
+    speed, hip = 0.4, np.array([0.2, 0.1])
+    way = np.column_stack((speed * TIME, np.zeros_like(TIME)))
+    own = [beat for beat in timing if beat.pair == 0]
+    places = steps.footholds(own, hip, way=way, yaw=np.zeros_like(TIME), stop=6.0 - TICK)
+    assert places[0] == (*hip, 0.0)
+    for (beat, following), place in zip(pairwise(own), places[1:-1], strict=True):
+        standing = following.lift - beat.touch  # Raibert: half a stance ahead of the hip
+        expected = hip[0] + speed * (beat.touch + standing / 2)
+        assert place.x == pytest.approx(expected, abs=speed * TICK)
+        assert place.y == hip[1]
+
+
+def test_feet_turn_with_the_body(timing):
+    yaw = 0.3 * TIME
+    own = [beat for beat in timing if beat.pair == 1]
+    places = steps.footholds(own, np.array([0.2, 0.1]), way=np.zeros((6000, 2)), yaw=yaw, stop=5.5)
+    for place in places:
+        turned = (0.2 + 0.1j) * np.exp(1j * place.yaw)
+        assert (place.x, place.y) == pytest.approx((turned.real, turned.imag))
+    assert places[-1].yaw == pytest.approx(0.3 * 5.5)
+
+
+@pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
+def test_the_body_goes_from_rest_to_rest_its_way(way):
+    rng = np.random.default_rng(1)
+    path, yaw = steer(TIME, way, GO2, rng, start=0.5, stop=5.5)
+    velocity = np.gradient(path, TICK, axis=0)
+    speed = np.linalg.norm(velocity, axis=1)
+    ahead = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
+    assert not speed[TIME < 0.49].any()
+    assert speed[TIME > 5.51].max() < 1e-9
+    assert speed.max() <= GO2.speed * 1.001
+    assert np.abs(np.diff(velocity, axis=0)).max() < 2 * GO2.speed / CHANGE * 2 * TICK
+    if way == "spot":
+        assert speed.max() == 0
+    elif way == "directions":
+        assert ahead[TIME > 1].max() < 0.5 * GO2.speed
+    else:
+        assert ahead[(TIME > 1) & (TIME < 4)].min() > 0.3 * GO2.speed
+        assert (np.ptp(yaw) > 0.2) == (way == "curve")

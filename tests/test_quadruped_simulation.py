@@ -1,0 +1,197 @@
+"""Quadrupeds stand, trot as they are told, and stumble where something lies in their way."""
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import scenarios
+from scenarios import simulation
+from scenarios.case import Case
+from scenarios.faults import Faults
+from scenarios.imperfections import Imperfections
+from scenarios.labels import annotate
+from scenarios.motions import Trot
+from scenarios.quadruped import scene
+from scenarios.quadruped.cases import QUADRUPED
+from scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
+from scenarios.quadruped.standing import stand
+from scenarios.reduced import reduced_model
+from scenarios.sensing import sensors_of
+
+SHORT = 3.0
+SEED = 2
+ROBOTS = [GO2, SOLO12, ANYMAL]
+FAILURE = {
+    "obstacle-full": "impact",
+    "obstacle-heel": "impact",
+    "decalibrated": "impact",
+    "multisine-60-100": "oscillations",
+    "early-height": "impact",
+    "platform": "highaccelerations",
+    "torque-jump": "highaccelerations",
+    "limit-cycle": "oscillations",
+    "reference-jump": "highaccelerations",
+}
+
+
+@pytest.fixture(scope="module")
+def trot():
+    """A healthy trot of Go2, and its plan."""
+    rng = np.random.default_rng(np.random.SeedSequence(SEED).spawn(1)[0])
+    plan = scene.plan(GO2, Trot(), rng, SHORT)
+    return simulation._try(GO2, Case(Trot()), SEED, SHORT), plan
+
+
+@pytest.fixture(scope="module")
+def stumble():
+    """The same trot over an obstacle."""
+    case = QUADRUPED["obstacle-full"]
+    return simulation._try(GO2, case, SEED, SHORT)
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_a_robot_stands_with_its_mass_over_the_middle_of_its_feet(robot):
+    model, standing = reduced_model(robot), stand(robot)
+    data = model.createData()
+    centre = pin.centerOfMass(model, data, standing.configuration)
+    pin.framesForwardKinematics(model, data, standing.configuration)
+    feet = np.array([data.oMf[model.getFrameId(foot.frame)].translation for foot in robot.feet])
+    assert centre == pytest.approx([0, 0, standing.height], abs=1e-10)
+    assert feet == pytest.approx(standing.feet, abs=1e-10)
+    assert feet.mean(axis=0) == pytest.approx([0, 0, robot.feet[0].radius], abs=1e-10)
+
+
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_a_trot_begins_as_it_stands_and_never_steps_beyond_its_legs(robot):
+    plan = scene.plan(robot, Trot(way="curve"), np.random.default_rng(1), 5.0)
+    standing = stand(robot)
+    np.testing.assert_allclose(plan.feet[0], standing.feet, atol=1e-12)
+    np.testing.assert_allclose(plan.centre[0], [0, 0, standing.height], atol=1e-12)
+    reach = np.linalg.norm(plan.feet - plan.centre[:, None], axis=2)
+    assert reach.max() < 1.25 * reach[0].max()
+    moving = np.linalg.norm(np.diff(plan.feet, axis=0), axis=2)
+    assert not moving[~(plan.swing[1:] | plan.swing[:-1])].any()
+
+
+def test_the_beginning_of_a_trot_does_not_depend_on_its_duration():
+    long, short = (scene.plan(GO2, Trot(), np.random.default_rng(7), end) for end in (6.0, 4.0))
+    np.testing.assert_array_equal(long.feet[:2000], short.feet[:2000])
+
+
+def test_the_feet_bear_the_weight(trot):
+    trial, _ = trot
+    imperfections = trial.imperfections
+    masses = [inertia.mass for inertia in list(reduced_model(GO2).inertias)[1:]]
+    weight = 9.81 * (np.dot(masses, imperfections.mass) + imperfections.payload)
+    borne = trial.motion.contact.sum(axis=1).mean()  # from rest to rest: no momentum is gained
+    assert borne == pytest.approx(weight, rel=5e-3)
+
+
+def test_the_trot_goes_where_it_is_told(trot):
+    trial, plan = trot
+    way = trial.motion.base_pose[::10, :2] - trial.motion.base_pose[0, :2]
+    planned = plan.centre[:, :2] - plan.centre[0, :2]
+    assert planned[-1, 0] > 0.3
+    assert way[-1] == pytest.approx(planned[-1], abs=0.02 + 0.02 * planned[-1, 0])
+    assert np.abs(way - planned).max() < 0.03
+
+
+def test_feet_touch_when_they_are_planned_to(trot):
+    trial, plan = trot
+    assert trial.events == ()
+    touching = trial.motion.contact > 0
+    for contact in plan.contacts:
+        if contact.start > 0:
+            window = slice(*(round((contact.start + late) * 1e4) for late in (0.0, 0.1)))
+            assert touching[window, contact.effector].any()
+    in_air = plan.load == 0
+    assert touching[::10][in_air].mean() < 0.35  # the last of the swing, where it may touch
+
+
+def test_the_body_stays_level(trot):
+    trial, _ = trot
+    _, x, y, _ = trial.motion.base_pose[:, 3:].T
+    assert 2 * np.hypot(x, y).max() < 0.05
+    assert np.ptp(trial.motion.base_pose[:, 2]) < 0.015
+
+
+def test_mujoco_and_pinocchio_agree_on_where_and_how_fast_the_feet_are(trot):
+    trial, plan = trot
+    motion, model = trial.motion, reduced_model(GO2)
+    perfect = Imperfections.draw(np.random.default_rng(0), 12, bodies=13, payload=0.0, force=0.0)
+    perfect = type(perfect)(**{**vars(perfect), "mass": (1.0,) * 13, "payload": 0.0})
+    built = scene.scene(GO2, plan, Faults(), perfect).model
+    theirs, ours, where = mujoco.MjData(built), model.createData(), sensors_of(built)
+    for sample in range(0, len(motion.position), 1499):
+        pose, velocity = motion.base_pose[sample], motion.base_velocity[sample]
+        theirs.qpos[:] = np.concatenate((pose, motion.position[sample]))
+        theirs.qvel[:] = np.concatenate((velocity, motion.velocity[sample]))
+        mujoco.mj_forward(built, theirs)
+        quaternion = pose[[4, 5, 6, 3]]
+        turn = pin.Quaternion(quaternion).normalized().toRotationMatrix()
+        q = np.concatenate((pose[:3], quaternion, motion.position[sample]))
+        v = np.concatenate((turn.T @ velocity[:3], velocity[3:], motion.velocity[sample]))
+        pin.forwardKinematics(model, ours, q, v)
+        pin.updateFramePlacements(model, ours)
+        pin.centerOfMass(model, ours, q, v)
+        for foot in GO2.feet:
+            frame = model.getFrameId(foot.frame)
+            place = theirs.sensordata[where[f"{foot.frame}.place"]]
+            assert ours.oMf[frame].translation == pytest.approx(place, abs=1e-8)
+            jacobian = np.zeros((3, built.nv))
+            site = built.site(foot.frame).id
+            mujoco.mj_jacSite(built, theirs, jacobian, None, site)
+            axes = pin.LOCAL_WORLD_ALIGNED
+            speed = pin.getFrameVelocity(model, ours, frame, axes).linear
+            assert speed == pytest.approx(jacobian @ theirs.qvel, abs=1e-8)
+        assert ours.com[0] == pytest.approx(theirs.sensordata[where["centre.place"]], abs=1e-8)
+        assert ours.vcom[0] == pytest.approx(theirs.sensordata[where["centre.velocity"]], abs=1e-8)
+
+
+def test_an_obstacle_is_an_impact_and_the_run_is_healthy_before(trot, stumble):
+    healthy, _ = trot
+    first = stumble.events[0]
+    assert first.label == "impact"
+    assert first.facts["force"] > 100
+    assert first.facts["effector"] in range(4)
+    before = round(first.start * 1e4) - 10
+    np.testing.assert_array_equal(
+        stumble.motion.velocity[:before], healthy.motion.velocity[:before]
+    )
+    blocks, _ = annotate(
+        stumble.motion.velocity, healthy.motion.velocity, stumble.events, rate=10000
+    )
+    assert {"ok", "impact"} <= {block.label for block in blocks}
+
+
+def test_a_robot_that_lies_or_leans_has_fallen():
+    plan = scene.plan(GO2, Trot(), np.random.default_rng(1), SHORT)
+    perfect = Imperfections.draw(
+        np.random.default_rng(0), 12, bodies=scene.bodies(GO2), payload=0.0, force=0.0
+    )
+    ready = scene.scene(GO2, plan, Faults(), perfect)
+    where = sensors_of(ready.model)
+    for height, tilt, fallen in ((0.3, 0.0, False), (0.1, 0.0, True), (0.3, 0.9, True)):
+        sensors = np.zeros(ready.model.nsensordata)
+        sensors[where["centre.place"]] = (0, 0, height)
+        sensors[where["base.turn"]] = (np.cos(tilt / 2), np.sin(tilt / 2), 0, 0)
+        assert ready.control.fallen(sensors) == fallen
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["go2", "solo12", "anymal"])
+@pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
+def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
+    run = scenarios.simulate(robot, way, 1)
+    (block,) = run.blocks
+    assert (block.start, block.label) == (0.0, "ok")
+    assert block.stop == pytest.approx(run.meta["duration"])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["go2", "solo12", "anymal"])
+def test_scenarios_keep_their_promise_on_every_quadruped(robot):
+    for name, failure in FAILURE.items():
+        labels = {block.label for block in scenarios.simulate(robot, name, 1).blocks}
+        assert failure in labels, name
