@@ -80,7 +80,7 @@ QUADRUPED: Mapping[str, Case] = {
     "torque-jump": Case(
         _TROT,
         SensorJumps(
-            (0.03, 0.06),
+            (0.03, 0.06),  # of the quaternion: half of the angle
             sensor="base.turn",
             axes=(False, True, True, False),
             hold=(0.03, 0.08),
