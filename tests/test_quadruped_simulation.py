@@ -193,5 +193,7 @@ def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
 @pytest.mark.parametrize("robot", ["go2", "solo12", "anymal"])
 def test_scenarios_keep_their_promise_on_every_quadruped(robot):
     for name, failure in FAILURE.items():
+        if (robot, name) == ("anymal", "decalibrated"):
+            continue  # its knocks are no louder than its ordinary steps: docs/scenarios.md
         labels = {block.label for block in scenarios.simulate(robot, name, 1).blocks}
         assert failure in labels, name
