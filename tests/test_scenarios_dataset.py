@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import scenarios
-from noisemodel import Block, Run
+from noisemodel import Block, Run, runfile
 from scenarios import dataset, folder
 from scenarios.balance import Balance
 from scenarios.dataset import make
@@ -253,16 +253,16 @@ def test_outputs_that_are_no_folder_for_a_data_set_are_refused(tmp_path):
 def test_a_full_disk_is_one_line_and_leaves_nothing_half(simulated, tmp_path, monkeypatch):
     place = Folder.opened(tmp_path)
     written = []
-    savez = np.savez_compressed
+    pack = runfile._pack
 
-    def full(stream, **arrays):
+    def full(stream, arrays):
         if len(written) == 3:
             stream.write(b"half of it")
             raise OSError(errno.ENOSPC, "No space left on device")
         written.append(1)
-        savez(stream, **arrays)
+        pack(stream, arrays)
 
-    monkeypatch.setattr(np, "savez_compressed", full)
+    monkeypatch.setattr(runfile, "_pack", full)
     with pytest.raises(
         scenarios.DatasetError,
         match=r"-000\.npz: cannot be written \(No space left on device\); started again, it",
@@ -271,7 +271,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half(simulated, tmp_path, mo
     assert len(place.kept()) == 3
     assert len([name for name in files(tmp_path) if name.endswith(".npz")]) == 3
     place.clear(overwrite=False)
-    monkeypatch.setattr(np, "savez_compressed", savez)
+    monkeypatch.setattr(runfile, "_pack", pack)
     assert len(list(make(place, ALL))) == len(ALL) - 3
 
 
