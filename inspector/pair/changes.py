@@ -1,0 +1,88 @@
+"""The failures that came, went and stayed, matched in time."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from inspector.inspection import Inspection
+from inspector.pair.levels import Level, within
+from inspector.pair.pair import Pair
+from models import Event
+from noisemodel import Block
+
+CAME, WENT, STAYED = "came", "went", "stayed"
+
+
+@dataclass(frozen=True)
+class Change:
+    """A failure in either run, or in both at the same time.
+
+    Attributes:
+        kind: "came", "went" or "stayed".
+        label: Its class.
+        start: In [s], of whichever run has it first.
+        stop: In [s], of whichever has it last.
+        level: How loud both runs are there, above 10 Hz, in [dB re 1 rad/s].
+    """
+
+    kind: str
+    label: str
+    start: float
+    stop: float
+    level: Level
+
+    def __str__(self) -> str:
+        return (
+            f"{self.kind}: {self.label}, {self.start:.2f} s to {self.stop:.2f} s,"
+            f" {self.level.change:+.1f} dB"
+        )
+
+
+def changes(pair: Pair) -> tuple[Change, ...]:
+    """Match the failures of two runs.
+
+    Findings of one class that overlap in time, whichever run they are of, are one failure. It
+    stayed if both runs have a part in it; otherwise it came or went.
+
+    Args:
+        pair: The two runs.
+
+    Returns:
+        Changes in order of time; of annotated blocks, unless both runs could be labelled.
+    """
+    found = [
+        Change(kind, label, start, stop, within(pair, start, stop))
+        for kind, label, start, stop in _matched(*(failures(pair, s) for _, s in pair.sides))
+    ]
+    return tuple(sorted(found, key=lambda change: (change.start, change.stop, change.label)))
+
+
+def failures(pair: Pair, side: Inspection) -> Sequence[Event | Block]:
+    """List what of a run is matched: its findings, or its annotated failures."""
+    if judged(pair):
+        return side.events
+    return [block for block in side.run.blocks if block.label != "ok"]
+
+
+def judged(pair: Pair) -> bool:
+    """Whether both runs could be labelled, so that findings are what is matched."""
+    return pair.before.labels is not None and pair.after.labels is not None
+
+
+def _matched(
+    before: Sequence[Event | Block], after: Sequence[Event | Block]
+) -> Iterator[tuple[str, str, float, float]]:
+    """Merge failures of a class that overlap: kind, class, start and stop."""
+    kinds = {frozenset({True}): CAME, frozenset({False}): WENT}
+    every = [(f.label, f.start, f.stop, False) for f in before]
+    every += [(f.label, f.start, f.stop, True) for f in after]
+    for label in sorted({each[0] for each in every}):
+        own = sorted(each[1:] for each in every if each[0] == label)
+        groups: list[list[tuple[float, float, bool]]] = []
+        for each in own:
+            if groups and each[0] < max(stop for _, stop, _ in groups[-1]):
+                groups[-1].append(each)
+            else:
+                groups.append([each])
+        for group in groups:
+            kind = kinds.get(frozenset(later for *_, later in group), STAYED)
+            yield kind, label, group[0][0], max(stop for _, stop, _ in group)

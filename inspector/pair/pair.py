@@ -1,0 +1,171 @@
+"""Two runs with what was found in each, sample beside sample."""
+
+import hashlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import models
+import noisemodel as nm
+from inspector.errors import InspectorError
+from inspector.inspection import Inspection, robot_known
+from inspector.labelling import CannotTellError, Library, label_run
+from inspector.linknoise import LinkNoise, link_noise, vibrating
+from inspector.pair.alignment import Align, Alignment, align
+from inspector.pair.common import alike, together
+from noisemodel import robot as robots
+from noisemodel.types import Array, Mask
+
+SIDES = ("before", "after")
+
+
+@dataclass(frozen=True, eq=False)
+class Pair:
+    """Two runs over the stretch of time that both cover.
+
+    Attributes:
+        before: The run before the change; its times are those of both.
+        after: The run after the change.
+        alignment: How they were laid beside each other.
+        remarks: What is not compared and why, a sentence each.
+    """
+
+    before: Inspection
+    after: Inspection
+    alignment: Alignment
+    remarks: tuple[str, ...]
+
+    @property
+    def sides(self) -> tuple[tuple[str, Inspection], tuple[str, Inspection]]:
+        """Both with what they are called."""
+        return (SIDES[0], self.before), (SIDES[1], self.after)
+
+    @property
+    def rate(self) -> float:
+        """Of both, in [Hz]."""
+        return float(self.before.run.rate)
+
+    @property
+    def time(self) -> Array:
+        """Of both, shape (samples,), in [s]."""
+        return self.before.run.time
+
+    @cached_property
+    def valid(self) -> Mask:
+        """The samples that lie in a gap of neither, shape (samples,)."""
+        return self.before.run.mask & self.after.run.mask
+
+    @cached_property
+    def vibration(self) -> tuple[Array, Array]:
+        """The noise above 10 Hz of both, each of shape (samples,), in [rad/s]; 0 in gaps."""
+        fast = (
+            vibrating(side.noise[:, None], self.valid, self.rate)[:, 0] for _, side in self.sides
+        )
+        return next(fast), next(fast)
+
+    @property
+    def links(self) -> tuple[LinkNoise, LinkNoise] | None:
+        """Noise of the links of both; None unless both are of one robot."""
+        if self.before.links is None or self.after.links is None:
+            return None
+        return self.before.links, self.after.links
+
+
+def compare(
+    before: Path,
+    after: Path,
+    library: Library,
+    *,
+    how: Align = Align.AUTO,
+    robot: bool = True,
+    kind: str = "normal",
+) -> Pair:
+    """Read two run files and lay them beside each other.
+
+    Args:
+        before: A run file.
+        after: Another.
+        library: Models to choose from by rate.
+        how: How they are aligned.
+        robot: Whether to look at the robot, if both runs are of one that is known.
+        kind: Kind of the extended noise, see ``noisemodel.extended``.
+
+    Returns:
+        The pair; both runs lie on the time axis of the first.
+
+    Raises:
+        RunFileError: If a file is no run file.
+        RobotError: If the robot cannot be read, or lacks one of the joints.
+        InspectorError: If the robot's shape cannot be had, or the runs share no time.
+    """
+    one, other, remarks = alike(nm.Run.load(before), nm.Run.load(after))
+    alignment = align(one, other, how)
+    one, other, left_out = together(one, other, alignment)
+    missing = _no_links(one, other) if robot else ""
+    sides = [
+        _look(path, run, library, kind=kind if robot and not missing else "")
+        for path, run in ((before, one), (after, other))
+    ]
+    said = dict.fromkeys(remark for side in sides for remark in side.remarks)
+    both = [(remark, [remark in side.remarks for side in sides]) for remark in said]
+    return Pair(
+        before=sides[0],
+        after=sides[1],
+        alignment=alignment,
+        remarks=(
+            *remarks,
+            *left_out,
+            *([missing] if missing else []),
+            *(f"{_who(*has)}: {remark}" for remark, has in both),
+        ),
+    )
+
+
+def _who(before: bool, after: bool) -> str:
+    return "Both" if before and after else "Before" if before else "After"
+
+
+def _look(path: Path, run: nm.Run, library: Library, *, kind: str) -> Inspection:
+    """Look at a part of a run; at its links too, if a kind of noise is named."""
+    found = Inspection(
+        name=path.stem,
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        run=run,
+        noise=nm.simplified(run.motion, run.velocity_desired),
+        labels=None,
+        model="",
+        events=(),
+        links=None,
+        remarks=(),
+    )
+    try:
+        labelled = label_run(run, library)
+    except (CannotTellError, models.SignalError, nm.RunError) as error:
+        found = replace(found, remarks=(f"no class lanes: {error}.",))
+    else:
+        labels = labelled.labels
+        found = replace(found, labels=labels, model=labelled.model, events=labels.events())
+    if not kind:
+        return found
+    try:
+        links = link_noise(run, kind)
+    except nm.GeometryError as error:
+        raise InspectorError(f"{error}; `--no-robot` shows the runs without the robot") from error
+    return replace(found, links=links, remarks=(*found.remarks, *links.remarks))
+
+
+def _no_links(before: nm.Run, after: nm.Run) -> str:
+    """Say why the links of two runs cannot be compared; nothing if they can."""
+    for which, run in zip(SIDES, (before, after), strict=True):
+        if not robot_known(run):
+            named = "names no robot" if run.robot is None else f"names {run.robot!r}, not known"
+            return f"Links are not compared: the run {which} {named}."
+        if run.position is None:
+            return f"Links are not compared: the run {which} has no positions."
+    assert before.robot is not None
+    assert after.robot is not None
+    if before.robot != after.robot and (
+        robots.locate(before.robot).read_bytes() != robots.locate(after.robot).read_bytes()
+    ):
+        return f"Links are not compared: {before.robot} and {after.robot} are two robots."
+    return ""

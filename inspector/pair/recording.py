@@ -1,0 +1,118 @@
+"""Two runs as one rerun recording: what goes into it, in order."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import rerun as rr
+from rerun.urdf import UrdfTree
+
+from inspector import scene, unstable
+from inspector.limbs import limbs
+from inspector.pair import classes, jointplots, linkplots, noiseplots
+from inspector.pair.changes import CAME, Change, changes
+from inspector.pair.layout import Contents, layout
+from inspector.pair.levels import STEP, steps, whole
+from inspector.pair.pair import Pair
+from inspector.pair.report import report
+from inspector.pair.sound import sounds
+from inspector.series import TIMELINE
+from noisemodel.atomic import replacing
+
+APPLICATION = "inspector"
+
+
+def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
+    """Write the recording of two runs, whole or not at all.
+
+    The same input makes a recording of the same id: opened again, it replaces itself.
+
+    Args:
+        pair: The runs.
+        path: The file to write, by convention ``*.rrd``.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+        RobotError: If the robot's URDF cannot be read, or lacks one of the runs' joints.
+        MeshError: If one of the robot's meshes cannot be read.
+    """
+    parts = (pair.before.sha256, pair.after.sha256, str(pair.alignment.lag))
+    identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
+    with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
+        tree = _tree(pair, Path(folder))
+        recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
+        recording.save(temporary)
+        contents = _log(recording, pair, tree)
+        recording.send_blueprint(layout(contents))  # takes the place of an older layout
+        recording.flush()
+        recording.disconnect()
+
+
+def _tree(pair: Pair, folder: Path) -> UrdfTree | None:
+    run = pair.after.run
+    if pair.links is None:
+        return None
+    assert run.robot is not None
+    tree = scene.load(run.robot, folder)
+    scene.check_joints(tree, run)
+    return tree
+
+
+def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Contents:
+    found, links = changes(pair), list[str]()
+    if tree is not None:
+        scene.log(recording, tree, pair.after.run, coloured=True)
+        links = linkplots.log(recording, tree, pair)
+    lanes = classes.log(recording, pair, found)
+    noiseplots.log(recording, pair)
+    names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
+    joints = jointplots.log(recording, pair, limbs(tuple(names), tree))
+    loop = _loudest_change(pair, found)
+    heard = sounds(pair, loop[0])
+    start = float(pair.time[0])
+    for name, sound in heard.items():
+        unstable.log_audio(recording, f"/sound/{name}", sound, TIMELINE, start=start)
+    _log_text(recording, pair)
+    return Contents(
+        joints=joints,
+        links=links,
+        root=None if tree is None else scene.root(tree, pair.after.run),
+        lanes=lanes,
+        events=bool(found),
+        sounds=tuple(heard),
+        rate=pair.rate,
+        loop=loop,
+    )
+
+
+def _loudest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
+    """Choose what is looked at first: what came, or else where the level changed most."""
+    came = [change for change in found if change.kind == CAME]
+    if came:
+        worst = max(came, key=lambda change: change.level.after)
+        begin, end = float(pair.time[0]), float(pair.time[-1])
+        return max(worst.start, begin), min(worst.stop, end)
+    time, level = steps(pair)
+    place = float(time[np.abs(level[:, 1] - level[:, 0]).argmax()])
+    return place - STEP, place + STEP
+
+
+def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:
+    document = rr.TextDocument(report(pair), media_type="text/markdown")
+    recording.log("/report", document, static=True)
+    recording.send_recording_name(f"{pair.before.name} → {pair.after.name}")
+    recording.send_property(
+        "inspector",
+        rr.AnyValues(
+            before_sha256=pair.before.sha256,
+            after_sha256=pair.after.sha256,
+            aligned=str(pair.alignment.how),
+            lag_s=pair.alignment.seconds,
+            rate_hz=pair.rate,
+            duration_s=pair.before.run.duration,
+            vibration_change_db=whole(pair).change,
+        ),
+    )

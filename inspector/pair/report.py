@@ -1,0 +1,104 @@
+"""The report of a comparison, in Markdown: what changed, where, and by how much."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from inspector.pair.changes import CAME, STAYED, WENT, changes, judged
+from inspector.pair.levels import Level, by_band, by_class, by_link, whole
+from inspector.pair.pair import Pair
+
+LINKS = 10
+
+
+def report(pair: Pair) -> str:
+    """Write the report of two runs.
+
+    Args:
+        pair: The runs.
+
+    Returns:
+        Markdown: verdict, events, classes, bands, links, runs, and what is not compared.
+    """
+    return "\n\n".join(_parts(pair)) + "\n"
+
+
+def summary(pair: Pair) -> str:
+    """Say in a line what changed."""
+    found = changes(pair)
+    count = {kind: sum(each.kind == kind for each in found) for kind in (CAME, WENT, STAYED)}
+    events = "nothing found in either"
+    if found:
+        events = ", ".join(f"{number} {kind}" for kind, number in count.items())
+        events = f"{'findings' if judged(pair) else 'annotated failures'}: {events}"
+    return f"{events}; vibration {whole(pair).change:+.1f} dB"
+
+
+def _parts(pair: Pair) -> Iterator[str]:
+    yield f"# {pair.before.name} → {pair.after.name}"
+    yield f"**{summary(pair)}**"
+    yield f"Aligned {pair.alignment}. Changes in dB; positive is louder after."
+    found = changes(pair)
+    if found:
+        yield "## Events" if judged(pair) else "## Annotated events"
+        events = [
+            (c.kind, c.label, f"{c.start:.2f}", f"{c.stop:.2f}", *_numbers(c.level)) for c in found
+        ]
+        yield _table(("", "class", "from [s]", "to [s]", "before", "after", "change"), events)
+    if classes := by_class(pair):
+        yield "## Classes"
+        rows = [
+            (
+                each.level.name,
+                *(f"{seconds:.1f}" for seconds in each.seconds),
+                *_numbers(each.level),
+            )
+            for each in classes
+        ]
+        head = ("class", "before [s]", "after [s]", "before", "after", "change")
+        yield _table(head, rows)
+    yield "## Bands"
+    yield _levels("octave", by_band(pair))
+    yield "Levels of the noise in dB re 1 rad/s; of events and classes, above 10 Hz."
+    if links := by_link(pair):
+        yield "## Links"
+        yield _levels("link", links[:LINKS])
+        yield "Sound power of the vibration above 10 Hz, in dB re 1 pW; the largest changes first."
+    yield "## Runs"
+    yield _table(("", "before", "after"), list(_facts(pair)))
+    if pair.remarks:
+        yield "## Remarks"
+        yield "\n".join(f"- {remark}" for remark in pair.remarks)
+
+
+def _facts(pair: Pair) -> Iterator[tuple[str, str, str]]:
+    before, after = pair.before, pair.after
+    yield "run", before.name, after.name
+    yield "robot", before.run.robot or "not named", after.run.robot or "not named"
+    yield "model", before.model or "none", after.model or "none"
+    yield "joints", str(len(before.run.joint_names)), str(len(after.run.joint_names))
+    for key in ("scenario", "seed"):
+        if key in before.run.meta or key in after.run.meta:
+            yield key, str(before.run.meta.get(key, "")), str(after.run.meta.get(key, ""))
+    shared = f"{before.run.duration:.2f} s at {pair.rate:g} Hz"
+    yield "compared", shared, shared
+
+
+def _levels(head: str, rows: Sequence[Level]) -> str:
+    return _table((head, "before", "after", "change"), [(r.name, *_numbers(r)) for r in rows])
+
+
+def _numbers(level: Level) -> tuple[str, str, str]:
+    change = f"{level.change:+.1f}" if np.isfinite(level.change) else ""
+    return _number(level.before), _number(level.after), change
+
+
+def _number(value: float) -> str:
+    if np.isnan(value):
+        return ""
+    return f"{value:.1f}" if np.isfinite(value) else "silent"
+
+
+def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:
+    lines = [head, ("---",) * len(head), *rows]
+    return "\n".join(f"| {' | '.join(cells)} |" for cells in lines)

@@ -1,0 +1,306 @@
+import dataclasses
+
+import numpy as np
+import pytest
+
+from inspector.assets import demo_run, model_files
+from inspector.labelling import load_library
+from inspector.pair import Align, PairError, changes, compare, report, summary
+from inspector.pair.alignment import align
+from inspector.pair.common import alike, part
+from inspector.pair.levels import by_band, by_class, by_link, link_steps, shared_links, steps, whole
+from inspector.pair.spectra import spectra
+from models import Event, Labels
+from noisemodel import Block, Run
+
+LOUDER = 20 * np.log10(2)
+
+
+def moving(seconds=4.0, rate=1000, *, seed=0, **changes):
+    """Make a run that moves as no other does: strokes at random times."""
+    time = np.arange(round(seconds * rate)) / rate
+    random = np.random.default_rng(seed)
+    centres, sizes = random.uniform(0, seconds, 12), random.uniform(0.2, 1.0, 12)
+    strokes = np.exp(-(((time[:, None] - centres) / 0.08) ** 2)) * sizes
+    velocity = np.stack([strokes[:, :6].sum(axis=1), strokes[:, 6:].sum(axis=1)], axis=1)
+    fields = {"time": time, "velocity": velocity, "joint_names": ("a", "b")}
+    return Run(**(fields | changes))
+
+
+def panda(velocity_scale=1.0, **changes):
+    time = np.arange(10_000) / 5000
+    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
+    rattle = 0.1 * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
+    fields = {
+        "time": time,
+        "velocity": velocity_scale * (np.cos(phase) + rattle[:, None]),
+        "position": 0.1 * np.sin(phase),
+        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
+        "robot": "panda",
+    }
+    return Run(**(fields | changes))
+
+
+def compared(tmp_path, before, after, library=None, **options):
+    before.save(tmp_path / "before.npz", overwrite=True)
+    after.save(tmp_path / "after.npz", overwrite=True)
+    library = {} if library is None else library
+    return compare(tmp_path / "before.npz", tmp_path / "after.npz", library, **options)
+
+
+@pytest.fixture(scope="module")
+def library():
+    return load_library(model_files())
+
+
+@pytest.fixture(scope="module")
+def itself(library):
+    return compare(demo_run(), demo_run(), library)
+
+
+def test_a_run_and_itself_differ_by_nothing(itself):
+    assert itself.alignment.lag == 0
+    assert itself.alignment.correlation == pytest.approx(1.0)
+    assert (np.diff(steps(itself)[1], axis=1) == 0).all()
+    assert (np.diff(spectra(itself).amplitude, axis=0) == 0).all()
+    assert (link_steps(itself, shared_links(itself))[1] == 0).all()
+    every = [*by_band(itself), *by_link(itself), *(c.level for c in changes(itself)), whole(itself)]
+    assert {level.change for level in every} == {0.0}
+
+
+def test_what_a_run_and_itself_have_in_common_stayed(itself):
+    found = changes(itself)
+    assert len(found) == len(itself.before.events) > 0
+    assert {change.kind for change in found} == {"stayed"}
+    assert f"findings: 0 came, 0 went, {len(found)} stayed; vibration +0.0 dB" in summary(itself)
+
+
+def test_a_run_that_starts_later_is_found_to_and_differs_by_nothing(tmp_path, library):
+    run = Run.load(demo_run())
+    late = part(run, round(0.7 * run.rate), len(run.time))
+    late = dataclasses.replace(late, time=late.time - late.time[0], blocks=())
+    pair = compared(tmp_path, run, late, library, robot=False)
+    assert pair.alignment.seconds == pytest.approx(0.7)
+    assert pair.time[0] == pytest.approx(run.time[0] + 0.7)
+    assert (pair.before.noise == pair.after.noise).all()
+    assert whole(pair).change == 0.0
+    assert "by the motion: after starts +0.7000 s" in str(pair.alignment)
+    assert any("The run before has 0.70 s that the other one has not" in r for r in pair.remarks)
+    back = compared(tmp_path, late, run, robot=False)
+    assert back.alignment.seconds == pytest.approx(-0.7)
+
+
+def test_a_run_twice_as_loud_is_6_db_louder_everywhere(tmp_path):
+    pair = compared(tmp_path, panda(), panda(2.0))
+    assert whole(pair).change == pytest.approx(LOUDER)
+    assert [band.change for band in by_band(pair)] == pytest.approx([LOUDER] * 8)
+    moved = [link.change for link in by_link(pair)]
+    assert moved == pytest.approx([LOUDER] * len(moved))
+    time, change = link_steps(pair, [by_link(pair)[0].name])
+    rattling = (time >= 0.5) & (time < 0.95)
+    np.testing.assert_allclose(change[rattling], LOUDER)
+
+
+def test_what_comes_back_is_what_went(tmp_path):
+    there = compared(tmp_path, panda(), panda(2.0))
+    back = compared(tmp_path, panda(2.0), panda())
+    assert whole(back).change == -whole(there).change
+    assert summary(back).endswith("vibration -6.0 dB")
+
+
+def test_events_of_one_class_that_overlap_stayed_and_the_others_came_or_went(itself):
+    def events(*found):
+        return tuple(Event(label, start, stop, 1.0) for label, start, stop in found)
+
+    before = events(("impact", 0.2, 0.6), ("oscillations", 1.0, 1.4), ("oscillations", 1.5, 1.8))
+    after = events(("impact", 0.8, 1.2), ("oscillations", 1.3, 1.6))
+    pair = dataclasses.replace(
+        itself,
+        before=dataclasses.replace(itself.before, events=before),
+        after=dataclasses.replace(itself.after, events=after),
+    )
+    assert [(c.kind, c.label, c.start, c.stop) for c in changes(pair)] == [
+        ("went", "impact", 0.2, 0.6),
+        ("came", "impact", 0.8, 1.2),
+        ("stayed", "oscillations", 1.0, 1.8),
+    ]
+
+
+def test_annotated_failures_are_matched_where_no_model_can_tell(tmp_path):
+    blocks = (Block(0.5, 1.0, "oscillations"), Block(1.0, 1.5, "ok"))
+    pair = compared(tmp_path, panda(), panda(blocks=blocks), robot=False)
+    (change,) = changes(pair)
+    assert (change.kind, change.label, change.start) == ("came", "oscillations", 0.5)
+    assert "annotated failures: 1 came, 0 went, 0 stayed" in summary(pair)
+    assert "## Annotated events" in report(pair)
+    assert any(remark.startswith("Both: no class lanes") for remark in pair.remarks)
+
+
+def test_a_class_is_as_long_and_as_loud_as_its_frames(tmp_path):
+    pair = compared(tmp_path, panda(), panda(), robot=False)
+    start = np.arange(0.0, 1.6, 0.1)
+    rattles = (start >= 0.5) & (start + 0.4 <= 1.0 + 1e-9)
+    sides = []
+    for label in (np.full(len(start), "ok"), np.where(rattles, "oscillations", "ok")):
+        scores = np.zeros((len(start), 2))
+        labels = Labels(start, start + 0.4, label, scores, ("ok", "oscillations"))
+        sides.append(dataclasses.replace(pair.before, labels=labels))
+    _, found = by_class(dataclasses.replace(pair, before=sides[0], after=sides[1]))
+    assert found.seconds == pytest.approx((0.0, 0.2))
+    assert np.isnan(found.level.before)
+    fast = pair.vibration[0]
+    twice = np.concatenate((fast[2500:4500], fast[3000:5000]))  # frames of 0.4 s overlap
+    assert found.level.after == pytest.approx(10 * np.log10(np.mean(twice**2)), abs=1e-6)
+
+
+def test_motions_that_have_nothing_in_common_are_laid_start_to_start():
+    found = align(moving(seed=1), moving(seed=2))
+    assert found.refused
+    assert (found.lag, found.how) == (0, Align.START)
+    assert str(found).startswith("from the start: the motions do not tell how they lie (corr")
+
+
+@pytest.mark.parametrize("velocity", [0.0, 0.3])
+def test_an_even_motion_tells_nothing(velocity):
+    still = moving(velocity=np.full((4000, 2), velocity))
+    assert align(still, still).refused
+    assert align(still, moving()).refused
+
+
+def test_a_motion_that_repeats_itself_tells_nothing():
+    time = np.arange(4000) / 1000
+    walk = moving(velocity=np.sin(2 * np.pi * 2 * time)[:, None] * np.ones(2))
+    later = dataclasses.replace(part(walk, 250, 4000), time=time[:3750])
+    assert align(walk, later).refused
+
+
+def test_a_motion_that_only_speeds_up_tells_nothing():
+    ramp = moving(velocity=np.arange(4000)[:, None] * np.ones(2))
+    assert align(ramp, ramp).refused
+
+
+def test_the_desired_motion_is_the_guide_where_there_is_one():
+    shaken = np.random.default_rng(3).normal(size=(4000, 2))
+    good = moving(velocity_desired=moving().velocity)
+    bad = moving(velocity=shaken, velocity_desired=moving().velocity)
+    assert align(good, bad).lag == 0
+    assert align(good, bad).correlation == pytest.approx(1.0)
+
+
+def test_starts_and_clocks_are_taken_as_asked():
+    run = moving()
+    later = dataclasses.replace(run, time=run.time + 1.5)
+    assert align(run, later, Align.START).lag == 0
+    assert align(run, later, Align.NONE).lag == 1500
+    assert str(align(run, later, Align.NONE)).endswith("after starts +1.5000 s from before")
+    assert align(run, later).lag == 0
+
+
+def test_a_gap_does_not_mislead_the_alignment():
+    valid = np.ones(4000, dtype=bool)
+    valid[1000:1600] = False
+    run = moving()
+    torn = moving(velocity=np.where(valid[:, None], run.velocity, 0.0), valid=valid)
+    assert align(run, torn).lag == 0
+
+
+def test_gaps_of_either_count_in_neither(tmp_path):
+    valid = np.ones(10_000, dtype=bool)
+    valid[2500:5000] = False  # where it rattles
+    torn = panda()
+    torn = panda(velocity=np.where(valid[:, None], torn.velocity, 0.0), valid=valid)
+    pair = compared(tmp_path, panda(), torn, robot=False)
+    assert whole(pair).change == pytest.approx(0.0, abs=1e-9)
+    assert not ((spectra(pair).time > 0.5) & (spectra(pair).time < 1.0)).any()
+
+
+def test_runs_that_share_no_time_are_refused(tmp_path):
+    run = moving()
+    later = dataclasses.replace(run, time=run.time + 60)
+    with pytest.raises(PairError, match=r"before lasts 4.00 s, and after starts \+60.00 s"):
+        compared(tmp_path, run, later, how=Align.NONE)
+
+
+def test_the_faster_run_is_lowered_and_both_sound_alike(tmp_path):
+    pair = compared(tmp_path, moving(rate=4000), moving(rate=1000))
+    assert pair.rate == 1000.0
+    assert whole(pair).change == pytest.approx(0.0, abs=0.1)
+    (remark,) = [r for r in pair.remarks if "lowered" in r]
+    assert remark.startswith("The run before has 4000 Hz: lowered to the 1000 Hz of the other one")
+
+
+def test_a_lowered_run_keeps_the_positions_of_its_links(tmp_path):
+    fast = panda()
+    slow = dataclasses.replace(
+        part(fast, 0, 10_000),
+        time=fast.time[::5],
+        velocity=np.cos(2 * np.pi * np.linspace(0.2, 0.5, 7) * fast.time[::5, None]),
+        position=fast.position[::5],
+        valid=None,
+    )
+    first, second, _ = alike(fast, slow)
+    np.testing.assert_allclose(first.position, second.position)
+    assert compared(tmp_path, fast, slow).links is not None
+
+
+def test_only_the_stretch_that_both_cover_is_compared(tmp_path):
+    run = moving(seconds=6.0)
+    short = part(run, 0, 4000)
+    pair = compared(tmp_path, run, short)
+    assert len(pair.time) == len(pair.before.noise) == len(pair.after.noise) == 4000
+    assert pair.remarks[0].startswith("The run before has 2.00 s that the other one has not")
+
+
+def test_blocks_move_with_their_run(tmp_path):
+    run = moving(seconds=6.0)
+    late = dataclasses.replace(
+        part(run, 1000, 6000), time=run.time[:5000], blocks=(Block(0.5, 1.0, "impact"),)
+    )
+    (block,) = compared(tmp_path, run, late).after.run.blocks
+    assert (block.start, block.stop) == pytest.approx((1.5, 2.0))
+
+
+@pytest.mark.parametrize(
+    ("changed", "why"),
+    [
+        ({"robot": None}, "the run after names no robot"),
+        ({"robot": "hal9000"}, "the run after names 'hal9000', not known"),
+        ({"position": None}, "the run after has no positions"),
+        ({"robot": "ur5"}, "panda and ur5 are two robots"),
+    ],
+)
+def test_links_of_what_is_not_one_robot_are_not_compared(tmp_path, changed, why):
+    pair = compared(tmp_path, panda(), panda(**changed))
+    assert pair.links is None
+    assert by_link(pair) == ()
+    assert f"- Links are not compared: {why}." in report(pair)
+    assert "## Bands" in report(pair)
+
+
+def test_what_only_one_run_has_is_left_out_of_both(tmp_path):
+    wanted = moving(velocity_desired=moving().velocity)
+    pair = compared(tmp_path, moving(), wanted)
+    assert whole(pair).change == 0.0
+    assert pair.remarks[0].startswith("Only the run after has desired velocities: they are left")
+
+
+def test_silence_in_both_is_no_change(tmp_path):
+    still = moving(velocity=np.zeros((4000, 2)))
+    pair = compared(tmp_path, still, still)
+    assert whole(pair).change == 0.0
+    assert "vibration +0.0 dB" in report(pair)
+    assert "nothing found in either" in summary(pair)
+
+
+@pytest.mark.slow
+def test_a_limit_cycle_is_what_came(tmp_path, library):
+    pytest.importorskip("mujoco")
+    scenarios = pytest.importorskip("scenarios")
+    runs = [scenarios.simulate("panda", scenario, 3) for scenario in ("straight", "limit-cycle")]
+    pair = compared(tmp_path, *runs, library)
+    assert abs(pair.alignment.seconds) < 0.01
+    came = [change for change in changes(pair) if change.kind == "came"]
+    blocks = [block for block in runs[1].blocks if block.label == "oscillations"]
+    for block in blocks:
+        assert any(c.start < block.stop and block.start < c.stop for c in came)
+    assert whole(pair).change > 1.0

@@ -1,0 +1,432 @@
+import hashlib
+import re
+import wave
+from dataclasses import replace
+from io import BytesIO
+
+import numpy as np
+import pyarrow as pa
+import pytest
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from inspector.cli import main
+from inspector.pair import colours, compare
+from inspector.pair.recording import write
+from models import Event, Labels
+from noisemodel import Block, OutputError, Run
+
+CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
+LINKS = r"panda_(link\d|leftfinger|rightfinger)"
+
+
+@pytest.fixture(autouse=True)
+def strict():
+    rr.set_strict_mode(True)
+
+
+def panda(scale=1.0, rattle=0.1, **changes):
+    time = np.arange(15_000) / 5000
+    phase = 2 * np.pi * np.linspace(0.2, 0.5, 7) * time[:, None]
+    shaking = rattle * np.sin(2 * np.pi * 120 * time) * ((time >= 0.5) & (time < 1.0))
+    velocity = scale * (np.cos(phase) + shaking[:, None])
+    fields = {
+        "time": time,
+        "velocity": velocity,
+        "velocity_desired": scale * np.cos(phase),
+        "position": 0.1 * np.sin(phase),
+        "effort": velocity,
+        "stages": {"planned": velocity},
+        "joint_names": tuple(f"panda_joint{i}" for i in range(1, 8)),
+        "robot": "panda",
+        "blocks": (Block(0.2, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
+    }
+    return Run(**(fields | changes))
+
+
+def some_labels(failing):
+    start = np.arange(0, 2.6, 0.1)
+    label = np.array(["ok"] * len(start), dtype="U20")
+    label[failing] = "impact"
+    scores = np.tile([0.7, 0.1, 0.1, 0.1], (len(start), 1))
+    return Labels(start=start, stop=start + 0.4, label=label, scores=scores, classes=CLASSES)
+
+
+def compared(folder, before, after, **options):
+    before.save(folder / "before.npz", overwrite=True)
+    after.save(folder / "after.npz", overwrite=True)
+    return compare(folder / "before.npz", folder / "after.npz", {}, **options)
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    rr.set_strict_mode(True)
+    folder = tmp_path_factory.mktemp("whole")
+    pair = compared(folder, panda(), panda(2.0))
+    events = (Event("impact", 0.5, 1.0, 0.9),)
+    after = replace(pair.after, labels=some_labels(slice(5, 8)), events=events, model="a model")
+    before = replace(pair.before, labels=some_labels(slice(0)), model="a model")
+    pair = replace(pair, before=before, after=after)
+    write(pair, folder / "out.rrd")
+    return folder / "out.rrd", pair
+
+
+def read(path, entity, component):
+    """Read a component back: times in [s] (None if static), values."""
+    times, values = [], []
+    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names:
+            values += batch.column(component).to_pylist()
+            if not chunk.is_static:
+                times += batch.column("time").cast(pa.int64()).to_pylist()
+    return (np.array(times) / 1e9 if times else None), values
+
+
+def scalars(path, entity):
+    time, values = read(path, entity, "Scalars:scalars")
+    return time, np.array(values)
+
+
+def entities(path):
+    return set(RrdReader(path).store().schema().entity_paths())
+
+
+LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
+LINE |= {"SeriesLines:aggregation_policy"}
+LANE = {f"StateConfiguration:{part}" for part in ("values", "labels", "colors")}
+LANE |= {"StateChange:state"}
+MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
+MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
+SIGNALS = "velocity|desired_velocity|position|effort|stage_planned"
+COLUMNS = {
+    r"/class/(before|after)/(found|annotated)": LANE,
+    r"/class/change": LANE,
+    r"/(noise|level|power)/(before|after)": LINE,
+    r"/change/noise": LINE,
+    rf"/change/links/{LINKS}": LINE,
+    rf"/links/{LINKS}/(before|after)": LINE,
+    rf"/joints/({SIGNALS})/(before|after|change)/0": LINE,
+    r"/spectrogram/(before|after|change)/\d\d": LINE | {"SeriesLines:interpolation_mode"},
+    r"/sound/(before|after)": {"AssetAudio:blob", "AssetAudio:media_type"},
+    r"/robot/motion/panda_joint\d": MOTION,
+    r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
+    r"/report": {"TextDocument:text", "TextDocument:media_type"},
+}
+"""The components of each entity."""
+
+
+def test_every_entity_has_its_columns_and_there_is_no_other(whole):
+    path, _ = whole
+    schema = RrdReader(path).store().schema()
+    found = {}
+    for column in schema.component_columns():
+        found.setdefault(column.entity_path, set()).add(column.component)
+    seen = set()
+    for entity, components in found.items():
+        kinds = [kind for kind in COLUMNS if re.fullmatch(kind, entity)]
+        if entity.startswith(("/__properties", "/robot/panda")) or entity in ("/", "/robot/fixed"):
+            continue  # written by rerun and its URDF reader; what we add is tested below
+        assert kinds, entity
+        assert components == COLUMNS[kinds[0]], entity
+        seen.add(kinds[0])
+    assert seen == set(COLUMNS)
+    assert {column.name for column in schema.index_columns()} == {"time"}
+
+
+def test_both_noises_lie_over_each_other_in_two_colours(whole):
+    path, pair = whole
+    for name, side, color in (
+        ("before", pair.before, colours.BEFORE),
+        ("after", pair.after, colours.AFTER),
+    ):
+        time, noise = scalars(path, f"/noise/{name}")
+        np.testing.assert_allclose(noise[:, 0], side.noise, rtol=1e-12)
+        np.testing.assert_allclose(time, pair.time, atol=1e-9)
+        _, drawn = read(path, f"/noise/{name}", "SeriesLines:colors")
+        assert drawn == [[int.from_bytes([*color, 255], "big")]]
+
+
+def test_twice_the_motion_is_6_db_in_all_that_is_drawn(whole):
+    path, _ = whole
+    for name in ("noise", "power"):
+        _, before = scalars(path, f"/{name}/before")
+        _, after = scalars(path, f"/{name}/after")
+        factor = after / before if name == "noise" else 10 ** ((after - before) / 20)
+        np.testing.assert_allclose(factor, 2.0, rtol=1e-6)
+    time, change = scalars(path, "/change/noise")
+    rattling = (time > 0.55) & (time < 0.95)
+    np.testing.assert_allclose(change[rattling], 20 * np.log10(2), rtol=1e-9)
+    lines = [entity for entity in entities(path) if entity.startswith("/change/links/")]
+    assert len(lines) == 8
+    for line in lines:
+        assert scalars(path, line)[1].max() == pytest.approx(20 * np.log10(2))
+
+
+def test_a_links_power_before_and_after_is_that_of_its_vibration(whole):
+    path, pair = whole
+    link = next(e for e in entities(path) if re.fullmatch(r"/links/panda_link\d/after", e))
+    time, level = scalars(path, link)
+    noise = pair.after.links
+    power = noise.vibration[:, noise.links.index(link.split("/")[2])]
+    loud = power > 1e-13
+    np.testing.assert_allclose(10 ** (level[loud, 0] / 10) * 1e-12, power[loud], rtol=1e-9)
+    np.testing.assert_allclose(time, noise.time, atol=1e-9)
+
+
+def test_joints_differ_by_what_came_on_top(whole):
+    path, pair = whole
+    _, change = scalars(path, "/joints/position/change/0")
+    assert not change.any()
+    _, change = scalars(path, "/joints/velocity/change/0")
+    _, before = scalars(path, "/joints/velocity/before/0")
+    _, after = scalars(path, "/joints/velocity/after/0")
+    np.testing.assert_allclose(change, before, atol=1e-12)  # twice as fast
+    np.testing.assert_allclose(after, 2 * before, atol=1e-12)
+    assert len(change) <= 2000
+    _, (names,) = read(path, "/joints/velocity/before/0", "SeriesLines:names")
+    assert names == [f"{joint} before" for joint in pair.before.run.joint_names]
+
+
+def test_lanes_show_the_classes_of_both_and_what_changed(whole):
+    path, _ = whole
+    time, states = read(path, "/class/after/found", "StateChange:state")
+    assert [state[0] for state in states] == ["ok", "impact", "ok", ""]
+    np.testing.assert_allclose(time, [0.15, 0.65, 0.95, 2.75], atol=1e-3)
+    _, states = read(path, "/class/before/found", "StateChange:state")
+    assert [state[0] for state in states] == ["ok", ""]
+    time, states = read(path, "/class/after/annotated", "StateChange:state")
+    assert [state[0] for state in states] == ["ok", "oscillations", ""]
+    time, states = read(path, "/class/change", "StateChange:state")
+    assert [state[0] for state in states] == ["came", ""]
+    np.testing.assert_allclose(time, [0.5, 1.0], atol=1e-9)
+
+
+def test_changes_are_listed_and_the_one_that_came_is_looped(whole):
+    path, _ = whole
+    time, text = read(path, "/events", "TextLog:text")
+    assert time.tolist() == [0.5]
+    assert text == [["came: impact, 0.50 s to 1.00 s, +6.0 dB"]]
+    assert read(path, "/events", "TextLog:level")[1] == [["WARN"]]
+    reader = RrdReader(path)
+    (blueprint,) = reader.blueprints()
+    panels = [c for c in reader.store(store=blueprint).stream() if c.entity_path == "/time_panel"]
+    name = "TimePanelBlueprint:time_selection"
+    (selection,) = [
+        batch.column(name).to_pylist()[0]
+        for batch in (chunk.to_record_batch() for chunk in panels)
+        if name in batch.schema.names
+    ]
+    assert selection == [{"min": 500_000_000, "max": 1_000_000_000}]
+
+
+def test_both_spectrograms_have_one_scale_and_the_difference_its_own(whole):
+    path, _ = whole
+    _, before = read(path, "/spectrogram/before/03", "SeriesLines:colors")
+    _, after = read(path, "/spectrogram/after/03", "SeriesLines:colors")
+    assert max(sum(row[0].to_bytes(4, "big")[:3]) for row in after) > max(
+        sum(row[0].to_bytes(4, "big")[:3]) for row in before
+    )
+    _, change = read(path, "/spectrogram/change/05", "SeriesLines:colors")  # 240 Hz
+    shade = colours.diverging(np.array([20 * np.log10(2)]))[0]
+    drawn = [row[0].to_bytes(4, "big") for row in change]
+    assert bytes(shade) in drawn
+    assert 1900.0 < scalars(path, "/spectrogram/change/47")[1][0, 0] < 2000.0
+
+
+def test_the_robot_is_coloured_by_what_became_louder(whole):
+    path, _ = whole
+    mesh = "/robot/panda/visual_geometries/panda_link5/visual_0"
+    time, rgba = read(path, mesh, "Asset3D:albedo_factor")
+    shades = {round(t, 2): row[0].to_bytes(4, "big") for t, row in zip(time, rgba, strict=True)}
+    at = max(t for t in shades if t <= 0.7)
+    assert shades[at] == bytes(colours.diverging(np.array([20 * np.log10(2)]))[0])
+    time, (still,) = read(
+        path, "/robot/panda/visual_geometries/panda_link0/visual_0", "Asset3D:albedo_factor"
+    )
+    assert time is None
+    assert still == [int.from_bytes([*colours.SAME, 255], "big")]
+
+
+def test_colours_tell_louder_from_quieter_and_grow_with_the_change():
+    quieter, same, louder, much = colours.diverging(np.array([-12.0, 0.0, 3.0, 40.0]))[:, :3]
+    assert tuple(quieter) == colours.BEFORE
+    assert tuple(same) == colours.SAME
+    assert tuple(much) == colours.AFTER
+    assert same[0] < louder[0] < much[0]
+
+
+def test_both_sound_at_one_gain(whole):
+    path, _ = whole
+    heard = []
+    for name in ("before", "after"):
+        time, blob = read(path, f"/sound/{name}", "AssetAudio:blob")
+        assert time.tolist() == [0.0]
+        with wave.open(BytesIO(bytes(blob[0][0]))) as file:
+            frames = np.frombuffer(file.readframes(file.getnframes()), dtype=np.int16)
+        heard.append(np.sqrt(np.mean(frames.astype(float) ** 2)))
+    assert heard[1] / heard[0] == pytest.approx(2.0, rel=0.01)
+
+
+def test_the_report_says_what_changed(whole):
+    path, _ = whole
+    _, (text,) = read(path, "/report", "TextDocument:text")
+    assert text[0].startswith("# before → after\n")
+    assert "**findings: 1 came, 0 went, 0 stayed; vibration +6.0 dB**" in text[0]
+    assert re.search(
+        r"\| came \| impact \| 0.50 \| 1.00 \| -\d+\.\d \| -\d+\.\d \| \+6.0 \|", text[0]
+    )
+    assert re.search(r"\| 256 Hz \| .* \| \+6.0 \|", text[0])
+    assert re.search(r"\| panda_link5 \| .* \| \+6.0 \|", text[0])
+
+
+def test_properties_name_both_runs_and_their_hashes(whole):
+    path, _ = whole
+    found = {}
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path == "/__properties/inspector":
+            batch = chunk.to_record_batch()
+            found |= {name: batch.column(name).to_pylist()[0] for name in batch.schema.names}
+    for name in ("before", "after"):
+        file = path.with_name(f"{name}.npz").read_bytes()
+        assert found[f"{name}_sha256"] == [hashlib.sha256(file).hexdigest()]
+    assert found["aligned"] == ["auto"]
+    assert found["lag_s"] == [0.0]
+    assert found["rate_hz"] == [5000.0]
+    assert found["duration_s"] == [3.0]
+    assert found["vibration_change_db"] == [pytest.approx(20 * np.log10(2))]
+
+
+def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
+    write(compared(tmp_path, panda(), panda()), tmp_path / "out.rrd")
+    lines = [e for e in entities(tmp_path / "out.rrd") if "/change" in e and "/class" not in e]
+    assert len(lines) == 48 + 1 + 8 + 5
+    for line in lines:
+        if "/spectrogram/" not in line:
+            assert not scalars(tmp_path / "out.rrd", line)[1].any(), line
+    rgba = read(tmp_path / "out.rrd", "/spectrogram/change/**", "SeriesLines:colors")[1]
+    assert {row[0] for row in rgba} == {int.from_bytes([*colours.SAME, 255], "big")}
+    assert read(tmp_path / "out.rrd", "/class/change", "StateChange:state")[1][0] == ["stayed"]
+
+
+def test_the_same_two_runs_make_the_same_recording_id_and_others_do_not(tmp_path):
+    runs = {
+        "ab": (panda(), panda(2.0)),
+        "again": (panda(), panda(2.0)),
+        "ba": (panda(2.0), panda()),
+    }
+    ids = {}
+    for name, (before, after) in runs.items():
+        write(compared(tmp_path, before, after, robot=False), tmp_path / f"{name}.rrd")
+        ids[name] = RrdReader(tmp_path / f"{name}.rrd").recordings()[0].recording_id
+    assert ids["ab"] == ids["again"] != ids["ba"]
+
+
+@pytest.mark.parametrize("samples", [2, 9, 60])
+def test_runs_of_few_samples_are_compared_too(tmp_path, samples):
+    run = Run(
+        time=np.arange(samples) / 1000,
+        velocity=np.arange(samples)[:, None] * np.ones((1, 2)),
+        joint_names=("a", "b"),
+    )
+    write(compared(tmp_path, run, run), tmp_path / "out.rrd")
+    assert scalars(tmp_path / "out.rrd", "/noise/after")[1].shape == (samples, 1)
+
+
+def test_different_joints_are_shown_each_and_the_shared_ones_compared(tmp_path):
+    time = np.arange(3000) / 1000
+    runs = [
+        Run(time=time, velocity=np.sin(9 * time)[:, None] * np.ones(2), joint_names=names)
+        for names in (("a", "b"), ("b", "c"))
+    ]
+    write(compared(tmp_path, *runs), tmp_path / "out.rrd")
+    named = {
+        what: read(tmp_path / "out.rrd", f"/joints/velocity/{what}/0", "SeriesLines:names")[1][0]
+        for what in ("before", "after", "change")
+    }
+    assert named == {
+        "before": ["b before", "a before"],
+        "after": ["b after", "c after"],
+        "change": ["b"],
+    }
+    assert not any(
+        entity.startswith(("/robot", "/links")) for entity in entities(tmp_path / "out.rrd")
+    )
+
+
+def test_an_existing_recording_is_not_overwritten_unasked(tmp_path):
+    (tmp_path / "out.rrd").write_text("precious")
+    pair = compared(tmp_path, panda(), panda(), robot=False)
+    with pytest.raises(OutputError, match="exists already"):
+        write(pair, tmp_path / "out.rrd")
+    assert (tmp_path / "out.rrd").read_text() == "precious"
+
+
+def inspector(capsys, monkeypatch, *arguments):
+    monkeypatch.setattr("sys.argv", ["inspector", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    printed = capsys.readouterr()
+    return ended.value.code or 0, printed.out, printed.err
+
+
+def test_the_command_shows_two_runs_and_says_how_they_were_aligned(capsys, monkeypatch, tmp_path):
+    panda(robot=None).save(tmp_path / "a.npz")
+    panda(2.0, robot=None).save(tmp_path / "b.npz")
+    save = ("--save", tmp_path / "ab.rrd")
+    runs = (tmp_path / "a.npz", tmp_path / "b.npz")
+    status, out, _ = inspector(capsys, monkeypatch, "view", *runs, *save)
+    assert status == 0
+    assert "vibration +6.0 dB" in out
+    assert "aligned by the motion: after starts +0.0000 s from before (correlation 1.00" in out
+    assert "/class/after/annotated" in entities(tmp_path / "ab.rrd")
+    status, out, _ = inspector(
+        capsys, monkeypatch, "view", *runs, *save, "--align", "start", "--overwrite"
+    )
+    assert (status, "aligned from the start, as asked" in out) == (0, True)
+
+
+def test_what_takes_two_runs_or_one_is_wrong_usage_with_the_other(capsys, monkeypatch, tmp_path):
+    panda(robot=None).save(tmp_path / "a.npz")
+    run = tmp_path / "a.npz"
+    status, _, err = inspector(capsys, monkeypatch, "view", run, "--align", "start")
+    assert (status, "--align takes two runs" in err) == (2, True)
+    status, _, err = inspector(capsys, monkeypatch, "view", run, run, "--terms")
+    assert (status, "--terms takes one run" in err) == (2, True)
+
+
+def test_runs_that_share_no_time_end_with_one_line(capsys, monkeypatch, tmp_path):
+    run = panda(robot=None, blocks=())
+    run.save(tmp_path / "a.npz")
+    panda(robot=None, blocks=(), time=run.time + 9).save(tmp_path / "b.npz")
+    runs = (tmp_path / "a.npz", tmp_path / "b.npz")
+    status, _, err = inspector(
+        capsys, monkeypatch, "view", *runs, "--align", "none", "--save", tmp_path / "ab.rrd"
+    )
+    assert status == 3
+    assert err.count("\n") == 1
+    assert "they share no time; `--align start`" in err
+    assert not (tmp_path / "ab.rrd").exists()
+
+
+@pytest.mark.slow
+def test_the_viewer_draws_a_comparison_and_reports_no_error(whole):
+    picture = pytest.importorskip("picture")
+    if not picture.DRIVERS:
+        pytest.skip(picture.MISSING)
+    path, _ = whole
+    with picture.headless_viewer() as client:
+        png = picture.picture(client, path, 0.7)
+        state = picture.settled(client)
+        errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
+    assert png.startswith(b"\x89PNG")
+    shown = {view.name for view in state.views}
+    assert {
+        "Robot after: orange is louder than before, blue quieter",
+        "Classes",
+        "Noise, simplified estimate [rad/s]",
+        "Spectrogram, change, 0-2000 Hz, -12 to +12 dB",
+        "Change of links above 10 Hz [dB]",
+    } <= shown
+    assert not [report for view in state.views for report in view.reports]
+    assert not errors
