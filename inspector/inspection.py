@@ -91,9 +91,11 @@ def inspect(
                 f"{error}; `--no-robot` shows the run without the robot"
             ) from error
         remarks += links.remarks
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
     return Inspection(
         name=path.stem,
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=digest.hexdigest(),
         run=run,
         noise=nm.simplified(run.motion, run.velocity_desired),
         labels=labels,

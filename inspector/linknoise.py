@@ -110,15 +110,18 @@ def link_noise(
 
     q, wanted = robot.configuration(middles)[0], robot.desired(middles)
     fast = _moments(robot, run, vibrating(run.motion, run.mask, run.rate), bins)
-    motions = [("normal", fast)]
+    motions, told = [("normal", fast)], []
     if kind in QUADRATIC:
         motions.append((kind, _moments(robot, run, run.motion, bins)))
+        if run.velocity_desired is not None:
+            told = [(kind, _moments(robot, run, run.velocity_desired, bins, desired=True))]
+    if run.position_desired is None:  # told to move where it is: one pose for all
+        motions, told = [*motions, *told], []
     vibration, *power = by_moments(robot, surface, q, motions)
+    if told and wanted is not None:
+        power += by_moments(robot, surface, wanted[0], told)
     if kind not in QUADRATIC:
         power = [by_samples(robot, surface, run, kind, bins)]
-    elif wanted is not None and run.velocity_desired is not None:
-        moments = _moments(robot, run, run.velocity_desired, bins, desired=True)
-        power += by_moments(robot, surface, wanted[0], [(kind, moments)])
     return LinkNoise(
         kind=kind,
         links=surface.names,
@@ -151,10 +154,11 @@ def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
         # Towards the ends the mean is taken over less, so that it stays in the middle.
         reach = np.minimum(np.minimum(centre, centre[::-1]), half)
         first, last = centre - reach, centre + reach + 1
+        count = (last - first).astype(np.float64)
         for joint in range(len(fast)):  # one by one they stay in the cache
             part = velocity[stretch, joint].astype(np.float64)
             sums = np.concatenate(([0.0], np.cumsum(part)))
-            fast[joint, stretch] = part - (sums[last] - sums[first]) / (last - first)
+            fast[joint, stretch] = part - (sums.take(last) - sums.take(first)) / count
     return fast.T
 
 

@@ -70,6 +70,8 @@ def by_moments(
         For each motion, shape (bins, links), in [W].
     """
     jacobians = _jacobians(robot, q)
+    # Bins lie next to each other in memory: all of them are worked on at once.
+    products = [np.ascontiguousarray(moments.transpose(1, 2, 0)) for _, moments in motions]
     power = [np.zeros((len(q), len(surface.links))) for _ in motions]
     for place, (link, joint) in enumerate(zip(surface.links, surface.joint, strict=True)):
         if not link.area:
@@ -77,17 +79,17 @@ def by_moments(
         entries, jacobian = jacobians(int(joint))
         forms = {"normal": link.mean_square_normal, "rms": link.mean_square}
         seen = {kind: _seen(forms[kind], jacobian) for kind in {kind for kind, _ in motions}}
-        for total, (kind, moments) in zip(power, motions, strict=True):
-            square = np.einsum("bjk,bjk->b", seen[kind], moments[:, entries[:, None], entries])
+        for total, (kind, _), product in zip(power, motions, products, strict=True):
+            square = np.einsum("jkb,jkb->b", seen[kind], product[entries[:, None], entries])
             # P_i = rho c S_i v_i², Sygulla & Rixen, Sec. II-A; rounding may make a square negative
             total[:, place] = DENSITY * SOUND_SPEED * link.area * np.maximum(square, 0.0)
     return power
 
 
 def _seen(form: Array, jacobian: Array) -> Array:
-    """J' M J, shape (bins, entries, entries)."""
-    pushed = (jacobian.reshape(-1, 6) @ form).reshape(jacobian.shape)  # all bins in one product
-    return np.asarray(pushed @ jacobian.transpose(0, 2, 1))
+    """J' M J, shape (entries, entries, bins)."""
+    pushed = (form @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+    return np.asarray(np.einsum("ajb,akb->jkb", pushed, jacobian))
 
 
 def second_moments(velocity: Real, valid: Mask, *, size: int) -> Array:
@@ -119,7 +121,7 @@ def _jacobians(robot: nm.Robot, q: Array) -> Callable[[int], tuple[Index, Array]
 
     Returns:
         What gives, for the index of a joint, the entries of v that move its link, and the twists
-        that they cause at unit velocity, shape (bins, entries, 6).
+        that they cause at unit velocity, shape (6, entries, bins).
     """
     chains: dict[int, list[int]] = {0: []}
     for index, joint in enumerate(robot.joints, start=1):
@@ -131,10 +133,10 @@ def _jacobians(robot: nm.Robot, q: Array) -> Callable[[int], tuple[Index, Array]
     unit = (turn == np.arange(turn.max(initial=0) + 1)[:, None]).astype(np.float64)
     v = np.repeat(unit, len(q), axis=0)
     twists = nm.link_twists(robot, np.tile(q, (len(unit), 1)), v)
-    twists = twists.reshape(len(unit), len(q), -1, 6)
+    twists = twists.transpose(1, 2, 0).reshape(-1, 6, len(unit), len(q))
 
     def jacobian(joint: int) -> tuple[Index, Array]:
         entries = np.array(chains[joint], dtype=np.intp)
-        return entries, np.ascontiguousarray(twists[turn[entries], :, joint].transpose(1, 0, 2))
+        return entries, twists[joint].take(turn[entries], axis=1)
 
     return jacobian

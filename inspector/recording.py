@@ -16,6 +16,7 @@ from inspector.moments import worst
 from inspector.report import report
 from inspector.reportlinks import linked
 from inspector.spectrogram import spectrogram
+from inspector.tensors import tensors
 from inspector.thinning import extremes
 from noisemodel.atomic import replacing
 
@@ -106,8 +107,8 @@ def _log_noise(recording: rr.RecordingStream, inspection: Inspection) -> None:
     series.log_heat_strip(recording, "/spectrogram/bands", spectrum)
     series.log_bars(recording, "/spectrogram/now", spectrum)
     upright = np.ascontiguousarray(spectrum.level[::-1], dtype=np.float32)  # row 0 is drawn on top
-    tensor = rr.Tensor(upright, dim_names=["frequency, high to low", "time"])
-    recording.log("/spectrogram/levels", tensor, static=True)
+    tensor = tensors(upright[None], ["frequency, high to low", "time"])
+    recording.log("/spectrogram/levels", rr.Tensor.from_fields(data=tensor), static=True)
 
 
 def _log_text(

@@ -7,7 +7,7 @@ What churns, as seen from 0.41:
 - ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
   time that it is logged at; a static asset stays silent;
 - ``ViewCoordinates``;
-- columns of tensors, which ``BarChart.columns`` does not make.
+- columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
 
 Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
 ``StateChange``, ``TextLog``, ``TextDocument``, ``Tensor``, ``BarChart``, ``UrdfTree``.
@@ -15,13 +15,14 @@ When rerun moves on, this module follows and no other.
 """
 
 from collections.abc import Sequence
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from inspector.tensors import tensors
 from noisemodel.types import Array
 
 Part: TypeAlias = rrb.View | rrb.Container
@@ -193,26 +194,14 @@ def log_bars(
         places: Where the bars stand, shape (bars,).
         color: Of all bars.
     """
-    heights = rr.BarChart.descriptor_values()
     widths = np.diff(places, prepend=0.0)
-    style = rr.BarChart(bars[0], abscissa=places, color=color, widths=widths).as_component_batches()
-    lasting = [batch for batch in style if batch.component_descriptor() != heights]
+    heights, stands = tensors(bars), tensors(places[None])
+    style = rr.BarChart(heights[:1], abscissa=stands, color=color, widths=widths)
+    changing = rr.BarChart.descriptor_values()
+    batches = style.as_component_batches()
+    lasting = [batch for batch in batches if batch.component_descriptor() != changing]
     recording.log(path, lasting, static=True)
-    # Rerun's own columns take several tensors for one.
-    rows = _Rows([rr.components.TensorDataBatch(row).as_arrow_array() for row in bars])
-    recording.send_columns(path, indexes=[index], columns=[rr.ComponentColumn(heights, rows)])
-
-
-class _Rows:
-    """Rows of one component, as rerun asks for them."""
-
-    def __init__(self, rows: Sequence[Any]) -> None:
-        self.rows = rows
-
-    def as_arrow_array(self) -> Any:
-        import pyarrow
-
-        return pyarrow.concat_arrays(self.rows)
+    recording.send_columns(path, indexes=[index], columns=rr.BarChart.columns(values=heights))
 
 
 def log_up(recording: rr.RecordingStream) -> None:

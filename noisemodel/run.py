@@ -4,6 +4,7 @@ import json
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self
@@ -102,7 +103,7 @@ class Run:
         assert self.valid is not None
         return self.valid
 
-    @property
+    @cached_property
     def rate(self) -> float:
         """Nominal sample rate: the inverse of the median step, in [Hz]."""
         return float(f"{1.0 / np.median(np.diff(self.time)):.9g}")

@@ -5,6 +5,9 @@ import numpy as np
 from noisemodel.errors import NoiseModelError
 from noisemodel.types import Array, Real
 
+CHUNK = 4096
+"""Samples that are squared at once: few enough for the cache."""
+
 
 def simplified(velocity: Real, velocity_desired: Real | None = None) -> Array:
     """Estimate a robot's noise pressure from its joint velocities, all constants 1.
@@ -33,6 +36,9 @@ def simplified(velocity: Real, velocity_desired: Real | None = None) -> Array:
 def _power(velocity: Real) -> Array:
     if velocity.ndim != 2:
         raise NoiseModelError(f"velocities of shape {velocity.shape}, expected (samples, joints)")
-    exact = velocity.astype(np.float64, copy=False)
-    power: Array = np.einsum("sj,sj->s", exact, exact)
+    power = np.empty(len(velocity))
+    for start in range(0, len(velocity), CHUNK):
+        part = slice(start, start + CHUNK)
+        exact = velocity[part].astype(np.float64, copy=False)
+        np.einsum("sj,sj->s", exact, exact, out=power[part])
     return power

@@ -6,7 +6,7 @@ import numpy as np
 
 from inspector.audit.slopes import derived
 from noisemodel import Run
-from noisemodel.types import Array
+from noisemodel.types import Real
 
 FARTHEST = 10
 """Samples by which a copy may come before or after."""
@@ -47,12 +47,10 @@ def copies(run: Run) -> tuple[Copy, ...]:
         measured, desired = getattr(run, signal), getattr(run, f"{signal}_desired")
         if measured is None or desired is None or derived(run, signal):
             continue
-        common = [name for name in run.joint_names if name in run.desired_joint_names]
+        did, told = (np.ascontiguousarray(each[run.mask].T) for each in (measured, desired))
         lags = {}
-        for name in common:
-            did = measured[:, run.joint_names.index(name)][run.mask]
-            told = desired[:, run.desired_joint_names.index(name)][run.mask]
-            lag = _lag(np.asarray(did, np.float64), np.asarray(told, np.float64))
+        for name in (name for name in run.joint_names if name in run.desired_joint_names):
+            lag = _lag(did[run.joint_names.index(name)], told[run.desired_joint_names.index(name)])
             if lag is not None:
                 lags[name] = lag
         if lags:
@@ -60,14 +58,14 @@ def copies(run: Run) -> tuple[Copy, ...]:
     return tuple(found)
 
 
-def _lag(measured: Array, desired: Array) -> int | None:
+def _lag(measured: Real, desired: Real) -> int | None:
     """Find the shift at which two signals are equal, None if there is none."""
     samples = len(measured)
+    changes = np.flatnonzero(desired[1:] != desired[:-1])
     for lag in sorted(range(-FARTHEST, FARTHEST + 1), key=abs):
-        did = measured[max(lag, 0) : samples + min(lag, 0)]
-        told = desired[max(-lag, 0) : samples - max(lag, 0)]
-        moving = np.flatnonzero(np.diff(told) != 0)
+        ends = np.searchsorted(changes, (max(-lag, 0), samples - max(lag, 0) - 1))
+        moving = changes[slice(*ends)]
         moving = moving[:: max(1, len(moving) // LOOKED_AT)]
-        if len(moving) >= FARTHEST and np.mean(did[moving] == told[moving]) >= SAME:
+        if len(moving) >= FARTHEST and np.mean(measured[moving + lag] == desired[moving]) >= SAME:
             return lag
     return None

@@ -25,14 +25,16 @@ def held_for(signal: Real, valid: Mask) -> float:
     Returns:
         Samples from jump to jump, 1.0 for a signal that is not held.
     """
-    differences = np.diff(signal.astype(np.float64), axis=0)
-    jumps = np.flatnonzero((differences != 0).any(axis=1) & valid[1:] & valid[:-1])
+    changes = (signal[1:] != signal[:-1]).any(axis=1)
+    jumps = np.flatnonzero(changes & valid[1:] & valid[:-1])
     if len(jumps) < FEWEST:
         return 1.0
     distances = np.diff(jumps)
     usual = np.median(distances)
     regular = np.abs(distances - usual) <= max(1.0, 0.1 * usual)
-    if usual < 2 or regular.mean() < REGULAR or _one_size(np.abs(differences[jumps])):
+    if usual < 2 or regular.mean() < REGULAR:
+        return 1.0
+    if _one_size(np.abs(signal[jumps + 1].astype(np.float64) - signal[jumps])):
         return 1.0
     return float(distances[regular].mean())
 

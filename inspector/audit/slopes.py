@@ -7,10 +7,13 @@ import numpy as np
 
 from noisemodel import Run
 from noisemodel.differentiate import ORDER, WINDOW
-from noisemodel.types import Array, Mask
+from noisemodel.types import Array
 
 EXACT = 1e-12
 """Share of the largest velocity by which a difference of positions may miss it."""
+
+LOOKED_AT = 5000
+"""Samples that are compared, evenly spread, or few more."""
 
 COARSE = 1e-4
 """If rounding alone explains more than this share of a velocity, nothing is told from it."""
@@ -89,15 +92,15 @@ def slope_of(run: Run) -> Slope | None:
         return SMOOTH
     if run.position is None or len(run.time) < 3:
         return None
-    inner = run.mask[:-2] & run.mask[1:-1] & run.mask[2:]
+    inner = np.flatnonzero(run.mask[:-2] & run.mask[1:-1] & run.mask[2:]) + 1
+    inner = inner[:: max(1, len(inner) // LOOKED_AT)]
     moves = np.ptp(run.velocity[run.mask], axis=0) > 0
-    if not (inner.any() and moves.any()):
+    if not (len(inner) and moves.any()):
         return None
     before, here, after = (
-        run.position[start : len(run.time) - 2 + start, moves].astype(np.float64)
-        for start in range(3)
+        run.position[inner + step][:, moves].astype(np.float64) for step in (-1, 0, 1)
     )
-    velocity = run.velocity[1:-1, moves].astype(np.float64)
+    velocity = run.velocity[inner][:, moves].astype(np.float64)
     grain = max(np.finfo(run.position.dtype).eps, np.finfo(run.velocity.dtype).eps)
     rounding = 4.0 * grain * max(np.abs(run.position).max() * run.rate, np.abs(velocity).max())
     tolerance = rounding + EXACT * np.abs(velocity).max()
@@ -108,8 +111,8 @@ def slope_of(run: Run) -> Slope | None:
         FORWARD: (after - here) * run.rate,
         CENTRAL: (after - before) * run.rate / 2,
     }
-    return next((how for how, v in found.items() if _same(v - velocity, tolerance, inner)), None)
+    return next((how for how, v in found.items() if _same(v - velocity, tolerance)), None)
 
 
-def _same(difference: Array, tolerance: float, mask: Mask) -> bool:
-    return bool(np.mean(np.abs(difference[mask]) <= tolerance) >= 0.99)
+def _same(difference: Array, tolerance: float) -> bool:
+    return bool(np.mean(np.abs(difference) <= tolerance) >= 0.99)

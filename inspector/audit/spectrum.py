@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from noisemodel.differentiate import stretches
 from noisemodel.types import Array, Mask, Real
@@ -61,15 +62,15 @@ def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
     if not starts:
         return None
     chosen = np.unique(np.linspace(0, len(starts) - 1, min(MOST, len(starts))).round().astype(int))
-    window = np.hanning(length + 1)[:-1, None]
-    power = np.zeros((length // 2 + 1, velocity.shape[1]))
+    window = np.hanning(length + 1)[:-1]
+    power = np.zeros((velocity.shape[1], length // 2 + 1))
     for index in chosen:
-        segment = velocity[starts[index] : starts[index] + length].astype(np.float64)
-        power += np.abs(np.fft.rfft(window * _level(segment), axis=0)) ** 2
+        segment = velocity[starts[index] : starts[index] + length].T.astype(np.float64, order="C")
+        power += _square(np.fft.rfft(window * _level(segment)))
     # P. Welch, IEEE Trans. Audio Electroacoust. 15 (1967): one-sided, per hertz
     density: Array = 2.0 * power / (len(chosen) * rate * np.square(window).sum())
     frequency = np.arange(1.0, length // 2 + 1.0) * (rate / length)
-    return Spectrum(np.asarray(frequency, dtype=np.float64), density[1:], rate)
+    return Spectrum(np.asarray(frequency, dtype=np.float64), density.T[1:], rate)
 
 
 def smoothed(
@@ -93,6 +94,10 @@ def smoothed(
 
 def _level(segment: Array) -> Array:
     """Subtract the straight line that fits best: slow motion must not leak upwards."""
-    ramp = np.linspace(-1.0, 1.0, len(segment))[:, None]
-    slope = (ramp * segment).sum(axis=0) / np.square(ramp).sum()
-    return np.asarray(segment - segment.mean(axis=0) - slope * ramp)
+    ramp = np.linspace(-1.0, 1.0, segment.shape[1])
+    slope = segment @ ramp / np.square(ramp).sum()
+    return np.asarray(segment - segment.mean(axis=1)[:, None] - slope[:, None] * ramp)
+
+
+def _square(amplitude: NDArray[np.complex128]) -> Array:
+    return np.asarray(np.square(amplitude.real) + np.square(amplitude.imag))

@@ -86,16 +86,12 @@ def _factor(run: Run) -> float | None:
     if not len(starts):
         return None
     way = run.position[starts + length].astype(np.float64) - run.position[starts]
-    area = np.concatenate((np.zeros((1, way.shape[1])), np.cumsum(_means(run), axis=0)))
-    summed = (area[starts + length] - area[starts]) / run.rate
+    whole = run.velocity[: len(run.time) // length * length]
+    sums = whole.reshape(-1, length, way.shape[1]).sum(axis=1, dtype=np.float64)[starts // length]
+    ends = (run.velocity[starts + length].astype(np.float64) - run.velocity[starts]) / 2
+    summed = (sums + ends) / run.rate  # trapezoids
     clear = np.square(way).sum(axis=0) > 0
     if not clear.any():
         return None
     factors = (summed * way).sum(axis=0)[clear] / np.square(way).sum(axis=0)[clear]
     return float(np.median(factors))
-
-
-def _means(run: Run) -> Array:
-    """Mean velocity from each sample to the next, shape (samples - 1, joints)."""
-    velocity = run.velocity.astype(np.float64)
-    return np.asarray((velocity[1:] + velocity[:-1]) / 2)

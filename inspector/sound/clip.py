@@ -64,12 +64,12 @@ def clip(run: Run, *, around: float = 0.0, lead: bool = False) -> Clip | None:
     """
     first, last = _kept(run, around)
     try:
-        sound = sound_of(_part(run, first, last), Settings())
+        sound = replace(sound_of(_part(run, first, last), Settings()), playing=SMALL_RATE)
     except InspectorError:
         return None
     gain = common_gain([sound])
     return Clip(
-        data=sound.file(gain, rate=SMALL_RATE, lead=first / run.rate if lead else 0.0),
+        data=sound.file(gain, lead=first / run.rate if lead else 0.0),
         start=sound.start,
         stop=sound.start + len(sound.signal) / sound.rate,
         said=f"{sound.what}, {said(sound, gain)}",

@@ -7,11 +7,12 @@ and the loudest signal there lends its phase. A signal that is alone comes out a
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
+from numpy import fft
 from numpy.typing import NDArray
-from scipy import fft
 
 from inspector.errors import InspectorError
 from noisemodel.differentiate import stretches
@@ -94,10 +95,10 @@ def mix(signals: Iterable[Array], *, valid: Mask, rate: float, lowest: float = L
     loudest = np.zeros(shape, dtype=np.complex128)
     for signal in signals:
         spectra = windows.spectra(_audible(signal, valid, rate, lowest))
-        each = np.square(np.abs(spectra))
+        each = np.square(spectra.real) + np.square(spectra.imag)
         power += each  # p_hat² = sum of v², Sygulla & Rixen, Sec. II-A, band by band
-        louder = each > most
-        most[louder], loudest[louder] = each[louder], spectra[louder]
+        np.copyto(loudest, spectra, where=each > most)
+        np.maximum(most, each, out=most)
     gain = np.sqrt(np.divide(power, most, out=np.zeros(shape), where=most > 0.0))
     return windows.signal(gain * loudest) * valid
 
@@ -124,11 +125,23 @@ def _high_passed(signal: Array, rate: float, lowest: float) -> Array:
     after = 2 * signal[-1] - signal[-2 : -reach - 2 : -1]
     longer = np.concatenate((before, signal, after))
     longer -= np.linspace(longer[0], longer[-1], len(longer))
-    size = fft.next_fast_len(len(longer), real=True)
-    frequency = fft.rfftfreq(size, 1 / rate)
-    gain = 1 / (1 + (lowest / np.maximum(frequency, lowest / 100)) ** (2 * ORDER))
-    filtered: Array = fft.irfft(fft.rfft(longer, size) * gain, size)
+    size = _quick(len(longer))
+    filtered: Array = fft.irfft(fft.rfft(longer, size) * _gain(size, rate, lowest), size)
     return filtered[reach : reach + len(signal)]
+
+
+@lru_cache(maxsize=1)
+def _gain(size: int, rate: float, lowest: float) -> Array:
+    frequency = fft.rfftfreq(size, 1 / rate)
+    gain: Array = 1 / (1 + (lowest / np.maximum(frequency, lowest / 100)) ** (2 * ORDER))
+    return gain
+
+
+@lru_cache(maxsize=1)
+def _quick(least: int) -> int:
+    """Find the first length that is a product of 2, 3 and 5: quick to transform."""
+    odd: list[int] = [3**threes * 5**fives for threes in range(20) for fives in range(14)]
+    return min(each << (-(-least // each) - 1).bit_length() for each in odd)
 
 
 def _enough(lowest: float, rate: float) -> int:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import fft
+from numpy import fft
 
 from inspector.sound.wavfile import wav
 from noisemodel.types import Array
@@ -30,6 +30,7 @@ class Sound:
         speed: How much faster than it was it is played.
         unit: "rad/s" or "√W".
         remarks: What cannot be heard and why, a sentence each.
+        playing: Samples per second of playing, in [Hz].
     """
 
     what: str
@@ -39,6 +40,7 @@ class Sound:
     speed: float
     unit: str
     remarks: tuple[str, ...] = ()
+    playing: int = RATE
 
     @property
     def peak(self) -> float:
@@ -57,8 +59,8 @@ class Sound:
 
     @cached_property
     def played(self) -> Array:
-        """The signal at 48 kHz, in [unit]."""
-        return self.at(RATE)
+        """The signal as it is played, in [unit]."""
+        return self.at(self.playing)
 
     def at(self, rate: int) -> Array:
         """Resample the signal as it is played, in [unit]; it is band-limited and ends in silence.
@@ -73,20 +75,22 @@ class Sound:
         resampled: Array = fft.irfft(spectrum, size) * (size / len(self.signal))
         return resampled
 
-    def file(self, gain: float, *, rate: int = RATE, lead: float = 0.0) -> bytes:
+    def file(self, gain: float, *, rate: int | None = None, lead: float = 0.0) -> bytes:
         """Write the sound as a WAV file that says its gain.
 
         Args:
             gain: At 0 dB, full scale is 1 of the unit, in [dB].
-            rate: Samples per second, in [Hz].
+            rate: Samples per second, in [Hz]; unless given, those of playing.
             lead: Silence before it, in [s].
         """
         comment = f"{self.what}, {scale(gain, self.unit)}"
         if self.speed != 1.0:
             comment += f", played {self.speed:g} times as fast"
         notes = {"INAM": self.what, "ISFT": SOFTWARE, "ICMT": comment}
+        rate = rate or self.playing
         silence = np.zeros(round(lead * rate))
-        return wav(np.concatenate((silence, self.at(rate) * _factor(gain))), rate, notes)
+        played = self.played if rate == self.playing else self.at(rate)
+        return wav(np.concatenate((silence, played * _factor(gain))), rate, notes)
 
     def clipped(self, gain: float) -> float:
         """Share of the sound that is beyond full scale at a gain in [dB]."""
