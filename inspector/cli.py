@@ -1,6 +1,8 @@
 """The command line: the commands under their names, and expected errors as one line."""
 
+import os
 import sys
+from typing import Annotated
 
 import typer
 
@@ -19,10 +21,34 @@ from inspector.commands import (
 )
 
 app = typer.Typer(
-    help="Inspect the noise that a robot's joints would make.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
 )
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            typer.echo(f"inspector {version('noise-inspector')}")
+        except PackageNotFoundError:  # run from its folder
+            typer.echo("inspector, not installed")
+        raise typer.Exit
+
+
+@app.callback()
+def _inspector(
+    _version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Inspect the noise that a robot's joints would make."""
+
+
 app.command()(looking.view)
 app.command()(living.live)
 app.command()(judging.classify)
@@ -43,6 +69,8 @@ app.command()(comparing.robots)
 
 def main() -> None:
     """Run the command line; expected errors become one line and exit status 3."""
+    # Matrices are small here: more threads mostly wait, and waiting takes processor time.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         app()
     except ValueError as error:

@@ -20,6 +20,10 @@ SETTLE = 2.0
 PORT = "9876"
 """Where rerun's viewer listens; one that does already takes the recording over."""
 HOST = "127.0.0.1"
+KEPT = 20
+"""Recordings that nobody named, of which the newest are kept."""
+ROOM = 1_000_000_000
+"""What they may take together, in bytes."""
 
 
 class ViewerError(InspectorError):
@@ -36,14 +40,32 @@ def has_display() -> bool:
 def scratch_path(run: Path) -> Path:
     """Name the file for a recording that nobody named: the same run replaces its own.
 
+    The oldest of those that were named before are deleted where there are too many.
+
     Args:
         run: The run file that is viewed.
     """
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = cache / "noise-inspector" / "recordings"
     folder.mkdir(parents=True, exist_ok=True)
+    _make_room(folder)
     key = hashlib.sha256(str(run.resolve()).encode()).hexdigest()[:8]
     return folder / f"{run.stem}-{key}.rrd"
+
+
+def _make_room(folder: Path) -> None:
+    """Delete recordings beyond the newest, leaving a place for one more."""
+    found = {}
+    for path in folder.glob("*.rrd"):
+        with suppress(OSError):  # another process may have been quicker
+            found[path] = path.stat()
+    newest = sorted(found, key=lambda path: found[path].st_mtime, reverse=True)
+    taken = 0
+    for place, path in enumerate(newest, start=1):
+        taken += found[path].st_size
+        if place >= KEPT or taken > ROOM:
+            with suppress(OSError):
+                path.unlink()
 
 
 def command(*arguments: str) -> list[str]:

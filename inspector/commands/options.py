@@ -12,8 +12,19 @@ ModelFiles = Annotated[
     list[Path] | None,
     typer.Option("--model", help="A model to use instead of those that ship; may be repeated."),
 ]
+
+
+def _known(kind: str) -> str:
+    if kind not in KINDS:
+        raise typer.BadParameter(f"{kind!r} is none of {', '.join(KINDS)}")
+    return kind
+
+
+KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
+"""Those of ``noisemodel``, which would take too long to import here."""
 Kind = Annotated[
-    str, typer.Option("--kind", help="Extended noise: normal, rms, mean, paper, A, B or C.")
+    str,
+    typer.Option("--kind", callback=_known, help=f"Extended noise, one of {', '.join(KINDS)}."),
 ]
 Inputs = Annotated[
     list[Path],
