@@ -7,7 +7,7 @@ import numpy as np
 
 from inspector.inspection import Inspection
 from inspector.linknoise import vibrating
-from inspector.report import culprits
+from inspector.report import ORIGIN, note, origin
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
 
@@ -53,7 +53,7 @@ def _told(value: object) -> str:
 
 def found(inspection: Inspection) -> Iterator[Table]:
     """List findings and annotated blocks, those that there are."""
-    links = "links with the largest excess"
+    said = note(inspection)
     if inspection.events:
         rows = [
             (
@@ -61,22 +61,29 @@ def found(inspection: Inspection) -> Iterator[Table]:
                 f"{event.start:.2f}",
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
-                culprits(inspection, event),
+                *_plain(origin(inspection, event)),
             )
             for event in inspection.events
         ]
-        yield Table("Findings", ("class", "from [s]", "to [s]", "score", links), rows, (1, 2, 3))
+        head = ("class", "from [s]", "to [s]", "score", *ORIGIN)
+        yield Table("Findings", head, rows, (1, 2, 3), said)
     if inspection.run.blocks:
         annotated = [
             (
                 block.label,
                 f"{block.start:.2f}",
                 f"{block.stop:.2f}",
-                culprits(inspection, block),
+                *_plain(origin(inspection, block)),
             )
             for block in inspection.run.blocks
         ]
-        yield Table("Annotated", ("class", "from [s]", "to [s]", links), annotated, (1, 2))
+        said = "" if inspection.events else said
+        yield Table("Annotated", ("class", "from [s]", "to [s]", *ORIGIN), annotated, (1, 2), said)
+
+
+def _plain(cells: tuple[str, ...]) -> tuple[str, ...]:
+    """Leave Markdown's marks out."""
+    return tuple(cell.replace("`", "") for cell in cells)
 
 
 def parts(inspection: Inspection) -> Iterator[Table]:

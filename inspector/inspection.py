@@ -3,6 +3,7 @@
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import models
@@ -11,6 +12,7 @@ from inspector.audit import audit, summary
 from inspector.errors import InspectorError
 from inspector.labelling import CannotTellError, Library, label_run
 from inspector.linknoise import LinkNoise, link_noise
+from inspector.origin import Origin, origins
 from noisemodel.types import Array
 
 
@@ -44,6 +46,11 @@ class Inspection:
     def has_robot(self) -> bool:
         """Whether there is a robot to draw, and motion to move it by."""
         return self.links is not None
+
+    @cached_property
+    def origins(self) -> dict[models.Event | nm.Block, Origin]:
+        """Where each failure comes from, found or annotated."""
+        return origins(self.run, self.events, self.labels)
 
 
 def inspect(

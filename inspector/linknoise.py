@@ -207,9 +207,9 @@ def _moments(
         else:
             velocity = velocity[:, 6:]
     products = second_moments(velocity, run.mask, size=int(bins[1]))
-    moments = np.zeros((len(bins) - 1, robot.nv, robot.nv))
-    moments[:, np.array(entries)[:, None], entries] = products
-    return moments
+    moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
+    moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
+    return moments.transpose(2, 0, 1)
 
 
 def _remarks(run: nm.Run, robot: nm.Robot, surface: nm.Surface) -> Iterator[str]:

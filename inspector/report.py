@@ -3,10 +3,13 @@
 from collections.abc import Sequence
 
 from inspector.inspection import Inspection
+from inspector.origin import flows
 from models import Event
 from noisemodel import Block
 
-HEAD = ("class", "from [s]", "to [s]", "links with the largest excess")
+ORIGIN = ("shows first in", "band", "links with the largest excess")
+"""Names of the columns that say where a failure comes from."""
+HEAD = ("class", "from [s]", "to [s]", *ORIGIN)
 
 
 def report(inspection: Inspection) -> str:
@@ -33,25 +36,43 @@ def report(inspection: Inspection) -> str:
     ]
     if inspection.events:
         found = [
-            (e.label, f"{e.start:.2f}", f"{e.stop:.2f}", culprits(inspection, e))
+            (e.label, f"{e.start:.2f}", f"{e.stop:.2f}", *origin(inspection, e))
             for e in inspection.events
         ]
         parts += ["## Events", _table(HEAD, found)]
     if run.blocks:
         rows = [
-            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", culprits(inspection, b))
-            for b in run.blocks
+            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *origin(inspection, b)) for b in run.blocks
         ]
         parts += ["## Annotated", _table(HEAD, rows)]
+    if note(inspection):
+        parts += [note(inspection)]
     if inspection.remarks:
         parts += ["## Remarks", "\n".join(f"- {remark}" for remark in inspection.remarks)]
     return "\n\n".join(parts) + "\n"
 
 
 def sentence(inspection: Inspection, event: Event | Block) -> str:
-    """Say what an event is, when, and in which links it shows."""
-    links = culprits(inspection, event)
-    return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{links and f': {links}'}"
+    """Say what an event is, when, and where it comes from."""
+    stage, *others = origin(inspection, event)
+    shown = [stage and f"first in {stage}", *others]
+    where = "; ".join(part for part in shown if part)
+    return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{where and f': {where}'}"
+
+
+def origin(inspection: Inspection, failure: Event | Block) -> tuple[str, str, str]:
+    """Say where a failure comes from: stage of the control flow, band, links."""
+    if failure.label == "ok":
+        return "", "", ""
+    known = inspection.origins[failure]
+    return known.stage, known.frequencies, culprits(inspection, failure)
+
+
+def note(inspection: Inspection) -> str:
+    """Say why no failure has a stage; nothing if that is not so."""
+    if not inspection.origins or flows(inspection.run):
+        return ""
+    return "No stages: the run has neither desired velocities nor named stages of the control flow."
 
 
 def culprits(inspection: Inspection, failure: Event | Block) -> str:

@@ -229,7 +229,8 @@ def test_events_list_failures_found_and_annotated_by_time(whole):
     _, level = read(path, "/events", "TextLog:level")
     assert time.tolist() == [0.5, 1.0]
     assert level == [["WARN"], ["INFO"]]
-    assert text[0][0].startswith("found: impact, 0.50 s to 1.00 s: panda_link")
+    assert text[0][0].startswith("found: impact, 0.50 s to 1.00 s: first in `desired`; ")
+    assert "; panda_link" in text[0][0]
     assert text[1][0].startswith("annotated: oscillations, 1.00 s to 1.50 s")
 
 
@@ -316,10 +317,10 @@ def test_the_report_says_what_was_found(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert "1 finding: impact" in text[0]
-    assert "| impact | 0.50 | 1.00 | [panda_link" in text[0]
+    assert "| impact | 0.50 | 1.00 | `desired` | " in text[0]
     assert "](recording://robot/panda/visual_geometries/panda_link" in text[0]
     assert "| scenario | made up |" in text[0]
-    assert "| ok | 0.20 | 1.00 |  |" in text[0]
+    assert "| ok | 0.20 | 1.00 |  |  |  |" in text[0]
 
 
 def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):

@@ -191,9 +191,9 @@ def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["go2", "solo12", "anymal"])
-def test_scenarios_keep_their_promise_on_every_quadruped(robot):
-    for name, failure in FAILURE.items():
-        if (robot, name) == ("anymal", "decalibrated"):
-            continue  # its knocks are no louder than its ordinary steps: docs/scenarios.md
-        labels = {block.label for block in scenarios.simulate(robot, name, 1).blocks}
-        assert failure in labels, name
+@pytest.mark.parametrize("name", FAILURE)
+def test_a_scenario_keeps_its_promise_on_every_quadruped(robot, name):
+    if (robot, name) == ("anymal", "decalibrated"):
+        pytest.skip("every step of ANYmal differs from its twin's then, impacts do not stand out")
+    run = scenarios.simulate(robot, name, 1)
+    assert FAILURE[name] in {block.label for block in run.blocks}

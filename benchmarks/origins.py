@@ -1,0 +1,159 @@
+"""Measure how often the right stage and the right limb are named.
+
+    python benchmarks/origins.py build/origins [--robots talos,go2,panda] [--seeds 3,4]
+
+Simulates runs whose defects are known, into a folder; those that are there are not simulated
+again. Of each event that became a label, the stage named is held against the one in which the
+defect acts, the first three links against the limb on which it acts: the leg whose foot met
+something, whose sensor or plan jumped, or that was shaken alone; arms have one limb. Events
+without a limb of their own are left out of that column. The band named is held against that of
+oscillations that were commanded in one: right if they overlap.
+"""
+
+import argparse
+import os
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import noisemodel as nm
+from inspector.linknoise import LinkNoise, link_noise
+from inspector.origin import Origin, origins
+from scenarios import ROBOTS, ScenarioError, SimulationError, simulate
+from scenarios.limbs import limbs
+
+SCENARIOS = (
+    "obstacle-full",
+    "decalibrated",
+    "early-height",
+    "platform",
+    "force-jump",
+    "torque-jump",
+    "limit-cycle",
+    "multisine-30-40",
+    "multisine-100-150",
+    "reference-jump",
+)
+ACTS = {
+    "jump of the planned motion": "planned",
+    "force control with too high a gain": "commanded",
+    "multi-sine on the reference": "desired",
+    "unplanned contact": "measured",
+    "ground that gives way": "measured",
+    "ground that is not there": "measured",
+    "partial contact at an edge": "measured",
+}
+"""The stage in which each cause acts; jumps of sensors act in the commanded one."""
+LATE = 0.15
+"""How long after its cause a label may begin, in [s]."""
+
+
+def run_of(folder: Path, robot: str, scenario: str, seed: int, seconds: float) -> nm.Run | None:
+    """Load a run, or simulate it; None if the robot has no such scenario, or falls."""
+    path = folder / f"{robot}-{scenario}-{seed}.npz"
+    if not path.exists():
+        try:
+            simulate(robot, scenario, seed, duration=seconds).save(path)
+        except (ScenarioError, SimulationError) as error:
+            print(f"{path.stem}: {error}")
+            return None
+    return nm.Run.load(path)
+
+
+def labelled(run: nm.Run) -> Iterator[tuple[dict[str, Any], nm.Block]]:
+    """Pair the events that left a label with the first block that they left."""
+    for event in run.meta["events"]:
+        for block in run.blocks:
+            near = event["start"] - 0.02 <= block.start < event["stop"] + LATE
+            if event["labelled"] > 0.0 and block.label == event["label"] and near:
+                yield event, block
+                break
+
+
+def limb_of(robot: str, event: dict[str, Any]) -> tuple[str, ...]:
+    """Joints of the limb on which an event acts; nothing if it acts on more than one."""
+    parts, facts = limbs(robot), event["facts"]
+    if not parts:
+        return ROBOTS[robot].drives.joints
+    if "base." in event["cause"]:
+        return ()
+    shares = facts.get("effectors", ())
+    alone = [index for index, share in enumerate(shares) if share]
+    effector = facts.get("effector", alone[0] if len(alone) == 1 else None)
+    frames = [one.frame for one in ROBOTS[robot].effectors]
+    return () if effector is None else parts[frames[effector]]
+
+
+def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:
+    """Links that the joints of a limb move, by the joint that carries each."""
+    known = nm.Robot.load(robot)
+    surface = nm.Surface.of(known, "auto")
+    carried = zip(surface.names, surface.joint, strict=True)
+    return {name for name, index in carried if known.joints[index - 1].name in joints}
+
+
+def judge(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str, bool]]]:
+    """Judge each event: cause, what was found, and whether stage, limb and band are right."""
+    robot, known = str(run.robot), origins(run, ())
+    for event, block in labelled(run):
+        found = known[block]
+        stage = None if found.first is None else found.first.stage
+        marks = {"stage": stage == ACTS.get(event["cause"], "commanded")}
+        joints = limb_of(robot, event)
+        if joints:
+            named = {link for link, _ in links.culprits(block, list(known))}
+            marks["limb"] = bool(named & links_of(robot, joints))
+        if "band" in event["facts"]:
+            low, high = event["facts"]["band"]
+            marks["band"] = found.band is not None and (
+                found.band[0] <= high and found.band[1] >= low
+            )
+        yield event["cause"], found, marks
+
+
+def main() -> None:
+    """Simulate, judge, and print."""
+    arguments = argparse.ArgumentParser(description=__doc__)
+    arguments.add_argument("folder", type=Path)
+    arguments.add_argument("--robots", default="talos,go2,panda")
+    arguments.add_argument("--seeds", default="3,4")
+    arguments.add_argument("--seconds", type=float, default=6.0)
+    arguments.add_argument("--each", action="store_true", help="print each event")
+    options = arguments.parse_args()
+    options.folder.mkdir(parents=True, exist_ok=True)
+    right: dict[tuple[str, str, str], list[bool]] = defaultdict(list)
+    for robot in options.robots.split(","):
+        # Scenarios of one seed share the run without a defect.
+        for seed in options.seeds.split(","):
+            for scenario in SCENARIOS:
+                run = run_of(options.folder, robot, scenario, int(seed), options.seconds)
+                if run is None:
+                    continue
+                for cause, found, marks in judge(run, link_noise(run)):
+                    if options.each:
+                        print(
+                            f"{robot}-{scenario}-{seed} {cause}: {found.stage} {found.band}", marks
+                        )
+                    for column, mark in marks.items():
+                        for row in (
+                            (scenario, robot),
+                            (scenario, "all"),
+                            ("all", robot),
+                            ("all", "all"),
+                        ):
+                            right[(column, *row)].append(mark)
+    robots = [*options.robots.split(","), "all"]
+    for column in ("stage", "limb", "band"):
+        print(f"\n{column:20}" + "".join(f"{robot:>16}" for robot in robots))
+        for scenario in (*SCENARIOS, "all"):
+            cells = [right.get((column, scenario, robot), []) for robot in robots]
+            if any(cells):
+                texts = [f"{sum(c)}/{len(c)} {sum(c) / len(c):.0%}" if c else "-" for c in cells]
+                print(f"{scenario:20}" + "".join(f"{text:>16}" for text in texts))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+"""Stretches of a run in which nothing failed: what a failure is held against."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from models import Event
+from noisemodel import Block, Run
+
+MOST = 16
+"""Stretches that are looked at; a long run is not read whole."""
+
+
+def quiet(
+    run: Run, failures: Sequence[Event | Block], *, length: float, most: int = MOST
+) -> list[slice]:
+    """Pick stretches without failures or gaps, spread evenly over a run.
+
+    Args:
+        run: The run.
+        failures: All of its failures, found and annotated.
+        length: Of a stretch, in [s].
+        most: How many are picked at most.
+
+    Returns:
+        The samples of each stretch, none if the failures leave no room.
+    """
+    size = max(1, round(length * run.rate))
+    free = run.mask.copy()
+    for failure in failures:
+        first, last = np.searchsorted(run.time, (failure.start, failure.stop))
+        free[first:last] = False
+    taken = np.concatenate(([0], np.cumsum(~free)))
+    starts = np.arange(0, len(free) - size + 1, size)
+    starts = starts[taken[starts + size] == taken[starts]]
+    if len(starts) > most:
+        starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
+    return [slice(start, start + size) for start in starts.tolist()]

@@ -1,0 +1,164 @@
+"""The first stage of the control flow in which a failure shows, told from the run alone.
+
+There is no run without the failure to hold it against. What tells where it came in is what is new
+in each stage, see `inspector.stagesnew`. Two kinds of failures are told apart:
+
+- A *blow or jump* comes through one stage after the other, so these are ordered by time. It is
+  placed where the news of the measured motion rises most. In a stage it sets in where the news
+  first exceed a fifth of their peak and twice what they were in the 50 ms before. A stage does not
+  show it whose peak is less than four times what was before, or less than a fifth of all that
+  changes there (it passes on what the stage before it did). Nothing foretells the first stage,
+  hence its peak also has to exceed by half what is usual for it, or
+  another stage has to follow within 3 ms. The earliest onset wins; of
+  simultaneous ones, the stage that a motion passes first.
+- A *lasting vibration* has gone round the loop many times, and its onset, such as the touch that
+  starts a limit cycle, is not its source. It lies in the first stage that adds to it: whose news
+  have a quarter or more of the excess power that those of any stage have, and more than twice
+  what is usual for it.
+
+A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in all, of the first
+second. What shows no onset is treated as if it lasted.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from inspector import stagesonset
+from inspector.stages import Flow, flow
+from inspector.stagesnew import WARM, News, Usual
+from models import Event
+from noisemodel import Block, Run
+from noisemodel.types import Array
+
+EARLY = 0.015
+"""How long before its start a failure may have set in, in [s]."""
+BEFORE, AFTER = 0.1 + WARM, 0.05
+"""What is looked at around a failure, in [s]."""
+LONGEST = 1.0
+"""What is looked at of a failure, in [s]."""
+BIN = 0.05
+"""Time over which a vibration's power is taken, in [s]."""
+LOUD = 0.25
+"""Share of the loudest bin's power from which a bin counts: 6 dB less."""
+LASTING = 0.3
+"""Loud time of a lasting vibration, in [s]."""
+PASSED_ON = 0.2
+"""Share of a stage's change that has to be new."""
+UNHEARD = 1.5
+"""How far the first stage has to exceed its usual peak."""
+ANSWERED = 0.003
+"""Time within which the next stage else has to answer the first, in [s]."""
+ADDS = 0.25
+"""Share of the largest addition from which a stage counts as adding."""
+MORE = 2.0
+"""How far the power of a stage that adds exceeds the usual."""
+SLOWEST = 0.02
+"""Longest lag between two stages that vibrate together, in [s]."""
+
+
+@dataclass(frozen=True)
+class First:
+    """The stage in which a failure shows first.
+
+    Attributes:
+        stage: Its name.
+        following: The next stage in which the failure shows; empty if it is in no other.
+        lag: By how much that one is later, in [s].
+        lasting: Whether the failure is a vibration that lasts, and not a blow or jump.
+    """
+
+    stage: str
+    following: str
+    lag: float
+    lasting: bool
+
+
+def first_stage(run: Run, usual: Usual, failure: Event | Block, *, reach: float) -> First | None:
+    """Find the stage in which a failure shows first.
+
+    Args:
+        run: The run.
+        usual: What its stages do when nothing fails.
+        failure: A finding, or an annotated block.
+        reach: How long after its start it may have set in, in [s].
+
+    Returns:
+        The stage, and its lag to the next; None if no stage shows the failure.
+    """
+    stop = min(failure.stop, failure.start + LONGEST)
+    edges = (failure.start - BEFORE, max(stop, failure.start + reach) + AFTER)
+    first, last = (int(index) for index in np.searchsorted(run.time, edges))
+    stages = flow(run, slice(first, last))
+    start, end = (int(index) for index in np.searchsorted(stages.time, (failure.start, stop)))
+    if end <= start or not stages.valid[start:end].any():
+        return None
+    news, during = usual.news(stages), slice(start, end)
+    found = None
+    if not _lasts(news.new[-1, during], float(usual.power[-1]), stages):
+        edges = (failure.start - EARLY, failure.start + reach)
+        found = _earliest(stages, news, usual, *np.searchsorted(stages.time, edges).tolist())
+    return found or _adding(stages, news, usual, during)
+
+
+def _lasts(sharp: Array, usual: float, stages: Flow) -> bool:
+    """Tell whether a vibration lasts."""
+    size = stages.samples(BIN)
+    power = np.add.reduceat(np.square(sharp), np.arange(0, len(sharp), size)) / size
+    loud = power > max(LOUD * power.max(), MORE * usual)
+    return bool(loud.sum() * BIN >= LASTING)
+
+
+def _earliest(stages: Flow, news: News, usual: Usual, first: int, last: int) -> First | None:
+    """Order the stages by when a blow or jump comes through."""
+    rate, samples = stages.rate, len(stages.time)
+    # Of a stage that adds nothing, anything would be unusual.
+    scale = usual.peak + PASSED_ON * (float(usual.peak.max()) or 1.0)
+    unusual = (news.new / scale[:, None]).max(axis=0)
+    moment = stagesonset.rise(unusual, first, last, rate=rate)
+    around = stagesonset.window(moment, samples, rate=rate)
+    onsets = [
+        (stagesonset.onset(new, moment, rate=rate, least=PASSED_ON * float(peak)), place)
+        for place, (new, peak) in enumerate(
+            zip(news.new, news.whole[:, around].max(axis=1), strict=True)
+        )
+    ]
+    found = sorted((at, place) for at, place in onsets if at is not None)
+    if found and found[0][1] == 0 and len(news.new) > 1:
+        common = float(news.new[0, around].max()) <= UNHEARD * usual.peak[0]
+        if common and (len(found) == 1 or found[1][0] - found[0][0] > ANSWERED * rate):
+            found = found[1:]
+    if not found:
+        return None
+    earliest, place = found[0]
+    at, other = next((later for later in found if later[0] > earliest), (earliest, None))
+    return First(
+        stage=stages.names[place],
+        following="" if other is None else stages.names[other],
+        lag=(at - earliest) / rate,
+        lasting=False,
+    )
+
+
+def _adding(stages: Flow, news: News, usual: Usual, during: slice) -> First | None:
+    """Find the first stage that adds to a vibration."""
+    power = np.square(news.new[:, during]).mean(axis=1)
+    least = np.maximum(
+        MORE * usual.power, PASSED_ON**2 * np.square(news.whole[:, during]).mean(axis=1)
+    )
+    excess = np.where(power > least, power - usual.power, 0.0)
+    if not excess.max() > 0.0:
+        return None
+    place = int(np.argmax(excess >= ADDS * excess.max()))
+    if place == len(excess) - 1:
+        return First(stages.names[place], "", 0.0, lasting=True)
+    lag = _lag(news.change[place, during], news.change[-1, during], stages.samples(SLOWEST))
+    return First(stages.names[place], stages.names[-1], lag / stages.rate, lasting=True)
+
+
+def _lag(cause: Array, effect: Array, most: int) -> int:
+    """Samples, up to a number, by which one vibration follows another, all joints together."""
+    size = len(cause) + most
+    waves = [np.fft.rfft(signal, size, axis=0) for signal in (effect, cause)]
+    together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), size)
+    return int(np.argmax(together[: most + 1]))

@@ -1,0 +1,181 @@
+import numpy as np
+import pytest
+
+from inspector import stagesonset
+from inspector.stages import flow
+from inspector.stagesfirst import first_stage
+from inspector.stagesnew import changes, usual
+from models import Event
+from noisemodel import Block, Run
+
+RATE, SECONDS = 2000.0, 4.0
+NAMES = ("hip", "knee", "ankle")
+DELAY = 4
+"""Samples by which each stage follows the one before: 2 ms."""
+JUMP = Block(2.0, 2.1, "highaccelerations")
+SHAKE = Block(2.0, 3.0, "oscillations")
+
+
+def later(signal, samples):
+    return np.concatenate((np.repeat(signal[:1], samples, axis=0), signal[:-samples]))
+
+
+def flowing_run(acts_in=None, kind="jump", *, feedback=0.0, **changed):
+    """Let a swing pass planned, commanded, desired and measured; something is added to one."""
+    time = np.arange(round(RATE * SECONDS)) / RATE
+    random = np.random.default_rng(1)
+    failure = np.zeros((len(time), 3))
+    during = (time >= 2.0) & (time < (2.05 if kind == "jump" else 3.0))
+    wave = 1.0 if kind == "jump" else np.sin(2 * np.pi * 80 * time[during])
+    failure[during, 1] = 0.5 * wave
+    swing = np.cos(np.outer(time, [2.0, 3.0, 4.0])) + 0.02 * np.sin(np.outer(time, [180, 200, 220]))
+    added = {
+        name: failure if name == acts_in else np.zeros_like(failure)
+        for name in ("planned", "commanded", "desired", "measured")
+    }
+    planned = swing + added["planned"]
+    answer = feedback * later(added["measured"], 3 * DELAY)
+    commanded = later(planned, DELAY) + added["commanded"] + answer
+    desired = commanded + added["desired"]
+    noise = 1e-4 * random.standard_normal(swing.shape)
+    fields = {
+        "time": time,
+        "velocity": later(desired, DELAY) + added["measured"] + noise,
+        "velocity_desired": desired,
+        "stages": {"planned": planned, "commanded": commanded},
+        "joint_names": NAMES,
+        "blocks": (JUMP if kind == "jump" else SHAKE,),
+    }
+    return Run(**(fields | changed))
+
+
+def found(run, failure=None, reach=0.1):
+    failure = failure or run.blocks[0]
+    return first_stage(run, usual(run, run.blocks), failure, reach=reach)
+
+
+@pytest.mark.parametrize(
+    ("stage", "following", "lag"),
+    [
+        ("planned", "commanded", 0.002),
+        ("commanded", "measured", 0.002),
+        ("desired", "measured", 0.002),
+    ],
+)
+def test_a_jump_is_named_by_the_stage_in_which_it_is_new_and_its_lead(stage, following, lag):
+    first = found(flowing_run(stage))
+    assert (first.stage, first.following, first.lasting) == (stage, following, False)
+    assert first.lag == pytest.approx(lag, abs=1.1e-3)
+
+
+def test_a_blow_shows_in_the_measured_motion_before_the_command_answers():
+    first = found(flowing_run("measured", feedback=0.5))
+    assert (first.stage, first.following) == ("measured", "commanded")
+    assert first.lag == pytest.approx(3 * DELAY / RATE, abs=1e-3)
+
+
+def test_a_blow_that_nothing_answers_shows_in_the_measured_motion_alone():
+    first = found(flowing_run("measured"))
+    assert (first.stage, first.following, first.lag) == ("measured", "", 0.0)
+
+
+@pytest.mark.parametrize("stage", ["planned", "commanded", "desired", "measured"])
+def test_a_lasting_vibration_is_named_by_the_stage_that_adds_it(stage):
+    first = found(flowing_run(stage, "shake"))
+    assert first.lasting
+    assert first.stage == stage
+
+
+def test_a_lasting_vibration_leads_the_measured_one_by_the_delay_between_them():
+    assert found(flowing_run("desired", "shake")).lag == pytest.approx(DELAY / RATE, abs=2 / RATE)
+    assert found(flowing_run("planned", "shake")).lag == pytest.approx(
+        2 * DELAY / RATE, abs=2 / RATE
+    )
+
+
+def test_a_vibration_that_the_command_answers_faintly_is_not_blamed_on_the_command():
+    assert found(flowing_run("measured", "shake", feedback=0.1)).stage == "measured"
+
+
+def test_a_finding_is_searched_over_its_first_frame():
+    event = Event("highaccelerations", 1.7, 2.3, 1.0)
+    run = flowing_run("commanded")
+    first = first_stage(run, usual(run, [event, *run.blocks]), event, reach=0.4)
+    assert first.stage == "commanded"
+
+
+def test_no_stage_shows_what_is_not_there():
+    assert found(flowing_run(None)) is None
+
+
+def test_without_stages_desired_and_measured_are_told_apart():
+    assert found(flowing_run("desired", stages={})).stage == "desired"
+    assert found(flowing_run("measured", stages={})).stage == "measured"
+
+
+def test_joints_that_are_desired_in_another_order_are_matched_by_name():
+    run = flowing_run("desired")
+    turned = flowing_run(
+        "desired",
+        velocity_desired=run.velocity_desired[:, ::-1],
+        desired_joint_names=NAMES[::-1],
+    )
+    assert found(turned) == found(run)
+
+
+def test_the_flow_has_the_joints_that_all_stages_have():
+    run = flowing_run()
+    part = flowing_run(velocity_desired=run.velocity_desired[:, 1:], desired_joint_names=NAMES[1:])
+    stages = flow(part, slice(10, 20))
+    assert stages.names == ("planned", "commanded", "desired", "measured")
+    assert stages.velocity.shape == (4, 10, 2)
+    np.testing.assert_array_equal(stages.velocity[3], run.velocity[10:20, 1:])
+
+
+def test_the_edge_of_a_gap_is_no_jump():
+    valid = np.ones(round(RATE * SECONDS), dtype=bool)
+    valid[3920:3960] = False
+    run = flowing_run(None)
+    empty = {name: np.where(valid[:, None], stage, 0.0) for name, stage in run.stages.items()}
+    gap = flowing_run(
+        velocity=np.where(valid[:, None], run.velocity, 0.0),
+        velocity_desired=np.where(valid[:, None], run.velocity_desired, 0.0),
+        stages=empty,
+        valid=valid,
+    )
+    assert np.abs(changes(flow(gap, slice(3800, 4080)))).max() < 10.0
+    assert found(gap) is None
+
+
+def test_a_failure_that_lies_in_a_gap_has_no_stage():
+    valid = np.ones(round(RATE * SECONDS), dtype=bool)
+    valid[3960:4240] = False
+    assert found(flowing_run(valid=valid)) is None
+
+
+def test_a_run_without_quiet_time_still_names_a_stage():
+    run = flowing_run("commanded")
+    whole = Block(0.0, 4.0, "impact")
+    first = first_stage(run, usual(run, [whole]), run.blocks[0], reach=0.1)
+    assert first.stage in {"planned", "commanded"}
+
+
+def test_slow_motion_is_no_change():
+    run = flowing_run(stages={})
+    smooth = np.cos(np.outer(run.time, [2.0, 3.0, 4.0]))
+    slow = flow(flowing_run(velocity=smooth, velocity_desired=smooth, stages={}), slice(0, 2000))
+    assert np.abs(changes(slow)[:, 80:]).max() < 0.3  # of accelerations of up to 16 rad/s²
+
+
+def test_an_onset_is_the_sample_at_which_something_sets_in():
+    sharp = np.full(2000, 1.0)
+    sharp[1000:1100] = 50.0
+    moment = stagesonset.rise(sharp, 900, 1100, rate=10000.0)
+    assert stagesonset.onset(sharp, moment, rate=10000.0) == 1000
+    assert stagesonset.onset(np.ones(2000), 1000, rate=10000.0) is None
+
+
+def test_of_two_rises_the_first_counts_if_it_is_steep():
+    sharp = np.full(4000, 1.0)
+    sharp[1000:1100], sharp[1800:1900] = 40.0, 60.0
+    assert abs(stagesonset.rise(sharp, 600, 2000, rate=10000.0) - 1000) < 20
