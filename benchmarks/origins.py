@@ -106,6 +106,8 @@ def judge(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str
         if joints:
             named = {link for link, _ in links.culprits(block, list(known))}
             marks["limb"] = bool(named & links_of(robot, joints))
+            new = () if found.first is None else found.first.joints
+            marks["joints"] = any(joint in joints for joint, _ in new)
         if "band" in event["facts"]:
             low, high = event["facts"]["band"]
             marks["band"] = found.band is not None and (
@@ -146,7 +148,7 @@ def main() -> None:
                         ):
                             right[(column, *row)].append(mark)
     robots = [*options.robots.split(","), "all"]
-    for column in ("stage", "limb", "band"):
+    for column in ("stage", "limb", "joints", "band"):
         print(f"\n{column:20}" + "".join(f"{robot:>16}" for robot in robots))
         for scenario in (*SCENARIOS, "all"):
             cells = [right.get((column, scenario, robot), []) for robot in robots]

@@ -11,6 +11,8 @@ from noisemodel import Block, Run
 
 ANNOTATED = 0.1
 """How long after the start of an annotation its failure may set in, in [s]."""
+LEAST = 0.05
+"""Joints with a smaller share are not told."""
 SHARP = 10.0
 """A lag is told to a tenth of a millisecond up to this, in [ms]."""
 
@@ -38,6 +40,12 @@ class Origin:
         ahead = f"{lag_ms:.1f} ms" if 0.0 < lag_ms < SHARP else f"{lag_ms:.0f} ms"
         later = f", {ahead} before `{self.first.following}`" if lag_ms > 0.0 else ""
         return f"`{self.first.stage}`{later}"
+
+    @property
+    def joints(self) -> str:
+        """The joints in which it is new at that stage, and their shares; empty if not known."""
+        known = () if self.first is None else self.first.joints
+        return ", ".join(f"{joint} {share:.0%}" for joint, share in known if share >= LEAST)
 
     @property
     def frequencies(self) -> str:

@@ -14,6 +14,8 @@ SHORTEST, LONGEST = 0.1, 0.4
 """Windows of the spectrum, in [s]: as long as the failure, between these."""
 MOST = 16
 """Windows that are looked at of a failure."""
+USUAL = 90.0
+"""Percentile of what quiet stretches have: a robot that walks hums now and then."""
 SHARE = 0.7
 """Of the excess power that lies in the band."""
 
@@ -23,8 +25,9 @@ def band(
 ) -> tuple[float, float] | None:
     """Find the frequencies at which the joints vibrate more than they use to.
 
-    The power spectrum of the measured velocities above 10 Hz, mean over the failure, less its
-    median over quiet stretches, is the excess; the band is the narrowest that holds 70 % of it.
+    The power spectrum of the measured velocities above 10 Hz, mean over the failure, less what
+    one of ten quiet stretches exceeds, is the excess; the band is the narrowest that holds 70 %
+    of it.
 
     Args:
         run: The run.
@@ -50,7 +53,7 @@ def band(
     usual = [_spectrum(run.velocity[part]) for part in quiet(run, failures, length=length)]
     excess = np.mean([_spectrum(run.velocity[part]) for part in during], axis=0)
     if usual:
-        excess = excess - np.median(usual, axis=0)
+        excess = excess - np.percentile(usual, USUAL, axis=0)
     frequency = np.arange(len(excess)) * run.rate / size
     excess = np.where(frequency >= FAST, np.maximum(excess, 0.0), 0.0)
     if not excess.sum() > 0.0:

@@ -7,7 +7,7 @@ from inspector.origin import flows
 from models import Event
 from noisemodel import Block
 
-ORIGIN = ("shows first in", "band", "links with the largest excess")
+ORIGIN = ("shows first in", "by joints", "band", "links with the largest excess")
 """Names of the columns that say where a failure comes from."""
 HEAD = ("class", "from [s]", "to [s]", *ORIGIN)
 
@@ -54,18 +54,18 @@ def report(inspection: Inspection) -> str:
 
 def sentence(inspection: Inspection, event: Event | Block) -> str:
     """Say what an event is, when, and where it comes from."""
-    stage, *others = origin(inspection, event)
-    shown = [stage and f"first in {stage}", *others]
-    where = "; ".join(part for part in shown if part)
+    stage, joints, *others = origin(inspection, event)
+    by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
+    where = "; ".join(part for part in (by, *others) if part)
     return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{where and f': {where}'}"
 
 
-def origin(inspection: Inspection, failure: Event | Block) -> tuple[str, str, str]:
-    """Say where a failure comes from: stage of the control flow, band, links."""
+def origin(inspection: Inspection, failure: Event | Block) -> tuple[str, str, str, str]:
+    """Say where a failure comes from: stage of the control flow, joints, band, links."""
     if failure.label == "ok":
-        return "", "", ""
+        return "", "", "", ""
     known = inspection.origins[failure]
-    return known.stage, known.frequencies, culprits(inspection, failure)
+    return known.stage, known.joints, known.frequencies, culprits(inspection, failure)
 
 
 def note(inspection: Inspection) -> str:

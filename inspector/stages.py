@@ -16,6 +16,7 @@ class Flow:
 
     Attributes:
         names: Of the stages: those that the run names, in its order, then desired and measured.
+        joints: Their names.
         velocity: Shape (stages, samples, joints), in [rad/s] or [m/s].
         time: Shape (samples,), in [s].
         valid: False in gaps, shape (samples,).
@@ -23,6 +24,7 @@ class Flow:
     """
 
     names: tuple[str, ...]
+    joints: tuple[str, ...]
     velocity: Array
     time: Array
     valid: Mask
@@ -54,6 +56,7 @@ def flow(run: Run, part: slice) -> Flow:
     stages.append((MEASURED, run.velocity, own))
     return Flow(
         names=tuple(name for name, _, _ in stages),
+        joints=tuple(run.joint_names[index] for index in joints),
         velocity=np.array(
             [
                 signal[part][:, columns if name == DESIRED else joints]

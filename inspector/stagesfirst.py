@@ -4,13 +4,13 @@ There is no run without the failure to hold it against. What tells where it came
 in each stage, see `inspector.stagesnew`. Two kinds of failures are told apart:
 
 - A *blow or jump* comes through one stage after the other, so these are ordered by time. It is
-  placed where the news of the measured motion rises most. In a stage it sets in where the news
-  first exceed a fifth of their peak and twice what they were in the 50 ms before. A stage does not
-  show it whose peak is less than four times what was before, or less than a fifth of all that
-  changes there (it passes on what the stage before it did). Nothing foretells the first stage,
-  hence its peak also has to exceed by half what is usual for it, or
-  another stage has to follow within 3 ms. The earliest onset wins; of
-  simultaneous ones, the stage that a motion passes first.
+  looked for where the news of a stage, relative to its usual peak, first rise steeply. In a stage
+  it sets in where the news first exceed a fifth of their peak and twice what they were in the
+  50 ms before. A stage does not show it whose peak is less than four times what was before, or
+  less than a fifth of all that changes there: it passes on what the stage before it did. Nothing
+  foretells the first stage, hence its peak also has to exceed by half what is usual for it, or
+  another stage has to follow within 3 ms. The earliest onset wins; of simultaneous ones, the
+  stage that a motion passes first.
 - A *lasting vibration* has gone round the loop many times, and its onset, such as the touch that
   starts a limit cycle, is not its source. It lies in the first stage that adds to it: whose news
   have a quarter or more of the excess power that those of any stage have, and more than twice
@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspector import stagesonset
+from inspector.linknoise import CULPRITS
 from inspector.stages import Flow, flow
 from inspector.stagesnew import WARM, News, Usual
 from models import Event
@@ -53,6 +54,8 @@ ADDS = 0.25
 """Share of the largest addition from which a stage counts as adding."""
 MORE = 2.0
 """How far the power of a stage that adds exceeds the usual."""
+FRESH = 0.005
+"""Time after its onset in which a blow or jump has not spread over the robot, in [s]."""
 SLOWEST = 0.02
 """Longest lag between two stages that vibrate together, in [s]."""
 
@@ -66,12 +69,15 @@ class First:
         following: The next stage in which the failure shows; empty if it is in no other.
         lag: By how much that one is later, in [s].
         lasting: Whether the failure is a vibration that lasts, and not a blow or jump.
+        joints: Up to three joints in which it is new there, and their shares of the power of
+            what is, the largest first.
     """
 
     stage: str
     following: str
     lag: float
     lasting: bool
+    joints: tuple[tuple[str, float], ...] = ()
 
 
 def first_stage(run: Run, usual: Usual, failure: Event | Block, *, reach: float) -> First | None:
@@ -137,6 +143,7 @@ def _earliest(stages: Flow, news: News, usual: Usual, first: int, last: int) -> 
         following="" if other is None else stages.names[other],
         lag=(at - earliest) / rate,
         lasting=False,
+        joints=_joints(stages, news.unforetold[place, earliest : earliest + stages.samples(FRESH)]),
     )
 
 
@@ -150,10 +157,19 @@ def _adding(stages: Flow, news: News, usual: Usual, during: slice) -> First | No
     if not excess.max() > 0.0:
         return None
     place = int(np.argmax(excess >= ADDS * excess.max()))
+    joints = _joints(stages, news.unforetold[place, during])
     if place == len(excess) - 1:
-        return First(stages.names[place], "", 0.0, lasting=True)
+        return First(stages.names[place], "", 0.0, lasting=True, joints=joints)
     lag = _lag(news.change[place, during], news.change[-1, during], stages.samples(SLOWEST))
-    return First(stages.names[place], stages.names[-1], lag / stages.rate, lasting=True)
+    return First(stages.names[place], stages.names[-1], lag / stages.rate, True, joints)
+
+
+def _joints(stages: Flow, unforetold: Array) -> tuple[tuple[str, float], ...]:
+    """Name the joints in which something is new, shape (samples, joints), and their shares."""
+    power = np.square(unforetold).sum(axis=0)
+    shares = power / (power.sum() or 1.0)
+    ranked = np.argsort(-shares, kind="stable")[:CULPRITS].tolist()
+    return tuple((stages.joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
 
 
 def _lag(cause: Array, effect: Array, most: int) -> int:

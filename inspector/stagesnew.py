@@ -41,11 +41,14 @@ class News:
 
     Attributes:
         change: What changes suddenly, shape (stages, samples, joints), in [rad/s²].
-        whole: Its norm over the joints, shape (stages, samples), in [rad/s²].
-        new: That of what is new, shape (stages, samples), in [rad/s²].
+        unforetold: What of it the stage before did not foretell, of the same shape.
+        whole: Norm of all changes over the joints, shape (stages, samples), in [rad/s²].
+        new: That of what is new, shape (stages, samples), in [rad/s²]: what is not foretold, but
+            no more than all changes, for what was foretold and stays away is no news.
     """
 
     change: Array
+    unforetold: Array
     whole: Array
     new: Array
 
@@ -75,7 +78,7 @@ class Usual:
                 new[place + 1, lag:] -= weights[:, column] * past
         new[:, ~stages.valid] = 0.0
         whole, rest = np.linalg.norm(change, axis=2), np.linalg.norm(new, axis=2)
-        return News(change, whole, np.minimum(whole, rest))
+        return News(change, new, whole, np.minimum(whole, rest))
 
 
 def usual(run: Run, failures: Sequence[Event | Block]) -> Usual:

@@ -93,13 +93,14 @@ def test_every_failure_has_an_origin_and_what_is_ok_has_none():
 
 def test_the_report_says_stage_and_band_of_each_failure(tmp_path):
     inspection = inspected(shaken_run(), tmp_path)
-    assert "| class | from [s] | to [s] | shows first in | band |" in report(inspection)
+    assert "| class | from [s] | to [s] | shows first in | by joints | band |" in report(inspection)
     low, high = inspection.origins[SHAKE].band
-    assert f"| oscillations | 2.00 | 3.50 | `measured` | {low:.0f}-{high:.0f} Hz |" in report(
-        inspection
+    assert (
+        f"| oscillations | 2.00 | 3.50 | `measured` | knee 100% | {low:.0f}-{high:.0f} Hz |"
+        in report(inspection)
     )
     assert sentence(inspection, SHAKE).startswith(
-        f"oscillations, 2.00 s to 3.50 s: first in `measured`; {low:.0f}-{high:.0f} Hz"
+        f"oscillations, 2.00 s to 3.50 s: first in `measured` by knee 100%; {low:.0f}-{high:.0f} Hz"
     )
     assert "No stages" not in report(inspection)
 
@@ -115,5 +116,5 @@ def test_a_run_without_desired_velocities_says_once_that_it_has_no_stages(tmp_pa
 
 def test_the_page_has_the_same_columns_without_marks(tmp_path):
     (annotated,) = tables(inspected(shaken_run(), tmp_path))
-    assert annotated.head[3:5] == ("shows first in", "band")
+    assert annotated.head[3:6] == ("shows first in", "by joints", "band")
     assert annotated.rows[0][3] == "measured"

@@ -229,7 +229,7 @@ def test_events_list_failures_found_and_annotated_by_time(whole):
     _, level = read(path, "/events", "TextLog:level")
     assert time.tolist() == [0.5, 1.0]
     assert level == [["WARN"], ["INFO"]]
-    assert text[0][0].startswith("found: impact, 0.50 s to 1.00 s: first in `desired`; ")
+    assert text[0][0].startswith("found: impact, 0.50 s to 1.00 s: first in `desired` by panda")
     assert "; panda_link" in text[0][0]
     assert text[1][0].startswith("annotated: oscillations, 1.00 s to 1.50 s")
 

@@ -68,6 +68,14 @@ def test_a_jump_is_named_by_the_stage_in_which_it_is_new_and_its_lead(stage, fol
     assert first.lag == pytest.approx(lag, abs=1.1e-3)
 
 
+@pytest.mark.parametrize("kind", ["jump", "shake"])
+@pytest.mark.parametrize("stage", ["planned", "commanded", "desired", "measured"])
+def test_the_joint_on_which_a_defect_acts_is_named(stage, kind):
+    joint, share = found(flowing_run(stage, kind)).joints[0]
+    assert joint == "knee"
+    assert share > 0.9
+
+
 def test_a_blow_shows_in_the_measured_motion_before_the_command_answers():
     first = found(flowing_run("measured", feedback=0.5))
     assert (first.stage, first.following) == ("measured", "commanded")
