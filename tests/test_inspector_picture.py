@@ -14,12 +14,13 @@ pytestmark = pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING)
 def test_the_viewer_draws_the_demo_and_reports_no_error(tmp_path):
     path = tmp_path / "demo.rrd"
     write(inspect(demo_run(), load_library(model_files())), path)
-    with picture.headless_viewer() as client:
-        png = picture.picture(client, path, 2.0)
-        state = picture.settled(client)
-        errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
-    # A busy machine draws late, and the viewer then draws once more.
-    errors = [entry for entry in errors if "timed out" not in entry.message]
+    for _ in range(2):  # a busy machine may draw too late for the first viewer
+        with picture.headless_viewer() as client:
+            png = picture.picture(client, path, 2.0)
+            state = picture.settled(client)
+            errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
+        if not any("timed out" in entry.message for entry in errors):
+            break
     assert png.startswith(b"\x89PNG")
     assert struct.unpack(">II", png[16:24]) >= (1000, 500)
     shown = {view.name for view in state.views}
