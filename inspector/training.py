@@ -119,22 +119,17 @@ def of_sample(path: Path, rate: float) -> models.Recording:
 
     Args:
         path: A sample, as `inspector simulate dataset` makes it.
-        rate: The rate that it must have, in [Hz]: noise cannot be lowered as velocities can.
+        rate: A rate that it keeps its noise at, in [Hz]: noise cannot be lowered as velocities can.
 
     Returns:
         Its simplified noise with its blocks, named by robot, scenario and seed, with the hash of
         the run that it was made of.
 
     Raises:
-        InspectorError: If the sample has another rate, or no blocks.
-        SampleError: If it cannot be read.
+        InspectorError: If the sample has no blocks.
+        ScenarioError: If it cannot be read, or has no noise of that rate.
     """
-    sample = Sample.load(path, only=WHOLE[:2])
-    if abs(sample.rate / rate - 1) > 1e-3:
-        raise InspectorError(
-            f"{path}: keeps the noise at {sample.rate:g} Hz and no velocities, so that it cannot"
-            f" be brought to {rate:g} Hz; scenarios.again makes its run again"
-        )
+    sample = Sample.load(path, only=WHOLE[:2]).at(rate)
     if not sample.blocks:
         raise InspectorError(f"{path}: has no annotated blocks")
     return models.Recording(

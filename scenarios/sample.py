@@ -1,27 +1,34 @@
 """One compact sample: a run's noise signals, its blocks, and the recipe to make it again.
 
-A sample file is an archive of plain arrays: ``format`` ("noise-sample/1"), ``robot``, ``rate`` in
+A sample file is an archive of plain arrays: ``format`` ("noise-sample/2"), ``robot``, ``rate`` in
 [Hz], ``block_start``, ``block_stop`` and ``block_label`` as in a run file, ``meta`` (a JSON object:
 the run's own, and the ``sha256`` of its arrays), and each signal under its name, float32, of shape
-(samples,). What signals there are is said in `scenarios.signals`.
+(samples,). What signals there are is said in `scenarios.signals`. Noise cannot be lowered to
+another rate as velocities can, so that the norms of the run lowered to 1 kHz are there as well,
+as ``lowered_<name>``.
 """
 
 import hashlib
 import json
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel import Block, Run, runfile
-from scenarios.errors import SampleError
-from scenarios.signals import WHOLE, Signals, signals
+from noisemodel import Block, Run, lowered, runfile
+from scenarios.errors import SampleError, ScenarioError
+from scenarios.signals import WHOLE, Signals, norms, signals
 
-FORMAT = "noise-sample/1"
+FORMAT = "noise-sample/2"
+LOWERED = 1000.0
+"""The second rate of the signals, in [Hz]."""
+CLOSE = 1e-3
+"""Rates that differ by less are the same."""
+PREFIX = "lowered_"
 DAMAGE = (
     OSError,
     ValueError,
@@ -45,6 +52,7 @@ class Sample:
         robot: A name in ``scenarios.ROBOTS``.
         rate: Sample rate, in [Hz].
         signals: Noise signals by name, each of shape (samples,).
+        lowered: Norms of the run lowered to ``LOWERED``, as a slower logger has them.
         blocks: Annotated stretches.
         meta: The recipe, and the hash of the run's arrays.
     """
@@ -52,6 +60,7 @@ class Sample:
     robot: str
     rate: float
     signals: Signals
+    lowered: Signals
     blocks: tuple[Block, ...]
     meta: Mapping[str, Any]
 
@@ -62,6 +71,7 @@ class Sample:
             robot=str(run.robot),
             rate=run.rate,
             signals=signals(run),
+            lowered=norms(lowered(run, LOWERED)),
             blocks=run.blocks,
             meta={**run.meta, "sha256": digest(run)},
         )
@@ -76,6 +86,28 @@ class Sample:
         """The simplified noise, shape (samples,), in [rad/s]."""
         # p_hat = sqrt(|qd|^2 + |qd_desired|^2), Sygulla & Rixen, Sec. II-A
         return np.hypot(self.signals["measured"], self.signals["desired"])
+
+    def at(self, rate: float) -> Self:
+        """Take the signals of another rate.
+
+        Args:
+            rate: The rate of the sample, or ``LOWERED``, in [Hz].
+
+        Returns:
+            The sample with the signals that it keeps at that rate.
+
+        Raises:
+            ScenarioError: If it keeps none of that rate.
+        """
+        if abs(rate / self.rate - 1) < CLOSE:
+            return self
+        if abs(rate / LOWERED - 1) < CLOSE:
+            return replace(self, rate=LOWERED, signals=self.lowered)
+        raise ScenarioError(
+            f"{self.name}: keeps its noise at {self.rate:g} Hz and {LOWERED:g} Hz and no"
+            f" velocities, so that it cannot be brought to {rate:g} Hz; scenarios.again makes its"
+            " run again"
+        )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the sample, whole or not at all.
@@ -94,6 +126,7 @@ class Sample:
             "meta": json.dumps(dict(self.meta), sort_keys=True),
             **_columns(self.blocks),
             **self.signals,
+            **{f"{PREFIX}{name}": signal for name, signal in self.lowered.items()},
         }
         runfile.write(Path(path), arrays, overwrite=overwrite)
 
@@ -170,15 +203,13 @@ def _fields(path: Path, archive: Any, only: Iterable[str] | None) -> dict[str, A
     version = str(archive["format"]) if "format" in archive else "none"
     if version != FORMAT:
         raise SampleError(path, f"format {version!r}, expected {FORMAT!r}")
-    there = [name for name in archive.files if name not in _FACTS]
+    there = [name for name in archive.files if name not in _FACTS and PREFIX not in name]
     names = there if only is None else list(only)
     lacking = [name for name in (*WHOLE, *names) if name not in there]
     if lacking:
         raise SampleError(path, f"has no signal {', '.join(lacking)}; it has {', '.join(there)}")
-    read = {name: archive[name] for name in names}
-    if len({signal.shape for signal in read.values()}) > 1:
-        shapes = ", ".join(f"{name} {signal.shape}" for name, signal in read.items())
-        raise SampleError(path, f"signals of different shapes: {shapes}")
+    read = _equal(path, {name: archive[name] for name in names})
+    low = {name: archive[f"{PREFIX}{name}"] for name in names if f"{PREFIX}{name}" in archive}
     columns = (archive[name].tolist() for name in ("block_start", "block_stop", "block_label"))
     meta = json.loads(str(archive["meta"]))
     if not meta.keys() >= RECIPE:
@@ -187,9 +218,17 @@ def _fields(path: Path, archive: Any, only: Iterable[str] | None) -> dict[str, A
         "robot": str(archive["robot"]),
         "rate": float(archive["rate"]),
         "signals": read,
+        "lowered": _equal(path, low),
         "blocks": tuple(Block(*block) for block in zip(*columns, strict=True)),
         "meta": meta,
     }
+
+
+def _equal(path: Path, signals: Signals) -> Signals:
+    if len({signal.shape for signal in signals.values()}) > 1:
+        shapes = ", ".join(f"{name} {signal.shape}" for name, signal in signals.items())
+        raise SampleError(path, f"signals of different shapes: {shapes}")
+    return signals
 
 
 def _one_line(error: BaseException) -> str:

@@ -25,11 +25,22 @@ def signals(run: Run) -> Signals:
         run: A run as ``scenarios.simulate`` makes it.
 
     Returns:
-        Norms of velocities, in [rad/s]: ``measured`` (a floating base's six count too),
-        ``desired`` and ``error``, their difference; the same of each limb as
-        ``measured_<effector>``, if there are several; of each stage under its name. Sound power,
-        kind normal, in [W]: ``power`` of the measured motion and ``power_desired`` of the desired
-        one, if the robot has a surface.
+        Norms of its velocities; and sound power, kind normal, in [W]: ``power`` of the measured
+        motion and ``power_desired`` of the desired one, if the robot has a surface.
+    """
+    return {**norms(run), **_single(_power(run))}
+
+
+def norms(run: Run) -> Signals:
+    """Reduce a run to the norms of its velocities, in [rad/s].
+
+    Args:
+        run: A run as ``scenarios.simulate`` makes it, or one that was lowered.
+
+    Returns:
+        ``measured`` (a floating base's six count too), ``desired`` and ``error``, their
+        difference; the same of each limb as ``measured_<effector>``, if there are several; of
+        each stage under its name.
     """
     assert run.velocity_desired is not None
     desired, error = run.velocity_desired, run.velocity_desired - run.velocity
@@ -43,7 +54,10 @@ def signals(run: Run) -> Signals:
         mine = [run.joint_names.index(joint) for joint in joints]
         for name, velocity in zip(WHOLE, (run.velocity, desired, error), strict=True):
             found[f"{name}_{frame}"] = simplified(velocity[:, mine])
-    found |= _power(run)
+    return _single(found)
+
+
+def _single(found: Mapping[str, Array]) -> Signals:
     return {name: signal.astype(np.float32) for name, signal in found.items()}
 
 

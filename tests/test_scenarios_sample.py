@@ -128,6 +128,28 @@ def test_a_sample_is_read_as_it_was_written(tmp_path):
         np.testing.assert_array_equal(read.signals[name], signal)
 
 
+def test_a_sample_has_the_norms_of_the_lowered_run_too(tmp_path):
+    run = random_run()
+    Sample.of(run).save(tmp_path / "a.npz")
+    slower = nm.lowered(run, 1000.0)
+    lowered = Sample.load(tmp_path / "a.npz", only=("error", "measured_FL_FOOT")).lowered
+    assert list(lowered) == ["error", "measured_FL_FOOT"]
+    exact = np.linalg.norm(slower.velocity_desired - slower.velocity, axis=1)
+    np.testing.assert_allclose(lowered["error"], exact, rtol=1e-6)
+
+
+def test_a_sample_gives_its_noise_at_either_rate_and_at_no_other():
+    run = random_run()
+    slower = nm.lowered(run, 1000.0)
+    sample = Sample.of(run)
+    assert sample.at(10_000.0) is sample
+    np.testing.assert_allclose(
+        sample.at(1000.0).noise, nm.simplified(slower.motion, slower.velocity_desired), rtol=2e-7
+    )
+    with pytest.raises(scenarios.ScenarioError, match=r"keeps its noise at 10000 Hz and 1000 Hz"):
+        sample.at(500.0)
+
+
 def test_equal_runs_make_equal_files(tmp_path):
     for name in ("a.npz", "b.npz"):
         Sample.of(random_run()).save(tmp_path / name)
@@ -194,11 +216,12 @@ def damaged(sample, path, **changes):
 @pytest.mark.parametrize(
     ("changes", "problem"),
     [
-        ({"format": "noise-sample/2"}, f"format 'noise-sample/2', expected '{FORMAT}'"),
+        ({"format": "noise-sample/1"}, f"format 'noise-sample/1', expected '{FORMAT}'"),
         ({"format": "noise-run/1"}, f"format 'noise-run/1', expected '{FORMAT}'"),
         ({"format": None}, f"format 'none', expected '{FORMAT}'"),
         ({"measured": None}, "has no signal measured; it has desired, error"),
         ({"error": np.zeros(3)}, r"signals of different shapes: .*error \(3,\)"),
+        ({"lowered_error": np.zeros(3)}, r"signals of different shapes: .*error \(3,\)"),
         ({"meta": "{"}, "damaged"),
         ({"meta": "{}"}, "its meta lacks duration, scenario, seed, sha256"),
         ({"block_label": np.array(["ok"])}, "damaged"),
