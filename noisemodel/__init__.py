@@ -27,6 +27,7 @@ from noisemodel.extended import extended, extended_chunks
 from noisemodel.kinematics import link_twists
 from noisemodel.lowering import lowered
 from noisemodel.noise import Noise
+from noisemodel.norms import norms
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.simplified import simplified
@@ -59,6 +60,7 @@ __all__ = [
     "extended_chunks",
     "link_twists",
     "lowered",
+    "norms",
     "simplified",
     "surface_speed",
 ]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import GeometryError, Robot, Run, Surface, extended, simplified
+from noisemodel import norms as whole_norms
 from noisemodel.types import Array
 from scenarios.limbs import limbs
 
@@ -44,12 +45,9 @@ def norms(run: Run) -> Signals:
     """
     assert run.velocity_desired is not None
     desired, error = run.velocity_desired, run.velocity_desired - run.velocity
-    found = {
-        "measured": simplified(run.motion),
-        "desired": simplified(desired),
-        "error": simplified(error),
-        **{name: simplified(stage) for name, stage in run.stages.items()},
-    }
+    whole = whole_norms(run)
+    found = {name: whole[name] for name in WHOLE}
+    found |= {name: simplified(stage) for name, stage in run.stages.items()}
     for frame, joints in limbs(str(run.robot)).items():
         mine = [run.joint_names.index(joint) for joint in joints]
         for name, velocity in zip(WHOLE, (run.velocity, desired, error), strict=True):

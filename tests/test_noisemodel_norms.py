@@ -1,0 +1,51 @@
+"""The norms of a run are the parts of its simplified noise."""
+
+import numpy as np
+import pytest
+
+import noisemodel as nm
+
+SAMPLES = 40
+generator = np.random.default_rng(5)
+velocity, desired, base = (generator.normal(size=(SAMPLES, width)) for width in (3, 3, 6))
+
+
+def run(**signals):
+    names = {"joint_names": ("a", "b", "c"), **signals}
+    return nm.Run(time=np.arange(SAMPLES) / 1000, velocity=velocity, **names)
+
+
+def test_measured_and_desired_norms_make_the_noise():
+    norms = nm.norms(run(velocity_desired=desired, base_velocity=base))
+    np.testing.assert_allclose(
+        norms["noise"], np.hypot(norms["measured"], norms["desired"]), rtol=1e-12
+    )
+    whole = np.hstack((base, velocity))
+    np.testing.assert_allclose(norms["measured"], np.linalg.norm(whole, axis=1), rtol=1e-12)
+
+
+def test_a_run_that_follows_perfectly_has_no_error():
+    norms = nm.norms(run(velocity_desired=velocity))
+    assert not norms["error"].any()
+    assert norms["desired"].any()
+
+
+def test_errors_are_between_joints_of_one_name():
+    swapped = nm.norms(run(velocity_desired=velocity[:, ::-1], desired_joint_names=("c", "b", "a")))
+    assert not swapped["error"].any()
+    fewer = nm.norms(run(velocity_desired=desired[:, :1], desired_joint_names=("b",)))
+    np.testing.assert_allclose(fewer["error"], np.abs(desired[:, 0] - velocity[:, 1]), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("signals", "names"),
+    [
+        ({}, {"noise", "measured"}),
+        (
+            {"velocity_desired": desired[:, :1], "desired_joint_names": ("tool",)},
+            {"noise", "measured", "desired"},
+        ),
+    ],
+)
+def test_what_a_run_does_not_have_makes_no_norm(signals, names):
+    assert nm.norms(run(**signals)).keys() == names
