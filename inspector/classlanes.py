@@ -24,7 +24,8 @@ def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
     known = () if labels is None else labels.classes
     colours = colors.of_classes((*known, *sorted(annotated - set(known))))
     if labels is not None:
-        shown = {name: colours[name] for name in known}
+        heard = (*known, *sorted(set(labels.label.tolist()) - set(known)))
+        shown = colors.of_classes(heard)
         series.log_lane(recording, "/class/found", list(_stretches(labels)), shown)
         _log_scores(recording, labels, colours)
     if run.blocks:

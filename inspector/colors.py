@@ -7,11 +7,15 @@ from numpy.typing import NDArray
 
 Color: TypeAlias = tuple[int, int, int]
 
+UNKNOWN = "unknown"
+"""What a model calls a frame that is like nothing it has learnt from."""
+
 CLASSES: dict[str, Color] = {
     "ok": (0, 158, 115),
     "impact": (213, 94, 0),
     "highaccelerations": (240, 228, 66),
     "oscillations": (86, 180, 233),
+    UNKNOWN: (60, 60, 60),
 }
 OTHERS: tuple[Color, ...] = ((204, 121, 167), (230, 159, 0), (0, 114, 178), (190, 190, 190))
 NOISE: Color = (160, 196, 255)

@@ -1,7 +1,7 @@
 """Choose a model for a run and let it label the run's noise."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import models
@@ -42,7 +42,7 @@ def load_library(paths: Sequence[Path]) -> Library:
 
 
 def label_run(run: nm.Run, library: Library) -> Labelled:
-    """Label a run by the model of the nearest rate at or below its own.
+    """Label a run by the model of the nearest rate at or below its own that it can feed.
 
     Args:
         run: The run.
@@ -52,22 +52,42 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         Labels on the time axis of the run.
 
     Raises:
-        CannotTellError: If the run is slower than every model, or no frame is free of gaps.
+        CannotTellError: If the run is slower than every model, no frame is free of gaps, or it is
+            like nothing that the model has learnt from.
         SignalError: If the run is too short for a frame.
     """
-    name, classifier = _choose(library, run.rate)
+    signals = _signals(run)
+    name, classifier = _choose(library, run.rate, signals)
     rate, remark = classifier.rate, ""
     if not _close(run.rate, rate):
         run = nm.lowered(run, rate)
+        signals = _signals(run)
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
-    noise = nm.simplified(run.motion, run.velocity_desired)
-    labels = classifier.classify(noise, rate, start=float(run.time[0]), valid=run.mask)
+    labels = classifier.classify(signals, rate, start=float(run.time[0]), valid=run.mask)
     if not len(labels):
         raise CannotTellError(
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
             " takes to tell anything"
         )
-    return Labelled(labels, name, remark)
+    return _known(Labelled(labels, name, remark))
+
+
+def _signals(run: nm.Run) -> dict[str, Array]:
+    """Take the norms of a run, without the error where what is desired is what was measured."""
+    signals = nm.norms(run)
+    return {name: signal for name, signal in signals.items() if name != "error" or signal.any()}
+
+
+def _known(labelled: Labelled) -> Labelled:
+    """Say how much of the run is like nothing that the model has learnt from."""
+    labels = labelled.labels
+    unknown = int((labels.label == models.UNKNOWN).sum())
+    if unknown == len(labels):
+        raise CannotTellError(f"nothing that model {labelled.model} has learnt from is like it")
+    if not unknown:
+        return labelled
+    line = f"{unknown} of {len(labels)} frames are like nothing that model {labelled.model} knows."
+    return replace(labelled, remark=" ".join(filter(None, (labelled.remark, line))))
 
 
 def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
@@ -87,7 +107,7 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
         SignalError: If the noise is too short for a frame.
     """
     rate = models.nominal_rate(time)
-    name, classifier = _choose(library, rate)
+    name, classifier = _choose(library, rate, (models.NOISE,))
     if not _close(rate, classifier.rate):
         raise CannotTellError(
             f"a noise of {rate:g} Hz cannot be lowered to the {classifier.rate:g} Hz of"
@@ -97,9 +117,11 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
     return Labelled(labels, name)
 
 
-def _choose(library: Library, rate: float) -> tuple[str, models.Classifier]:
+def _choose(
+    library: Library, rate: float, signals: Collection[str]
+) -> tuple[str, models.Classifier]:
     try:
-        chosen = models.nearest(tuple(library.values()), rate)
+        chosen = models.nearest(tuple(library.values()), rate, signals)
     except models.RateError as error:
         raise CannotTellError(str(error)) from error
     return next((name, model) for name, model in library.items() if model is chosen)

@@ -7,11 +7,15 @@ from pathlib import Path
 import models
 import noisemodel as nm
 from inspector.errors import InspectorError
+from inspector.part import Part
+from inspector.progress import progress
 from noisemodel.atomic import refuse_existing
 from scenarios.sample import Sample, is_sample
 from scenarios.signals import WHOLE
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
+    "general": lambda rate: models.GENERAL.at(rate),
+    "scalar": lambda rate: models.SCALAR.at(rate),
     "logbands": lambda rate: models.LogBands().at(rate),
     "noisytest-rbf": lambda _: models.Profile.noisytest("rbf"),
     "noisytest-linear": lambda _: models.Profile.noisytest("linear"),
@@ -21,7 +25,13 @@ PROFILES: dict[str, Callable[[float], models.Profile]] = {
 
 
 def train(
-    inputs: Sequence[Path], profile: str, rate: float, output: Path, *, overwrite: bool = False
+    inputs: Sequence[Path],
+    profile: str,
+    rate: float,
+    output: Path,
+    *,
+    part: Part = Part.ALL,
+    overwrite: bool = False,
 ) -> models.Evaluation:
     """Train a model and write it.
 
@@ -30,6 +40,7 @@ def train(
         profile: One of ``PROFILES``.
         rate: Rate of the model, in [Hz]; faster runs are lowered to it.
         output: The model file to write.
+        part: Which of the recordings to learn from.
         overwrite: Whether a file that exists may be replaced.
 
     Returns:
@@ -39,43 +50,80 @@ def train(
         InspectorError: If there is no such profile, or it does not exist at this rate.
         OutputError: If the file exists or cannot be written.
     """
+    chosen = settings(profile, rate)
+    refuse_existing(output, overwrite=overwrite)
+    watched = progress(recordings(inputs, rate, part), "read", total=sum(map(_count, inputs)))
+    try:
+        examples = models.Examples.read(watched, chosen)
+    except models.MissingSignalError as error:
+        raise InspectorError(f"{error}; --profile scalar takes the noise alone") from error
+    classifier = models.Classifier.train(examples, chosen)
+    classifier.save(output, overwrite=overwrite)
+    called = classifier.hear(examples.features)
+    return models.Evaluation.of(examples.labels, called, classifier.classes)
+
+
+def settings(profile: str, rate: float) -> models.Profile:
+    """Look up a profile.
+
+    Args:
+        profile: One of ``PROFILES``.
+        rate: The rate that it is wanted at, in [Hz].
+
+    Raises:
+        InspectorError: If there is no such profile, or it does not exist at this rate.
+    """
     if profile not in PROFILES:
         raise InspectorError(f"no profile {profile!r}; there are {', '.join(PROFILES)}")
-    settings = PROFILES[profile](rate)
-    if settings.rate != rate:
-        raise InspectorError(f"profile {profile} exists at {settings.rate:g} Hz only, not {rate:g}")
-    refuse_existing(output, overwrite=overwrite)
-    dataset = models.Dataset.of(list(recordings(inputs, rate)), settings)
-    classifier = models.Classifier.train(dataset, settings)
-    classifier.save(output, overwrite=overwrite)
-    return models.evaluate(classifier, dataset)
+    found = PROFILES[profile](rate)
+    if found.rate != rate:
+        raise InspectorError(f"profile {profile} exists at {found.rate:g} Hz only, not {rate:g}")
+    return found
 
 
-def evaluate(model: Path, inputs: Sequence[Path]) -> models.Evaluation:
+def evaluate(
+    model: Path, inputs: Sequence[Path], *, part: Part = Part.ALL, seen_too: bool = False
+) -> models.Assessment:
     """Measure a model.
 
     Args:
         model: A model file.
         inputs: Annotated runs, samples or NoisyTest folders that it was not trained on.
+        part: Which of the recordings to measure on.
+        seen_too: Whether runs count that it was trained on, or that share their motion with such.
 
     Returns:
         The paper's metrics and the honest ones.
+
+    Raises:
+        SeenError: If it was trained on a run, unless that is asked for.
     """
     classifier = models.Classifier.load(model)
-    found = list(recordings(inputs, classifier.profile.rate))
-    return models.evaluate(classifier, models.Dataset.of(found, classifier.profile, training=False))
+    found = recordings(inputs, classifier.rate, part)
+    watched = progress(found, "evaluate", total=sum(map(_count, inputs)))
+    return models.assess(classifier, watched, seen_too=seen_too)
 
 
-def recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recording]:
+def recordings(
+    inputs: Sequence[Path], rate: float, part: Part = Part.ALL
+) -> Iterator[models.Recording]:
     """Read annotated noise from runs, samples and NoisyTest folders.
 
     Args:
         inputs: Files, and folders of them, however deep.
         rate: The rate to bring runs to, in [Hz].
+        part: Which of them are meant.
 
     Yields:
         One recording per run, sample or log.
     """
+    for recording in _recordings(inputs, rate):
+        held_out = models.held_out(models.group_of(recording.name))
+        if part is Part.ALL or held_out == (part is Part.TEST):
+            yield recording
+
+
+def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recording]:
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
             yield from models.noisytest.read_folder(path, rate=rate)
@@ -92,7 +140,7 @@ def of_run(path: Path, rate: float) -> models.Recording:
         rate: The rate to bring it to, in [Hz].
 
     Returns:
-        Its simplified noise with its blocks.
+        Its norms with its blocks.
 
     Raises:
         InspectorError: If the run is slower than that.
@@ -105,7 +153,7 @@ def of_run(path: Path, rate: float) -> models.Recording:
     slower = nm.lowered(run, rate)
     return models.Recording(
         name=path.stem,
-        signal=nm.simplified(slower.motion, slower.velocity_desired),
+        signal=nm.norms(slower),
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in slower.blocks),
         start=float(slower.time[0]),
@@ -122,20 +170,25 @@ def of_sample(path: Path, rate: float) -> models.Recording:
         rate: A rate that it keeps its noise at, in [Hz]: noise cannot be lowered as velocities can.
 
     Returns:
-        Its simplified noise with its blocks, named by robot, scenario and seed, with the hash of
+        Its norms with its blocks, named by robot, scenario and seed, with the hash of
         the run that it was made of.
 
     Raises:
         InspectorError: If the sample has no blocks.
         ScenarioError: If it cannot be read, or has no noise of that rate.
     """
-    sample = Sample.load(path, only=WHOLE[:2]).at(rate)
+    sample = Sample.load(path, only=WHOLE).at(rate)
     if not sample.blocks:
         raise InspectorError(f"{path}: has no annotated blocks")
     return models.Recording(
         name=sample.name,
-        signal=sample.noise,
+        signal={name: sample.signals[name] for name in WHOLE},
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in sample.blocks),
         sha256=str(sample.meta["sha256"]),
     )
+
+
+def _count(path: Path) -> int:
+    """Say how many recordings there are to be read, or a few more."""
+    return sum(1 for file in path.rglob("*.*") if file.suffix in (".npz", ".toml")) or 1

@@ -4,8 +4,8 @@
 
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` names each
 choice on the way: NoisyTest's own, the paper's, or ours for any rate (`LogBands`). A `Dataset`
-holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts. A
-`Stream` labels a signal while it comes in.
+holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts, and
+`assess` measures whole recordings. A `Stream` labels a signal while it comes in.
 
 This package knows no robot: a signal and its rate are all that it takes. It needs NumPy, and
 scikit-learn only to train.
@@ -19,27 +19,38 @@ from models.errors import (
     DataFileError,
     DatasetError,
     FileError,
+    MissingSignalError,
     ModelFileError,
     ModelsError,
     OutputError,
     ProfileError,
     RateError,
     RecordingError,
+    SeenError,
     SignalError,
     UnknownLabelError,
 )
 from models.evaluation import Evaluation, evaluate
+from models.examples import Examples
 from models.features import features
 from models.framing import frame
-from models.labels import Event, Labels
-from models.logbands import LogBands
+from models.labels import UNKNOWN, Event, Labels
+from models.logbands import GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
+from models.measuring.assessment import Assessment, assess
 from models.profile import CLASSES, Profile
 from models.recording import Block, Recording
+from models.signals import NOISE, Signals
+from models.splitting import check_apart, folds, group_of, held_out, leave_one_out
 from models.stream import Stream
 
 __all__ = [
     "CLASSES",
+    "GENERAL",
+    "NOISE",
+    "SCALAR",
+    "UNKNOWN",
+    "Assessment",
     "Block",
     "Classifier",
     "DataFileError",
@@ -47,9 +58,11 @@ __all__ = [
     "DatasetError",
     "Evaluation",
     "Event",
+    "Examples",
     "FileError",
     "Labels",
     "LogBands",
+    "MissingSignalError",
     "ModelFileError",
     "ModelsError",
     "OutputError",
@@ -58,12 +71,20 @@ __all__ = [
     "RateError",
     "Recording",
     "RecordingError",
+    "SeenError",
     "SignalError",
+    "Signals",
     "Stream",
     "UnknownLabelError",
+    "assess",
+    "check_apart",
     "evaluate",
     "features",
+    "folds",
     "frame",
+    "group_of",
+    "held_out",
+    "leave_one_out",
     "nearest",
     "noisytest",
     "nominal_rate",

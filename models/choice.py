@@ -1,24 +1,30 @@
 """The choice of a model for a signal."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from models.classifier import Classifier
 from models.errors import RateError
 from models.profile import TOLERANCE
+from models.signals import NOISE, feeds
 
 
-def nearest(models: Iterable[Classifier], rate: float) -> Classifier:
+def nearest(
+    models: Iterable[Classifier], rate: float, signals: Collection[str] = (NOISE,)
+) -> Classifier:
     """Find the model of the nearest rate at or below a signal's own: down, never up.
+
+    Of models of one rate, it is the one that listens to most signals.
 
     Args:
         models: Models of any rates.
-        rate: Sample rate of the signal, in [Hz].
+        rate: Sample rate of the signals, in [Hz].
+        signals: Names of the signals that there are.
 
     Raises:
-        RateError: If all models are of higher rates, or there are none.
+        RateError: If all models are of higher rates, or there are none that these signals feed.
     """
-    models = list(models)
+    models = [model for model in models if feeds(signals, model.profile.signals)]
     below = [model for model in models if model.rate <= rate * (1.0 + TOLERANCE)]
     if not below:
         raise RateError(rate, [model.rate for model in models], "too low for any; log faster")
-    return max(below, key=lambda model: model.rate)
+    return max(below, key=lambda model: (model.rate, len(model.profile.signals)))

@@ -7,29 +7,28 @@ from typing import Any, Self
 
 import numpy as np
 
-from models import modelfile, svm
+from models import modelfile
 from models.dataset import Dataset
 from models.errors import DatasetError, RateError, SignalError
-from models.evaluation import evaluate
-from models.features import features
+from models.evaluation import Evaluation
+from models.examples import CHUNK, Examples
+from models.features import features, standard
 from models.framing import frame_starts
-from models.labels import Labels
+from models.labels import UNKNOWN, Labels
+from models.machine import Machine, rebuilt
 from models.profile import TOLERANCE, Profile
-from models.svm import Machines
+from models.signals import Signals, check, stacked
 from models.types import Array, Index, Mask, Real, Words
-
-CHUNK = 64
-"""Frames that are looked at together, which bounds the memory that a long signal takes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Classifier:
-    """A trained model: frames of a noise signal become class names.
+    """A trained model: frames of noise become class names.
 
     Attributes:
         profile: How a signal becomes features.
         classes: What frames can be called, in the profile's order: those it was trained with.
-        machines: The support vector machines.
+        machines: What decides: support vector machines, or networks.
         mean: What is subtracted from the features, shape (features,).
         scale: What they are divided by then, shape (features,).
         runs: SHA-256 of each training recording, by name.
@@ -39,7 +38,7 @@ class Classifier:
 
     profile: Profile
     classes: tuple[str, ...]
-    machines: Machines
+    machines: Machine
     mean: Array
     scale: Array
     runs: Mapping[str, str] = field(default_factory=dict)
@@ -48,14 +47,18 @@ class Classifier:
 
     @classmethod
     def train(
-        cls, dataset: Dataset, profile: Profile, *, validation: Dataset | None = None
+        cls,
+        dataset: Dataset | Examples,
+        profile: Profile,
+        *,
+        validation: Dataset | Examples | None = None,
     ) -> Self:
         """Learn a classifier; needs scikit-learn.
 
         Args:
-            dataset: Annotated frames, cut by the same profile.
+            dataset: Annotated frames cut by the same profile, or what was made of them.
             profile: What to learn.
-            validation: Other frames, to be measured by.
+            validation: Others, to be measured by.
 
         Returns:
             The classifier; equal input gives an equal model.
@@ -64,24 +67,28 @@ class Classifier:
             DatasetError: If the frames are of fewer than two classes.
             SignalError: If the frames do not fit the profile.
         """
-        from models.training import fit, versions
+        from models.training import learn, versions
 
-        there = set(dataset.labels.tolist())
+        examples = _examples(dataset, profile)
+        there = set(examples.labels.tolist())
         classes = tuple(name for name in profile.classes if name in there)
         if len(classes) < 2 or there != set(classes):
             raise DatasetError(
                 f"training takes two classes or more of {', '.join(profile.classes)};"
                 f" the frames are {', '.join(sorted(there))}"
             )
-        plain = np.concatenate(
-            [features(dataset.frames[chunk], profile) for chunk in _chunks(np.arange(len(dataset)))]
-        )
-        mean, scale = _standard(plain, profile)
-        targets = np.array([classes.index(label) for label in dataset.labels.tolist()])
-        machines = fit((plain - mean) / scale, targets, profile).condensed()
-        classifier = cls(profile, classes, machines, mean, scale, dict(dataset.hashes))
-        sets = {"training": dataset} | ({"validation": validation} if validation else {})
-        metrics = {name: evaluate(classifier, each).as_dict() for name, each in sets.items()}
+        mean, scale = standard(examples.features, profile)
+        targets = np.array([classes.index(label) for label in examples.labels.tolist()])
+        scaled = (examples.features - mean) / scale
+        machines = learn(scaled, targets, examples.groups, profile)
+        classifier = cls(profile, classes, machines, mean, scale, dict(examples.hashes))
+        sets = {"training": examples}
+        if validation is not None:
+            sets["validation"] = _examples(validation, profile)
+        metrics = {
+            name: Evaluation.of(each.labels, classifier.hear(each.features), classes).as_dict()
+            for name, each in sets.items()
+        }
         return replace(classifier, metrics=metrics, versions=versions())
 
     @property
@@ -104,13 +111,13 @@ class Classifier:
         return self._choose(self.decision(frames))
 
     def decision(self, frames: Real) -> Array:
-        """Evaluate the two-class machines.
+        """Decide on frames.
 
         Args:
-            frames: Stretches of noise signal, shape (frames, length).
+            frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
 
         Returns:
-            Decisions, shape (frames, machines); `svm` says what they mean.
+            Decisions, shape (frames, decisions); `svm` and `networks` say what they mean.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
@@ -124,7 +131,7 @@ class Classifier:
             frames: Stretches of noise signal, shape (frames, length).
 
         Returns:
-            Scores, shape (frames, classes); `svm.score` says what they mean.
+            Scores, shape (frames, classes): probabilities if networks decide, else see `svm.score`.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
@@ -132,12 +139,12 @@ class Classifier:
         return self._score(self.decision(frames))
 
     def classify(
-        self, signal: Real, rate: float, *, start: float = 0.0, valid: Mask | None = None
+        self, signal: Signals, rate: float, *, start: float = 0.0, valid: Mask | None = None
     ) -> Labels:
         """Label all frames of a signal.
 
         Args:
-            signal: The noise estimate, shape (samples,).
+            signal: The noise estimate, shape (samples,), or signals by name, each of that shape.
             rate: Its sample rate, in [Hz], which must be the model's.
             start: Time of its first sample, in [s].
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
@@ -147,23 +154,30 @@ class Classifier:
 
         Raises:
             RateError: If the model is of another rate.
-            SignalError: If the signal is too short for a frame, or not finite, or not 1-D.
+            SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
+                model needs another one.
         """
         if not abs(rate / self.rate - 1.0) <= TOLERANCE:
             raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
-        signal = np.asarray(signal, dtype=np.float64)
-        valid = np.ones(signal.shape, dtype=bool) if valid is None else np.asarray(valid, bool)
+        samples = stacked(signal, self.profile.signals).astype(np.float64, copy=False)
+        count = samples.shape[-1]
+        valid = np.ones(count, dtype=bool) if valid is None else np.asarray(valid, bool)
         first, length = int(self.profile.drop_first_sample), self.profile.length
-        _check_signal(signal, valid, least=first + length)
+        check(samples, valid)
+        if count < first + length:
+            raise SignalError(
+                f"a signal of {count} samples is too short: a frame takes {first + length}"
+            )
         starts = first + frame_starts(
-            len(signal) - first,
+            count - first,
             length=length,
             hop=self.profile.hop,
             flush_end=self.profile.flush_end,
         )
         gaps = np.concatenate(([0], np.cumsum(~valid)))
         starts = starts[gaps[starts + length] == gaps[starts]]
-        view = np.lib.stride_tricks.sliding_window_view(signal, length)
+        windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=-1)
+        view = np.moveaxis(windows, -2, 0)
         return self.labels(self._decide(view, starts), starts, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
@@ -184,15 +198,26 @@ class Classifier:
         )
 
     def judge(self, plain: Array) -> Array:
-        """Evaluate the two-class machines on features.
+        """Decide on features.
 
         Args:
             plain: Features, not yet standardised, shape (frames, features).
 
         Returns:
-            Decisions, shape (frames, machines).
+            Decisions, shape (frames, decisions).
         """
         return self.machines.decision((plain - self.mean) / self.scale)
+
+    def hear(self, plain: Array) -> Words:
+        """Name the class of each frame by its features.
+
+        Args:
+            plain: Features, not yet standardised, shape (frames, features).
+
+        Returns:
+            Class names, shape (frames,).
+        """
+        return self._choose(self.judge(plain))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
@@ -212,13 +237,7 @@ class Classifier:
             "metrics": dict(self.metrics),
             "versions": dict(self.versions),
         }
-        arrays = {
-            "vectors": self.machines.vectors,
-            "coefficients": self.machines.coefficients,
-            "intercept": self.machines.intercept,
-            "mean": self.mean,
-            "scale": self.scale,
-        }
+        arrays = {**self.machines.arrays(), "mean": self.mean, "scale": self.scale}
         modelfile.write(path, manifest, arrays, overwrite=overwrite)
 
     @classmethod
@@ -233,17 +252,10 @@ class Classifier:
         """
         manifest, arrays = modelfile.read(path)
         profile = Profile.of(manifest["profile"])
-        machines = Machines(
-            arrays["vectors"],
-            arrays["coefficients"],
-            arrays["intercept"],
-            profile.kernel,
-            profile.gamma,
-        )
         return cls(
             profile,
             tuple(manifest["classes"]),
-            machines,
+            rebuilt(arrays, profile),
             arrays["mean"],
             arrays["scale"],
             runs=manifest["runs"],
@@ -257,34 +269,15 @@ class Classifier:
         )
 
     def _choose(self, decisions: Array) -> Words:
-        chosen = svm.choose(
-            decisions, classes=len(self.classes), multiclass=self.profile.multiclass
-        )
-        return np.array(self.classes)[chosen]
+        return np.array((*self.classes, UNKNOWN))[self.machines.choose(decisions)]
 
     def _score(self, decisions: Array) -> Array:
-        return svm.score(decisions, classes=len(self.classes), multiclass=self.profile.multiclass)
+        return self.machines.score(decisions)
+
+
+def _examples(dataset: Dataset | Examples, profile: Profile) -> Examples:
+    return Examples.of(dataset, profile) if isinstance(dataset, Dataset) else dataset
 
 
 def _chunks(index: Index) -> list[Index]:
     return np.split(index, range(CHUNK, len(index), CHUNK))
-
-
-def _standard(plain: Array, profile: Profile) -> tuple[Array, Array]:
-    """Learn mean and scale of each feature; 0 and 1 where features stay as they are."""
-    if not profile.least_deviation:
-        return np.zeros(plain.shape[1]), np.ones(plain.shape[1])
-    return plain.mean(axis=0), np.maximum(plain.std(axis=0), profile.least_deviation)
-
-
-def _check_signal(signal: Real, valid: Mask, *, least: int) -> None:
-    if signal.ndim != 1 or valid.shape != signal.shape:
-        raise SignalError(
-            f"a signal of shape {signal.shape} and validity of shape {valid.shape},"
-            " expected (samples,) for both"
-        )
-    if len(signal) < least:
-        raise SignalError(f"a signal of {len(signal)} samples is too short: a frame takes {least}")
-    if not np.isfinite(signal).all():
-        row = int(np.flatnonzero(~np.isfinite(signal))[0])
-        raise SignalError(f"sample {row} of the signal is not finite ({signal[row]})")

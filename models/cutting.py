@@ -8,6 +8,7 @@ from models.errors import RecordingError
 from models.framing import pad_end
 from models.profile import Profile
 from models.recording import Block, Recording
+from models.signals import stacked
 from models.types import Mask, Real
 
 
@@ -27,9 +28,11 @@ def cut(
         training: Whether the frames are to learn from.
 
     Returns:
-        Samples and which of them are valid, each of shape (samples,); padding counts as valid.
+        Samples, shape (samples,), or (signals, samples) if the profile listens to several, and
+        which of them are valid, shape (samples,); padding counts as valid.
 
     Raises:
+        SignalError: If the recording lacks a signal.
         RecordingError: If the block holds no sample, or the recording is shorter than a frame that
             a block is widened to.
     """
@@ -42,17 +45,19 @@ def cut(
         time, _spread(block, time, profile) if spread else block, profile, pad=pad
     )
     samples = _samples(time, start, stop, profile)
-    signal: Real = recording.signal[lost:][samples].astype(precision)
-    if not len(signal):
+    whole = stacked(recording.signal, profile.signals)
+    signal: Real = whole[..., lost:][..., samples].astype(precision)
+    count = signal.shape[-1]
+    if not count:
         raise RecordingError(
             recording.name,
             f"block {block.label!r} from {block.start:g} s to {block.stop:g} s holds no sample",
         )
-    if len(signal) < profile.length and not (pad or profile.pad_widened):
+    if count < profile.length and not (pad or profile.pad_widened):
         raise RecordingError(
             recording.name, f"{len(time)} samples are too short: one frame takes {profile.length}"
         )
-    padding = max(profile.length - len(signal), 0)
+    padding = max(profile.length - count, 0)
     valid = np.ones(len(time), bool) if recording.valid is None else recording.valid[lost:]
     return (
         pad_end(signal, length=profile.length),

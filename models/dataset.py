@@ -22,7 +22,8 @@ class Dataset:
     """Labelled frames; recordings and their blocks keep their order.
 
     Attributes:
-        frames: Stretches of noise signal, shape (frames, length).
+        frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length)
+            if the profile listens to several.
         labels: What each frame is, shape (frames,).
         runs: Name of the recording that each frame is from, shape (frames,).
         hashes: SHA-256 of each recording, by name.

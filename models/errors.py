@@ -1,6 +1,6 @@
 """What can be wrong with a signal, a data set or a model: one base error, facts in subclasses."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 
@@ -10,6 +10,19 @@ class ModelsError(ValueError):
 
 class SignalError(ModelsError):
     """A signal, or frames of one, that cannot be classified."""
+
+
+class MissingSignalError(SignalError):
+    """Signals that a model needs and that are not there.
+
+    Args:
+        lacking: Their names.
+        there: What there is.
+    """
+
+    def __init__(self, lacking: Iterable[str], there: Iterable[str]) -> None:
+        self.lacking, self.there = tuple(lacking), tuple(there)
+        super().__init__(f"no signal {', '.join(self.lacking)}; there is {', '.join(self.there)}")
 
 
 class ProfileError(ModelsError):
@@ -85,3 +98,21 @@ class OutputError(FileError):
 
 class DatasetError(ModelsError):
     """A data set that cannot be built, or that no classifier can be learnt from."""
+
+
+class SeenError(DatasetError):
+    """Recordings that a model is to be measured by, and that it has learnt from.
+
+    Args:
+        seen: What the model knows, by name of the recording.
+        total: How many recordings there are to measure by.
+        advice: What to do about it.
+    """
+
+    def __init__(
+        self, seen: Mapping[str, str], total: int, advice: str = "measure it on other runs"
+    ) -> None:
+        self.seen, self.total = dict(seen), total
+        name, what = next(iter(self.seen.items()))
+        others = f" (and {len(seen) - 1} more of {total})" if len(seen) > 1 else ""
+        super().__init__(f"{name}: the model was trained on {what}{others}; {advice}")

@@ -1,10 +1,13 @@
 """Features: the numbers by which a machine tells one frame from another.
 
-Conventions: a spectrogram has the axes (frames, time, frequency). A feature vector of NoisyTest and
-the paper runs over time first: all coefficients of the first band, then those of the second.
+Conventions: a spectrogram has the axes (frames, time, frequency), and (frames, signals, time,
+frequency) if a profile listens to several signals. A feature vector of NoisyTest and the paper runs
+over time first: all coefficients of the first band, then those of the second. What there is of
+several signals follows one after the other.
 """
 
 from functools import lru_cache
+from math import prod
 
 import numpy as np
 
@@ -20,7 +23,7 @@ def features(frames: Real, profile: Profile) -> Array:
     """Describe each frame by the levels of its frequency bands and their course in time.
 
     Args:
-        frames: Stretches of noise signal, shape (frames, length).
+        frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
         profile: What to compute, and the length that frames must have.
 
     Returns:
@@ -69,23 +72,42 @@ def course(loudness: Array, profile: Profile) -> Array:
     """Describe each frame by the course of its levels in time.
 
     Args:
-        loudness: Levels of the frames' windows, shape (frames, time, bands).
+        loudness: Levels of the frames' windows, shape (frames, time, bands), or (frames, signals,
+            time, bands).
         profile: What to compute.
 
     Returns:
         Features, not yet standardised, shape (frames, features).
     """
     if profile.bands == "log":
-        return pool(loudness)
+        described = (_relative if profile.relative else pool)(loudness)
+        return described.reshape(len(loudness), feature_count(profile))
     flat = dct(loudness).reshape(len(loudness), feature_count(profile))
     return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
 
 
 def feature_count(profile: Profile) -> int:
     """Say how many features a frame has."""
+    signals = len(profile.signals)
     if profile.bands == "log":
-        return POOLED * (len(profile.edges) - 1)
-    return profile.bins // 3 * profile.transforms
+        spectra = 2 * signals - 1 if profile.relative else signals
+        return spectra * POOLED * (len(profile.edges) - 1) + profile.relative
+    return signals * (profile.bins // 3) * profile.transforms
+
+
+def standard(plain: Array, profile: Profile) -> tuple[Array, Array]:
+    """Learn what features are scaled by; 0 and 1 where they stay as they are.
+
+    Args:
+        plain: Features to learn from, shape (frames, features).
+        profile: Says the least deviation.
+
+    Returns:
+        Mean and scale of each feature, shape (features,) each.
+    """
+    if not profile.least_deviation:
+        return np.zeros(plain.shape[1]), np.ones(plain.shape[1])
+    return plain.mean(axis=0), np.maximum(plain.std(axis=0), profile.least_deviation)
 
 
 def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
@@ -121,13 +143,13 @@ def dct(loudness: Array) -> Array:
     """Describe the course of each band in time by its cosine transform of type II, orthonormal.
 
     Args:
-        loudness: Levels of the bands, shape (frames, time, frequency).
+        loudness: Levels of the bands, shape (..., time, frequency).
 
     Returns:
-        Coefficients, shape (frames, frequency, time). Distances between frames stay what they
+        Coefficients, shape (..., frequency, time). Distances between frames stay what they
         were: the transform is a rotation, so that no decision depends on it.
     """
-    coefficients: Array = np.swapaxes(loudness, 1, 2) @ _cosines(loudness.shape[1])
+    coefficients: Array = np.swapaxes(loudness, -1, -2) @ _cosines(loudness.shape[-2])
     return coefficients
 
 
@@ -135,12 +157,22 @@ def pool(loudness: Array) -> Array:
     """Describe the course of each band in time by what does not depend on when things happen.
 
     Args:
-        loudness: Levels of the bands, shape (frames, time, frequency).
+        loudness: Levels of the bands, shape (..., time, frequency).
 
     Returns:
-        Mean, maximum and standard deviation of each band, shape (frames, 3 * frequency).
+        Mean, maximum and standard deviation of each band, shape (..., 3 * frequency).
     """
-    return np.hstack((loudness.mean(axis=1), loudness.max(axis=1), loudness.std(axis=1)))
+    statistics = (loudness.mean(axis=-2), loudness.max(axis=-2), loudness.std(axis=-2))
+    return np.concatenate(statistics, axis=-1)
+
+
+def _relative(loudness: Array) -> Array:
+    """Pool levels above the whole frame's, differences between signals, and that whole level."""
+    several = loudness if loudness.ndim == 4 else loudness[:, None]
+    whole = several.mean(axis=(1, 2, 3), keepdims=True)
+    spectra = np.concatenate((several - whole, np.diff(several, axis=1)), axis=1)
+    pooled = pool(spectra)
+    return np.hstack((pooled.reshape(len(pooled), prod(pooled.shape[1:])), whole.reshape(-1, 1)))
 
 
 @lru_cache
@@ -166,7 +198,7 @@ def band_shares(profile: Profile) -> Array:
 
 
 def _stretches(frames: Array, window: int, stride: int) -> Array:
-    return np.lib.stride_tricks.sliding_window_view(frames, window, axis=1)[:, ::stride]
+    return np.lib.stride_tricks.sliding_window_view(frames, window, axis=-1)[..., ::stride, :]
 
 
 def _amplitude(stretches: Array) -> Array:
@@ -205,11 +237,14 @@ def _cosines(count: int) -> Array:
 
 
 def _check(frames: Real, profile: Profile) -> None:
-    if frames.ndim != 2 or frames.shape[1] != profile.length:
+    count = len(profile.signals)
+    shape = (profile.length,) if count == 1 else (count, profile.length)
+    if frames.shape[1:] != shape:
         raise SignalError(
-            f"frames of shape {frames.shape}, expected (frames, {profile.length})"
+            f"frames of shape {frames.shape}, expected (frames, {', '.join(map(str, shape))})"
             f" for profile {profile.name!r} at {profile.rate:g} Hz"
         )
     if not np.isfinite(frames).all():
-        number = int(np.flatnonzero(~np.isfinite(frames).all(axis=1))[0])
+        plain = frames.reshape(len(frames), -1)
+        number = int(np.flatnonzero(~np.isfinite(plain).all(axis=1))[0])
         raise SignalError(f"frame {number} holds a value that is not finite")

@@ -19,23 +19,24 @@ def frame(signal: NDArray[Scalar], *, length: int = 4000, hop: int = 1000) -> ND
     """Cut a signal into overlapping frames.
 
     Args:
-        signal: The noise signal, shape (samples,).
+        signal: The noise signal, shape (samples,), or several, shape (signals, samples).
         length: Samples of a frame.
         hop: Samples from the start of one frame to the start of the next.
 
     Returns:
-        A read-only view of the signal, shape (frames, length).
+        A read-only view, shape (frames, length), or (frames, signals, length) of several.
 
     Raises:
-        SignalError: If the signal is not one-dimensional or shorter than one frame.
+        SignalError: If the signal has another shape or is shorter than one frame.
     """
-    if signal.ndim != 1:
+    if signal.ndim not in (1, 2):
         raise SignalError(f"a signal of shape {signal.shape}, expected (samples,)")
-    if len(signal) < length:
+    if signal.shape[-1] < length:
         raise SignalError(
-            f"a signal of {len(signal)} samples is too short: one frame takes {length}"
+            f"a signal of {signal.shape[-1]} samples is too short: one frame takes {length}"
         )
-    return np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
+    windows = np.lib.stride_tricks.sliding_window_view(signal, length, axis=-1)
+    return np.moveaxis(windows[..., ::hop, :], -2, 0)
 
 
 def frame_starts(samples: int, *, length: int, hop: int, flush_end: bool) -> Index:
@@ -59,12 +60,13 @@ def pad_end(signal: Real, *, length: int) -> Real:
     """Lengthen a signal at its end, continuous in value and slope.
 
     Args:
-        signal: The signal, shape (samples,), at least one sample.
+        signal: The signal, shape (..., samples), at least one sample.
         length: Samples that are wanted.
 
     Returns:
         The signal reflected at its last sample in time and in amplitude (paper, Sec. III-A),
-        shape (length,), or the signal itself if it is that long already.
+        shape (..., length), or the signal itself if it is that long already.
     """
-    missing = max(length - len(signal), 0)
-    return np.pad(signal, (0, missing), mode="reflect", reflect_type="odd")
+    missing = max(length - signal.shape[-1], 0)
+    widths = [(0, 0)] * (signal.ndim - 1) + [(0, missing)]
+    return np.pad(signal, widths, mode="reflect", reflect_type="odd")

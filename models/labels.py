@@ -6,6 +6,9 @@ import numpy as np
 
 from models.types import Array, Index, Words
 
+UNKNOWN = "unknown"
+"""What a frame is called that is like nothing the classifier has learnt from."""
+
 
 @dataclass(frozen=True)
 class Event:
@@ -31,7 +34,7 @@ class Labels:
     Attributes:
         start: When each frame starts, shape (frames,), in [s].
         stop: When it stops, shape (frames,), in [s].
-        label: Its class, shape (frames,).
+        label: Its class, or `unknown`, shape (frames,).
         scores: How certain each class is, shape (frames, classes); comparable within one model.
         classes: Names of the classes, `ok` first.
     """
@@ -41,6 +44,12 @@ class Labels:
     label: Words
     scores: Array
     classes: tuple[str, ...]
+
+    def score(self, frame: int) -> float:
+        """Give the score of what a frame is called; 0 if it is unknown."""
+        label = str(self.label[frame])
+        known = label in self.classes
+        return float(self.scores[frame, self.classes.index(label)]) if known else 0.0
 
     def events(self) -> tuple[Event, ...]:
         """Merge frames of one failure class that overlap or follow each other.

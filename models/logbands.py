@@ -1,10 +1,11 @@
-"""Our own profile, in seconds and hertz, for any sample rate."""
+"""Our own profiles, in seconds and hertz, for any sample rate."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from models.errors import ProfileError
 from models.features import POOLED
-from models.profile import CLASSES, Profile
+from models.profile import CLASSES, Machine, Profile
+from models.signals import NOISE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,6 +17,14 @@ class LogBands:
 
     classes: tuple[str, ...] = CLASSES
     """What a frame can be called, `ok` first."""
+    signals: tuple[str, ...] = (NOISE,)
+    """What is listened to."""
+    relative: bool = False
+    """Whether levels are told from the whole frame's, and from those of the signal before."""
+    machine: Machine = "svm"
+    """What decides."""
+    alarm: float = 0.5
+    """Probability of any failure from which networks call a frame one."""
     frame: float = 0.4
     """Duration of a frame, in [s]."""
     hop: float = 0.1
@@ -61,6 +70,7 @@ class LogBands:
         return Profile(
             name="logbands",
             classes=self.classes,
+            signals=self.signals,
             rate=rate,
             length=round(self.frame * rate),
             hop=round(self.hop * rate),
@@ -68,8 +78,11 @@ class LogBands:
             stride=round(self.stride * rate),
             bands="log",
             edges=edges,
+            relative=self.relative,
             floor=self.floor,
             least_deviation=self.least_deviation,
+            machine=self.machine,
+            alarm=self.alarm,
             kernel="rbf",
             regularization=self.regularization,
             # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
@@ -89,3 +102,10 @@ class LogBands:
         ):
             edges.append(upper)
         return tuple(edges)
+
+
+SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.9)
+"""For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
+encoders, and differs from robot to robot and from simulator to simulator."""
+GENERAL = replace(SCALAR, signals=("desired", "measured", "error"))
+"""For runs with measured and desired motion."""

@@ -6,8 +6,8 @@ from typing import Any
 
 from models.errors import ModelFileError, ProfileError
 from models.features import feature_count
+from models.machine import DIMENSIONS, shapes
 from models.profile import Profile
-from models.svm import machine_count
 from models.types import Array
 
 _KINDS = {
@@ -58,16 +58,13 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
 def _check_arrays(
     path: str | Path, profile: Profile, classes: int, arrays: Mapping[str, Array]
 ) -> None:
-    count, vectors = feature_count(profile), len(arrays["vectors"])
-    machines = machine_count(classes, profile.multiclass)
-    shapes = {
-        "vectors": (vectors, count),
-        "coefficients": (machines, vectors),
-        "intercept": (machines,),
-        "mean": (count,),
-        "scale": (count,),
-    }
-    for name, shape in shapes.items():
+    if lacking := sorted(DIMENSIONS[profile.machine].keys() - arrays.keys()):
+        raise ModelFileError(
+            path, f"its profile asks for {profile.machine}, but it has no {', '.join(lacking)}"
+        )
+    count = feature_count(profile)
+    wanted = shapes(arrays, profile, features=count, classes=classes)
+    for name, shape in {**wanted, "mean": (count,), "scale": (count,)}.items():
         if arrays[name].shape != shape:
             raise ModelFileError(
                 path, f"array {name!r} has shape {arrays[name].shape}, its profile asks for {shape}"

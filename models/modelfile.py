@@ -1,8 +1,8 @@
-"""The model file, version 1: one uncompressed `.npz` of plain arrays and a JSON manifest.
+"""The model file, version 2: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
-Members: ``manifest`` (one text), ``vectors`` (vectors, features), ``coefficients`` (machines,
-vectors), ``intercept`` (machines,), ``mean`` and ``scale`` (features,). Nothing in it is ever
-unpickled; sizes are checked before an array is made. The same model is the same bytes.
+Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the machine, as
+`machine.shapes` lists them. Nothing in it is ever unpickled; sizes are checked before an array is
+made. The same model is the same bytes.
 """
 
 import io
@@ -19,21 +19,17 @@ from numpy.typing import NDArray
 
 from models.atomic import write_bytes
 from models.errors import ModelFileError
+from models.machine import DIMENSIONS
 from models.manifest import check
 from models.types import Array
 
-FORMAT = "noise-model/1"
+FORMAT = "noise-model/2"
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times what is usual."""
 
-_DIMENSIONS = {
-    "manifest": 0,
-    "vectors": 2,
-    "coefficients": 2,
-    "intercept": 1,
-    "mean": 1,
-    "scale": 1,
-}
+_KINDS = [
+    {"manifest": 0, "mean": 1, "scale": 1, **dimensions} for dimensions in DIMENSIONS.values()
+]
 
 
 def write(
@@ -75,8 +71,8 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            _check_members(path, archive)
-            members = {name: _member(path, archive, name) for name in _DIMENSIONS}
+            dimensions = _check_members(path, archive)
+            members = {name: _member(path, archive, name, n) for name, n in dimensions.items()}
     except OSError as error:
         raise ModelFileError(path, f"cannot be read ({error.strerror or error})") from error
     except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
@@ -89,12 +85,14 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
     return manifest, members
 
 
-def _check_members(path: str | Path, archive: zipfile.ZipFile) -> None:
-    wanted = sorted(f"{name}.npy" for name in _DIMENSIONS)
+def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]:
+    """Check the table of contents; dimensions of each array, by name."""
     there = sorted(archive.namelist())
-    if there != wanted:
+    kinds = [kind for kind in _KINDS if there == sorted(f"{name}.npy" for name in kind)]
+    if not kinds:
+        wanted = " or ".join(", ".join(sorted(kind)) for kind in _KINDS)
         raise ModelFileError(
-            path, f"is no model file: holds {', '.join(there)[:200]}, expected {', '.join(wanted)}"
+            path, f"is no model file: holds {', '.join(there)[:200]}, expected {wanted}"
         )
     for info in archive.infolist():
         # Stored as they are, members cannot be larger than the file that holds them.
@@ -102,9 +100,10 @@ def _check_members(path: str | Path, archive: zipfile.ZipFile) -> None:
             raise ModelFileError(path, f"member {info.filename!r} is compressed, expected stored")
     if sum(info.file_size for info in archive.infolist()) > LARGEST:
         raise ModelFileError(path, f"is larger than {LARGEST} bytes, the most that is read")
+    return kinds[0]
 
 
-def _member(path: str | Path, archive: zipfile.ZipFile, name: str) -> NDArray[Any]:
+def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: int) -> NDArray[Any]:
     """Read one array, once its header has proved to be honest."""
     content = archive.read(f"{name}.npy")
     header = io.BytesIO(content)
@@ -115,11 +114,11 @@ def _member(path: str | Path, archive: zipfile.ZipFile, name: str) -> NDArray[An
     except ValueError as error:
         raise ModelFileError(path, f"array {name!r} is damaged ({error})") from error
     fits = dtype.kind == "U" if name == "manifest" else dtype == np.dtype("<f8")
-    if not fits or len(shape) != _DIMENSIONS[name]:
+    if not fits or len(shape) != dimensions:
         raise ModelFileError(
             path,
             f"array {name!r} is of type {dtype} and shape {shape},"
-            f" expected {'text' if name == 'manifest' else 'float64'}, {_DIMENSIONS[name]}-D",
+            f" expected {'text' if name == 'manifest' else 'float64'}, {dimensions}-D",
         )
     if prod(shape) * dtype.itemsize != len(content) - header.tell():
         raise ModelFileError(path, f"array {name!r} is damaged: its size is not what it declares")

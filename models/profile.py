@@ -16,9 +16,16 @@ TOLERANCE = 1e-3
 
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
+Machine: TypeAlias = Literal["svm", "networks"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
-_CHOICES = {"bands": Bands, "kernel": Kernel, "multiclass": Multiclass}
+_CHOICES = {"bands": Bands, "kernel": Kernel, "machine": Machine, "multiclass": Multiclass}
+
+
+_POSITIVE = (
+    *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
+    *("networks", "units", "epochs", "alarm"),
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,6 +40,8 @@ class Profile:
     """Whose recipe this is."""
     classes: tuple[str, ...] = CLASSES
     """What a frame can be called, `ok` first."""
+    signals: tuple[str, ...] = ("noise",)
+    """The signals that are listened to: noise estimates, norms of velocities, all in [rad/s]."""
     rate: float = 10_000.0
     """Sample rate of the signal, in [Hz]."""
     length: int = 4000
@@ -47,11 +56,17 @@ class Profile:
     """How bins become bands: three adjacent ones, NoisyTest's comb, or ``edges``."""
     edges: tuple[float, ...] = ()
     """Edges of the bands of ``log``, ascending, in [Hz]."""
+    relative: bool = False
+    """Whether levels of ``log`` bands are told from how loud the frame is on the whole, and from
+    those of the signal before: what matters then is the shape of a spectrum, and how much of a
+    noise is neither wanted nor followed."""
     floor: float = 1e-6
     """What is added to an amplitude before its logarithm."""
     least_deviation: float = 0.0
     """Deviation that a feature is taken to have at least, when features are scaled to the mean 0
     and the deviation 1 of the training set; 0 leaves them as they are."""
+    machine: Machine = "svm"
+    """What decides: support vector machines, or small neural networks."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1
@@ -60,6 +75,16 @@ class Profile:
     """Kernel parameter; the linear kernel has none."""
     multiclass: Multiclass = "one-vs-rest"
     """How two-class machines make one for more classes."""
+    networks: int = 3
+    """Networks whose answers are averaged."""
+    units: int = 64
+    """Units in the hidden layer of a network."""
+    decay: float = 1.0
+    """Penalty on the squares of a network's weights."""
+    epochs: int = 30
+    """How often a network sees each training frame."""
+    alarm: float = 0.5
+    """Probability of any failure from which networks call a frame one."""
     pad_short: bool = True
     """Whether a training block shorter than a frame is padded, or else widened."""
     spread_failures: bool = False
@@ -136,7 +161,8 @@ class Profile:
 
     def as_dict(self) -> dict[str, Any]:
         """Give a value for each field, as JSON can hold it."""
-        return asdict(self) | {"classes": list(self.classes), "edges": list(self.edges)}
+        settings = asdict(self)
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in settings.items()}
 
     @property
     def bins(self) -> int:
@@ -172,7 +198,7 @@ def _check_types(profile: Profile) -> None:
         elif kind in (int, bool, str):
             fits, wanted = type(value) is kind, f"a value of type {kind.__name__}"
         else:
-            item = str if field.name == "classes" else float
+            item = float if field.name == "edges" else str
             fits = isinstance(value, tuple) and all(type(each) is item for each in value)
             wanted = f"a tuple of {item.__name__}"
         if not fits:
@@ -180,16 +206,19 @@ def _check_types(profile: Profile) -> None:
 
 
 def _check_ranges(profile: Profile) -> None:
-    positive = ("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma")
-    for name in positive:
+    for name in _POSITIVE:
         if getattr(profile, name) <= 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected more than 0")
-    for name in ("open_end", "widen_extra", "least_deviation"):
+    for name in ("open_end", "widen_extra", "least_deviation", "decay"):
         if getattr(profile, name) < 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
     if profile.window > profile.length:
         raise ProfileError(
             f"window of {profile.window} samples is longer than a frame of {profile.length}"
+        )
+    if not profile.signals or len(set(profile.signals)) < len(profile.signals):
+        raise ProfileError(
+            f"signals are {', '.join(profile.signals) or 'none'}, expected one or more, each once"
         )
     repeated = len(set(profile.classes)) < len(profile.classes)
     if repeated or len(profile.classes) < 2 or profile.classes[0] != "ok":

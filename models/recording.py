@@ -1,4 +1,4 @@
-"""A recording: one noise signal with the stretches of it that someone annotated."""
+"""A recording: noise signals with the stretches of them that someone annotated."""
 
 import hashlib
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from models.errors import RecordingError
-from models.types import Array, Mask, Real
+from models.signals import NOISE, Signals, named
+from models.types import Array, Mask
 
 
 class Block(NamedTuple):
@@ -25,11 +26,11 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """One annotated noise signal, checked when it is made.
+    """Annotated noise, checked when it is made.
 
     Attributes:
         name: What the recording is called in messages and models.
-        signal: The noise estimate, shape (samples,).
+        signal: The noise estimate, shape (samples,), or signals by name, each of that shape.
         rate: Sample rate, in [Hz].
         blocks: Annotations; what overlaps must agree.
         start: Time of the first sample, in [s].
@@ -42,7 +43,7 @@ class Recording:
     """
 
     name: str
-    signal: Real
+    signal: Signals
     rate: float
     blocks: tuple[Block, ...] = ()
     start: float = 0.0
@@ -56,29 +57,40 @@ class Recording:
         object.__setattr__(self, "blocks", plain)
         _check_blocks(self)
         if not self.sha256:
-            samples = np.ascontiguousarray(self.signal, dtype="<f8")
-            object.__setattr__(self, "sha256", hashlib.sha256(samples.tobytes()).hexdigest())
+            hashed = hashlib.sha256()
+            for signal in named(self.signal).values():
+                hashed.update(np.ascontiguousarray(signal, dtype="<f8").tobytes())
+            object.__setattr__(self, "sha256", hashed.hexdigest())
+
+    @property
+    def samples(self) -> int:
+        """How many samples there are."""
+        return len(next(iter(named(self.signal).values())))
 
     @property
     def time(self) -> Array:
         """Time of each sample, shape (samples,), in [s]."""
-        time: Array = self.start + np.arange(len(self.signal)) / self.rate
+        time: Array = self.start + np.arange(self.samples) / self.rate
         return time
 
 
 def _check_signal(recording: Recording) -> None:
-    signal, valid = recording.signal, recording.valid
-    if signal.ndim != 1 or not len(signal):
+    for name, signal in named(recording.signal).items():
+        if signal.shape != (recording.samples,) or not recording.samples:
+            raise RecordingError(
+                recording.name,
+                f"a signal of shape {signal.shape}, expected (samples,), one or more",
+            )
+        if not np.isfinite(signal).all():
+            row = int(np.flatnonzero(~np.isfinite(signal))[0])
+            what = f"sample {row}" if name == NOISE else f"sample {row} of {name}"
+            raise RecordingError(recording.name, f"{what} is not finite ({signal[row]})")
+    valid = recording.valid
+    if valid is not None and valid.shape != (recording.samples,):
         raise RecordingError(
-            recording.name, f"a signal of shape {signal.shape}, expected (samples,), one or more"
+            recording.name,
+            f"valid has shape {valid.shape}, the signal {(recording.samples,)}",
         )
-    if valid is not None and valid.shape != signal.shape:
-        raise RecordingError(
-            recording.name, f"valid has shape {valid.shape}, the signal {signal.shape}"
-        )
-    if not np.isfinite(signal).all():
-        row = int(np.flatnonzero(~np.isfinite(signal))[0])
-        raise RecordingError(recording.name, f"sample {row} is not finite ({signal[row]})")
     if not (isfinite(recording.rate) and recording.rate > 0 and isfinite(recording.start)):
         raise RecordingError(
             recording.name,
@@ -91,7 +103,7 @@ def _check_blocks(recording: Recording) -> None:
     step = 1.0 / recording.rate
     # Annotations are written with few digits: one sample more or less is no contradiction.
     begin = recording.start - step
-    end = recording.start + (len(recording.signal) + 1) * step
+    end = recording.start + (recording.samples + 1) * step
     for block in recording.blocks:
         if not block.start < block.stop:
             raise RecordingError(

@@ -6,14 +6,15 @@ from typing import TypeAlias
 import numpy as np
 
 from models.classifier import Classifier
-from models.errors import RateError, SignalError
+from models.errors import RateError
 from models.features import course, levels, rounded
 from models.labels import Labels
 from models.profile import TOLERANCE
-from models.types import Array, Index, Mask, Real
+from models.signals import Signals, check, stacked
+from models.types import Array, Index, Mask
 
 Decided: TypeAlias = tuple[Index, Array]
-"""Where frames start, shape (frames,), and the decisions on them, shape (frames, machines)."""
+"""Where frames start, shape (frames,), and the decisions on them, shape (frames, decisions)."""
 
 
 class Stream:
@@ -52,13 +53,15 @@ class Stream:
         self._of_frame = hops * len(phases) + rank
         self._phases: list[int] = phases.tolist()
         # Room for a frame, and for as much as is taken at once.
-        self._samples = np.zeros(3 * profile.length)
+        several = profile.signals[1:] and (len(profile.signals),)
+        self._samples = np.zeros((*several, 3 * profile.length))
         self._valid = np.zeros(3 * profile.length, dtype=bool)
-        self._windows = np.lib.stride_tricks.sliding_window_view(self._samples, profile.window)
+        windows = np.lib.stride_tricks.sliding_window_view(self._samples, profile.window, axis=-1)
+        self._windows = np.moveaxis(windows, -2, 0)
         rows = len(self._phases) * (2 * profile.length // profile.hop + 2)
-        bands = levels(self._windows[:1], profile).shape[1]
-        self._levels = np.zeros((rows, bands))  # of window i in row i modulo rows
-        nothing = np.empty(0, dtype=np.intp), np.empty((0, len(classifier.machines.intercept)))
+        # Of window i in row i modulo rows.
+        self._levels = np.zeros((rows, *levels(self._windows[0], profile).shape))
+        nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.machines.width))
         self._nothing = self._labels([nothing])
         self._begin()
 
@@ -67,26 +70,27 @@ class Stream:
         """Samples that came so far."""
         return self._count
 
-    def push(self, samples: Real, valid: Mask | None = None) -> Labels:
-        """Take samples of the noise signal.
+    def push(self, samples: Signals, valid: Mask | None = None) -> Labels:
+        """Take samples of the noise.
 
         Args:
-            samples: Any number of them, none included, shape (samples,).
+            samples: Any number of them, none included, shape (samples,), or of each signal by name.
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
 
         Returns:
             Labels of the frames that these samples complete, most often none.
 
         Raises:
-            SignalError: If the samples are not finite, or not one-dimensional; none is taken.
+            SignalError: If the samples are not finite, not one-dimensional, or not all that the
+                model needs; none is taken.
         """
-        samples = np.asarray(samples)
-        _check(samples, valid, self._count)
-        exact = rounded(samples, self._profile)
+        plain = stacked(samples, self._profile.signals)
+        check(plain, np.ones(plain.shape[-1], bool) if valid is None else valid, first=self._count)
+        exact = rounded(plain, self._profile)
         found: list[Decided] = []
-        for first in range(0, len(exact), self._profile.length):
+        for first in range(0, exact.shape[-1], self._profile.length):
             piece = slice(first, first + self._profile.length)
-            self._keep(exact[piece], True if valid is None else valid[piece])
+            self._keep(exact[..., piece], True if valid is None else valid[piece])
             if self._count >= self._due:
                 found += self._advance()
         return self._labels(found) if found else self._nothing
@@ -132,19 +136,21 @@ class Stream:
         self._due = self._first + self._profile.window  # count with which there is work to do
 
     def _lose(self, samples: int) -> None:
-        self.push(np.zeros(samples), np.zeros(samples, dtype=bool))
+        silence = dict.fromkeys(self._profile.signals, np.zeros(samples))
+        self.push(silence, np.zeros(samples, dtype=bool))
 
     def _keep(self, samples: Array, valid: Mask | bool) -> None:
         """Append at most a frame's length of samples to the buffer."""
         length = self._profile.length
-        if self._held + len(samples) > len(self._samples):
+        count = samples.shape[-1]
+        if self._held + count > len(self._valid):
             for buffer in (self._samples, self._valid):
-                buffer[:length] = buffer[self._held - length : self._held]
+                buffer[..., :length] = buffer[..., self._held - length : self._held]
             self._held = length
-        stop = self._held + len(samples)
-        self._samples[self._held : stop], self._valid[self._held : stop] = samples, valid
+        stop = self._held + count
+        self._samples[..., self._held : stop], self._valid[self._held : stop] = samples, valid
         self._held = stop
-        self._count += len(samples)
+        self._count += count
 
     def _advance(self) -> list[Decided]:
         """Transform the windows that are complete now, and decide on the frames that are."""
@@ -181,20 +187,10 @@ class Stream:
         return bool(self._valid[place : place + self._profile.length].all())
 
     def _decide(self, frames: list[int], loudness: Array) -> list[Decided]:
-        return [(np.array(frames), self.classifier.judge(course(loudness, self._profile)))]
+        """Decide on frames by the levels of their windows, shape (frames, time, …, bands)."""
+        in_time = np.ascontiguousarray(np.moveaxis(loudness, 1, -2))
+        return [(np.array(frames), self.classifier.judge(course(in_time, self._profile)))]
 
     def _labels(self, found: list[Decided]) -> Labels:
         starts, decisions = (np.concatenate(each) for each in zip(*found, strict=True))
         return self.classifier.labels(decisions, starts, self.rate, start=self.start)
-
-
-def _check(samples: Real, valid: Mask | None, count: int) -> None:
-    shape = samples.shape if valid is None else valid.shape
-    if samples.ndim != 1 or shape != samples.shape:
-        raise SignalError(
-            f"samples of shape {samples.shape} and validity of shape {shape},"
-            " expected (samples,) for both"
-        )
-    if not np.isfinite(samples).all():
-        row = int(np.flatnonzero(~np.isfinite(samples))[0])
-        raise SignalError(f"sample {count + row} of the signal is not finite ({samples[row]})")

@@ -8,6 +8,7 @@ is one for each class, against all others.
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
+from math import isqrt
 from typing import Self
 
 import numpy as np
@@ -27,6 +28,7 @@ class Machines:
         intercept: Bias b, shape (machines,).
         kernel: The kernel function.
         gamma: Parameter of the RBF kernel.
+        multiclass: How the machines make a choice.
     """
 
     vectors: Array
@@ -34,6 +36,35 @@ class Machines:
     intercept: Array
     kernel: Kernel
     gamma: float
+    multiclass: Multiclass
+
+    @property
+    def width(self) -> int:
+        """Decisions on one frame."""
+        return len(self.intercept)
+
+    @property
+    def classes(self) -> int:
+        """How many classes the machines tell apart."""
+        if self.multiclass == "one-vs-rest":
+            return self.width
+        return (1 + isqrt(1 + 8 * self.width)) // 2
+
+    def choose(self, decisions: Array) -> Index:
+        """Choose a class for each frame, see `choose`."""
+        return choose(decisions, classes=self.classes, multiclass=self.multiclass)
+
+    def score(self, decisions: Array) -> Array:
+        """Grade all classes for each frame, see `score`."""
+        return score(decisions, classes=self.classes, multiclass=self.multiclass)
+
+    def arrays(self) -> dict[str, Array]:
+        """Give what a model file keeps."""
+        return {
+            "vectors": self.vectors,
+            "coefficients": self.coefficients,
+            "intercept": self.intercept,
+        }
 
     def decision(self, features: Array) -> Array:
         """Evaluate every machine, sum y_i alpha_i K(x_i, x) + b (paper, Sec. III-B).

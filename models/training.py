@@ -1,4 +1,4 @@
-"""Train support vector machines with scikit-learn (libsvm), the only place that needs it."""
+"""Train machines with scikit-learn: support vector machines (libsvm) here."""
 
 from importlib import metadata
 from itertools import combinations
@@ -6,13 +6,35 @@ from typing import Any
 
 import numpy as np
 
+from models.machine import Machine
+from models.networktraining import fit_networks
 from models.profile import Profile
 from models.svm import Machines
-from models.types import Array, Index
+from models.types import Array, Index, Words
+
+
+def learn(features: Array, targets: Index, groups: Words, profile: Profile) -> Machine:
+    """Learn what a profile asks for.
+
+    Args:
+        features: Feature vectors, shape (frames, features).
+        targets: Class of each, as an index from 0 without a gap, shape (frames,).
+        groups: What each shares its motion with, shape (frames,).
+        profile: What decides, its parameters, and how machines make a choice.
+
+    Returns:
+        The machines.
+
+    Raises:
+        DatasetError: If networks cannot be calibrated, for there are too few groups.
+    """
+    if profile.machine == "networks":
+        return fit_networks(features, targets, groups, profile)
+    return fit(features, targets, profile).condensed()
 
 
 def fit(features: Array, targets: Index, profile: Profile) -> Machines:
-    """Learn the machines that a profile asks for.
+    """Learn support vector machines.
 
     Args:
         features: Feature vectors, shape (frames, features).
@@ -39,7 +61,7 @@ def versions() -> dict[str, str]:
 
 def _one_vs_one(features: Array, targets: Index, profile: Profile) -> Machines:
     """Train a machine for each pair of classes, C times N / (classes N_c) for each class."""
-    svc = _svc(profile, profile.regularization, dict(enumerate(_balance(targets))))
+    svc = _svc(profile, profile.regularization, dict(enumerate(balance(targets))))
     svc.fit(features, targets)
     pairs = list(combinations(range(len(svc.classes_)), 2))
     stops = np.cumsum(svc.n_support_)
@@ -58,12 +80,13 @@ def _one_vs_one(features: Array, targets: Index, profile: Profile) -> Machines:
         sign * svc.intercept_,
         profile.kernel,
         profile.gamma,
+        profile.multiclass,
     )
 
 
 def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> Machines:
     """Train a machine for each class, with C_cls = C N / (classes N_cls) (paper, Sec. III-B)."""
-    weights = _balance(targets)
+    weights = balance(targets)
     coefficients, intercept = np.zeros((len(weights), len(targets))), np.zeros(len(weights))
     for machine, weight in enumerate(weights):
         svc = _svc(profile, profile.regularization * float(weight))
@@ -71,10 +94,17 @@ def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> Machines:
         coefficients[machine, svc.support_] = svc.dual_coef_[0]
         intercept[machine] = svc.intercept_[0]
     used = np.flatnonzero(coefficients.any(axis=0))
-    return Machines(features[used], coefficients[:, used], intercept, profile.kernel, profile.gamma)
+    return Machines(
+        features[used],
+        coefficients[:, used],
+        intercept,
+        profile.kernel,
+        profile.gamma,
+        profile.multiclass,
+    )
 
 
-def _balance(targets: Index) -> Array:
+def balance(targets: Index) -> Array:
     """Weigh classes against their frequency, N / (classes N_c)."""
     counts = np.bincount(targets)
     balance: Array = len(targets) / len(counts) / counts

@@ -21,7 +21,8 @@ class Amount:
     Attributes:
         blocks: Annotated stretches.
         seconds: How long they last together, in [s].
-        frames: Frames that lie whole in one of them.
+        frames: Frames that lie whole in one of them; one for each that is shorter, which is padded
+            to a frame for training (paper, Sec. III-A).
     """
 
     blocks: int = 0
@@ -160,5 +161,5 @@ class Balance:
 def _amount(block: Block) -> Amount:
     seconds = block.stop - block.start
     # Blocks begin and stop on samples, which floats meet but nearly.
-    frames = int((seconds - FRAME) / HOP + 1e-6) + 1 if seconds > FRAME - 1e-6 else 0
+    frames = 1 + int(max(seconds - FRAME, 0.0) / HOP + 1e-6)
     return Amount(1, seconds, frames)

@@ -37,7 +37,7 @@ def test_what_the_model_does_not_look_at_cannot_be_seen(rate):
     found = seen(noisy_run(rate))
     assert found["impact"].sight is Sight.OBSERVABLE
     oscillations = found["oscillations"]
-    top = band_edges(LIBRARY["arm-1khz"].profile)[-1]
+    top = band_edges(LIBRARY["scalar-1khz"].profile)[-1]
     assert (oscillations.sight, oscillations.high) == (Sight.PARTLY, top)
     assert oscillations.needed == 10_000.0
     assert oscillations.reason == "the model of 1000 Hz ends there"
@@ -53,7 +53,7 @@ def test_below_every_model_nothing_can_be_told(rate):
 
 
 def test_without_the_faster_model_twice_the_frequency_is_what_it_takes():
-    slow = {"arm-1khz": LIBRARY["arm-1khz"]}
+    slow = {"scalar-1khz": LIBRARY["scalar-1khz"]}
     assert seen(noisy_run(1000.0), slow)["oscillations"].needed == 2 * OSCILLATIONS[1]
     assert audit(noisy_run(1000.0), {}).classes == ()
 
@@ -62,7 +62,7 @@ def test_the_bands_are_those_of_the_profile():
     edges = band_edges(Profile.paper())
     assert edges[0] == pytest.approx(9.8, abs=0.1)  # the paper's f_min, Sec. III-A
     assert edges[-1] == pytest.approx(5000, abs=20)
-    profile = LIBRARY["arm-10khz"].profile
+    profile = LIBRARY["scalar-10khz"].profile
     assert tuple(band_edges(profile)) == profile.edges
 
 

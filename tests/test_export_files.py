@@ -53,7 +53,7 @@ def test_the_noise_is_what_the_other_commands_say(demo):
         content.simplified, simplified(demo.motion, demo.velocity_desired)
     )
     np.testing.assert_array_equal(content.extended, estimate(demo, "C").power.sum(axis=1))
-    assert content.model == "arm-10khz"
+    assert content.model == "general-10khz"
     assert {event.label for event in content.events} >= {"impact"}
     assert content.remarks == ()
 
@@ -78,7 +78,7 @@ def test_parquet_holds_every_number_to_the_bit(exported, demo):
     np.testing.assert_array_equal(table["simplified"].to_numpy(), content.simplified)
     np.testing.assert_array_equal(table["extended"].to_numpy(), content.extended)
     assert table.schema.field("simplified").metadata == {b"unit": b"rad/s"}
-    assert table.schema.metadata[b"model"] == b"arm-10khz"
+    assert table.schema.metadata[b"model"] == b"general-10khz"
 
 
 def test_the_frames_can_be_had_back_from_the_table(exported):

@@ -263,10 +263,14 @@ def test_a_model_is_trained_and_evaluated(inspector, tmp_path):
         )
     model = tmp_path / "model.npz"
     runs = [tmp_path / f"run{seed}.npz" for seed in range(2)]
-    status, out, _ = inspector("train", *runs, "-o", model, "--rate", 1000)
+    call = ["train", *runs, "-o", model, "--rate", 1000]
+    status, _, err = inspector(*call)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "no signal desired, error; there is noise, measured; --profile scalar takes" in err
+    status, out, _ = inspector(*call, "--profile", "scalar")
     assert status == 0
     assert "Subset accuracy" in out
-    status, out, _ = inspector("evaluate", model, *runs)
+    status, out, _ = inspector("evaluate", model, *runs, "--seen-too")
     assert status == 0
     assert "Failure recall" in out
     status, out, _ = inspector("evaluate", model, tmp_path / "run2.npz", "--json")
@@ -281,7 +285,7 @@ def test_a_profile_that_does_not_exist_at_a_rate_is_said(inspector, tmp_path):
     status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
     assert (status, "exists at 10000 Hz only" in err) == (3, True)
     status, _, err = inspector(*arguments, "best")
-    assert (status, "no profile 'best'; there are logbands" in err) == (3, True)
+    assert (status, "no profile 'best'; there are general" in err) == (3, True)
     status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
     assert (status, "has no annotated blocks" in err) == (3, True)
 

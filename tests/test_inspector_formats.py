@@ -8,11 +8,11 @@ from inspector.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
 from inspector.verdict import Status, Verdict, exit_status
 from models import Event
 
-QUIET = Verdict(Path("quiet.npz"), Status.OK, "arm-10khz")
+QUIET = Verdict(Path("quiet.npz"), Status.OK, "scalar-10khz")
 LOUD = Verdict(
     Path("loud.npz"),
     Status.FINDINGS,
-    "arm-10khz",
+    "scalar-10khz",
     (Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8)),
 )
 SLOW = Verdict(Path("slow.npz"), Status.CANNOT_TELL, message="30 Hz is below every model")
@@ -35,7 +35,7 @@ def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
 
 def test_text_says_what_was_found_and_when():
     lines = text([QUIET, LOUD]).splitlines()
-    assert lines[0] == "quiet.npz: ok [arm-10khz]"
+    assert lines[0] == "quiet.npz: ok [scalar-10khz]"
     assert lines[2] == "  impact from 1.00 s to 1.50 s"
 
 
@@ -44,7 +44,7 @@ def test_json_is_noise_verdict_1():
     assert verdicts["format"] == "noise-verdict/1"
     loud, slow = verdicts["runs"]
     assert loud["events"][1] == {"label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8}
-    assert (loud["run"], loud["status"], loud["model"]) == ("loud.npz", "findings", "arm-10khz")
+    assert (loud["run"], loud["status"], loud["model"]) == ("loud.npz", "findings", "scalar-10khz")
     assert (slow["status"], slow["events"]) == ("cannot-tell", [])
     assert slow["message"] == "30 Hz is below every model"
 

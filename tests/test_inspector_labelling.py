@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -42,7 +44,7 @@ def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
 
 def test_a_faster_run_is_lowered_and_a_slower_one_is_not_judged():
     labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), LIBRARY)
-    assert labelled.remark == "Labelled at 1000 Hz, the rate of model arm-1khz."
+    assert labelled.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
     with pytest.raises(CannotTellError, match="500 Hz"):
         label_run(run_of(np.zeros((2000, 1)), 500.0), LIBRARY)
 
@@ -51,3 +53,29 @@ def test_a_scalar_noise_cannot_be_lowered():
     time = np.arange(20_000) / 5000.0
     with pytest.raises(CannotTellError, match="5000 Hz cannot be lowered to the 1000 Hz of model"):
         label_noise(time, np.ones(20_000), LIBRARY)
+
+
+def test_the_richest_model_that_a_run_feeds_is_taken():
+    generator = np.random.default_rng(0)
+    noisy = 0.1 + 1e-3 * generator.normal(size=(3000, 3))
+    assert label_run(run_of(noisy, 1000.0), LIBRARY).model == "scalar-1khz"  # desired is measured
+    time, names = np.arange(3000) / 1000.0, ("a", "b", "c")
+    followed = Run(time=time, velocity=noisy, velocity_desired=0 * noisy + 0.1, joint_names=names)
+    assert label_run(followed, LIBRARY).model == "general-1khz"
+    measured = Run(time=time, velocity=noisy, joint_names=names)
+    assert label_run(measured, LIBRARY).model == "scalar-1khz"
+
+
+def test_a_run_like_nothing_that_was_learnt_cannot_be_judged_and_part_of_one_is_said():
+    generator = np.random.default_rng(0)
+    odd = 1e4 * generator.normal(size=(6000, 3))
+    names = ("a", "b", "c")
+    run = Run(
+        time=np.arange(6000) / 1000.0, velocity=odd, velocity_desired=0 * odd, joint_names=names
+    )
+    with pytest.raises(CannotTellError, match="nothing that model general-1khz has learnt from is"):
+        label_run(run, LIBRARY)
+    known = np.where(run.time[:, None] < 3.0, odd, 0.1 + 1e-7 * odd)
+    labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
+    assert "frames are like nothing that model general-1khz knows" in labelled.remark
+    assert "unknown" in labelled.labels.label

@@ -12,6 +12,7 @@ from inspector.live.clock import Clock
 from inspector.live.ear import Ear
 from inspector.live.lane import Lane
 from inspector.live.moving import Moving
+from inspector.live.norms import NOISY, Norms
 from inspector.live.slower import Slower
 from inspector.live.strip import QUIETEST_DB, Strip
 from inspector.live.troubles import Troubles
@@ -115,8 +116,7 @@ def test_what_is_too_fast_for_the_lower_rate_is_gone():
 def heard(ear, motion, valid=None, size=77):
     valid = np.ones(len(motion), dtype=bool) if valid is None else valid
     parts = [
-        ear.hear(motion[i : i + size], nm.simplified(motion[i : i + size]), valid[i : i + size])
-        for i in range(0, len(motion), size)
+        ear.hear(motion[i : i + size], valid[i : i + size]) for i in range(0, len(motion), size)
     ]
     fields = ("start", "stop", "label", "scores")
     joined = (np.concatenate([getattr(part, name) for part in parts]) for name in fields)
@@ -125,7 +125,9 @@ def heard(ear, motion, valid=None, size=77):
 
 @pytest.fixture(scope="module")
 def library():
-    return load_library(assets.model_files())
+    """The models that listen to the noise alone."""
+    models = load_library(assets.model_files())
+    return {name: model for name, model in models.items() if name.startswith("scalar")}
 
 
 def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
@@ -135,9 +137,9 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
     lower = nm.lowered(run, 1000.0)
     (model,) = (each for each in library.values() if each.rate == 1000.0)
     batch = model.classify(nm.simplified(lower.velocity), 1000.0)
-    ear = Ear(library, 2000.0, 3)
+    ear = Ear(library, 2000.0, Norms({"velocity": 3}))
     labels = heard(ear, velocity)
-    assert ear.remark == "Labelled at 1000 Hz, the rate of model arm-1khz."
+    assert ear.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
     # The first frame and the last ones touch ends beyond which the whole run was guessed.
     np.testing.assert_allclose(labels.start, batch.start[1:-1], atol=1e-9)
     assert np.array_equal(labels.label, batch.label[1:-1])
@@ -147,7 +149,7 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
 @pytest.mark.parametrize("rate", [1000.0, 2000.0])
 def test_after_a_gap_labels_know_what_time_it_is(library, rate):
     second = round(rate)
-    ear = Ear(library, rate, 3)
+    ear = Ear(library, rate, Norms({"velocity": 3}))
     heard(ear, walk(second, rate))
     ear.skip(10 * second + 1)
     labels = heard(ear, walk(second, rate))
@@ -165,9 +167,9 @@ def test_after_a_gap_labels_know_what_time_it_is(library, rate):
     ],
 )
 def test_rates_that_no_model_can_follow_have_no_labels_and_it_is_said(library, rate, remark):
-    ear = Ear(library, rate, 3)
+    ear = Ear(library, rate, Norms({"velocity": 3}))
     assert ear.remark.startswith(remark)
-    assert ear.hear(walk(900, rate), np.zeros(900), np.ones(900, dtype=bool)) is None
+    assert ear.hear(walk(900, rate), np.ones(900, dtype=bool)) is None
     ear.skip(100)
     assert ear.classes == ()
     assert ear.elapsed == 1000 / rate
@@ -264,3 +266,21 @@ def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
         assert abs(expected @ turn) == pytest.approx(1.0, abs=1e-6)
         checked += 1
     assert checked >= len(names)
+
+
+@pytest.mark.parametrize("missing", [(), ("base_velocity",), ("velocity_desired",)])
+def test_columns_make_the_norms_that_a_run_makes(missing):
+    generator = np.random.default_rng(3)
+    widths = {"base_velocity": 6, "velocity": 4, "velocity_desired": 4}
+    columns = {
+        name: generator.normal(size=(50, width))
+        for name, width in widths.items()
+        if name not in missing
+    }
+    run = nm.Run(time=np.arange(50) / 1000, joint_names=("a", "b", "c", "d"), **columns)
+    norms = Norms({name: width for name, width in widths.items() if name not in missing})
+    found = norms.of(np.hstack([columns[name] for name in NOISY if name in columns]), norms.names)
+    wanted = nm.norms(run)
+    assert found.keys() == wanted.keys()
+    for name, signal in wanted.items():
+        np.testing.assert_allclose(found[name], signal, rtol=1e-12)

@@ -1,5 +1,6 @@
 import gc
 import sys
+from collections import Counter
 from itertools import pairwise
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -29,7 +30,9 @@ def strict():
 
 @pytest.fixture(scope="module")
 def library():
-    return load_library(assets.model_files())
+    """The models that listen to the noise alone."""
+    models = load_library(assets.model_files())
+    return {name: model for name, model in models.items() if name.startswith("scalar")}
 
 
 def motion(seconds, joints=3, hum=(1.0, 2.0)):
@@ -97,7 +100,7 @@ def test_a_session_shows_everything(tmp_path, library):
     } <= entities(path)
     assert len(RrdReader(path).blueprints()) == 1
     assert summary.samples == 3000
-    assert summary.model == "arm-1khz"
+    assert summary.model == "scalar-1khz"
     assert sum(summary.labels.values()) == 27
     assert summary.troubles == {}
     assert "delay from a sample to its label: median" in str(summary)
@@ -109,7 +112,7 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
     signals = motion(2.5)
     path, _, _ = shown(tmp_path, signals, range(size, 2500, size), library=library)
     noise = nm.simplified(signals["velocity"], signals["velocity_desired"])
-    batch = library["arm-1khz"].classify(noise, RATE)
+    batch = library["scalar-1khz"].classify(noise, RATE)
     time, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
     np.testing.assert_allclose(scores, batch.scores, atol=1e-9)
@@ -119,6 +122,19 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
         label for i, label in enumerate(batch.label) if i == 0 or label != batch.label[i - 1]
     ]
     assert [state[0] for state in states] == [*changes, ""]
+
+
+@pytest.mark.parametrize("size", [7, 1301])
+def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size):
+    signals = motion(2.5)
+    library = load_library(assets.model_files())
+    path, _, summary = shown(tmp_path, signals, range(size, 2500, size), library=library)
+    assert summary.model == "general-1khz"
+    run = nm.Run(joint_names=("a", "b", "c"), **signals)
+    batch = library["general-1khz"].classify(nm.norms(run), RATE)
+    _, scores = read(path, "/score", "Scalars:scalars")
+    np.testing.assert_allclose(scores, batch.scores, atol=1e-9)
+    assert summary.labels == dict(Counter(batch.label.tolist()))
 
 
 def test_no_peak_of_the_noise_is_lost(tmp_path, library):
@@ -177,7 +193,7 @@ def test_missing_samples_end_the_lane_and_labels_go_on_after_them(tmp_path, libr
         valid=kept,
     )
     noise = nm.simplified(valid.velocity, valid.velocity_desired)
-    batch = library["arm-1khz"].classify(noise, RATE, valid=kept)
+    batch = library["scalar-1khz"].classify(noise, RATE, valid=kept)
     time, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
     np.testing.assert_allclose(scores, batch.scores, atol=1e-9)

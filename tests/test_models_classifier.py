@@ -161,7 +161,7 @@ def test_all_gaps_are_no_labels(ours):
     ("signal", "reason"),
     [
         (np.zeros(399), "signal of 399 samples is too short: a frame takes 400"),
-        (np.zeros((400, 2)), r"a signal of shape \(400, 2\)"),
+        (np.zeros((400, 2)), r"noise \(400, 2\), expected \(samples,\)"),
         (np.where(np.arange(500) == 9, np.nan, 1.0), r"sample 9 of the signal is not finite \(nan"),
         (np.where(np.arange(500) == 9, np.inf, 1.0), r"sample 9 of the signal is not finite \(inf"),
     ],

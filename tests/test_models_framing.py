@@ -46,6 +46,13 @@ def test_a_signal_shorter_than_a_frame_is_refused():
         models.frame(np.zeros(399), length=400, hop=100)
 
 
-def test_a_signal_of_several_columns_is_refused():
-    with pytest.raises(models.SignalError, match=r"shape \(1000, 2\), expected \(samples,\)"):
-        models.frame(np.zeros((1000, 2)), length=400, hop=100)
+def test_several_signals_are_framed_alike():
+    signals = np.arange(2000.0).reshape(2, 1000)
+    frames = models.frame(signals, length=400, hop=100)
+    assert frames.shape == (7, 2, 400)
+    np.testing.assert_array_equal(frames[:, 1], models.frame(signals[1], length=400, hop=100))
+
+
+def test_a_signal_of_more_axes_is_refused():
+    with pytest.raises(models.SignalError, match=r"shape \(3, 1000, 2\), expected \(samples,\)"):
+        models.frame(np.zeros((3, 1000, 2)), length=400, hop=100)

@@ -185,7 +185,7 @@ def test_a_rate_that_is_nearly_the_models_counts_time_by_its_own():
 @pytest.mark.parametrize(
     ("samples", "valid", "reason"),
     [
-        (np.zeros((3, 2)), None, r"samples of shape \(3, 2\)"),
+        (np.zeros((3, 2)), None, r"noise \(3, 2\), expected \(samples,\)"),
         (np.zeros(3), np.ones(2, bool), r"validity of shape \(2,\), expected \(samples,\) for"),
         (np.array([0.0, np.nan]), None, r"sample 11 of the signal is not finite \(nan\)"),
     ],

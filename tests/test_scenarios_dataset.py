@@ -177,7 +177,9 @@ def test_a_run_that_fell_is_recorded_counted_and_not_redone(simulated, tmp_path)
     assert "1 of which fell" in str(balance)
 
 
-def test_frames_are_counted_that_lie_whole_in_a_block(simulated, tmp_path, monkeypatch):
+def test_frames_are_counted_that_lie_whole_in_a_block_and_one_for_a_shorter_block(
+    simulated, tmp_path, monkeypatch
+):
     lengths = (0.39, 0.4, 0.4999, 0.5, 1.25)
     starts = np.cumsum([0.0, *lengths])
     blocks = tuple(Block(a, a + b, "ok") for a, b in zip(starts, lengths, strict=False))
@@ -187,7 +189,7 @@ def test_frames_are_counted_that_lie_whole_in_a_block(simulated, tmp_path, monke
     amount = Balance.of(place).amounts["panda"]["ok"]
     assert amount.blocks == 5
     assert amount.seconds == pytest.approx(sum(lengths))
-    assert amount.frames == 0 + 1 + 1 + 2 + 9
+    assert amount.frames == 1 + 1 + 1 + 2 + 9
 
 
 def test_the_tables_are_data_too(simulated, tmp_path):

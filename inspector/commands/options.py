@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from inspector.part import Part
+
 RunFile = Annotated[Path, typer.Argument(help="A run file (run.npz).", show_default=False)]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
@@ -25,6 +27,9 @@ KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
 Kind = Annotated[
     str,
     typer.Option("--kind", callback=_known, help=f"Extended noise, one of {', '.join(KINDS)}."),
+]
+InPart = Annotated[
+    Part, typer.Option("--part", help="Take all runs, or those (not) held out for the last test.")
 ]
 Inputs = Annotated[
     list[Path],

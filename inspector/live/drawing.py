@@ -40,7 +40,7 @@ class Drawing:
         hertz: Array,
     ) -> None:
         self._recording, self._hertz = recording, hertz
-        self._colours = colors.of_classes(classes)
+        self._colours = colors.of_classes((*classes, colors.UNKNOWN))
         self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
         self._slices = [
             slice(first, min(first + JOINTS_PER_PLOT, len(joint_names)))
@@ -52,9 +52,10 @@ class Drawing:
         self._style_lines("/noise/simplified", ["simplified [rad/s]"], [colors.NOISE])
         recording.log("/spectrogram/bands", _strip_style(hertz), static=True)
         if classes:
-            self._style_lines("/score", list(classes), list(self._colours.values()))
+            self._style_lines("/score", list(classes), [self._colours[name] for name in classes])
+            names = list(self._colours)
             states = rr.StateConfiguration(
-                values=list(classes), labels=list(classes), colors=list(self._colours.values())
+                values=names, labels=names, colors=list(self._colours.values())
             )
             recording.log("/class/found", states, static=True)
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 import models
-import noisemodel as nm
 from inspector.labelling import Library
+from inspector.live.norms import Norms
 from inspector.live.slower import Slower
 from models.profile import TOLERANCE
 from noisemodel.lowering import EDGE
@@ -17,20 +17,21 @@ class Ear:
     Args:
         library: Models to choose from.
         rate: Samples per second, in [Hz].
-        columns: Velocities that the noise is made of.
+        norms: What makes which noise signal.
 
     Attributes:
         model: Name of the model that hears; empty without one.
         remark: Why nothing is heard, or at which other rate; empty if there is nothing to say.
     """
 
-    def __init__(self, library: Library, rate: float, columns: int) -> None:
+    def __init__(self, library: Library, rate: float, norms: Norms) -> None:
         self.rate, self.remark, self.model = rate, "", ""
         self._stream: models.Stream | None = None
         self._slower: Slower | None = None
+        self._norms, self._names = norms, tuple[str, ...]()
         self._ratio, self._heard = 1, 0
         try:
-            chosen = models.nearest(tuple(library.values()), rate)
+            chosen = models.nearest(tuple(library.values()), rate, norms.names)
         except models.RateError as error:
             self.remark = f"No labels: {error}."
             return
@@ -42,10 +43,10 @@ class Ear:
             )
             return
         self.model = next(name for name, model in library.items() if model is chosen)
-        self._ratio = ratio
+        self._ratio, self._names = ratio, chosen.profile.signals
         self._stream = models.Stream(chosen, rate=rate / ratio)
         if ratio > 1:
-            self._slower = Slower(ratio, columns)
+            self._slower = Slower(ratio, norms.columns)
             self.remark = f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}."
 
     @property
@@ -72,25 +73,23 @@ class Ear:
         """Time since the first sample, lost ones counted, in [s]: the clock of the labels."""
         return self._heard / self.rate
 
-    def hear(self, motion: Array, noise: Array, valid: Mask) -> models.Labels | None:
+    def hear(self, motion: Array, valid: Mask) -> models.Labels | None:
         """Take samples.
 
         Args:
             motion: All velocities that the noise is made of, shape (samples, columns).
-            noise: Their simplified noise, shape (samples,).
             valid: False where there is none, shape (samples,).
 
         Returns:
             Labels that are complete now, on the clock that starts with the first sample; None
             without a model.
         """
-        self._heard += len(noise)
+        self._heard += len(motion)
         if self._stream is None:
             return None
         if self._slower is not None:
-            lower, valid = self._slower.push(motion, valid)
-            noise = nm.simplified(lower)
-        return self._stream.push(noise, valid)
+            motion, valid = self._slower.push(motion, valid)
+        return self._stream.push(self._norms.of(motion, self._names), valid)
 
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
@@ -107,4 +106,4 @@ class Ear:
         lower, valid = self._slower.push(
             np.zeros((rest, self._slower.columns)), np.zeros(rest, dtype=bool)
         )
-        self._stream.push(nm.simplified(lower), valid)
+        self._stream.push(self._norms.of(lower, self._names), valid)

@@ -40,8 +40,7 @@ class Lane:
             if begin > self._end + self._hop / 2:
                 changes += self.end()
             if label != self._state:
-                score = float(labels.scores[index, labels.classes.index(label)])
-                changes.append(Change(begin, label, score))
+                changes.append(Change(begin, label, labels.score(index)))
             self._state, self._end = label, begin + self._hop
         return changes
 

@@ -17,13 +17,12 @@ from inspector.live.ear import Ear
 from inspector.live.lane import Lane
 from inspector.live.layout import Contents, layout
 from inspector.live.moving import Moving
+from inspector.live.norms import NOISY, Norms
 from inspector.live.sink import Sink
 from inspector.live.strip import Strip
 from inspector.live.troubles import Troubles
 from noisemodel.types import Array, Mask
 
-NOISY = ("base_velocity", "velocity", "velocity_desired")
-"""The signals that make noise: where one of them is unknown there is none."""
 REMEMBERED = 100_000
 """Delays that are kept, of the latest labels."""
 
@@ -62,7 +61,7 @@ class Worker:
         self._rate, self._sink, self._troubles = rate, sink, troubles
         self._noisy = [name for name in NOISY if name in widths]
         self._clock, self._strip = Clock(rate, troubles), Strip(rate)
-        self._ear = Ear(library, rate, sum(widths[name] for name in self._noisy))
+        self._ear = Ear(library, rate, Norms(widths))
         self._lane = Lane(self._ear.hop, self._ear.length)
         self._heard: Counter[str] = Counter()
         self._delays: deque[float] = deque(maxlen=REMEMBERED)
@@ -158,7 +157,7 @@ class Worker:
     def _hear(self, time: Array, came: Array, motion: Array, noise: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
         end = float(time[-1]) + 1.0 / self._rate
-        labels = self._ear.hear(motion, noise, valid)
+        labels = self._ear.hear(motion, valid)
         columns = self._strip.push(noise, valid, end)
         if labels is not None and len(labels):
             # How far back in the stretch frames end; a lower rate lags behind.

@@ -1,0 +1,92 @@
+"""Examples: what a machine learns from, features in place of frames."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Self
+
+import numpy as np
+
+from models.dataset import Dataset
+from models.errors import DatasetError
+from models.features import features
+from models.profile import Profile
+from models.recording import Recording
+from models.splitting import group_of
+from models.types import Array, Words
+
+CHUNK = 64
+"""Frames that are looked at together, which bounds the memory that they take."""
+
+
+@dataclass(frozen=True, eq=False)
+class Examples:
+    """Features of labelled frames; a tenth of the memory that the frames themselves take.
+
+    Attributes:
+        features: Not yet standardised, shape (frames, features).
+        labels: What each frame is, shape (frames,).
+        runs: Name of the recording that each frame is from, shape (frames,).
+        hashes: SHA-256 of each recording, by name.
+    """
+
+    features: Array
+    labels: Words
+    runs: Words
+    hashes: Mapping[str, str]
+
+    @classmethod
+    def of(cls, dataset: Dataset, profile: Profile) -> Self:
+        """Compute the features of all frames.
+
+        Args:
+            dataset: Annotated frames, cut by the same profile.
+            profile: What to compute.
+
+        Raises:
+            SignalError: If the frames do not fit the profile.
+        """
+        chunks = range(0, len(dataset), CHUNK)
+        found = [features(dataset.frames[first : first + CHUNK], profile) for first in chunks]
+        return cls(np.concatenate(found), dataset.labels, dataset.runs, dataset.hashes)
+
+    @classmethod
+    def read(cls, recordings: Iterable[Recording], profile: Profile) -> Self:
+        """Look at recordings one after the other; only their features are kept.
+
+        Args:
+            recordings: Annotated signals at the profile's rate, each of another name; those
+                without an annotation are passed over.
+            profile: How blocks are cut and framed, and what to compute.
+
+        Raises:
+            DatasetError: If there is no frame at all, or a name repeats.
+            ModelsError: As `Dataset.of` does.
+        """
+        found: list[Self] = []
+        hashes: dict[str, str] = {}
+        for recording in recordings:
+            if recording.name in hashes:
+                raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
+            hashes[recording.name] = recording.sha256
+            if recording.blocks:
+                found.append(cls.of(Dataset.of([recording], profile), profile))
+        if not found:
+            raise DatasetError(
+                f"no annotated frame in {len(hashes)} recordings; annotate blocks of"
+                f" {', '.join(profile.classes)}"
+            )
+        return cls(
+            np.concatenate([each.features for each in found]),
+            np.concatenate([each.labels for each in found]),
+            np.concatenate([each.runs for each in found]),
+            MappingProxyType(hashes),
+        )
+
+    @property
+    def groups(self) -> Words:
+        """What each frame shares its motion with, shape (frames,); see `splitting.group_of`."""
+        return np.array([group_of(name) for name in self.runs.tolist()])
+
+    def __len__(self) -> int:
+        return len(self.labels)

@@ -1,0 +1,94 @@
+"""Machines: what decides on features, of whatever kind."""
+
+from collections.abc import Mapping
+from typing import Protocol
+
+from models.networks import Networks
+from models.profile import Profile
+from models.svm import Machines, machine_count
+from models.types import Array, Index
+
+
+class Machine(Protocol):
+    """What decides on standardised features."""
+
+    @property
+    def width(self) -> int:
+        """Decisions on one frame."""
+
+    def decision(self, features: Array) -> Array:
+        """Decide on features, shape (frames, features); shape (frames, width)."""
+
+    def choose(self, decisions: Array) -> Index:
+        """Choose a class for each frame, shape (frames,); beyond the last is unknown."""
+
+    def score(self, decisions: Array) -> Array:
+        """Grade all classes for each frame, shape (frames, classes)."""
+
+    def arrays(self) -> dict[str, Array]:
+        """Give what a model file keeps."""
+
+
+def rebuilt(arrays: Mapping[str, Array], profile: Profile) -> Machine:
+    """Make a machine of the arrays of a model file."""
+    if profile.machine == "networks":
+        return Networks(
+            arrays["hidden"],
+            arrays["hidden_bias"],
+            arrays["output"],
+            arrays["output_bias"],
+            arrays["calibration"],
+            arrays["known"],
+            profile.alarm,
+        )
+    return Machines(
+        arrays["vectors"],
+        arrays["coefficients"],
+        arrays["intercept"],
+        profile.kernel,
+        profile.gamma,
+        profile.multiclass,
+    )
+
+
+def shapes(
+    arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
+) -> dict[str, tuple[int, ...]]:
+    """Say which shapes the arrays of a machine have to have.
+
+    Args:
+        arrays: Its arrays, each of the right number of dimensions.
+        profile: What they are to fit.
+        features: Features of a frame.
+        classes: How many classes there are.
+    """
+    if profile.machine == "networks":
+        count, units = profile.networks, profile.units
+        return {
+            "hidden": (count, features, units),
+            "hidden_bias": (count, units),
+            "output": (count, units, classes),
+            "output_bias": (count, classes),
+            "calibration": (1 + classes,),
+            "known": (2, features),
+        }
+    vectors, machines = len(arrays["vectors"]), machine_count(classes, profile.multiclass)
+    return {
+        "vectors": (vectors, features),
+        "coefficients": (machines, vectors),
+        "intercept": (machines,),
+    }
+
+
+DIMENSIONS = {
+    "svm": {"vectors": 2, "coefficients": 2, "intercept": 1},
+    "networks": {
+        "hidden": 3,
+        "hidden_bias": 2,
+        "output": 3,
+        "output_bias": 2,
+        "calibration": 1,
+        "known": 2,
+    },
+}
+"""Arrays of each kind of machine in a model file, and their dimensions."""

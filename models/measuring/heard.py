@@ -1,0 +1,88 @@
+"""What a model hears in a recording: in the blocks that were annotated, and from end to end."""
+
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from models.classifier import Classifier
+from models.dataset import Dataset
+from models.errors import DatasetError
+from models.labels import Labels
+from models.recording import Block, Recording
+from models.splitting import group_of
+from models.types import Words
+
+
+@dataclass(frozen=True, eq=False)
+class Heard:
+    """One recording, as it was annotated and as a model heard it.
+
+    Attributes:
+        name: Of the recording.
+        group: Of the recording, as `splitting.group_of` names it.
+        step: Time from one sample to the next, in [s].
+        blocks: Annotations, in order; each ends with the recording at the latest.
+        truth: What each frame is that was cut from a block, shape (frames,).
+        called: What the model calls it, shape (frames,).
+        labels: What the model says of the whole recording.
+    """
+
+    name: str
+    group: str
+    step: float
+    blocks: tuple[Block, ...]
+    truth: Words
+    called: Words
+    labels: Labels
+
+
+def hear(classifier: Classifier, recording: Recording) -> Heard:
+    """Let a model hear a recording.
+
+    Args:
+        classifier: The model.
+        recording: Annotated noise at its rate.
+
+    Returns:
+        What it says; a recording whose blocks all lie in gaps has no frame that was cut.
+
+    Raises:
+        ModelsError: If the recording does not fit the model.
+    """
+    truth, called = _of_blocks(classifier, recording)
+    return Heard(
+        recording.name,
+        group_of(recording.name),
+        1.0 / recording.rate,
+        _within(recording),
+        truth,
+        called,
+        _whole(classifier, recording),
+    )
+
+
+def _whole(classifier: Classifier, recording: Recording) -> Labels:
+    """Label a recording from end to end, as a user would."""
+    return classifier.classify(
+        recording.signal, recording.rate, start=recording.start, valid=recording.valid
+    )
+
+
+def _of_blocks(classifier: Classifier, recording: Recording) -> tuple[Words, Words]:
+    """Cut frames from the blocks as the paper does for validation, and let a model name them."""
+    try:
+        dataset = Dataset.of([recording], classifier.profile, training=False)
+    except DatasetError:  # no frame without a gap
+        return np.array([], dtype=str), np.array([], dtype=str)
+    return dataset.labels, classifier.predict(dataset.frames)
+
+
+def _within(recording: Recording) -> tuple[Block, ...]:
+    end = recording.start + len(recording.time) / recording.rate
+    return tuple(
+        sorted(
+            block._replace(stop=end if block.stop == inf else block.stop)
+            for block in recording.blocks
+        )
+    )

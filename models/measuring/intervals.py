@@ -1,0 +1,165 @@
+"""Intervals: within which bounds a measure lies, given how few recordings it was taken from.
+
+Frames of a recording and recordings of a group (`splitting.group_of`) resemble each other, so that
+only groups are drawn: of 2000 sets of as many groups, drawn with replacement, the bounds hold the
+middle 95 % (percentile bootstrap). Where hardly anything went wrong, the sets hardly differ, and
+bounds that follow from counting take over:
+
+- *shares*: n recordings without a mistake leave room for a true share of 0.025^(1/n), so that no
+  interval ends closer to 1, nor closer to 0 than 1 - 0.025^(1/n) (Clopper and Pearson, 1934);
+- *events in a time*: the exact bounds of Garwood (1936), if they are wider; for 0 events the upper
+  one is 3.7 over the time, and 3.0 with 95 % on this one side (the "rule of three").
+
+Fewer than five groups tell nothing of how groups differ: shares then have no interval.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Self
+
+import numpy as np
+
+from models.types import Array, Index, Mask
+
+RESAMPLES = 2000
+SEED = 0
+TAIL = 0.025
+"""Probability beyond each bound."""
+LEAST_GROUPS = 5
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A measure, its bounds, and what is behind it; NaN where there is none."""
+
+    value: float
+    """What was measured."""
+    low: float
+    """Lower bound with 95 %."""
+    high: float
+    """Upper bound with 95 %."""
+    runs: int
+    """Recordings that had anything to say."""
+    groups: int
+    """Groups of recordings that share their motion."""
+
+    def as_dict(self) -> dict[str, float | int | None]:
+        """Give the fields as JSON can hold them, None for what is not defined."""
+        bounds = {"value": self.value, "low": self.low, "high": self.high}
+        plain = {name: None if isnan(each) else float(each) for name, each in bounds.items()}
+        return {**plain, "runs": self.runs, "groups": self.groups}
+
+
+@dataclass(frozen=True, eq=False)
+class Resampling:
+    """Sets of groups, drawn once for all measures.
+
+    Attributes:
+        group: Group of each recording, as a number, shape (runs,).
+        weights: How often each set has each recording, shape (resamples, runs).
+    """
+
+    group: Index
+    weights: Array
+
+    @classmethod
+    def of(cls, groups: Sequence[str]) -> Self:
+        """Draw the sets.
+
+        Args:
+            groups: Group of each recording, shape (runs,).
+        """
+        names, group = np.unique(np.asarray(groups, dtype=str), return_inverse=True)
+        random = np.random.default_rng(SEED)
+        drawn = random.multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
+        return cls(group, drawn[:, group].astype(np.float64))
+
+    def share(self, part: Array, whole: Array) -> Estimate:
+        """Estimate a share.
+
+        Args:
+            part: What counts, shape (runs,).
+            whole: What it is a share of, shape (runs,).
+        """
+        drawn = ratio(self.weights @ part, self.weights @ whole)
+        return self.bounded(float(ratio(part.sum(), whole.sum())), drawn, [whole > 0])
+
+    def rate(self, events: Array, time: Array) -> Estimate:
+        """Estimate how many events there are in a unit of time.
+
+        Args:
+            events: Of each recording, shape (runs,).
+            time: How long each was watched, shape (runs,).
+        """
+        value = float(ratio(events.sum(), time.sum()))
+        runs, groups = self._behind(time > 0)
+        low, high = garwood(float(events.sum()))
+        low, high = (float(ratio(bound, time.sum())) for bound in (low, high))
+        if groups >= LEAST_GROUPS:
+            drawn = _middle(ratio(self.weights @ events, self.weights @ time))
+            low, high = min(low, drawn[0]), max(high, drawn[1])
+        return Estimate(value, low, high, runs, groups)
+
+    def bounded(self, value: float, drawn: Array, behind: Sequence[Mask]) -> Estimate:
+        """Put bounds to a share, or a mean of shares, that was computed for all sets.
+
+        Args:
+            value: What was measured.
+            drawn: The same of each set, shape (resamples,).
+            behind: For each share, which recordings had anything to say, shape (runs,).
+        """
+        runs = int(np.any(behind, axis=0).sum())
+        groups = min(self._behind(mask)[1] for mask in behind)
+        if groups < LEAST_GROUPS:
+            return Estimate(value, nan, nan, runs, groups)
+        # The mean of the shares' own bounds lies further out than the bound of their mean.
+        room = float(np.mean([TAIL ** (1.0 / mask.sum()) for mask in behind]))
+        low, high = _middle(drawn)
+        return Estimate(value, min(low, room), max(high, 1.0 - room), runs, groups)
+
+    def plain(self, value: float, drawn: Array, behind: Mask) -> Estimate:
+        """Put bounds to any other measure that was computed for all sets.
+
+        Args:
+            value: What was measured.
+            drawn: The same of each set, shape (resamples,).
+            behind: Which recordings had anything to say, shape (runs,).
+        """
+        runs, groups = self._behind(behind)
+        low, high = _middle(drawn) if groups >= LEAST_GROUPS else (nan, nan)
+        return Estimate(value, low, high, runs, groups)
+
+    def _behind(self, mask: Mask) -> tuple[int, int]:
+        return int(mask.sum()), len(np.unique(self.group[mask]))
+
+
+def garwood(events: float) -> tuple[float, float]:
+    """Bound the mean of a Poisson distribution, exactly.
+
+    Args:
+        events: How many there were.
+
+    Returns:
+        Lower and upper bound with 95 %.
+    """
+    from scipy.special import gammaincinv
+
+    # F. Garwood, Fiducial limits for the Poisson distribution, Biometrika 28 (1936)
+    low = float(gammaincinv(events, TAIL)) if events else 0.0
+    return low, float(gammaincinv(events + 1.0, 1.0 - TAIL))
+
+
+def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:
+    """Divide, NaN where there is nothing to divide by."""
+    part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
+    share: Array = np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
+    return share
+
+
+def _middle(drawn: Array) -> tuple[float, float]:
+    known = drawn[~np.isnan(drawn)]
+    if not len(known):
+        return nan, nan
+    low, high = np.quantile(known, (TAIL, 1.0 - TAIL)).tolist()
+    return low, high

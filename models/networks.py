@@ -1,0 +1,124 @@
+"""Small neural networks, evaluated in NumPy, that say how probable each class is.
+
+Several networks with one hidden layer look at the same features; their probabilities are averaged
+and then calibrated. A decision is the logarithm of a class's probability, for all classes, and
+then how foreign the frame is: how far its farthest feature lies above nearly all that the networks
+have learnt from, in deviations. Far above, probabilities mean nothing. What lies below is taken for
+the least that is known: a motion quieter than any other is no failure, and a simulator without
+sensor noise is not foreign for that.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.types import Array, Index
+
+TINY = 1e-12
+"""The least probability that is told from none."""
+FOREIGN = 2.0
+"""A frame is unknown if a feature lies farther than this above what was learnt from."""
+
+
+@dataclass(frozen=True, eq=False)
+class Networks:
+    """Networks whose answers are averaged, their calibration, and what they know.
+
+    Attributes:
+        hidden: Weights to the hidden layers, shape (networks, features, units).
+        hidden_bias: Shape (networks, units).
+        output: Weights to the classes, shape (networks, units, classes).
+        output_bias: Shape (networks, classes).
+        calibration: Scale of the averaged log-probabilities, then an offset for each class, shape
+            (1 + classes,).
+        known: Lowest and highest value of each feature that is known, shape (2, features).
+        alarm: Probability of any failure from which a frame is one.
+    """
+
+    hidden: Array
+    hidden_bias: Array
+    output: Array
+    output_bias: Array
+    calibration: Array
+    known: Array
+    alarm: float
+
+    @property
+    def width(self) -> int:
+        """Decisions on one frame."""
+        return len(self.calibration)
+
+    def decision(self, features: Array) -> Array:
+        """Say how probable each class is, and how foreign the frame.
+
+        Args:
+            features: Feature vectors, shape (frames, features).
+
+        Returns:
+            Logarithms of calibrated probabilities, then how foreign it is, shape
+            (frames, classes + 1).
+        """
+        beyond = (features - self.known[1]).max(axis=1, keepdims=True)
+        heard = np.maximum(features, self.known[0])
+        answers = calibrated(self.average(heard), self.calibration)
+        return np.hstack((answers, beyond))
+
+    def average(self, features: Array) -> Array:
+        """Average the networks' probabilities; their logarithms, shape (frames, classes)."""
+        hidden = np.maximum(features @ self.hidden + self.hidden_bias[:, None], 0.0)
+        answers = _log_softmax(hidden @ self.output + self.output_bias[:, None])
+        average: Array = np.log(np.exp(answers).mean(axis=0) + TINY)
+        return average
+
+    def choose(self, decisions: Array) -> Index:
+        """Choose the most probable failure if failures are probable enough, or else `ok`.
+
+        Args:
+            decisions: What `decision` gave.
+
+        Returns:
+            Index of a class for each frame, shape (frames,); one more than the last for a frame
+            that is unknown.
+        """
+        answers, foreign = decisions[:, :-1], decisions[:, -1]
+        failure = 1.0 - np.exp(answers[:, 0]) >= self.alarm
+        chosen = np.where(failure, 1 + answers[:, 1:].argmax(axis=1), 0)
+        return np.where(foreign > FOREIGN, answers.shape[1], chosen)
+
+    def score(self, decisions: Array) -> Array:
+        """Grade all classes by their probabilities, shape (frames, classes)."""
+        probabilities: Array = np.exp(decisions[:, :-1])
+        return probabilities
+
+    def arrays(self) -> dict[str, Array]:
+        """Give what a model file keeps."""
+        return {
+            "hidden": self.hidden,
+            "hidden_bias": self.hidden_bias,
+            "output": self.output,
+            "output_bias": self.output_bias,
+            "calibration": self.calibration,
+            "known": self.known,
+        }
+
+
+def calibrated(answers: Array, calibration: Array) -> Array:
+    """Make probabilities come true: scale their logarithms, and shift each class.
+
+    Vector scaling with one scale for all classes, C. Guo et al., *On Calibration of Modern Neural
+    Networks*, 2017, Sec. 4.2.
+
+    Args:
+        answers: Logarithms of probabilities, shape (frames, classes).
+        calibration: Scale and offsets, shape (1 + classes,).
+
+    Returns:
+        Logarithms of calibrated probabilities, shape (frames, classes).
+    """
+    return _log_softmax(calibration[0] * answers + calibration[1:])
+
+
+def _log_softmax(values: Array) -> Array:
+    shifted = values - values.max(axis=-1, keepdims=True)
+    softmax: Array = shifted - np.log(np.exp(shifted).sum(axis=-1, keepdims=True))
+    return softmax

@@ -1,0 +1,72 @@
+"""Recordings as a made-up model heard them."""
+
+import numpy as np
+
+from models.framing import frame_starts
+from models.labels import Labels
+from models.measuring.heard import Heard
+from models.recording import Block
+from models.splitting import group_of
+
+CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
+RATE, LENGTH, HOP = 1000.0, 400, 100
+
+OK = np.eye(4)[0]
+
+
+def blocks(*rows):
+    return tuple(Block(*row) for row in rows)
+
+
+def frames(seconds=5.0):
+    """Start of each frame of a recording."""
+    starts = frame_starts(round(seconds * RATE), length=LENGTH, hop=HOP, flush_end=True)
+    return starts / RATE
+
+
+def perfect(blocks, seconds=5.0):
+    """What a model without fault calls each frame: a failure as soon as it hears any of it."""
+    called = []
+    for start in frames(seconds):
+        stop = start + LENGTH / RATE
+        shared = {
+            min(stop, block.stop) - max(start, block.start): block.label
+            for block in blocks
+            if block.label != "ok"
+        }
+        most = max(shared, default=0.0)
+        called.append(shared[most] if most > 2e-3 else "ok")
+    return called
+
+
+def heard(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, start=0.0):
+    """A recording; by default it is heard without fault, and frames cut from blocks likewise."""
+    called = perfect(blocks, seconds) if called is None else called
+    called = np.array(called)
+    begins = start + frames(seconds)
+    if scores is None:
+        scores = np.array([np.eye(4)[CLASSES.index(label)] - 0.5 for label in called])
+    truth = np.array([block.label for block in blocks])
+    return Heard(
+        name,
+        group_of(name),
+        1.0 / RATE,
+        tuple(sorted(b._replace(start=b.start + start, stop=b.stop + start) for b in blocks)),
+        truth,
+        truth if cut is None else np.array(cut),
+        Labels(begins, begins + LENGTH / RATE, called, scores, CLASSES),
+    )
+
+
+QUIET = blocks((0.0, 5.0, "ok"))
+BLOW = blocks((0.0, 2.0, "ok"), (2.03, 2.2, "impact"), (3.0, 5.0, "ok"))
+SWING = blocks((0.0, 1.0, "ok"), (1.05, 3.5, "oscillations"), (3.6, 5.0, "ok"))
+
+
+def many(seeds, called=None):
+    """Good runs, blows and swings of one robot."""
+    return [
+        heard(f"talos/{scenario}-{seed:03d}", annotated, called)
+        for seed in range(seeds)
+        for scenario, annotated in (("good", QUIET), ("blow", BLOW), ("swing", SWING))
+    ]

@@ -1,0 +1,151 @@
+"""The command that measures a model."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from commandline import call
+from hearings import BLOW, CLASSES, QUIET, SWING, frames, heard, many, perfect
+
+from inspector import evaluationpicture
+from models.measuring.assessment import judge
+
+
+def run(path, seed, *, label="oscillations"):
+    time = np.arange(20_000) / 10_000
+    calm = 1 + 0.01 * np.random.default_rng(seed).normal(size=20_000)
+    calm[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
+    np.savez(
+        path,
+        time=time,
+        velocity=calm[:, None],
+        block_start=[0.0, 1.0],
+        block_stop=[1.0, 2.0],
+        block_label=["ok", label],
+    )
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A model, two runs that it was trained on, and six others."""
+    path = tmp_path_factory.mktemp("evaluate")
+    known = [run(path / f"known{seed}.npz", seed) for seed in range(2)]
+    (path / "test").mkdir()
+    for seed in range(2, 8):
+        run(path / "test" / f"run{seed}.npz", seed)
+    assert (
+        call("train", *known, "-o", path / "model.npz", "--rate", 1000, "--profile", "logbands")[0]
+        == 0
+    )
+    return path
+
+
+def test_a_model_is_measured_and_told(folder):
+    status, out, err = call("evaluate", folder / "model.npz", folder / "test")
+    assert (status, err) == (0, "")
+    assert "6 runs in 6 groups" in out
+    assert "all failures            100.0% [54.1, 100.0]" in out
+    assert "False alarms            0, or 0 per hour [0, " in out
+    assert "As the paper measures, in shares of ALL frames" in out
+
+
+def test_json_is_printed_or_written_with_the_models_name(folder, tmp_path):
+    status, out, _ = call("evaluate", folder / "model.npz", folder / "test", "--json")
+    assert status == 0
+    report = json.loads(out)
+    assert (report["model"], report["runs"]) == ("model.npz", 6)
+    assert np.array(report["confusion"]).sum() == 6 * 2 * 7
+    path = tmp_path / "report.json"
+    status, out, _ = call("evaluate", folder / "model.npz", folder / "test", "-o", path)
+    assert status == 0
+    assert "Balanced accuracy" in out
+    assert json.loads(path.read_text()) == report
+
+
+def test_runs_that_it_was_trained_on_are_refused_in_one_line(folder):
+    calls = folder / "model.npz", folder / "test", folder / "known1.npz"
+    status, out, err = call("evaluate", *calls)
+    assert (status, out, err.count("\n")) == (3, "", 1)
+    assert "known1: the model was trained on the same recording as 'known1'" in err
+    assert "(--seen-too)" in err
+    status, out, _ = call("evaluate", *calls, "--seen-too")
+    assert status == 0
+    assert "NOT A TEST: 1 of these runs were trained on" in out
+    status, out, _ = call("evaluate", *calls, "--seen-too", "--json")
+    assert list(json.loads(out)["seen"]) == ["known1"]
+
+
+def test_what_exists_is_not_written_over(folder, tmp_path):
+    there = tmp_path / "there"
+    there.write_text("kept")
+    for option in ("-o", "--picture"):
+        status, _, err = call("evaluate", folder / "model.npz", folder / "test", option, there)
+        assert (status, err.count("\n")) == (3, 1)
+        assert "exists already" in err
+    assert there.read_text() == "kept"
+    call("evaluate", folder / "model.npz", folder / "test", "-o", there, "--overwrite")
+    assert json.loads(there.read_text())["runs"] == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "problem"),
+    [("bare.npz", "has no annotated blocks"), ("odd.npz", "label 'rattle' is no class")],
+)
+def test_runs_that_cannot_be_measured_by_are_refused(folder, tmp_path, name, problem):
+    run(tmp_path / "odd.npz", 9, label="rattle")
+    time = np.arange(20_000) / 10_000
+    np.savez(tmp_path / "bare.npz", time=time, velocity=np.ones((20_000, 1)))
+    status, _, err = call("evaluate", folder / "model.npz", tmp_path / name)
+    assert (status, err.count("\n")) == (3, 1)
+    assert problem in err
+
+
+def test_a_folder_without_runs_is_refused(folder, tmp_path):
+    status, _, err = call("evaluate", folder / "model.npz", tmp_path)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "no annotated frame in 0 recordings" in err
+
+
+def test_a_picture_is_drawn(folder, tmp_path):
+    pytest.importorskip("matplotlib")
+    path = tmp_path / "report.png"
+    status, _, err = call("evaluate", folder / "model.npz", folder / "test", "--picture", path)
+    assert (status, err) == (0, "")
+    png = path.read_bytes()
+    assert png.startswith(b"\x89PNG")
+    assert struct.unpack(">II", png[16:24]) == (1100, 850)
+
+
+def sure(name, blocks, random):
+    """A recording that is heard with probabilities."""
+    scores = np.array([np.eye(4)[CLASSES.index(label)] for label in perfect(blocks)])
+    scores = np.exp(4 * scores + random.normal(size=scores.shape))
+    scores /= scores.sum(axis=1, keepdims=True)
+    called = [CLASSES[best] for best in scores.argmax(axis=1)]
+    return heard(name, blocks, called, scores=scores)
+
+
+def test_pictures_show_what_there_is_and_leave_out_what_is_not(tmp_path, monkeypatch):
+    pytest.importorskip("matplotlib")
+    from matplotlib.figure import Figure
+
+    drawn = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
+    random = np.random.default_rng(0)
+    probable = [
+        sure(f"talos/{name}-{seed:03d}", blocks, random)
+        for seed in range(8)
+        for name, blocks in (("good", QUIET), ("blow", BLOW), ("swing", SWING))
+    ]
+    silent = [heard("a", SWING[1:2], ["ok"] * len(frames()))]  # no ok motion, and nothing found
+    for recordings in (probable, many(6), silent):
+        evaluationpicture.draw(judge(recordings), tmp_path / "p.png", title="m", overwrite=True)
+    texts = [
+        {text.get_text() for text in figure.findobj() if hasattr(text, "get_text")}
+        for figure in drawn
+    ]
+    assert any(text.startswith("expected calibration error") for text in texts[0])
+    assert "the scores are no probabilities" in texts[1]
+    assert drawn[0].get_suptitle() == "m: 24 runs of 8 groups, 0.0253 h of ok motion"

@@ -1,0 +1,119 @@
+from math import isnan, nan
+
+import numpy as np
+import pytest
+
+from models.measuring.intervals import Resampling, garwood
+
+
+def each_its_own(runs):
+    return Resampling.of([f"run{number}" for number in range(runs)])
+
+
+def test_bounds_of_rare_events_are_those_of_the_tables():
+    # Garwood (1936), 95 %
+    assert garwood(0) == pytest.approx((0.0, 3.6889), abs=1e-4)
+    assert garwood(1) == pytest.approx((0.0253, 5.5716), abs=1e-4)
+    assert garwood(10) == pytest.approx((4.7954, 18.3904), abs=1e-4)
+
+
+def test_no_event_at_all_leaves_room_for_some():
+    rate = each_its_own(1000).rate(np.zeros(1000), np.full(1000, 2.0 / 1000))
+    assert (rate.value, rate.low) == (0.0, 0.0)
+    assert rate.high == pytest.approx(3.6889 / 2.0, abs=1e-4)
+
+
+def test_events_that_come_in_crowds_are_less_certain_than_those_that_come_alone():
+    hours, alone, crowd = np.full(50, 0.1), np.zeros(50), np.zeros(50)
+    alone[:20] = 1
+    crowd[:2] = 10
+    resampling = each_its_own(50)
+    assert resampling.rate(crowd, hours).value == pytest.approx(4.0)
+    exact = np.array(garwood(20)) / 5.0
+    assert resampling.rate(alone, hours).low == pytest.approx(exact[0])
+    assert resampling.rate(crowd, hours).high > 1.3 * exact[1]
+
+
+def test_runs_without_a_mistake_promise_no_more_than_they_can():
+    for runs in (5, 20, 500):
+        perfect = each_its_own(runs).share(np.full(runs, 7.0), np.full(runs, 7.0))
+        assert perfect.value == perfect.high == 1.0
+        assert perfect.low == pytest.approx(0.025 ** (1 / runs))
+        nothing = each_its_own(runs).share(np.zeros(runs), np.full(runs, 7.0))
+        assert (nothing.low, nothing.high) == (0.0, pytest.approx(1.0 - 0.025 ** (1 / runs)))
+
+
+def test_a_mistake_never_raises_the_lower_bound():
+    part = np.full(30, 100.0)
+    perfect = each_its_own(30).share(part, np.full(30, 100.0))
+    part[0] = 99.0
+    assert each_its_own(30).share(part, np.full(30, 100.0)).low <= perfect.low
+
+
+def test_intervals_shrink_with_the_root_of_the_number_of_groups():
+    widths = []
+    for runs in (20, 80, 320):
+        part = np.where(np.arange(runs) % 4 == 0, 2.0, 9.0)
+        share = each_its_own(runs).share(part, np.full(runs, 10.0))
+        widths.append(share.high - share.low)
+    assert widths[0] / widths[1] == pytest.approx(2.0, rel=0.15)
+    assert widths[1] / widths[2] == pytest.approx(2.0, rel=0.15)
+
+
+def test_more_runs_of_the_same_groups_make_nothing_more_certain():
+    part, whole = np.tile([2.0, 9.0, 5.0, 7.0, 1.0, 10.0], 5), np.full(30, 10.0)
+    few = Resampling.of([f"g{number % 6}" for number in range(6)]).share(part[:6], whole[:6])
+    many = Resampling.of([f"g{number % 6}" for number in range(30)]).share(part, whole)
+    assert (many.low, many.high) == pytest.approx((few.low, few.high))
+    assert (few.runs, many.runs, many.groups) == (6, 30, 6)
+
+
+def test_intervals_hold_what_is_true_in_95_of_100_cases_and_those_by_frames_do_not():
+    random = np.random.default_rng(5)
+    held, naive = 0, 0
+    for _ in range(200):
+        own = random.beta(8, 2, 40)  # groups differ; their mean is 0.8
+        right = random.binomial(50, own).astype(float)
+        share = each_its_own(40).share(right, np.full(40, 50.0))
+        held += share.low <= 0.8 <= share.high
+        half = 1.96 * np.sqrt(share.value * (1 - share.value) / 2000)
+        naive += abs(share.value - 0.8) <= half
+    assert held >= 180
+    assert naive <= 140
+
+
+def test_fewer_than_five_groups_have_no_interval():
+    share = Resampling.of(["a", "b", "c", "d", "d", "d"]).share(np.ones(6), np.ones(6))
+    assert share.value == 1.0
+    assert isnan(share.low)
+    assert isnan(share.high)
+    assert (share.runs, share.groups) == (6, 4)
+    rate = Resampling.of(["a"]).rate(np.ones(1), np.ones(1))  # counting alone bounds a rate
+    assert (rate.low, rate.high) == pytest.approx(garwood(1))
+
+
+def test_only_what_has_something_to_say_is_behind_a_measure():
+    whole = np.array([0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 0.0])
+    assert each_its_own(7).share(whole / 2, whole).runs == 5
+    nothing = each_its_own(7).share(np.zeros(7), np.zeros(7))
+    assert isnan(nothing.value)
+    assert nothing.as_dict() == {"value": None, "low": None, "high": None, "runs": 0, "groups": 0}
+
+
+def test_sets_are_the_same_each_time_and_in_any_order_of_the_runs():
+    names = [f"g{number // 3}" for number in range(60)]
+    part, whole = np.arange(60.0) % 7, np.full(60, 7.0)
+    first = Resampling.of(names).share(part, whole)
+    assert Resampling.of(names).share(part, whole) == first
+    back = Resampling.of(names[::-1]).share(part[::-1], whole)
+    assert (back.low, back.high) == pytest.approx((first.low, first.high))
+
+
+def test_the_bounds_of_a_mean_allow_for_the_least_known_part():
+    resampling = each_its_own(40)
+    both = [np.ones(40, dtype=bool), np.arange(40) < 6]
+    mean = resampling.bounded(1.0, np.ones(2000), both)
+    assert mean.low == pytest.approx((0.025 ** (1 / 40) + 0.025 ** (1 / 6)) / 2)
+    assert mean.groups == 6
+    assert isnan(resampling.bounded(1.0, np.ones(2000), [both[0], np.arange(40) < 4]).low)
+    assert isnan(resampling.plain(nan, np.full(2000, nan), both[0]).low)
