@@ -18,6 +18,7 @@ from inspector.commands import (
     showing,
     simulating,
     travelling,
+    tuning,
 )
 
 app = typer.Typer(
@@ -62,6 +63,7 @@ app.command()(travelling.labels)
 app.command()(travelling.export)
 app.add_typer(simulating.app, name="simulate")
 app.command()(learning.train)
+app.command()(tuning.tune)
 app.command()(learning.evaluate)
 app.command()(comparing.compare)
 app.command()(comparing.robots)

@@ -1,0 +1,173 @@
+"""The file that results of tuning are kept in, a line of JSON for each point of the grid.
+
+The first line is the question: profile, grid, what was trained on and measured by, and the software
+that did it. Points follow in the order of the grid as they are worked off, so that whatever lines
+are there is the beginning of the whole. Tuning that was killed goes on from there; so does another
+look at results that are complete.
+"""
+
+import fcntl
+import json
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields
+from math import nan
+from pathlib import Path
+from typing import IO, Any
+
+from inspector.errors import InspectorError
+from models.tuning.grid import Point
+from models.tuning.search import Measures
+
+FORMAT = "noise-tuning/1"
+
+
+class ResultsError(InspectorError):
+    """A file of results that cannot be gone on with.
+
+    Args:
+        path: The file.
+        problem: What is wrong with it, in one line.
+    """
+
+    def __init__(self, path: Path, problem: str) -> None:
+        self.path, self.problem = path, problem
+        super().__init__(f"{path}: {problem}; name another file, or overwrite it (--overwrite)")
+
+
+@dataclass(eq=False)
+class Results:
+    """What is known of the points of a grid, in their order.
+
+    Attributes:
+        path: Where it is kept.
+        points: All points.
+        measures: Measures of the first of them.
+    """
+
+    path: Path
+    points: Sequence[Point]
+    measures: list[Measures]
+    _file: IO[bytes]
+
+    def add(self, measures: Sequence[Measures]) -> None:
+        """Keep the measures of the next points, safely on the disk.
+
+        Raises:
+            InspectorError: If they cannot be written.
+        """
+        points = self.points[len(self.measures) :][: len(measures)]
+        rows = zip(points, measures, strict=True)
+        lines = [_line({**point, **each.as_dict()}) for point, each in rows]
+        _append(self.path, self._file, b"".join(lines))
+        self.measures += measures
+
+
+@contextmanager
+def opened(
+    path: Path, question: Mapping[str, Any], points: Sequence[Point], *, overwrite: bool = False
+) -> Iterator[Results]:
+    """Open a file of results to go on with it, or make it.
+
+    Args:
+        path: The file.
+        question: What the results answer, by topic, as JSON can hold it.
+        points: All points of the grid.
+        overwrite: Whether to start anew, whatever the file holds.
+
+    Yields:
+        The results that there are.
+
+    Raises:
+        ResultsError: If the file is no such file, is damaged, or answers another question.
+        InspectorError: If it cannot be read or written, or somebody else is writing it.
+    """
+    with _locked(path) as file:
+        file.seek(0)
+        whole, _, torn = (b"" if overwrite else file.read()).rpartition(b"\n")
+        header = _line({"format": FORMAT, **question})
+        measures: list[Measures] = []
+        if whole:
+            first, *rows = whole.split(b"\n")
+            _check_question(path, first, json.loads(header))
+            measures = _read(path, rows, points)
+        elif not header.startswith(torn):
+            raise ResultsError(path, "holds no results of tuning")
+        # A line without its end is one that was being written when the end came.
+        file.truncate(len(whole) + bool(whole))
+        if not whole:
+            _append(path, file, header)
+        yield Results(path, points, measures, file)
+
+
+def _locked(path: Path) -> IO[bytes]:
+    try:
+        file = path.open("a+b")
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        file.close()
+        raise InspectorError(
+            f"{path}: is being written by another process; wait for it, or name another file"
+        ) from error
+    except OSError as error:
+        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
+    return file
+
+
+def _append(path: Path, file: IO[bytes], content: bytes) -> None:
+    try:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
+    except OSError as error:
+        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _check_question(path: Path, line: bytes, question: Mapping[str, Any]) -> None:
+    try:
+        there = json.loads(line)
+    except ValueError:
+        there = None
+    if not isinstance(there, dict) or not str(there.get("format")).startswith("noise-tuning/"):
+        raise ResultsError(path, "holds no results of tuning")
+    for topic, mine in question.items():
+        if there.get(topic) != mine:
+            name = topic.replace("_", " ")
+            raise ResultsError(
+                path, f"holds results of another {name} ({_difference(there.get(topic), mine)})"
+            )
+
+
+def _difference(there: Any, mine: Any) -> str:
+    """Name the first thing that is not the same."""
+    if not (isinstance(there, dict) and isinstance(mine, dict)):
+        return f"{there}, not {mine}"
+    names = [*mine, *(name for name in there if name not in mine)]
+    name = next(name for name in names if there.get(name) != mine.get(name))
+    if name in there and name in mine:
+        return f"{name} differs"
+    return f"{name} was {'in' if name in there else 'not in'} it"
+
+
+def _read(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> list[Measures]:
+    """Read the measures, of the points that they have to be of."""
+    if len(rows) > len(points):
+        raise ResultsError(path, f"is damaged: {len(rows)} points of {len(points)}")
+    names = [field.name for field in fields(Measures)]
+    measures = []
+    for number, (row, point) in enumerate(zip(rows, points, strict=False), start=2):
+        try:
+            found = json.loads(row)
+            values = [nan if found[name] is None else float(found[name]) for name in names]
+            fits = {name: found[name] for name in point} == point
+        except (ValueError, KeyError, TypeError):
+            fits = False
+        if not fits:
+            raise ResultsError(path, f"is damaged in line {number}")
+        measures.append(Measures(*values))
+    return measures
+
+
+def _line(content: Mapping[str, Any]) -> bytes:
+    return json.dumps(content, allow_nan=False).encode() + b"\n"

@@ -1,0 +1,363 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from commandline import call
+
+import inspector.tuning
+import models
+
+GRID = ("--grid", "stride=25,50", "--grid", "gamma=0.001,0.01", "--grid", "C=0.1,1,10")
+OPTIONS = ("--profile", "logbands", "--rate", "1000")
+
+
+def write_log(folder, number, classes=("ok", "impact", "oscillations")):
+    """Six seconds of noise at 1 kHz with a stretch of each class, as NoisyTest keeps them."""
+    folder.mkdir(exist_ok=True)
+    random = np.random.default_rng(number)
+    time = np.arange(6000) / 1000.0
+    noise = random.standard_normal(len(time))
+    noise += 0.6 * np.sin(300.0 * time) * (time > 4.0)
+    noise += 2.0 * random.standard_normal(len(time)) * (time > 2.3) * (time < 2.4)
+    spans = dict(
+        zip(("ok", "impact", "oscillations"), ([0, 1.5], [2.2, 2.5], [4, 5.9]), strict=True)
+    )
+    path = folder / f"walk{number}.log"
+    np.savetxt(path, np.column_stack((time, noise)), fmt="%.6f")
+    path.with_suffix(".toml").write_text(
+        f"[data]\nchunk_ranges = {[spans[each] for each in classes]}\n"
+        f"chunk_labels = {json.dumps(list(classes))}\n"
+    )
+
+
+@pytest.fixture(scope="module")
+def data(tmp_path_factory):
+    """A folder to train on and one to measure by."""
+    folder = tmp_path_factory.mktemp("data")
+    for number in range(4):
+        write_log(folder / "training", number)
+    for number in range(4, 7):
+        write_log(folder / "validation", number)
+    for kind in ("log", "toml"):  # NoisyTest's own sets share names, too
+        (folder / "validation" / f"walk6.{kind}").rename(folder / "validation" / f"walk3.{kind}")
+    return folder
+
+
+def tune(data, output, *more, grid=GRID):
+    against = ("--validation", data / "validation")
+    return call("tune", data / "training", *against, *OPTIONS, *grid, "-o", output, *more)
+
+
+@pytest.fixture(scope="module")
+def whole(data, tmp_path_factory):
+    """Results that came without a pause, and what was printed."""
+    output = tmp_path_factory.mktemp("whole") / "tuned.jsonl"
+    status, out, err = tune(data, output)
+    assert (status, err) == (0, "")
+    return output, out
+
+
+def lines(path):
+    return [json.loads(line) for line in path.read_text().splitlines()]
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """Lists the points that are measured."""
+    points = []
+
+    def measure(profiles, trial):
+        points.extend(profiles)
+        return models.tuning.search.measure(profiles, trial)
+
+    monkeypatch.setattr(inspector.tuning, "measure", measure)
+    return points
+
+
+def test_each_point_has_a_line_after_that_of_the_question(whole):
+    question, *points = lines(whole[0])
+    assert question["format"] == "noise-tuning/1"
+    assert question["grid"] == {
+        "stride": [25, 50],
+        "gamma": [0.001, 0.01],
+        "regularization": [0.1, 1.0, 10.0],
+    }
+    assert sorted(question["training_set"]) == ["walk0", "walk1", "walk2", "walk3"]
+    assert len(points) == 12
+    assert [points[1][name] for name in question["grid"]] == [25, 0.001, 1.0]
+    assert all(0.0 <= point["balanced_accuracy"] <= 1.0 for point in points)
+
+
+def test_the_best_points_are_printed_under_each_other(whole):
+    output, out = whole
+    points = lines(output)[1:]
+    best = min(points, key=lambda point: (-point["balanced_accuracy"], point["log_loss"]))
+    heading, _, _, names, first, *_ = out.splitlines()
+    assert heading.startswith("12 points of logbands, trained on ")
+    assert "4 recordings, measured on" in heading
+    assert heading.endswith("3 others")
+    assert names.split()[:3] == ["stride", "gamma", "regularization"]
+    assert first.split()[:4] == ["1", *(f"{best[name]:g}" for name in names.split()[:3])]
+    assert f"{best['log_loss']:.4f}" in first
+    assert "as was        25" in out
+
+
+def test_the_number_of_points_that_share_the_best_is_printed(whole):
+    output, out = whole
+    for name, words in (("balanced_accuracy", "balanced"), ("subset_accuracy", "subset")):
+        values = [point[name] for point in lines(output)[1:]]
+        count = values.count(max(values))
+        verb = "has" if count == 1 else "share"
+        assert f"{count} of 12 points {verb} the best {words} accuracy, {max(values):.1%}" in out
+
+
+def test_json_is_printed_for_programs(data, whole):
+    status, out, _ = tune(data, whole[0], "--json", "--rows", 3)
+    report = json.loads(out)
+    assert (status, report["points"], len(report["best"])) == (0, 12, 3)
+    assert report["best"][0] in lines(whole[0])
+    assert report["profile"]["gamma"] == report["best"][0]["gamma"]
+
+
+def test_the_best_point_is_the_one_that_is_trained(data, whole, tmp_path):
+    model = tmp_path / "model.npz"
+    status, out, _ = tune(data, whole[0], "--train", model)
+    assert status == 0
+    assert out.endswith(f"{model}: written, the best point trained on all training runs\n")
+    points = lines(whole[0])[1:]
+    best = min(points, key=lambda point: (-point["balanced_accuracy"], point["log_loss"]))
+    classifier = models.Classifier.load(model)
+    for name in ("stride", "gamma", "regularization"):
+        assert getattr(classifier.profile, name) == best[name]
+    metrics = classifier.metrics["validation"]
+    for name in ("balanced_accuracy", "failure_recall", "false_alarm_rate", "subset_accuracy"):
+        assert metrics[name] == pytest.approx(best[name], abs=1e-9)
+
+
+def test_what_is_done_is_not_done_again(data, whole, tmp_path, counted):
+    output = tmp_path / "tuned.jsonl"
+    output.write_bytes(whole[0].read_bytes())
+    status, out, _ = tune(data, output)
+    assert (status, out) == (0, whole[1])
+    assert not counted
+    assert output.read_bytes() == whole[0].read_bytes()
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.65, 0.999])
+def test_tuning_that_was_cut_off_goes_on_to_the_same_bytes(data, whole, tmp_path, counted, share):
+    output, content = tmp_path / "tuned.jsonl", whole[0].read_bytes()
+    output.write_bytes(content[: int(share * len(content))])
+    there = max(output.read_bytes().count(b"\n") - 1, 0)
+    assert tune(data, output)[0] == 0
+    assert len(counted) == 12 - there
+    assert output.read_bytes() == content
+
+
+def test_two_jobs_come_to_the_same(data, whole, tmp_path):
+    output = tmp_path / "tuned.jsonl"
+    assert tune(data, output, "-j", 2)[0] == 0
+    assert lines(output) == lines(whole[0])
+
+
+def test_killed_tuning_goes_on_where_it_was(data, whole, tmp_path, counted):
+    output = tmp_path / "tuned.jsonl"
+    words = ("tune", data / "training", "--validation", data / "validation", *OPTIONS, *GRID)
+    command = [sys.executable, "-m", "inspector", *map(str, words), "-o", str(output)]
+    process = subprocess.Popen(command, env=os.environ | {"PYTHONUNBUFFERED": "1"})
+    while process.poll() is None:
+        if output.exists() and output.read_bytes().count(b"\n") > 3:
+            process.send_signal(signal.SIGKILL)
+        time.sleep(0.002)
+    there = output.read_bytes().count(b"\n") - 1
+    assert there >= 3
+    assert tune(data, output)[0] == 0
+    assert len(counted) == 12 - there
+    assert lines(output) == lines(whole[0])
+
+
+def test_another_criterion_takes_no_new_work(data, whole, counted):
+    status, out, _ = tune(data, whole[0], "--criterion", "log-loss")
+    points = lines(whole[0])[1:]
+    best = min(points, key=lambda point: point["log_loss"])
+    assert (status, counted) == (0, [])
+    assert f"{best['log_loss']:.4f}" in out.splitlines()[4]
+    assert "the log-loss decides" not in out
+
+
+def test_without_a_validation_set_recordings_are_folded(data, tmp_path):
+    output = tmp_path / "tuned.jsonl"
+    options = (*OPTIONS, *GRID, "--folds", 2, "-o", output)
+    status, out, err = call("tune", data / "training", *options)
+    assert (status, err) == (0, "")
+    assert "frames of the same, in 2 folds" in out
+    assert lines(output)[0]["number_of_folds"] == 2
+
+
+def test_a_part_of_the_recordings_can_be_meant(data, tmp_path):
+    held_out = [f"walk{n}" for n in range(4) if models.held_out(f"walk{n}")]
+    options = (*OPTIONS, *GRID, "--folds", 2, "--part", "training", "-o", tmp_path / "a.jsonl")
+    assert call("tune", data / "training", *options)[0] == 0
+    kept = lines(tmp_path / "a.jsonl")[0]["training_set"]
+    assert held_out
+    assert sorted([*kept, *held_out]) == ["walk0", "walk1", "walk2", "walk3"]
+
+
+def test_a_validation_set_without_a_recording_is_refused(data, tmp_path):
+    (tmp_path / "empty").mkdir()
+    arguments = ("--validation", tmp_path / "empty", *OPTIONS, *GRID, "-o", tmp_path / "a.jsonl")
+    status, _, err = call("tune", data / "training", *arguments)
+    assert (status, err) == (3, f"inspector: {tmp_path / 'empty'}: no recording (of part 'all')\n")
+
+
+def test_one_recording_cannot_be_folded(tmp_path):
+    write_log(tmp_path / "one", 0)
+    status, _, err = call("tune", tmp_path / "one", *OPTIONS, *GRID, "-o", tmp_path / "tuned.jsonl")
+    assert status == 3
+    assert "5 folds of 1 groups" in err
+    assert not (tmp_path / "tuned.jsonl").exists()
+
+
+def refused(data, output, *more, grid=GRID):
+    """Call in vain; the complaint, which is one line."""
+    status, out, err = tune(data, output, *more, grid=grid)
+    assert (status, out) == (3, "")
+    assert err.startswith("inspector: ")
+    assert err.count("\n") == 1
+    return err
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        (("--grid", "C=1"), "holds results of another grid (regularization differs)"),
+        (("--grid", "floor=1e-3"), "holds results of another grid (floor was not in it)"),
+    ],
+)
+def test_results_of_another_question_are_refused(data, whole, tmp_path, more, reason):
+    output = tmp_path / "tuned.jsonl"
+    output.write_bytes(whole[0].read_bytes())
+    assert reason in refused(data, output, *more)
+    assert output.read_bytes() == whole[0].read_bytes()
+    assert tune(data, output, *more, "--overwrite")[0] == 0
+
+
+def test_results_of_other_recordings_are_refused(data, whole, tmp_path):
+    write_log(tmp_path / "others", 7)
+    arguments = ("--validation", tmp_path / "others", *OPTIONS, *GRID, "-o", whole[0])
+    status, _, err = call("tune", data / "training", *arguments)
+    assert status == 3
+    assert "holds results of another validation set (walk7 was not in it)" in err
+
+
+def test_results_of_other_annotations_are_refused(data, whole, tmp_path):
+    for each in (data / "validation").iterdir():
+        (tmp_path / each.name).write_bytes(each.read_bytes())
+    toml = tmp_path / "walk5.toml"
+    toml.write_text(toml.read_text().replace("1.5", "1.4"))
+    arguments = ("--validation", tmp_path, *OPTIONS, *GRID, "-o", whole[0])
+    status, _, err = call("tune", data / "training", *arguments)
+    assert status == 3
+    assert "holds results of another validation set (walk5 differs)" in err
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        (lambda text: "time,noise\n" + text, "holds no results of tuning"),
+        (lambda text: "[]\n" + text, "holds no results of tuning"),
+        (lambda text: "an unfinished letter", "holds no results of tuning"),
+        (lambda text: text.replace('{"stride": 25', '{"stride"', 1), "is damaged in line 2"),
+        (lambda text: text.replace('"stride": 50', '"stride": 51', 1), "is damaged in line 8"),
+        (lambda text: text.replace('"log_loss"', '"loss"', 1), "is damaged in line 2"),
+        (lambda text: text + text.splitlines()[-1] + "\n", "is damaged: 13 points of 12"),
+        (lambda text: text.replace("noise-tuning/1", "noise-tuning/0"), "of another format"),
+    ],
+)
+def test_a_damaged_file_is_named_and_left_alone(data, whole, tmp_path, damage, reason):
+    output = tmp_path / "tuned.jsonl"
+    output.write_text(damage(whole[0].read_text()))
+    before = output.read_bytes()
+    complaint = refused(data, output)
+    assert f"{output}: {reason}" in complaint or reason in complaint
+    assert complaint.endswith("name another file, or overwrite it (--overwrite)\n")
+    assert output.read_bytes() == before
+
+
+def test_two_processes_do_not_write_one_file(data, tmp_path):
+    import fcntl
+
+    output = tmp_path / "tuned.jsonl"
+    with output.open("ab") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        assert "is being written by another process" in refused(data, output)
+
+
+@pytest.mark.parametrize(
+    ("grid", "reason"),
+    [
+        (("--grid", "C=2:1:0.1"), "grid has no value for regularization"),
+        (("--grid", "stride=401"), "stride of 401 samples is longer than a frame of 400"),
+        (("--grid", "units=8"), "units does nothing with support vector machines"),
+        (("--grid", "hop=1"), "no setting 'hop' to tune; there are window, stride"),
+    ],
+)
+def test_a_grid_that_cannot_be_searched_is_named(data, tmp_path, grid, reason):
+    assert reason in refused(data, tmp_path / "tuned.jsonl", grid=grid)
+
+
+@pytest.mark.parametrize(
+    ("more", "reason"),
+    [
+        (("--profile", "mfcc"), "no profile 'mfcc'; there are general, scalar, logbands"),
+        (("--profile", "paper-rbf"), "profile paper-rbf exists at 10000 Hz only, not 1000"),
+    ],
+)
+def test_a_profile_that_does_not_exist_is_named(data, tmp_path, more, reason):
+    assert reason in refused(data, tmp_path / "tuned.jsonl", *more)
+
+
+def test_gamma_of_a_linear_kernel_is_refused(data, tmp_path):
+    more = ("--profile", "noisytest-linear", "--rate", 10_000)
+    reason = "gamma does nothing with the linear kernel; leave it out of the grid"
+    assert reason in refused(data, tmp_path / "tuned.jsonl", *more, grid=("--grid", "gamma=1"))
+
+
+def test_one_class_is_refused(tmp_path):
+    for number in range(2):
+        write_log(tmp_path / "quiet", number, classes=("ok",))
+    arguments = (*OPTIONS, *GRID, "--folds", 2, "-o", tmp_path / "tuned.jsonl")
+    status, _, err = call("tune", tmp_path / "quiet", *arguments)
+    assert (status, err) == (3, "inspector: all frames are ok; tuning takes two classes\n")
+
+
+def test_recordings_of_the_training_set_do_not_validate(data, tmp_path):
+    arguments = ("--validation", data / "training", *OPTIONS, *GRID, "-o", tmp_path / "a.jsonl")
+    status, _, err = call("tune", data / "training", *arguments)
+    assert status == 3
+    assert "trained on the same recording as 'walk0'" in err
+
+
+def test_an_output_that_cannot_be_written_is_named(data, tmp_path):
+    reason = f"{tmp_path / 'none' / 'tuned.jsonl'}: cannot be written (No such file or directory)"
+    assert reason in refused(data, tmp_path / "none" / "tuned.jsonl")
+    assert f"{tmp_path}: cannot be written (Is a directory)" in refused(data, tmp_path)
+
+
+def test_a_model_that_exists_is_refused_before_the_work(data, tmp_path, counted):
+    model = tmp_path / "model.npz"
+    model.write_bytes(b"")
+    complaint = refused(data, tmp_path / "tuned.jsonl", "--train", model)
+    assert f"{model}: exists already" in complaint
+    assert not counted
+    assert not (tmp_path / "tuned.jsonl").exists()
+
+
+def test_folds_and_a_validation_set_exclude_each_other(data, tmp_path):
+    status, _, err = tune(data, tmp_path / "tuned.jsonl", "--folds", 3)
+    assert status == 2
+    assert "not both" in err

@@ -1,0 +1,215 @@
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import models
+from models.recording import Block, Recording
+from models.splitting import folds
+from models.tuning import kernels
+from models.tuning.grid import Grid
+from models.tuning.search import CRITERIA, Measures, ask, measure, order
+from models.tuning.trial import Trial
+
+SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
+PROFILES = {
+    "noisytest": replace(models.Profile.noisytest(), **SMALL, open_end=100),
+    "noisytest-linear": replace(models.Profile.noisytest("linear"), **SMALL, open_end=100),
+    "paper": replace(models.Profile.paper(), **SMALL),
+    "paper-linear": replace(models.Profile.paper("linear"), **SMALL),
+    "logbands": models.LogBands().at(1000.0),
+}
+
+
+def recording(number, classes=models.CLASSES):
+    """Ten seconds of noise in which each class has a stretch, hard to tell from the others."""
+    random = np.random.default_rng(number)
+    signal = random.standard_normal(10_000)
+    time = np.arange(len(signal)) / 1000.0
+    sounds = {
+        "impact": 3.0 * random.standard_normal(len(signal)) * (np.sin(12.0 * time) > 0.97),
+        "highaccelerations": np.convolve(random.standard_normal(len(signal)), np.ones(8), "same"),
+        "oscillations": 0.5 * np.sin(2.0 * np.pi * random.uniform(40, 90) * time),
+    }
+    blocks = []
+    for start, label in zip(range(0, 8, 2), classes, strict=False):
+        blocks.append(Block(start, start + random.uniform(0.3, 1.9), label))
+        inside = (time >= blocks[-1].start) & (time < blocks[-1].stop)
+        signal += inside * sounds.get(label, 0.0)
+    return Recording(f"walk-{number}", signal, 1000.0, tuple(blocks))
+
+
+@dataclass(frozen=True)
+class Sets:
+    """Recordings to learn from and to check, as a trial has them and as a classifier takes them."""
+
+    learn: list
+    check: list
+
+    @property
+    def trial(self):
+        return Trial.against(self.learn, self.check)
+
+    def called(self, profile):
+        """What a classifier of its own calls the frames to check."""
+        known = models.Dataset.of(self.learn, profile)
+        fresh = models.Dataset.of(self.check, profile, training=False)
+        return models.Classifier.train(known, profile).predict(fresh.frames)
+
+
+def sets(classes=models.CLASSES, learn=range(4), check=range(4, 7)):
+    return Sets([recording(n, classes) for n in learn], [recording(n, classes) for n in check])
+
+
+def some_points(profile, count=6):
+    """Points of a coarse grid, drawn at random; neighbours share what they can."""
+    texts = [f"stride={profile.stride}", "C=0.01:100:x10"]
+    texts += ["gamma=1e-5:1e-1:x10"] if profile.kernel == "rbf" else []
+    points = Grid.of(texts, profile.kernel).profiles(profile)
+    drawn = np.random.default_rng(7).permutation(len(points))[:count]
+    return [points[index] for index in sorted(drawn)]
+
+
+def names(asked, point=0):
+    """Names of what a point calls the frames."""
+    return np.array((*asked.classes, "unknown"))[asked.answers[point].chosen]
+
+
+def assert_equal_to_training(points, sets):
+    asked = ask(points, sets.trial)
+    for index, point in enumerate(points):
+        assert np.array_equal(names(asked, index), sets.called(point))
+
+
+@pytest.mark.parametrize("name", PROFILES)
+def test_a_point_predicts_what_a_classifier_with_its_profile_predicts(name):
+    profile = PROFILES[name]
+    assert_equal_to_training(some_points(profile), sets())
+
+
+@pytest.mark.parametrize("name", ["noisytest", "paper"])
+def test_two_classes_are_predicted_as_a_classifier_does(name):
+    profile = PROFILES[name]
+    assert_equal_to_training(some_points(profile), sets(("ok", "oscillations")))
+
+
+def test_points_of_networks_predict_what_a_classifier_predicts():
+    profile = replace(PROFILES["logbands"], machine="networks", epochs=3)
+    points = Grid.of(["units=4,8"]).profiles(profile)
+    assert_equal_to_training(points, sets(learn=range(12), check=range(12, 14)))
+
+
+def test_too_many_frames_for_a_kernel_matrix_change_no_answer(monkeypatch):
+    points, trial = some_points(PROFILES["paper"]), sets().trial
+    kept = ask(points, trial).answers
+    monkeypatch.setattr(kernels, "LARGEST", 0)
+    for with_matrix, without in zip(kept, ask(points, trial).answers, strict=True):
+        assert np.array_equal(with_matrix.chosen, without.chosen)
+        np.testing.assert_allclose(with_matrix.graded, without.graded, atol=1e-6)
+
+
+def test_folds_predict_what_a_classifier_of_the_other_recordings_predicts():
+    profile = PROFILES["logbands"]
+    recordings = [recording(number) for number in range(5)]
+    splits = folds([each.name for each in recordings], 3)
+    asked = ask([profile], Trial(recordings, splits))
+    for learn, check in splits:
+        others = [recordings[index] for index in learn]
+        for index in check:
+            own = asked.runs == recordings[index].name
+            theirs = Sets(others, [recordings[index]]).called(profile)
+            assert np.array_equal(names(asked)[own], theirs)
+
+
+def test_recordings_without_annotations_are_passed_over():
+    silent = replace(recording(9), blocks=())
+    given = sets()
+    (found,) = measure([PROFILES["paper"]], given.trial)
+    more = Trial.against([*given.learn, silent], [silent, *given.check])
+    assert measure([PROFILES["paper"]], more) == [found]
+
+
+def test_measures_are_those_of_an_evaluation():
+    profile, given = PROFILES["noisytest"], sets()
+    (found,) = measure([profile], given.trial)
+    truth = models.Dataset.of(given.check, profile, training=False).labels
+    report = models.Evaluation.of(truth, given.called(profile), models.CLASSES)
+    assert 0.3 < report.balanced_accuracy < 1.0
+    for name in ("balanced_accuracy", "failure_recall", "false_alarm_rate", "subset_accuracy"):
+        assert getattr(found, name) == pytest.approx(getattr(report, name), abs=1e-9)
+
+
+def test_frames_that_are_unknown_are_neither_found_nor_false_alarms():
+    profile = replace(PROFILES["logbands"], machine="networks", epochs=3)
+    given = sets(learn=range(12), check=range(12, 14))
+    strange = [replace(each, signal=1e6 * each.signal) for each in given.check]
+    asked = ask([profile], Trial.against(given.learn, strange))
+    assert set(names(asked)) == {"unknown"}
+    (found,) = asked.measures()
+    assert (found.failure_recall, found.false_alarm_rate, found.subset_accuracy) == (0.0, 0.0, 0.0)
+
+
+def test_a_measure_of_nothing_is_none_in_json():
+    (found,) = measure([PROFILES["paper"]], sets(("impact", "oscillations")).trial)
+    assert found.as_dict()["false_alarm_rate"] is None
+    assert found.as_dict()["failure_recall"] == 1.0
+
+
+def test_the_log_loss_decides_between_equals():
+    sure, unsure = Measures(0.9, 0.2, 1.0, 0.0, 0.8), Measures(0.9, 0.3, 1.0, 0.0, 0.9)
+    assert min(unsure, sure, key=order("balanced-accuracy")) is sure
+    assert min(unsure, sure, key=order("subset-accuracy")) is unsure
+    assert min(unsure, sure, key=order("log-loss")) is sure
+
+
+@pytest.mark.parametrize("criterion", CRITERIA)
+def test_whoever_is_better_in_all_is_the_best(criterion):
+    better, worse = Measures(0.9, 0.2, 1.0, 0.0, 0.9), Measures(0.8, 0.3, 0.9, 0.1, 0.8)
+    assert min(worse, better, key=order(criterion)) is better
+
+
+def test_one_class_cannot_be_tuned():
+    with pytest.raises(models.DatasetError, match="all frames are ok; tuning takes two classes"):
+        measure([PROFILES["paper"]], sets(("ok",)).trial)
+
+
+def test_recordings_without_any_annotation_cannot_be_tuned():
+    trial = Trial.against([replace(recording(0), blocks=())], [recording(1)])
+    with pytest.raises(models.DatasetError, match="no annotated frame in 1 recordings; annotate"):
+        measure([PROFILES["paper"]], trial)
+
+
+def test_a_class_that_is_checked_and_never_learnt_is_named():
+    trial = Trial.against([recording(0, ("ok", "impact"))], [recording(1)])
+    reason = "no frame of highaccelerations to learn from where those of walk-1 are checked"
+    with pytest.raises(models.DatasetError, match=reason):
+        measure([PROFILES["paper"]], trial)
+
+
+def test_a_class_of_a_single_recording_cannot_be_folded():
+    recordings = [recording(n, models.CLASSES if n == 2 else ("ok", "impact")) for n in range(4)]
+    trial = Trial(recordings, folds([each.name for each in recordings], 2))
+    reason = "of walk-2 are checked; give more recordings of it, or take other folds"
+    with pytest.raises(models.DatasetError, match=reason):
+        measure([PROFILES["paper"]], trial)
+
+
+@pytest.fixture(scope="module")
+def stand_in(lola):
+    """The recordings of the stand-in."""
+    each = [list(models.noisytest.read_folder(lola / name)) for name in ("training", "validation")]
+    return Sets(*each)
+
+
+@pytest.mark.parametrize(("kernel", "count"), [("rbf", 8), ("linear", 3)])
+def test_points_of_the_papers_grid_predict_what_a_classifier_predicts(stand_in, kernel, count):
+    points = Grid.paper(kernel).profiles(models.Profile.noisytest(kernel))
+    for index in np.random.default_rng(11).integers(len(points), size=count):
+        assert_equal_to_training([points[index]], stand_in)
+
+
+def test_the_papers_own_point_is_golden(stand_in, golden):
+    arrays, _ = golden
+    asked = ask([models.Profile.noisytest()], stand_in.trial)
+    assert asked.classes == models.CLASSES
+    assert np.array_equal(asked.answers[0].chosen, arrays["rbf_validation_pred"])
