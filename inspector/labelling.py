@@ -52,16 +52,16 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         Labels on the time axis of the run.
 
     Raises:
-        CannotTellError: If the run is slower than every model, no frame is free of gaps, or it is
-            like nothing that the model has learnt from.
+        CannotTellError: If the run is slower than every model, feeds none, has no frame without a
+            gap, or is like nothing that the model has learnt from.
         SignalError: If the run is too short for a frame.
     """
-    signals = _signals(run)
+    signals = signals_of(run)
     name, classifier = _choose(library, run.rate, signals)
     rate, remark = classifier.rate, ""
     if not _close(run.rate, rate):
         run = nm.lowered(run, rate)
-        signals = _signals(run)
+        signals = signals_of(run)
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
     labels = classifier.classify(signals, rate, start=float(run.time[0]), valid=run.mask)
     if not len(labels):
@@ -72,8 +72,15 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
     return _known(Labelled(labels, name, remark))
 
 
-def _signals(run: nm.Run) -> dict[str, Array]:
-    """Take the norms of a run, without the error where what is desired is what was measured."""
+def signals_of(run: nm.Run) -> dict[str, Array]:
+    """Take the norms of a run, without the error where what is desired is what was measured.
+
+    Args:
+        run: The run.
+
+    Returns:
+        Signals by name, each of shape (samples,), in [rad/s].
+    """
     signals = nm.norms(run)
     return {name: signal for name, signal in signals.items() if name != "error" or signal.any()}
 
@@ -122,7 +129,7 @@ def _choose(
 ) -> tuple[str, models.Classifier]:
     try:
         chosen = models.nearest(tuple(library.values()), rate, signals)
-    except models.RateError as error:
+    except models.ModelsError as error:
         raise CannotTellError(str(error)) from error
     return next((name, model) for name, model in library.items() if model is chosen)
 

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Iterable
 
 from models.classifier import Classifier
-from models.errors import RateError
+from models.errors import MissingSignalError, RateError
 from models.profile import TOLERANCE
 from models.signals import NOISE, feeds
 
@@ -21,10 +21,15 @@ def nearest(
         signals: Names of the signals that there are.
 
     Raises:
-        RateError: If all models are of higher rates, or there are none that these signals feed.
+        MissingSignalError: If all models listen to something that is not there.
+        RateError: If all others are of higher rates, or there are no models.
     """
-    models = [model for model in models if feeds(signals, model.profile.signals)]
-    below = [model for model in models if model.rate <= rate * (1.0 + TOLERANCE)]
+    models = list(models)
+    fed = [model for model in models if feeds(signals, model.profile.signals)]
+    if models and not fed:
+        wanted = min((model.profile.signals for model in models), key=len)
+        raise MissingSignalError([name for name in wanted if name not in signals], signals)
+    below = [model for model in fed if model.rate <= rate * (1.0 + TOLERANCE)]
     if not below:
-        raise RateError(rate, [model.rate for model in models], "too low for any; log faster")
+        raise RateError(rate, [model.rate for model in fed], "too low for any; log faster")
     return max(below, key=lambda model: (model.rate, len(model.profile.signals)))

@@ -52,6 +52,17 @@ def test_below_every_model_nothing_can_be_told(rate):
         assert each.reason == f"{rate:g} Hz is slower than every model"
 
 
+def test_a_run_that_feeds_no_model_shows_nothing_and_the_reason_is_said():
+    alone = {"general-1khz": LIBRARY["general-1khz"]}
+    found = audit(noisy_run(1000.0), alone)
+    assert found.blind
+    for each in found.classes:
+        assert (each.needed, each.reason) == (
+            None,
+            "no signal desired, error; there is noise, measured",
+        )
+
+
 def test_without_the_faster_model_twice_the_frequency_is_what_it_takes():
     slow = {"scalar-1khz": LIBRARY["scalar-1khz"]}
     assert seen(noisy_run(1000.0), slow)["oscillations"].needed == 2 * OSCILLATIONS[1]

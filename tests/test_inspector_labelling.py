@@ -79,3 +79,10 @@ def test_a_run_like_nothing_that_was_learnt_cannot_be_judged_and_part_of_one_is_
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
     assert "frames are like nothing that model general-1khz knows" in labelled.remark
     assert "unknown" in labelled.labels.label
+
+
+def test_a_run_that_feeds_no_model_is_not_judged_and_the_reason_is_said():
+    alone = {"general-1khz": LIBRARY["general-1khz"]}
+    run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
+    with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
+        label_run(run, alone)

@@ -16,7 +16,7 @@ A class is observable if all of its band can be seen, partly if three bands of t
 can, and if rounding is all there is in some of them: then a failure must be louder than that.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -72,7 +72,10 @@ class ClassSight:
 
 
 def sights(
-    bandwidth: Bandwidth, valid: Mask, library: Mapping[str, models.Classifier]
+    bandwidth: Bandwidth,
+    valid: Mask,
+    library: Mapping[str, models.Classifier],
+    signals: Collection[str],
 ) -> tuple[ClassSight, ...]:
     """Tell how well each failure class can be seen.
 
@@ -80,6 +83,7 @@ def sights(
         bandwidth: How far up the log reaches.
         valid: False in gaps, shape (samples,).
         library: Models to choose from.
+        signals: Names of the signals that a model can listen to.
 
     Returns:
         One for each class of the model that would look, `ok` left out.
@@ -87,9 +91,13 @@ def sights(
     rate = 2 * bandwidth.nyquist
     profiles = [model.profile for model in library.values()]
     try:
-        chosen = models.nearest(tuple(library.values()), rate)
-    except models.RateError:
+        chosen = models.nearest(tuple(library.values()), rate, signals)
+    except models.ModelsError as error:
         classes = dict.fromkeys(name for profile in profiles for name in profile.classes[1:])
+        if isinstance(error, models.MissingSignalError):
+            return tuple(
+                ClassSight(label, Sight.CANNOT_TELL, reason=str(error)) for label in classes
+            )
         slowest = min((profile.rate for profile in profiles), default=None)
         reason = f"{rate:g} Hz is slower than every model"
         return tuple(

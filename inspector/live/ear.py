@@ -32,7 +32,7 @@ class Ear:
         self._ratio, self._heard = 1, 0
         try:
             chosen = models.nearest(tuple(library.values()), rate, norms.names)
-        except models.RateError as error:
+        except models.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
         ratio = round(rate / chosen.rate)
