@@ -75,7 +75,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
             members = {name: _member(path, archive, name, n) for name, n in dimensions.items()}
     except OSError as error:
         raise ModelFileError(path, f"cannot be read ({error.strerror or error})") from error
-    except (zipfile.BadZipFile, EOFError, NotImplementedError, RuntimeError) as error:
+    except (zipfile.BadZipFile, EOFError, RuntimeError) as error:
         raise ModelFileError(path, f"is no model file, or a damaged one ({error})") from error
     manifest = _manifest(path, str(members.pop("manifest")))
     for name, array in members.items():
