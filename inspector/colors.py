@@ -5,10 +5,9 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-Color: TypeAlias = tuple[int, int, int]
+from models import UNKNOWN
 
-UNKNOWN = "unknown"
-"""What a model calls a frame that is like nothing it has learnt from."""
+Color: TypeAlias = tuple[int, int, int]
 
 CLASSES: dict[str, Color] = {
     "ok": (0, 158, 115),

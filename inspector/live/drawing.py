@@ -10,7 +10,7 @@ from inspector.live.lane import Change
 from inspector.live.strip import Columns
 from inspector.series import LINE_WIDTH, at
 from inspector.thinning import extremes
-from models import Labels
+from models import UNKNOWN, Labels
 from noisemodel.types import Array
 
 JOINT_POINTS = 400.0
@@ -40,7 +40,7 @@ class Drawing:
         hertz: Array,
     ) -> None:
         self._recording, self._hertz = recording, hertz
-        self._colours = colors.of_classes((*classes, colors.UNKNOWN))
+        self._colours = colors.of_classes((*classes, UNKNOWN))
         self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
         self._slices = [
             slice(first, min(first + JOINTS_PER_PLOT, len(joint_names)))
