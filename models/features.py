@@ -162,15 +162,18 @@ def pool(loudness: Array) -> Array:
     Returns:
         Mean, maximum and standard deviation of each band, shape (..., 3 * frequency).
     """
-    statistics = (loudness.mean(axis=-2), loudness.max(axis=-2), loudness.std(axis=-2))
-    return np.concatenate(statistics, axis=-1)
+    count = loudness.shape[-2]
+    mean = loudness.sum(axis=-2) / count
+    beside = loudness - mean[..., None, :]
+    deviation = np.sqrt(np.square(beside).sum(axis=-2) / count)
+    return np.concatenate((mean, loudness.max(axis=-2), deviation), axis=-1)
 
 
 def _relative(loudness: Array) -> Array:
     """Pool levels above the whole frame's, differences between signals, and that whole level."""
     several = loudness if loudness.ndim == 4 else loudness[:, None]
     whole = several.mean(axis=(1, 2, 3), keepdims=True)
-    spectra = np.concatenate((several - whole, np.diff(several, axis=1)), axis=1)
+    spectra = np.concatenate((several - whole, several[:, 1:] - several[:, :-1]), axis=1)
     pooled = pool(spectra)
     return np.hstack((pooled.reshape(len(pooled), prod(pooled.shape[1:])), whole.reshape(-1, 1)))
 
