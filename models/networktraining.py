@@ -1,7 +1,6 @@
 """Train small neural networks with scikit-learn, and calibrate them on runs they have not seen."""
 
 import warnings
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,6 @@ from models.profile import Profile
 from models.splitting import folds
 from models.types import Array, Index, Words
 
-FOLDS = 4
-"""Parts of the training runs by which the networks are calibrated."""
 RATE, BATCH = 2e-3, 256
 """Of the gradient descent (Adam)."""
 NEVER = -30.0
@@ -22,11 +19,13 @@ USUAL = 1e-3
 
 
 def fit_networks(features: Array, targets: Index, groups: Words, profile: Profile) -> Networks:
-    """Learn networks, each from another start, and calibrate their average.
+    """Learn networks, each from another start and from other groups, and calibrate them.
+
+    Each network leaves a part of the groups out, and is asked about it: what they answer about
+    runs that they were not trained on is what their average is calibrated by.
 
     Rare classes count more, by the root of how much rarer they are: balanced in full, networks
-    would raise alarms for the sake of the rarest class. Calibration takes that back: it is learnt
-    on grouped folds, where networks speak about runs that they were not trained on.
+    would raise alarms for the sake of the rarest class. Calibration takes that back.
 
     Args:
         features: Standardised, shape (frames, features).
@@ -37,12 +36,27 @@ def fit_networks(features: Array, targets: Index, groups: Words, profile: Profil
     Returns:
         The networks; equal input gives equal networks. Those of a single group are not calibrated.
     """
-    networks = _fit(features, targets, profile, int(targets.max()) + 1)
+    classes = int(targets.max()) + 1
+    networks, answers, truth = [], [], []
+    for seed, (train, test) in enumerate(_parts(targets, groups, profile.networks)):
+        network = _fit(seed, features[train], targets[train], profile, classes)
+        networks.append(network)
+        answers.append(network.average(features[test]))
+        truth.append(targets[test])
+    heard = np.concatenate(truth)
+    calibration = networks[0].calibration
+    if len(heard):
+        calibration = calibrate(np.concatenate(answers), heard)
     known = np.quantile(features, (USUAL, 1.0 - USUAL), axis=0)
-    calibration = networks.calibration
-    if (count := min(FOLDS, len(set(groups.tolist())))) > 1:
-        calibration = calibrate(*_unseen(features, targets, groups, profile, count))
-    return replace(networks, calibration=calibration, known=known)
+    return Networks(
+        np.concatenate([network.hidden for network in networks]),
+        np.concatenate([network.hidden_bias for network in networks]),
+        np.concatenate([network.output for network in networks]),
+        np.concatenate([network.output_bias for network in networks]),
+        calibration,
+        known,
+        profile.alarm,
+    )
 
 
 def calibrate(decisions: Array, targets: Index) -> Array:
@@ -71,34 +85,29 @@ def calibrate(decisions: Array, targets: Index) -> Array:
     return calibration
 
 
-def _unseen(
-    features: Array, targets: Index, groups: Words, profile: Profile, count: int
-) -> tuple[Array, Index]:
-    """Let networks answer about groups that they have not learnt from; and the truth."""
-    answers, truth = [], []
-    for train, test in folds(groups.tolist(), count):
-        if len(set(targets[train].tolist())) > 1:
-            networks = _fit(features[train], targets[train], profile, int(targets.max()) + 1)
-            answers.append(networks.average(features[test]))
-            truth.append(targets[test])
-    return np.concatenate(answers), np.concatenate(truth)
+def _parts(targets: Index, groups: Words, networks: int) -> list[tuple[Index, Index]]:
+    """Say which frames each network learns from, and which it is asked about."""
+    everything = np.arange(len(targets)), np.arange(0)
+    count = min(networks, len(set(groups.tolist())))
+    parts = folds(groups.tolist(), count) if count > 1 else [everything]
+    telling = [part if len(set(targets[part[0]].tolist())) > 1 else everything for part in parts]
+    return [telling[number % len(telling)] for number in range(networks)]
 
 
-def _fit(features: Array, targets: Index, profile: Profile, classes: int) -> Networks:
-    """Learn networks whose calibration changes nothing."""
+def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: int) -> Networks:
+    """Learn one network, whose calibration changes nothing."""
     counts = np.bincount(targets, minlength=classes)
     weights = np.sqrt(counts.max() / np.maximum(counts, 1))[targets]
     there = np.flatnonzero(counts)
-    nets = [_train(seed, features, targets, weights, profile) for seed in range(profile.networks)]
+    network = _train(seed, features, targets, weights, profile)
     # scikit-learn has no output for a class that it does not see, and of two for the second alone.
     learnt = there if len(there) > 2 else there[1:]
-    output = np.zeros((len(nets), profile.units, classes))
-    output_bias = np.where(counts > 0, 0.0, NEVER) * np.ones((len(nets), 1))
-    output[:, :, learnt] = [net.coefs_[1] for net in nets]
-    output_bias[:, learnt] = [net.intercepts_[1] for net in nets]
+    output = np.zeros((1, profile.units, classes))
+    output_bias = np.where(counts > 0, 0.0, NEVER)[None]
+    output[0][:, learnt], output_bias[0, learnt] = network.coefs_[1], network.intercepts_[1]
     return Networks(
-        np.stack([net.coefs_[0] for net in nets]),
-        np.stack([net.intercepts_[0] for net in nets]),
+        network.coefs_[0][None],
+        network.intercepts_[0][None],
         output,
         output_bias,
         np.append(1.0, np.zeros(classes)),

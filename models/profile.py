@@ -16,7 +16,7 @@ TOLERANCE = 1e-3
 
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
-Machine: TypeAlias = Literal["svm", "networks"]
+Machine: TypeAlias = Literal["svm", "networks", "baseline"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
 _CHOICES = {"bands": Bands, "kernel": Kernel, "machine": Machine, "multiclass": Multiclass}
@@ -66,7 +66,7 @@ class Profile:
     """Deviation that a feature is taken to have at least, when features are scaled to the mean 0
     and the deviation 1 of the training set; 0 leaves them as they are."""
     machine: Machine = "svm"
-    """What decides: support vector machines, or small neural networks."""
+    """What decides: support vector machines, small networks, or a distance from good runs."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1
@@ -75,16 +75,16 @@ class Profile:
     """Kernel parameter; the linear kernel has none."""
     multiclass: Multiclass = "one-vs-rest"
     """How two-class machines make one for more classes."""
-    networks: int = 3
-    """Networks whose answers are averaged."""
+    networks: int = 5
+    """Networks whose answers are averaged; each leaves so great a part of the groups out."""
     units: int = 64
     """Units in the hidden layer of a network."""
-    decay: float = 1.0
+    decay: float = 0.1
     """Penalty on the squares of a network's weights."""
     epochs: int = 30
     """How often a network sees each training frame."""
     alarm: float = 0.5
-    """Probability of any failure from which networks call a frame one."""
+    """Probability of any failure from which networks are sure enough of it to raise an alarm."""
     pad_short: bool = True
     """Whether a training block shorter than a frame is padded, or else widened."""
     spread_failures: bool = False
