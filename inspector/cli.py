@@ -8,6 +8,7 @@ import typer
 
 from inspector.commands import (
     auditing,
+    baseline,
     comparing,
     hearing,
     judging,
@@ -63,6 +64,7 @@ app.command()(travelling.labels)
 app.command()(travelling.export)
 app.add_typer(simulating.app, name="simulate")
 app.command()(learning.train)
+app.command()(baseline.baseline)
 app.command()(tuning.tune)
 app.command()(learning.evaluate)
 app.command()(comparing.compare)

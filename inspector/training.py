@@ -143,13 +143,30 @@ def of_run(path: Path, rate: float) -> models.Recording:
         Its norms with its blocks.
 
     Raises:
+        InspectorError: If the run is slower than that, or has no blocks.
+    """
+    found = recording_of(path, nm.Run.load(path), rate)
+    if not found.blocks:
+        raise InspectorError(f"{path}: has no annotated blocks")
+    return found
+
+
+def recording_of(path: Path, run: nm.Run, rate: float) -> models.Recording:
+    """Take the noise of a run, annotated or not.
+
+    Args:
+        path: The run file.
+        run: What is in it.
+        rate: The rate to bring it to, in [Hz].
+
+    Returns:
+        Its norms with its blocks, if it has any.
+
+    Raises:
         InspectorError: If the run is slower than that.
     """
-    run = nm.Run.load(path)
     if run.rate < rate * (1 - 1e-3):
         raise InspectorError(f"{path}: recorded at {run.rate:g} Hz, the model needs {rate:g} Hz")
-    if not run.blocks:
-        raise InspectorError(f"{path}: has no annotated blocks")
     slower = nm.lowered(run, rate)
     return models.Recording(
         name=path.stem,

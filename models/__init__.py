@@ -5,13 +5,17 @@
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` names each
 choice on the way: NoisyTest's own, the paper's, or ours for any rate (`LogBands`). A `Dataset`
 holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts, and
-`assess` measures whole recordings. A `Stream` labels a signal while it comes in.
+`assess` measures whole recordings. A `Stream` labels a signal while it comes in. `learn_baseline`
+takes good runs alone.
 
 This package knows no robot: a signal and its rate are all that it takes. It needs NumPy, and
 scikit-learn only to train.
 """
 
 from models import noisytest
+from models.baselineframes import GoodMotion
+from models.baselinelimit import Limit
+from models.baselinetraining import Learnt, learn_baseline
 from models.choice import nearest
 from models.classifier import Classifier
 from models.dataset import Dataset
@@ -34,7 +38,7 @@ from models.evaluation import Evaluation, evaluate
 from models.examples import Examples
 from models.features import features
 from models.framing import frame
-from models.labels import UNKNOWN, Event, Labels
+from models.labels import DEPARTURE, UNKNOWN, Event, Labels
 from models.logbands import GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
 from models.measuring.assessment import Assessment, assess
@@ -46,6 +50,7 @@ from models.stream import Stream
 
 __all__ = [
     "CLASSES",
+    "DEPARTURE",
     "GENERAL",
     "NOISE",
     "SCALAR",
@@ -60,7 +65,10 @@ __all__ = [
     "Event",
     "Examples",
     "FileError",
+    "GoodMotion",
     "Labels",
+    "Learnt",
+    "Limit",
     "LogBands",
     "MissingSignalError",
     "ModelFileError",
@@ -84,6 +92,7 @@ __all__ = [
     "frame",
     "group_of",
     "held_out",
+    "learn_baseline",
     "leave_one_out",
     "nearest",
     "noisytest",

@@ -195,6 +195,7 @@ class Classifier:
             self._choose(decisions),
             self._score(decisions),
             self.classes,
+            self.machines.sure(decisions),
         )
 
     def judge(self, plain: Array) -> Array:

@@ -4,10 +4,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.types import Array, Index, Words
+from models.types import Array, Index, Mask, Words
 
 UNKNOWN = "unknown"
 """What a frame is called that is like nothing the classifier has learnt from."""
+DEPARTURE = "departure"
+"""What a baseline, which has learnt from good runs alone, calls a frame that is unlike them."""
+
+CONFIRM = 2
+"""Frames of a stretch that have to be sure of a failure for it to be a finding."""
 
 
 @dataclass(frozen=True)
@@ -34,9 +39,11 @@ class Labels:
     Attributes:
         start: When each frame starts, shape (frames,), in [s].
         stop: When it stops, shape (frames,), in [s].
-        label: Its class, or `unknown`, shape (frames,).
+        label: Its class, or `unknown`, as the frame alone tells, shape (frames,).
         scores: How certain each class is, shape (frames, classes); comparable within one model.
         classes: Names of the classes, `ok` first.
+        sure: Whether a frame is sure enough of a failure to raise an alarm, shape (frames,); None
+            if each frame that is called a failure is.
     """
 
     start: Array
@@ -44,6 +51,32 @@ class Labels:
     label: Words
     scores: Array
     classes: tuple[str, ...]
+    sure: Mask | None = None
+
+    @property
+    def settled(self) -> Words:
+        """What each frame is called in the light of its neighbours, shape (frames,).
+
+        Failure frames one after the other make a stretch. One of which less than two frames are
+        sure is `ok`: good motion startles a frame now and then, and what goes wrong is in several.
+        """
+        if self.sure is None:
+            return self.label
+        failing = ~np.isin(self.label, ("ok", UNKNOWN))
+        apart = self.start[1:] > self.stop[:-1]
+        kept = confirmed(failing, self.sure, apart, least=min(CONFIRM, len(self)))
+        return np.where(failing & ~kept, "ok", self.label)
+
+    @property
+    def outright(self) -> Words:
+        """What each frame is called by itself, a failure only where it is sure, shape (frames,).
+
+        That is all that can be said while the frames after it are still to come.
+        """
+        if self.sure is None:
+            return self.label
+        keep = self.sure | np.isin(self.label, ("ok", UNKNOWN))
+        return np.where(keep, self.label, "ok")
 
     def score(self, frame: int) -> float:
         """Give the score of what a frame is called; 0 if it is unknown."""
@@ -52,15 +85,16 @@ class Labels:
         return float(self.scores[frame, self.classes.index(label)]) if known else 0.0
 
     def events(self) -> tuple[Event, ...]:
-        """Merge frames of one failure class that overlap or follow each other.
+        """Merge settled frames of one failure class that overlap or follow each other.
 
         Returns:
             Findings only, no `ok`, in order of time. Frames overlap, and so may events of
             different classes; events of one class never do.
         """
         found: list[Event] = []
+        settled = self.settled
         for label in (name for name in self.classes if name != "ok"):
-            own = np.flatnonzero(self.label == label)
+            own = np.flatnonzero(settled == label)
             apart = np.flatnonzero(self.start[own[1:]] > self.stop[own[:-1]]) + 1
             found += [self._event(group) for group in np.split(own, apart) if len(group)]
         return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
@@ -76,3 +110,22 @@ class Labels:
     def __str__(self) -> str:
         heard = [str(event) for event in self.events()] or ["no findings"]
         return "\n".join([*heard, f"in {len(self)} frames"])
+
+
+def confirmed(failing: Mask, sure: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
+    """Keep the failure frames of those stretches of which enough frames are sure.
+
+    Args:
+        failing: Whether a frame seems to be a failure, shape (frames,).
+        sure: Whether it is sure of that, shape (frames,).
+        apart: Whether a frame and the next neither overlap nor touch, shape (frames - 1,).
+        least: How many sure frames are enough.
+
+    Returns:
+        The failure frames that are kept, shape (frames,).
+    """
+    begins = failing & ~np.append(False, failing[:-1] & ~apart)[: len(failing)]
+    stretch = np.cumsum(begins)
+    enough = np.bincount(stretch[failing & sure], minlength=len(failing) + 1) >= least
+    kept: Mask = failing & enough[stretch]
+    return kept

@@ -24,7 +24,7 @@ class LogBands:
     machine: Machine = "svm"
     """What decides."""
     alarm: float = 0.5
-    """Probability of any failure from which networks call a frame one."""
+    """Probability of any failure from which networks are sure enough of it to raise an alarm."""
     frame: float = 0.4
     """Duration of a frame, in [s]."""
     hop: float = 0.1
@@ -104,7 +104,7 @@ class LogBands:
         return tuple(edges)
 
 
-SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.9)
+SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85)
 """For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
 encoders, and differs from robot to robot and from simulator to simulator."""
 GENERAL = replace(SCALAR, signals=("desired", "measured", "error"))

@@ -3,10 +3,11 @@
 from collections.abc import Mapping
 from typing import Protocol
 
+from models.baseline import Baseline
 from models.networks import Networks
 from models.profile import Profile
 from models.svm import Machines, machine_count
-from models.types import Array, Index
+from models.types import Array, Index, Mask
 
 
 class Machine(Protocol):
@@ -22,6 +23,9 @@ class Machine(Protocol):
     def choose(self, decisions: Array) -> Index:
         """Choose a class for each frame, shape (frames,); beyond the last is unknown."""
 
+    def sure(self, decisions: Array) -> Mask | None:
+        """Say which frames may raise an alarm, shape (frames,); None: all that are failures."""
+
     def score(self, decisions: Array) -> Array:
         """Grade all classes for each frame, shape (frames, classes)."""
 
@@ -31,6 +35,8 @@ class Machine(Protocol):
 
 def rebuilt(arrays: Mapping[str, Array], profile: Profile) -> Machine:
     """Make a machine of the arrays of a model file."""
+    if profile.machine == "baseline":
+        return Baseline(arrays["good"], arrays["limit"])
     if profile.machine == "networks":
         return Networks(
             arrays["hidden"],
@@ -62,6 +68,8 @@ def shapes(
         features: Features of a frame.
         classes: How many classes there are.
     """
+    if profile.machine == "baseline":
+        return {"good": (max(len(arrays["good"]), 1), features), "limit": (1,)}
     if profile.machine == "networks":
         count, units = profile.networks, profile.units
         return {
@@ -90,5 +98,6 @@ DIMENSIONS = {
         "calibration": 1,
         "known": 2,
     },
+    "baseline": {"good": 2, "limit": 1},
 }
 """Arrays of each kind of machine in a model file, and their dimensions."""

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.types import Array, Index
+from models.types import Array, Index, Mask
 
 TINY = 1e-12
 """The least probability that is told from none."""
 FOREIGN = 2.0
 """A frame is unknown if a feature lies farther than this above what was learnt from."""
+LIKELY = 0.3
+"""Probability of any failure from which a frame is called one: to miss it is the worse mistake."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +34,7 @@ class Networks:
         calibration: Scale of the averaged log-probabilities, then an offset for each class, shape
             (1 + classes,).
         known: Lowest and highest value of each feature that is known, shape (2, features).
-        alarm: Probability of any failure from which a frame is one.
+        alarm: Probability of any failure from which a frame is sure enough to raise an alarm.
     """
 
     hidden: Array
@@ -81,9 +83,13 @@ class Networks:
             that is unknown.
         """
         answers, foreign = decisions[:, :-1], decisions[:, -1]
-        failure = 1.0 - np.exp(answers[:, 0]) >= self.alarm
-        chosen = np.where(failure, 1 + answers[:, 1:].argmax(axis=1), 0)
+        chosen = np.where(_risk(decisions) >= LIKELY, 1 + answers[:, 1:].argmax(axis=1), 0)
         return np.where(foreign > FOREIGN, answers.shape[1], chosen)
+
+    def sure(self, decisions: Array) -> Mask:
+        """Say which frames may raise an alarm, shape (frames,)."""
+        alarming: Mask = (_risk(decisions) >= self.alarm) & (decisions[:, -1] <= FOREIGN)
+        return alarming
 
     def score(self, decisions: Array) -> Array:
         """Grade all classes by their probabilities, shape (frames, classes)."""
@@ -116,6 +122,11 @@ def calibrated(answers: Array, calibration: Array) -> Array:
         Logarithms of calibrated probabilities, shape (frames, classes).
     """
     return _log_softmax(calibration[0] * answers + calibration[1:])
+
+
+def _risk(decisions: Array) -> Array:
+    """Probability of any failure, shape (frames,)."""
+    return 1.0 - np.exp(decisions[:, 0])
 
 
 def _log_softmax(values: Array) -> Array:

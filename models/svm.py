@@ -54,6 +54,9 @@ class Machines:
         """Choose a class for each frame, see `choose`."""
         return choose(decisions, classes=self.classes, multiclass=self.multiclass)
 
+    def sure(self, decisions: Array) -> None:
+        """Leave it at what each frame is called."""
+
     def score(self, decisions: Array) -> Array:
         """Grade all classes for each frame, see `score`."""
         return score(decisions, classes=self.classes, multiclass=self.multiclass)

@@ -163,7 +163,12 @@ class Worker:
             # How far back in the stretch frames end; a lower rate lags behind.
             back = np.rint((self._ear.elapsed - labels.stop) * self._rate).astype(int)
             shift = end - self._ear.elapsed
-            labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
+            labels = replace(
+                labels,
+                start=labels.start + shift,
+                stop=labels.stop + shift,
+                label=labels.outright,
+            )
             self._heard.update(labels.label.tolist())
             changes = self._lane.take(labels)
             if self._sink.alive:

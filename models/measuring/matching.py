@@ -29,7 +29,8 @@ class Frames:
         run: Number of the recording, shape (frames,).
         start: When it starts, shape (frames,), in [s].
         stop: When it stops, shape (frames,), in [s].
-        called: What the model calls it, shape (frames,).
+        called: What the model calls it in the light of its neighbours, shape (frames,).
+        suspect: Whether it calls it a failure by itself, shape (frames,).
         scores: What the model says of each class, shape (frames, classes).
         truth: What it is, `UNCLEAR` where that is not said, shape (frames,).
         quiet: Whether it lies wholly in `ok` blocks, shape (frames,).
@@ -40,6 +41,7 @@ class Frames:
     start: Array
     stop: Array
     called: Words
+    suspect: Mask
     scores: Array
     truth: Words
     quiet: Mask
@@ -85,6 +87,7 @@ class Matched:
     Attributes:
         names: Of the recordings, shape (runs,).
         classes: What the model can call a frame.
+        confirms: Whether a failure takes more than one frame that is sure of it.
         frames: Their frames.
         failures: Their failures.
         ok_annotated: `ok` time of each recording, shape (runs,), in [s].
@@ -95,6 +98,7 @@ class Matched:
 
     names: tuple[str, ...]
     classes: tuple[str, ...]
+    confirms: bool
     frames: Frames
     failures: Failures
     ok_annotated: Array
@@ -121,6 +125,7 @@ class Matched:
         return cls(
             tuple(one.name for one in heard),
             heard[0].labels.classes,
+            heard[0].labels.sure is not None,
             Frames(*_joined(frames)),
             Failures(*_joined(failures)),
             np.array(annotated, dtype=np.float64),
@@ -159,7 +164,8 @@ def _match(
         own,
         start,
         stop,
-        one.labels.label,
+        one.labels.settled,
+        ~np.isin(one.labels.label, (OK, UNKNOWN)),
         one.labels.scores,
         np.where(quiet, OK, _failure_of(shared, start, stop, bad, slack)),
         quiet,

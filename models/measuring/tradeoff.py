@@ -2,9 +2,11 @@
 
 Conventions: a frame's *failure score* is 1 - P(ok) if the scores are probabilities, or else the
 largest score of a failure less that of `ok`. At a threshold, the frames with larger scores count as
-failures, and all is counted as in `eventscore`. Thresholds are scores of quiet frames, the highest
-first: in between, nothing but recall changes. Alarms that grow together as the threshold sinks
-become fewer; lest that is a merit, a threshold costs what the dearest of those above it costs.
+failures, and all is counted as in `eventscore`. If the model takes two sure frames for an alarm, it
+is they whose scores are larger; frames beside them that it calls failures join in. Thresholds are
+scores of quiet frames, the highest first: in between, nothing but recall changes. Alarms that grow
+together as the threshold sinks become fewer; lest that is a merit, a threshold costs what the
+dearest of those above it costs.
 
 To read the recall at a budget from this curve is to choose the threshold on the very recordings
 that are measured: it tells what the scores are good for, not what a model will do.
@@ -15,12 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from models.labels import UNKNOWN
+from models.labels import UNKNOWN, confirmed
 from models.measuring.calibration import are_probabilities
 from models.measuring.eventscore import alarms, hit
 from models.measuring.intervals import Estimate, Resampling, ratio
 from models.measuring.matching import OK, UNCLEAR, Matched
-from models.types import Array, Index
+from models.types import Array, Index, Mask
 
 POINTS = 200
 """Thresholds at most."""
@@ -111,7 +113,7 @@ def trade_off(matched: Matched) -> TradeOff:
     quiet = np.unique(risk[frames.quiet])[::-1]
     ranks = np.unique(np.geomspace(1, max(len(quiet), 1), POINTS).round().astype(np.intp)) - 1
     thresholds = quiet[ranks[: len(quiet)]]
-    above = [risk > threshold for threshold in thresholds]
+    above = [_flagged(matched, risk > threshold) for threshold in thresholds]
     heard = [alarms(matched, flagged) for flagged in above]
     return TradeOff(
         thresholds,
@@ -122,6 +124,16 @@ def trade_off(matched: Matched) -> TradeOff:
         _columns(matched, [each.run[each.false] for each in heard]),
         matched.ok_heard / HOUR,
     )
+
+
+def _flagged(matched: Matched, above: Mask) -> Mask:
+    """Say which frames are failures if those above a threshold are sure of it, shape (frames,)."""
+    if not matched.confirms:
+        return above
+    frames = matched.frames
+    apart = frames.start[1:] > frames.stop[:-1] + matched.slack
+    apart |= frames.run[1:] != frames.run[:-1]
+    return confirmed(above | frames.suspect, above, apart)
 
 
 def failure_score(scores: Array, classes: Sequence[str]) -> Array:

@@ -1,0 +1,153 @@
+"""Good motion: the frames of runs in which nothing went wrong."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Self
+
+import numpy as np
+
+from models.errors import DatasetError, MissingSignalError, RateError, RecordingError
+from models.examples import CHUNK
+from models.features import feature_count, features
+from models.framing import frame_starts
+from models.profile import TOLERANCE, Profile
+from models.recording import Recording
+from models.signals import stacked
+from models.splitting import group_of
+from models.types import Array, Index, Mask, Words
+
+OK = "ok"
+
+
+@dataclass(frozen=True, eq=False)
+class GoodMotion:
+    """Features of the frames of good motion, run by run and in order of time.
+
+    Attributes:
+        features: Not yet standardised, shape (frames, features).
+        runs: Name of the recording that each frame is from, shape (frames,).
+        start: When each frame starts, shape (frames,), in [s].
+        stop: When it stops, shape (frames,), in [s].
+        hashes: SHA-256 of each recording, by name.
+        annotated: Names of the recordings of which only what is annotated `ok` was taken.
+    """
+
+    features: Array
+    runs: Words
+    start: Array
+    stop: Array
+    hashes: Mapping[str, str]
+    annotated: tuple[str, ...] = ()
+
+    @classmethod
+    def read(cls, recordings: Iterable[Recording], profile: Profile) -> Self:
+        """Look at recordings one after the other; only their features are kept.
+
+        Args:
+            recordings: Signals at the profile's rate, each of another name: good as a whole, or
+                where they are annotated as `ok`.
+            profile: How they are framed, as for classifying, and what to compute.
+
+        Raises:
+            DatasetError: If there is no good frame at all, or a name repeats.
+            RateError: If a recording has another rate than the profile.
+            RecordingError: If a recording lacks a signal that the profile listens to.
+        """
+        parts: list[tuple[Array, Array, Array]] = []
+        runs: list[str] = []
+        hashes: dict[str, str] = {}
+        annotated: list[str] = []
+        for recording in recordings:
+            if recording.name in hashes:
+                raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
+            hashes[recording.name] = recording.sha256
+            if recording.blocks:
+                annotated.append(recording.name)
+            parts.append(_frames(recording, profile))
+            runs += [recording.name] * len(parts[-1][0])
+        if not runs:
+            raise DatasetError(
+                f"no good frame in {len(hashes)} recordings: a frame takes {profile.duration:g} s"
+                " without a gap, annotated as ok where something is annotated"
+            )
+        columns = [np.concatenate(column) for column in zip(*parts, strict=True)]
+        return cls(
+            columns[0],
+            np.array(runs),
+            columns[1],
+            columns[2],
+            MappingProxyType(hashes),
+            tuple(annotated),
+        )
+
+    @property
+    def groups(self) -> Words:
+        """What each frame shares its motion with, shape (frames,); see `splitting.group_of`."""
+        return np.array([group_of(name) for name in self.runs.tolist()])
+
+    @property
+    def seconds(self) -> float:
+        """Time that the frames cover, in [s]."""
+        before = np.append(-np.inf, self.stop[:-1])
+        before[self.first_of_run] = -np.inf
+        return float((self.stop - np.maximum(self.start, before)).sum())
+
+    @property
+    def first_of_run(self) -> Mask:
+        """Whether a frame is the first of its recording, shape (frames,)."""
+        return np.append(True, self.runs[1:] != self.runs[:-1])
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+
+def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array]:
+    """Frame what is good of a recording: features, start and stop of each frame."""
+    if abs(recording.rate / profile.rate - 1.0) > TOLERANCE:
+        raise RateError(
+            recording.rate,
+            [profile.rate],
+            f"recording {recording.name!r} does not fit; lower its rate, or take another profile",
+        )
+    try:
+        samples = stacked(recording.signal, profile.signals).astype(np.float64, copy=False)
+    except MissingSignalError as error:
+        raise RecordingError(recording.name, str(error)) from error
+    starts = _whole(_good(recording), profile)
+    windows = np.lib.stride_tricks.sliding_window_view(
+        samples, min(profile.length, samples.shape[-1]), axis=-1
+    )
+    view = np.moveaxis(windows, -2, 0)
+    chunks = np.split(starts, range(CHUNK, len(starts), CHUNK)) if len(starts) else []
+    found = [features(view[chunk], profile) for chunk in chunks]
+    time = recording.start + starts / recording.rate
+    nothing = np.empty((0, feature_count(profile)))
+    return np.concatenate([nothing, *found]), time, time + profile.length / recording.rate
+
+
+def _good(recording: Recording) -> Mask:
+    """Tell which samples are good: not in a gap, and `ok` where something is annotated."""
+    good = np.ones(recording.samples, dtype=bool)
+    if recording.blocks:
+        slack = 0.5 / recording.rate
+        time = recording.time
+        inside = [
+            (time >= block.start - slack) & (time < block.stop - slack)
+            for block in recording.blocks
+            if block.label == OK
+        ]
+        good = np.any([np.zeros_like(good), *inside], axis=0)
+    return good if recording.valid is None else good & recording.valid
+
+
+def _whole(good: Mask, profile: Profile) -> Index:
+    """List where the frames start that are good throughout, as classifying would cut them."""
+    if len(good) < profile.length:
+        return np.empty(0, dtype=np.intp)
+    starts = frame_starts(
+        len(good), length=profile.length, hop=profile.hop, flush_end=profile.flush_end
+    )
+    bad = np.concatenate(([0], np.cumsum(~good)))
+    whole: Index = starts[bad[starts + profile.length] == bad[starts]]
+    return whole

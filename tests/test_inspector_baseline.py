@@ -1,0 +1,150 @@
+"""`inspector baseline`: from good runs to a model that finds what departs from them."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from commandline import call
+
+import models
+from inspector.baseline import learn
+from noisemodel import Block, Run
+
+RATE = 1000.0
+NAMES = ("shoulder", "elbow", "wrist")
+
+
+def run_of(seed, *, rattle=0.0, seconds=6.0, rate=RATE, robot=None, names=NAMES, desired=True):
+    """Joints that swing; a rattle of 120 Hz from 3 s to 4 s in the elbow."""
+    generator = np.random.default_rng(seed)
+    time = np.arange(round(seconds * rate)) / rate
+    wanted = np.sin(2 * np.pi * 0.5 * np.outer(time, [0.6, 0.8, 1.0]) + seed)
+    velocity = wanted + 0.01 * generator.normal(size=wanted.shape)
+    shaken = (time >= 3.0) & (time < 4.0)
+    velocity[shaken, 1] += rattle * np.sin(2 * np.pi * 120 * time[shaken])
+    given = wanted if desired else None
+    return Run(time=time, velocity=velocity, velocity_desired=given, joint_names=names, robot=robot)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Three good runs, a baseline of them, and a run that rattles."""
+    folder = tmp_path_factory.mktemp("baseline")
+    for seed in range(3):
+        run_of(seed).save(folder / f"good{seed}.npz")
+    blocks = (Block(0.0, 2.5, "ok"), Block(3.0, 4.0, "oscillations"), Block(4.5, 6.0, "ok"))
+    (folder / "test").mkdir()
+    replace(run_of(7, rattle=0.5), blocks=blocks).save(folder / "test" / "bad.npz")
+    run_of(8).save(folder / "test" / "fine.npz")
+    goods = [folder / f"good{seed}.npz" for seed in range(3)]
+    status, out, err = call("baseline", *goods, "-o", folder / "robot.npz", "--alarms", 5)
+    assert (status, err) == (0, "")
+    assert "learnt from 0.005 h of good motion in 3 runs" in out
+    assert "for 5 false alarms per hour" in out
+    assert "can show no fewer than 600 alarms per hour: the limit is extrapolated" in out
+    return folder
+
+
+def test_what_departs_from_good_runs_is_a_finding(folder):
+    tested = [folder / "test" / "bad.npz", folder / "test" / "fine.npz"]
+    status, out, _ = call("classify", *tested, "--model", folder / "robot.npz", "--format", "json")
+    bad, fine = json.loads(out)["runs"]
+    assert status == 1
+    (event,) = bad["events"]
+    assert event["label"] == "departure"
+    assert event["start"] == pytest.approx(2.8, abs=0.25)
+    assert event["stop"] == pytest.approx(4.2, abs=0.25)
+    assert (fine["status"], fine["model"]) == ("ok", "robot")
+
+
+def test_findings_go_into_label_files(folder, tmp_path):
+    call(
+        "classify", folder / "test" / "bad.npz", "--model", folder / "robot.npz",
+        "--labels-to", tmp_path, "--labels-format", "csv",
+    )  # fmt: skip
+    (written,) = tmp_path.iterdir()
+    assert "departure" in written.read_text()
+
+
+def test_a_baseline_is_measured_by_failures_of_any_name(folder):
+    status, out, _ = call("evaluate", folder / "robot.npz", folder / "test" / "bad.npz", "--json")
+    measured = json.loads(out)
+    assert status == 0
+    assert measured["events"]["all_found"]["value"] == 1.0
+    assert measured["events"]["false_alarms"] == 0
+    assert measured["classes"] == ["ok", "departure"]
+
+
+def test_only_what_is_annotated_ok_is_learnt(folder, tmp_path):
+    inputs = [folder / "good0.npz", folder / "test" / "bad.npz"]
+    learnt = learn(inputs, tmp_path / "model.npz")
+    assert "of 1 run that somebody annotated, what is annotated `ok` alone" in str(learnt)
+    assert learnt.limit.hours * 3600 == pytest.approx(6.0 + 2.5 + 1.5, abs=0.2)
+
+
+def test_runs_without_desired_motion_are_heard_by_their_noise(tmp_path):
+    for seed in range(2):
+        run_of(seed, desired=False).save(tmp_path / f"run{seed}.npz")
+    learnt = learn([tmp_path], tmp_path / "model.npz")
+    assert learnt.classifier.profile.signals == (models.NOISE,)
+
+
+def test_faster_runs_are_lowered_if_a_rate_is_asked_for(tmp_path):
+    run_of(0).save(tmp_path / "slow.npz")
+    run_of(1, rate=2000.0).save(tmp_path / "fast.npz")
+    learnt = learn([tmp_path], tmp_path / "model.npz", rate=1000.0)
+    assert (learnt.classifier.rate, learnt.runs) == (1000.0, 2)
+
+
+@pytest.mark.parametrize(
+    ("odd", "said"),
+    [
+        (
+            run_of(1, rate=2000.0),
+            "recorded at 2000 Hz, .*a.npz at 1000 Hz; --rate 1000 lowers the faster ones",
+        ),
+        (run_of(1, robot="ur5"), "a run of ur5, but .*a.npz of panda; a baseline knows one robot"),
+        (
+            run_of(1, names=("hip", "knee", "wrist")),
+            r"has other joints than .*a.npz \(elbow, hip, knee\); a baseline knows one robot",
+        ),
+        (
+            run_of(1, desired=False),
+            "b: no signal desired, error; there is .*; --profile scalar takes the noise alone",
+        ),
+    ],
+)
+def test_runs_that_do_not_belong_together_are_refused(tmp_path, odd, said):
+    run_of(0, robot="panda").save(tmp_path / "a.npz")
+    odd.save(tmp_path / "b.npz")
+    status, out, err = call("baseline", tmp_path, "-o", tmp_path / "model.npz")
+    assert (status, out) == (3, "")
+    assert err.startswith("inspector: ")
+    assert err.count("\n") == 1
+    assert re.search(said, err), err
+    assert not (tmp_path / "model.npz").exists()
+
+
+def test_bad_input_is_one_line(folder, tmp_path):
+    good, output = folder / "good0.npz", tmp_path / "model.npz"
+    failing = tmp_path / "failing.npz"
+    replace(run_of(1), blocks=(Block(0.0, 6.0, "impact"),)).save(failing)
+    run_of(2, seconds=3.0).save(tmp_path / "short.npz")
+    for arguments, said in [
+        ((good, "--alarms", 0), "0 alarms per hour, expected more than 0: say, 1"),
+        ((failing,), "no good frame in 1 recordings"),
+        ((tmp_path / "short.npz",), "3 s of good motion are too short to learn from"),
+        ((good, "--profile", "paper-rbf"), "a baseline has no profile 'paper-rbf'"),
+        ((good, "--rate", 2000), "recorded at 1000 Hz, the model needs 2000 Hz"),
+        ((good, "--part", "training"), "no run in "),  # its name is held out
+        ((good, good), "two recordings are called 'good0'; name them apart"),
+        ((tmp_path / "nothing.npz",), "nothing.npz"),
+    ]:
+        status, out, err = call("baseline", *arguments, "-o", output)
+        assert (status, out, err.count("\n")) == (3, "", 1), (arguments, err)
+        assert said in err
+    status, _, err = call("baseline", good, "-o", folder / "robot.npz")
+    assert status == 3
+    assert "exists" in err

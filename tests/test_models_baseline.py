@@ -1,0 +1,235 @@
+"""A baseline knows good motion alone, and for how many false alarms it is set."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import models
+from models.baseline import MOTION, NOISE_ALONE, Baseline, cover, distance
+from models.baselinelimit import HOUR, PEAKS, alarm_peaks, limit
+from models.baselinetraining import GUARD, _parts
+
+RATE = 1000.0
+PROFILE = MOTION.at(RATE)
+SECONDS = 8
+
+
+def signals(seed, rattle=0.0, seconds=SECONDS):
+    """A motion that hums; a rattle of 90 Hz from 4 s to 6 s on what is measured."""
+    generator = np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    desired = 1.0 + 0.5 * np.sin(2 * np.pi * 0.7 * time + seed)
+    error = 0.01 * generator.normal(size=len(time))
+    error += rattle * np.sin(2 * np.pi * 90 * time) * ((time >= 4.0) & (time < 6.0))
+    return {"desired": desired, "measured": desired + error, "error": np.abs(error)}
+
+
+def recording(name, seed, rattle=0.0, blocks=(), **more):
+    blocks = tuple(models.Block(*block) for block in blocks)
+    return models.Recording(name, signals(seed, rattle), RATE, blocks, **more)
+
+
+GOOD = [recording(f"good{seed}", seed) for seed in range(6)]
+
+
+@pytest.fixture(scope="module")
+def learnt():
+    return models.learn_baseline(models.GoodMotion.read(GOOD, PROFILE), PROFILE, alarms=5.0)
+
+
+def motion(apart, run=None, hop=1.0):
+    """Good motion whose frames of 0.4 s start every `hop` seconds."""
+    start = hop * np.arange(len(apart))
+    run = np.full(len(apart), "run") if run is None else np.array(run)
+    return models.GoodMotion(np.zeros((len(apart), 1)), run, start, start + 0.4, {})
+
+
+def test_what_good_runs_do_is_no_departure_and_a_rattle_is_one_when_it_happens(learnt):
+    model = learnt.classifier
+    assert model.classify(signals(11), RATE).events() == ()
+    (event,) = model.classify(signals(12, rattle=0.3), RATE).events()
+    assert event.label == models.DEPARTURE
+    assert 3.5 < event.start <= 4.0
+    assert 6.0 <= event.stop < 6.5
+    assert event.score > 1.0
+
+
+def test_silence_is_no_departure_and_neither_is_a_quieter_motion(learnt):
+    still = dict.fromkeys(PROFILE.signals, np.zeros(3000))
+    assert learnt.classifier.classify(still, RATE).events() == ()
+    good = signals(11)
+    quieter = {name: 0.03 * signal for name, signal in good.items()}
+    assert learnt.classifier.classify(quieter, RATE).events() == ()
+
+
+def test_distance_is_the_root_mean_square_to_the_nearest_frame():
+    generator = np.random.default_rng(0)
+    good, fresh = generator.normal(size=(20, 7)), generator.normal(size=(9, 7))
+    known = np.vstack((np.full(7, -9.0), good))
+    apart = np.sqrt(np.square(fresh[:, None] - known).mean(axis=2)).min(axis=1)
+    np.testing.assert_allclose(distance(fresh, known), apart, rtol=1e-12)
+
+
+def test_frames_that_stand_for_all_leave_nothing_uncovered_if_there_are_enough():
+    generator = np.random.default_rng(1)
+    features = generator.normal(size=(60, 5))
+    far = [distance(features, cover(features, count)).max() for count in (1, 5, 20, 60)]
+    assert far == sorted(far, reverse=True)
+    assert far[-1] < 1e-6
+    assert len(cover(np.repeat(features[:3], 9, axis=0), 20)) == 1 + 3
+
+
+def test_the_limit_of_an_exponential_tail_is_where_it_has_to_be():
+    generator = np.random.default_rng(2)
+    apart = generator.exponential(0.2, 5000)
+    good = motion(apart)
+    hours = good.seconds / HOUR
+    found = limit(apart, good, 0.5)
+    expected = 0.2 * np.log(len(apart) / (0.5 * hours))  # frames lie apart: each is an alarm
+    assert found.distance == pytest.approx(expected, rel=0.2)
+    assert found.distance > apart.max() - 0.4
+    assert found.extrapolated
+    assert found.peaks <= PEAKS
+
+
+def test_where_there_is_motion_enough_alarms_are_counted():
+    generator = np.random.default_rng(3)
+    apart = generator.normal(size=30_000) ** 2
+    good = motion(apart)
+    found = limit(apart, good, 40.0)
+    assert not found.extrapolated
+    assert found.alarms == pytest.approx(40.0 * found.hours, rel=0.1)
+    assert "extrapolated" not in str(found)
+
+
+def test_a_smaller_budget_asks_for_a_farther_limit():
+    apart = np.random.default_rng(4).exponential(0.2, 300)
+    limits = [limit(apart, motion(apart), budget).distance for budget in (0.1, 1.0, 10.0, 100.0)]
+    assert limits == sorted(limits, reverse=True)
+    assert limits[0] > limits[-1]
+
+
+def test_frames_that_overlap_or_touch_are_one_alarm_and_runs_are_never_joined():
+    apart = np.array([2.0, 3.0, 0.0, 5.0, 4.0, 0.0, 0.0, 1.0, 2.0])
+    overlapping = motion(apart, hop=0.1)
+    np.testing.assert_array_equal(alarm_peaks(apart, overlapping, 0.5), [5.0])
+    apart_by_time = motion(apart, hop=0.3)
+    np.testing.assert_array_equal(alarm_peaks(apart, apart_by_time, 0.5), [3.0, 5.0, 2.0])
+    two = motion(apart, ["a"] * 4 + ["b"] * 5, hop=0.1)
+    np.testing.assert_array_equal(alarm_peaks(apart, two, 0.5), [5.0, 4.0])
+
+
+def test_little_good_motion_is_said_to_show_little(learnt):
+    text = str(learnt)
+    assert "learnt from 0.0133 h of good motion in 6 runs" in text
+    assert "can show no fewer than 225 alarms per hour: the limit is extrapolated" in text
+    assert learnt.classifier.metrics["baseline"]["budget"] == 5.0
+
+
+def test_of_a_single_run_parts_are_left_out_with_time_between():
+    long = models.Recording("long", signals(0, seconds=30), RATE)
+    good = models.GoodMotion.read([long], PROFILE)
+    for train, test in _parts(good):
+        gap = np.maximum(good.start[train][:, None] - good.stop[test], 0)
+        gap += np.maximum(good.start[test] - good.stop[train][:, None], 0)
+        assert gap.min() >= GUARD
+    alone = models.learn_baseline(good, PROFILE)
+    assert "how much another run differs, it cannot say" in str(alone)
+    assert alone.classifier.classify(signals(12, rattle=0.3), RATE).events()
+
+
+def test_of_an_annotated_run_only_what_is_ok_is_learnt():
+    blocks = ((0.0, 3.0, "ok"), (4.0, 6.0, "impact"), (6.0, 8.0, "ok"))
+    good = models.GoodMotion.read([recording("one", 0, 0.3, blocks)], PROFILE)
+    assert ((good.stop <= 3.0 + 1e-9) | (good.start >= 6.0 - 1e-9)).all()
+    assert good.seconds == pytest.approx(5.0, abs=0.01)
+    assert good.annotated == ("one",)
+
+
+def test_frames_that_touch_a_gap_are_not_learnt():
+    valid = np.ones(SECONDS * 1000, dtype=bool)
+    valid[3000:3500] = False
+    good = models.GoodMotion.read([recording("one", 0, valid=valid)], PROFILE)
+    assert ((good.stop <= 3.0 + 1e-9) | (good.start >= 3.5 - 1e-9)).all()
+
+
+def test_a_baseline_is_a_model_file_and_the_same_runs_give_the_same_bytes(learnt, tmp_path):
+    learnt.classifier.save(tmp_path / "one.npz")
+    again = models.learn_baseline(models.GoodMotion.read(GOOD, PROFILE), PROFILE, alarms=5.0)
+    again.classifier.save(tmp_path / "two.npz")
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+    loaded = models.Classifier.load(tmp_path / "one.npz")
+    assert isinstance(loaded.machines, Baseline)
+    heard, known = (m.classify(signals(12, 0.3), RATE) for m in (loaded, learnt.classifier))
+    np.testing.assert_array_equal(heard.scores, known.scores)
+
+
+def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
+    odd = replace(learnt.classifier.machines, limit=np.ones(2))
+    replace(learnt.classifier, machines=odd).save(tmp_path / "odd.npz")
+    with pytest.raises(models.ModelFileError, match=r"array 'limit' has shape \(2,\)"):
+        models.Classifier.load(tmp_path / "odd.npz")
+
+
+def test_a_stream_hears_what_the_whole_signal_says(learnt):
+    whole = signals(12, rattle=0.3)
+    stream = models.Stream(learnt.classifier)
+    heard = [
+        stream.push({name: signal[first : first + 370] for name, signal in whole.items()})
+        for first in range(0, SECONDS * 1000, 370)
+    ]
+    labels = np.concatenate([each.label for each in heard])
+    batch = learnt.classifier.classify(whole, RATE)
+    np.testing.assert_array_equal(labels, batch.label[: len(labels)])
+    assert models.DEPARTURE in labels
+
+
+def test_a_failure_of_any_name_is_found_by_a_departure(learnt):
+    blocks = ((0.0, 3.5, "ok"), (4.0, 6.0, "oscillations"), (6.5, 8.0, "ok"))
+    tests = [recording(f"bad{seed}", seed, 0.3, blocks) for seed in (21, 22)]
+    measured = models.assess(learnt.classifier, tests)
+    assert measured.events.all_found.value == 1.0
+    assert measured.events.false_alarms == 0
+    assert measured.frames.failure_recall.value == 1.0
+    assert measured.calibration_error is None
+    with pytest.raises(models.SeenError, match="good0"):
+        models.assess(learnt.classifier, [recording("good0", 0, blocks=((0.0, 8.0, "ok"),))])
+
+
+def test_the_noise_alone_is_enough_for_a_baseline():
+    profile = NOISE_ALONE.at(RATE)
+    good = models.GoodMotion.read(GOOD, profile)
+    model = models.learn_baseline(good, profile).classifier
+    assert model.classify(signals(11), RATE).events() == ()
+    assert model.classify(signals(12, rattle=1.0), RATE).events()
+
+
+@pytest.mark.parametrize("alarms", [0.0, -1.0, np.nan, np.inf])
+def test_no_alarm_at_all_is_no_budget(alarms):
+    good = models.GoodMotion.read(GOOD[:2], PROFILE)
+    with pytest.raises(models.ProfileError, match="alarms per hour, expected more than 0"):
+        models.learn_baseline(good, PROFILE, alarms=alarms)
+
+
+def test_too_little_good_motion_is_refused():
+    short = models.Recording("short", signals(0, seconds=3), RATE)
+    with pytest.raises(models.DatasetError, match="3 s of good motion are too short to learn"):
+        models.learn_baseline(models.GoodMotion.read([short], PROFILE), PROFILE)
+
+
+def test_runs_without_a_good_frame_are_refused():
+    bad = recording("bad", 0, blocks=((0.0, 8.0, "impact"),))
+    tiny = models.Recording("tiny", signals(0, seconds=0.2), RATE)
+    with pytest.raises(models.DatasetError, match="no good frame in 2 recordings"):
+        models.GoodMotion.read([bad, tiny], PROFILE)
+
+
+def test_recordings_that_do_not_fit_are_refused_by_name():
+    with pytest.raises(models.DatasetError, match="two recordings are called 'good0'"):
+        models.GoodMotion.read([GOOD[0], GOOD[0]], PROFILE)
+    with pytest.raises(models.RateError, match="'good0' does not fit"):
+        models.GoodMotion.read(GOOD, MOTION.at(500.0))
+    alone = models.Recording("alone", np.ones(5000), RATE)
+    with pytest.raises(models.RecordingError, match="alone: no signal desired, measured, error"):
+        models.GoodMotion.read([alone], PROFILE)

@@ -1,0 +1,94 @@
+"""A finding takes two sure frames; what stands beside them joins in."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from models import UNKNOWN, Labels
+from models.labels import confirmed
+
+CLASSES = ("ok", "impact", "oscillations")
+HOP, LENGTH = 0.1, 0.4
+
+
+def labels(text, *, sure=None):
+    """Frames of classes by their first letters, `ok` as a dot; upper case where they are sure."""
+    names = {".": "ok", **{name[0]: name for name in (*CLASSES[1:], UNKNOWN)}}
+    start = HOP * np.arange(len(text))
+    called = np.array([names[letter.lower()] for letter in text])
+    certain = np.array([letter.isupper() for letter in text]) if sure is None else sure
+    scores = np.zeros((len(text), len(CLASSES)))
+    return Labels(start, start + LENGTH, called, scores, CLASSES, certain)
+
+
+def settled(text):
+    return "".join("." if name == "ok" else name[0] for name in labels(text).settled.tolist())
+
+
+@pytest.mark.parametrize(
+    ("alone", "together"),
+    [
+        ("..ii..", "......"),
+        ("..Ii..", "......"),
+        (".iIIi.", ".iiii."),
+        (".IiiiI", ".iiiii"),
+        (".I.I..", "......"),
+        ("II.ii.", "ii...."),
+        ("i.OOii", "..ooii"),
+        (".Io...", "......"),
+        (".IOo..", ".ioo.."),
+        ("uIIu..", "uiiu.."),
+        ("IuuI..", ".uu..."),
+    ],
+)
+def test_a_stretch_of_failures_takes_two_sure_frames(alone, together):
+    assert settled(alone) == together
+
+
+def test_a_stretch_of_several_classes_makes_an_event_of_each():
+    assert [event.label for event in labels(".IOo.").events()] == ["impact", "oscillations"]
+    assert labels(".Io..").events() == ()
+
+
+def test_frames_on_both_sides_of_a_gap_are_two_stretches():
+    both = labels("II")
+    later = np.array([0.0, 5.0])
+    far = replace(both, start=both.start + later, stop=both.stop + later)
+    assert both.settled.tolist() == ["impact", "impact"]
+    assert far.settled.tolist() == ["ok", "ok"]
+
+
+def test_the_only_frame_of_a_signal_speaks_for_itself():
+    assert labels("I").settled.tolist() == ["impact"]
+    assert labels("i").settled.tolist() == ["ok"]
+
+
+def test_without_sureness_each_frame_speaks_for_itself():
+    plain = replace(labels("i.iui"), sure=None)
+    assert plain.settled is plain.label
+    assert plain.outright is plain.label
+    assert len(plain.events()) == 1
+
+
+def test_while_frames_come_in_the_sure_ones_are_failures():
+    assert labels(".iIIiu.").outright.tolist() == [
+        "ok", "ok", "impact", "impact", "ok", "unknown", "ok",
+    ]  # fmt: skip
+
+
+def test_what_is_confirmed_is_never_more_than_what_seemed_to_fail():
+    generator = np.random.default_rng(3)
+    for _ in range(50):
+        failing, apart = generator.random(40) < 0.6, generator.random(39) < 0.1
+        sure = failing & (generator.random(40) < 0.4)
+        kept = [confirmed(failing, sure, apart, least=least) for least in (0, 1, 2, 3)]
+        assert (kept[0] == failing).all()
+        assert all((more >= less).all() for more, less in pairwise(kept))
+        assert (kept[1] >= sure).all()
+
+
+def test_no_frames_are_confirmed_of_none():
+    none = np.zeros(0, dtype=bool)
+    assert confirmed(none, none, none).shape == (0,)
