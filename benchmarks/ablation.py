@@ -1,0 +1,118 @@
+"""Say what each step of the classifier is worth: leave one out, or put another in its place.
+
+    python -m benchmarks.ablation data/ [--rate 1000] [--folds 3] [--seeds 8] [--only whole,svm]
+
+Only the training part of a data set is looked at. Groups of runs are dealt into folds; each variant
+learns from all folds but one and hears that one from end to end, in turn.
+"""
+
+import argparse
+import os
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import numpy as np
+
+import models
+from inspector.part import Part
+from inspector.training import recordings
+from models.examples import Examples
+from models.measuring.assessment import judge
+from models.measuring.heard import Heard, hear
+from models.splitting import folds
+from scenarios.sample import Sample
+
+GENERAL, SCALAR = models.GENERAL, models.SCALAR
+POWER = "power"
+VARIANTS = {
+    "the whole": GENERAL,
+    "the noise alone": SCALAR,
+    "the noise alone, levels as they are": replace(SCALAR, relative=False),
+    "measured alone": replace(GENERAL, signals=("measured",)),
+    "desired and measured": replace(GENERAL, signals=("desired", "measured")),
+    "levels as they are": replace(GENERAL, relative=False),
+    "quiet levels too (floor 3e-5 rad/s)": replace(GENERAL, floor=3e-5),
+    "windows of 50 ms": replace(GENERAL, window=0.05, stride=0.0125),
+    "support vector machine": replace(GENERAL, machine="svm", least_deviation=0.5),
+    "networks of 16 units": GENERAL,
+    "networks of 256 units": GENERAL,
+    "with the extended noise": replace(GENERAL, signals=(*GENERAL.signals, POWER)),
+    "the extended noise alone": replace(SCALAR, signals=(POWER,)),
+}
+SIZES = {"networks of 16 units": 16, "networks of 256 units": 256}
+HEAD = ("variant", "balanced", "failure recall", "found at 5/h", "at 20/h", "at 100/h", "CPU-s")
+
+
+def main() -> None:
+    """Measure and print."""
+    arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    arguments.add_argument("data", type=Path, nargs="+")
+    arguments.add_argument("--rate", type=float, default=1000.0)
+    arguments.add_argument("--folds", type=int, default=3)
+    arguments.add_argument("--seeds", type=int, default=10**6, help="of each robot, the first")
+    arguments.add_argument("--only", default="", help="parts of variants' names, by commas")
+    options = arguments.parse_args()
+    chosen = {
+        name: variant
+        for name, variant in VARIANTS.items()
+        if any(part in name for part in options.only.split(","))
+    }
+    power = any(POWER in variant.signals for variant in chosen.values())
+    read = [
+        one
+        for one in _recordings(options.data, options.rate, power=power)
+        if int(models.group_of(one.name).rpartition("-")[2]) < options.seeds
+    ]
+    print(f"{len(read)} runs in {len({models.group_of(one.name) for one in read})} groups")
+    print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|", flush=True)
+    for name, variant in chosen.items():
+        begun = time.process_time()
+        profile = variant.at(options.rate)
+        found = _measure(
+            read, replace(profile, units=SIZES.get(name, profile.units)), options.folds
+        )
+        print(f"| {name} | {found} | {time.process_time() - begun:.0f} |", flush=True)
+
+
+def _recordings(inputs: Sequence[Path], rate: float, *, power: bool) -> list[models.Recording]:
+    found = list(recordings(inputs, rate, Part.TRAINING))
+    if not power:
+        return found
+    paths = {
+        path.parent.name + "/" + path.stem: path for each in inputs for path in each.rglob("*.npz")
+    }
+    return [replace(one, signal={**one.signal, POWER: _power(paths[one.name])}) for one in found]
+
+
+def _power(path: Path) -> np.ndarray:
+    """The root of what the surfaces of all links radiate, measured and desired together."""
+    signals = Sample.load(path, only=("power", "power_desired")).signals
+    return np.sqrt(signals["power"] + signals["power_desired"])
+
+
+def _measure(read: Sequence[models.Recording], profile: models.Profile, count: int) -> str:
+    """Learn and hear in turn; the cells of a row of the table."""
+    examples = Examples.read(read, profile)
+    heard: list[Heard] = []
+    for train, test in folds([models.group_of(one.name) for one in read], count):
+        names = {read[item].name for item in train}
+        rows = np.array([run in names for run in examples.runs.tolist()])
+        hashes = {name: examples.hashes[name] for name in names}
+        part = Examples(examples.features[rows], examples.labels[rows], examples.runs[rows], hashes)
+        classifier = models.Classifier.train(part, profile)
+        heard += [hear(classifier, read[item]) for item in test]
+    found = judge(heard)
+    shares = [
+        found.frames.balanced_accuracy,
+        found.frames.failure_recall,
+        *(found.at_budgets[budget][1] for budget in (5.0, 20.0, 100.0)),
+    ]
+    return " | ".join(f"{one.value:.1%} [{one.low:.1%}, {one.high:.1%}]" for one in shares)
+
+
+if __name__ == "__main__":
+    main()
