@@ -134,7 +134,7 @@ def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size):
     batch = library["general-1khz"].classify(nm.norms(run), RATE)
     _, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(scores, batch.scores, atol=1e-9)
-    assert summary.labels == dict(Counter(batch.label.tolist()))
+    assert summary.labels == dict(Counter(batch.outright.tolist()))
 
 
 def test_no_peak_of_the_noise_is_lost(tmp_path, library):
