@@ -218,7 +218,8 @@ class Classifier:
         Returns:
             Class names, shape (frames,).
         """
-        return self._choose(self.judge(plain))
+        chunks = _chunks(np.arange(len(plain)))
+        return np.concatenate([self._choose(self.judge(plain[chunk])) for chunk in chunks])
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.

@@ -1,0 +1,180 @@
+"""One side of `noisytest.py`: does the tasks that are named on standard input, and times them.
+
+    python -I benchmarks/noisytestside.py original FOLDER
+
+It knows NoisyTest 0.0.1 and ours, and imports the one that is asked for. The folder of this file
+must not be on the path (``-I``, ``-P``): a module there has the name of the original's package.
+"""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+FILE = "earlycontacttoe.log"
+"""The file of the validation set that is labelled; a recording of 10 s."""
+HOPS = 100
+POINTS = 3
+"""Points of the grid that are trained and measured by themselves."""
+TIMES = {"hop": HOPS, "hop, stream": HOPS, "hop, scalar": HOPS, "point": POINTS}
+"""How often a task is done in one go."""
+
+
+class Original:
+    """NoisyTest 0.0.1, driven by its own pipeline as its command line drives it."""
+
+    def __init__(self, folder: Path) -> None:
+        """Import what its commands import."""
+        os.environ["TF_CPP_MIN_LOG_LEVEL"] = "3"
+        from copy import deepcopy
+
+        import tensorflow
+        from noisytest.pipeline import DefaultPipeline
+
+        self._tensor, self._copied, self._folder = tensorflow.constant, deepcopy, folder
+        with (folder / "noisytest-config.json").open() as config:
+            self._pipeline = DefaultPipeline(config)
+
+    def tasks(self) -> dict[str, Callable[[], Any]]:
+        """Name what can be done."""
+        return {
+            "train": self._train,
+            "prepare": self._prepare,
+            "file": self._label,
+            "hop": self._hop,
+            "point": self._point,
+        }
+
+    def _train(self) -> float:
+        paths = [str(self._folder / name) for name in ("training", "validation")]
+        self._sets = self._pipeline.load_training_data(*paths)
+        return self._point(1)
+
+    def _prepare(self) -> None:
+        read = self._pipeline.load_prediction_data(str(self._folder / "validation" / FILE))
+        self._windows = read.noise_estimate.numpy()
+        self._hop(1)
+
+    def _label(self) -> list[int]:
+        _, labels = self._pipeline.test(str(self._folder / "validation" / FILE))
+        return [round(label) for label in labels.tolist()]
+
+    def _hop(self, count: int = HOPS) -> None:
+        for index in range(count):
+            window = self._tensor(self._windows[index % len(self._windows)][None])
+            features = self._pipeline.feature_preprocessor.prepare_data(window)
+            self._pipeline.model.predict(features)
+
+    def _point(self, count: int = POINTS) -> float:
+        for _ in range(count):  # learning changes its input, so that its search copies it too
+            error = self._pipeline.learn(*self._copied(self._sets))
+        return float(error.subset_accuracy)
+
+
+class Ours:
+    """The profile that follows NoisyTest decision by decision."""
+
+    def __init__(self, folder: Path) -> None:
+        """Import what training and labelling import."""
+        import sklearn.svm  # noqa: F401
+
+        import models
+
+        self._models, self._folder = models, folder
+        self._profile = models.noisytest.profile_from_config(folder / "noisytest-config.json")
+
+    def tasks(self) -> dict[str, Callable[[], Any]]:
+        """Name what can be done."""
+        return {
+            "train": self._train,
+            "prepare": self._prepare,
+            "file": self._label,
+            "hop": self._hop,
+            "hop, stream": lambda: self._push(self._classifier),
+            "hop, scalar": lambda: self._push(self._scalar),
+            "point": self._point,
+            "points": self._points,
+        }
+
+    def _train(self) -> float:
+        read, profile = self._models.Dataset.read, self._profile
+        self._sets = [
+            read(self._folder / name, profile, training=name == "training")
+            for name in ("training", "validation")
+        ]
+        return self._point(1)
+
+    def _prepare(self) -> None:
+        models, profile = self._models, self._profile
+        shipped = Path(__file__).parents[1] / "assets" / "models" / "scalar-10khz.npz"
+        self._scalar = models.Classifier.load(shipped)
+        _, self._noise = models.read_log(self._folder / "validation" / FILE)
+        self._windows = models.frame(self._noise[1:], length=profile.length, hop=profile.hop)
+        self._recordings = [
+            list(models.noisytest.read_folder(self._folder / name, rate=profile.rate))
+            for name in ("training", "validation")
+        ]
+        self._hop(1)
+
+    def _label(self) -> list[int]:
+        _, noise = self._models.read_log(self._folder / "validation" / FILE)
+        labels = self._classifier.classify(noise, self._profile.rate)
+        return [self._classifier.classes.index(label) for label in labels.label.tolist()]
+
+    def _hop(self, count: int = HOPS) -> None:
+        for index in range(count):
+            self._classifier.predict(self._windows[index % len(self._windows)][None])
+
+    def _push(self, classifier: Any) -> None:
+        """Push hops; the few before the first frame is full, cost less."""
+        stream, hop = self._models.Stream(classifier), classifier.profile.hop
+        for index in range(HOPS):
+            first = index * hop % (len(self._noise) - hop)
+            stream.push(self._noise[first : first + hop])
+
+    def _point(self, count: int = POINTS) -> float:
+        known, fresh = self._sets
+        for _ in range(count):
+            self._classifier = self._models.Classifier.train(known, self._profile, validation=fresh)
+        return float(self._classifier.metrics["validation"]["subset_accuracy"])
+
+    def _points(self) -> int:
+        """Do all points of the paper's grid that share the stride; say how many."""
+        from models.tuning.grid import Grid
+        from models.tuning.search import measure
+        from models.tuning.trial import Trial
+
+        grid = Grid.of(["paper"], self._profile.kernel).profiles(self._profile)
+        points = [point for point in grid if point.stride == self._profile.stride]
+        return len(measure(points, Trial.against(*self._recordings)))
+
+
+def serve(side: type[Original] | type[Ours], folder: Path) -> None:
+    """Do what is asked for, line by line.
+
+    Args:
+        side: Whose tasks.
+        folder: NoisyTest's ``training``, ``validation`` and configuration.
+    """
+    say, sys.stdout = sys.stdout, sys.stderr  # a library may print
+
+    def tell(begun: tuple[float, float], times: int, answer: Any) -> None:
+        wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
+        print(json.dumps({"wall": wall / times, "cpu": cpu / times, "answer": answer}), file=say)
+        say.flush()
+
+    begun = time.perf_counter(), time.process_time()
+    tasks = side(folder).tasks()
+    tell(begun, 1, sorted(tasks))
+    for line in sys.stdin:
+        name = line.strip()
+        begun = time.perf_counter(), time.process_time()
+        answer = tasks[name]()
+        tell(begun, answer if name == "points" else TIMES.get(name, 1), answer)
+
+
+if __name__ == "__main__":
+    serve({"original": Original, "ours": Ours}[sys.argv[1]], Path(sys.argv[2]))
