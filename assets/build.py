@@ -43,10 +43,11 @@ CARD = """# {name}
 
 Listens to {signals} at {rate:g} Hz, and tells {classes} apart, or says unknown.
 
-Made by `make models`: profile `{profile}`, {runs} runs of the training part of {seeds}, every
-scenario (`scenarios`, recipe {recipe}); hashes of all of them are in the model file. Below is what
-it does on what is held out by hash of the seeds from {looked_at} on, and in {hours:.3g} hours more
-of good motion: robots that it knows, seeds that neither it nor those who made it have seen.
+Made by `make models`: profile `{profile}`, {runs} runs of the training part of
+{seeds}, every scenario (`scenarios`, recipe {recipe});
+hashes of all of them are in the model file. Below is what it does on what is held out by hash of
+the seeds from {looked_at} on, and in {hours:.3g} hours more of good motion: robots that it knows,
+seeds that neither it nor those who made it had seen.
 
 What it does not know: any other robot, real drives (gears, friction that is not Coulomb's, belts),
 payloads, hands at work. What is unlike all of its runs it calls unknown, as far as that can be told
