@@ -5,6 +5,8 @@ import re
 from collections.abc import Callable, Sequence
 from xml.etree import ElementTree as ET
 
+from inspector.origin import Origin
+from inspector.tracing import Origins
 from inspector.verdict import Status, Verdict
 from models import Event
 
@@ -28,8 +30,13 @@ def text(verdicts: Sequence[Verdict]) -> str:
     return "\n".join(lines)
 
 
-def as_json(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts as ``noise-verdict/1``."""
+def as_json(verdicts: Sequence[Verdict], origins: Sequence[Origins] = ()) -> str:
+    """Write verdicts as ``noise-verdict/1``.
+
+    Args:
+        verdicts: What was found in runs.
+        origins: Where it comes from, for each run; not written unless given.
+    """
     runs = [
         {
             "run": str(verdict.path),
@@ -41,12 +48,13 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
                     "start": round(event.start, 6),
                     "stop": round(event.stop, 6),
                     "score": round(event.score, 6),
+                    **({"origin": _origin(known[event])} if event in known else {}),
                 }
                 for event in verdict.events
             ],
             "message": verdict.message,
         }
-        for verdict in verdicts
+        for verdict, known in zip(verdicts, origins or [{}] * len(verdicts), strict=True)
     ]
     return json.dumps({"format": "noise-verdict/1", "runs": runs}, indent=2)
 
@@ -100,6 +108,18 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "junit": junit,
     "github": github,
 }
+
+
+def _origin(origin: Origin) -> dict[str, object]:
+    """Say where a finding comes from: lag in [s], band in [Hz], null where it is not known."""
+    first = origin.first
+    return {
+        "stage": first and first.stage,
+        "following": first and (first.following or None),
+        "lag": first and round(first.lag, 6),
+        "joints": {} if first is None else {name: round(share, 3) for name, share in first.joints},
+        "band": origin.band and [round(frequency, 3) for frequency in origin.band],
+    }
 
 
 def _sentence(event: Event) -> str:

@@ -50,7 +50,9 @@ class Inspection:
     @cached_property
     def origins(self) -> dict[models.Event | nm.Block, Origin]:
         """Where each failure comes from, found or annotated."""
-        return origins(self.run, self.events, self.labels)
+        labels = self.labels
+        frame = 0.0 if labels is None else float(labels.stop[0] - labels.start[0])
+        return origins(self.run, self.events, frame=frame)
 
 
 def inspect(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from inspector.originband import band
 from inspector.stagesfirst import First, first_stage
 from inspector.stagesnew import Usual, usual
-from models import Event, Labels
+from models import Event
 from noisemodel import Block, Run
 
 ANNOTATED = 0.1
@@ -56,15 +56,14 @@ class Origin:
         return f"{low} Hz" if low == high else f"{low}-{high} Hz"
 
 
-def origins(
-    run: Run, found: Sequence[Event], labels: Labels | None = None
-) -> dict[Event | Block, Origin]:
+def origins(run: Run, found: Sequence[Event], *, frame: float = 0.0) -> dict[Event | Block, Origin]:
     """Tell where each failure of a run comes from.
 
     Args:
         run: The run.
         found: Its findings.
-        labels: The frames that they consist of: a finding may set in at any time of its first.
+        frame: Duration of the frames that they consist of, in [s]: a finding may set in at any
+            time of its first.
 
     Returns:
         The origin of each finding, and of each block that is annotated as a failure.
@@ -74,8 +73,7 @@ def origins(
     if not failures:
         return {}
     known = usual(run, failures) if flows(run) else None
-    frame = 0.0 if labels is None or not len(labels.start) else labels.stop[0] - labels.start[0]
-    reach = max(ANNOTATED, float(frame))
+    reach = max(ANNOTATED, frame)
     return {
         failure: _origin(run, known, failure, failures, reach if failure in found else ANNOTATED)
         for failure in failures

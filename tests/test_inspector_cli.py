@@ -123,6 +123,18 @@ def test_noisytests_logs_are_classified(inspector, tmp_path):
     assert "10khz" in verdict["model"]
 
 
+def test_where_a_finding_comes_from_is_said_on_request(inspector):
+    status, out, _ = inspector("classify", demo_run(), "--format", "json", "--origins")
+    (run,) = json.loads(out)["runs"]
+    assert status == 1
+    assert all(event["origin"]["stage"] in ("desired", "measured") for event in run["events"])
+    status, out, _ = inspector("classify", demo_run(), "--format", "json")
+    assert "origin" not in out
+    status, _, err = inspector("classify", demo_run(), "--origins")
+    assert status == 2
+    assert "--origins takes --format json" in err
+
+
 def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
     (tmp_path / "text.npz").write_text("not an archive")
     good = bare_run(tmp_path / "good.npz")

@@ -5,6 +5,8 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from inspector.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
+from inspector.origin import Origin
+from inspector.stagesfirst import First
 from inspector.verdict import Status, Verdict, exit_status
 from models import Event
 
@@ -47,6 +49,23 @@ def test_json_is_noise_verdict_1():
     assert (loud["run"], loud["status"], loud["model"]) == ("loud.npz", "findings", "scalar-10khz")
     assert (slow["status"], slow["events"]) == ("cannot-tell", [])
     assert slow["message"] == "30 Hz is below every model"
+
+
+def test_json_says_where_findings_come_from_if_it_is_told():
+    joints = (("knee", 0.75), ("hip", 0.25))
+    blow = Origin(First("desired", "measured", 0.002, lasting=False, joints=joints), (85.0, 130.0))
+    known = {LOUD.events[0]: blow, LOUD.events[1]: Origin(None, None)}
+    quiet, loud = json.loads(as_json([QUIET, LOUD], [{}, known]))["runs"]
+    assert quiet["events"] == []
+    assert loud["events"][0]["origin"] == {
+        "stage": "desired",
+        "following": "measured",
+        "lag": 0.002,
+        "joints": {"knee": 0.75, "hip": 0.25},
+        "band": [85.0, 130.0],
+    }
+    unknown = {"stage": None, "following": None, "lag": None, "joints": {}, "band": None}
+    assert loud["events"][1]["origin"] == unknown
 
 
 def test_junit_counts_and_tells_why():

@@ -1,15 +1,21 @@
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from inspector.assets import demo_run, model_files
 from inspector.htmltables import found as tables
 from inspector.inspection import inspect
+from inspector.labelling import load_library
 from inspector.origin import Origin, origins
 from inspector.originband import band
 from inspector.originquiet import quiet
 from inspector.report import report, sentence
 from inspector.stagesfirst import First
+from inspector.tracing import trace_all
+from inspector.verdict import Status, Verdict, judge
+from models import Event
 from noisemodel import Block, Run
 
 RATE, SECONDS = 2000.0, 6.0
@@ -89,6 +95,20 @@ def test_every_failure_has_an_origin_and_what_is_ok_has_none():
     assert list(known) == [SHAKE]
     assert known[SHAKE].first.stage == "measured"
     assert origins(shaken_run(blocks=()), ()) == {}
+
+
+def test_findings_are_traced_to_what_a_view_of_their_run_says():
+    library = load_library(model_files())
+    verdict = judge(demo_run(), library)
+    assert verdict.events
+    (known,) = trace_all([verdict], library)
+    seen = inspect(demo_run(), library, robot=False)
+    assert known == {event: seen.origins[event] for event in verdict.events}
+
+
+def test_a_noise_without_its_run_is_traced_to_nothing():
+    heard = Verdict(Path("noise.log"), Status.FINDINGS, "m", (Event("impact", 1.0, 1.5, 0.9),))
+    assert trace_all([heard], {}) == [{}]
 
 
 def test_the_report_says_stage_and_band_of_each_failure(tmp_path):

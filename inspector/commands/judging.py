@@ -31,22 +31,31 @@ def classify(
     labels_format: Annotated[
         str, typer.Option(help="Of those files: noisytest, csv or audacity.")
     ] = "audacity",
+    origins: Annotated[
+        bool, typer.Option("--origins", help="In JSON, say where each finding comes from.")
+    ] = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Label runs; exit 0 if all are quiet, 1 findings, 3 bad input, 4 cannot tell."""
     from inspector import assets
-    from inspector.formats import FORMATS
+    from inspector.formats import FORMATS, as_json
     from inspector.labelfiles.findings import label_paths, write_findings
     from inspector.labelling import load_library
     from inspector.progress import progress
+    from inspector.tracing import trace_all
     from inspector.verdict import exit_status, judge_all
 
+    if origins and format is not Format.JSON:
+        raise typer.BadParameter("--origins takes --format json")
     library = load_library(model or assets.model_files())
     targets = {}
     if labels_to:
         targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)
     verdicts = list(progress(judge_all(runs, library, jobs=jobs), "classify", total=len(runs)))
-    typer.echo(FORMATS[format](verdicts))
+    if origins:
+        typer.echo(as_json(verdicts, trace_all(verdicts, library, jobs=jobs)))
+    else:
+        typer.echo(FORMATS[format](verdicts))
     if targets:
         write_findings(verdicts, targets, format_name=labels_format, overwrite=overwrite)
     for bad in verdicts:
