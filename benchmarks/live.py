@@ -3,8 +3,9 @@
     python benchmarks/live.py [--seconds 20] [--joints 32] [--rate 10000]
 
 Velocities, desired velocities and positions of TALOS's joints go through `LiveSession`, in chunks
-of 20 ms and one by one, and as CSV through `inspector live`; into a file, and to a server that
-receives as a viewer does. What starting costs is left out.
+of 20 ms and one by one, and as CSV through `inspector live`, from a file and from a pipe into which
+20 ms are written at a time, when they are due; into a file, and to a server that receives as a
+viewer does. What starting costs is left out.
 """
 
 import argparse
@@ -18,7 +19,9 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from pathlib import Path
+from typing import BinaryIO
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
@@ -59,7 +62,12 @@ def through_session(
 
 
 def through_csv(
-    signals: dict[str, np.ndarray], rate: float, names: tuple[str, ...], folder: Path, *sink: str
+    signals: dict[str, np.ndarray],
+    rate: float,
+    names: tuple[str, ...],
+    folder: Path,
+    *sink: str,
+    paced: bool,
 ) -> float:
     """CPU of one core per second of motion: what twice the motion takes more."""
     kinds = [kind for kind in signals if kind != "time"]
@@ -74,10 +82,28 @@ def through_csv(
         command += ["--robot", ROBOT, *sink]
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
         with path.open("rb") as stream:
-            subprocess.run(command, stdin=stream, check=True, capture_output=True)
+            if paced:
+                feed(command, stream, round(0.02 * rate))
+            else:
+                subprocess.run(command, stdin=stream, check=True, capture_output=True)
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         used.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
     return (used[1] - used[0]) / (len(signals["time"]) / rate / 2)
+
+
+def feed(command: list[str], stream: BinaryIO, rows: int) -> None:
+    """Write rows into a command's standard input, 20 ms at a time, when they are due."""
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, **quiet)
+    assert process.stdin is not None
+    due = time.monotonic()
+    while lines := b"".join(islice(stream, rows)):
+        process.stdin.write(lines)
+        process.stdin.flush()
+        due += 0.02
+        time.sleep(max(0.0, due - time.monotonic()))
+    process.stdin.close()
+    assert process.wait() == 0
 
 
 @contextmanager
@@ -118,8 +144,9 @@ def main() -> None:
             print(said)
             flags = ["--overwrite"] if where == "file" else []
             option = [item for key, value in sink.items() for item in (f"--{key}", value)]
-            share = through_csv(signals, rate, names, Path(name), *option, *flags)
-            print(f"CSV through `inspector live`, to a {where:7}          {share:6.1%}")
+            for paced, source in ((False, "file"), (True, "pipe")):
+                share = through_csv(signals, rate, names, Path(name), *option, *flags, paced=paced)
+                print(f"CSV from a {source} through `inspector live`, to a {where:7} {share:6.1%}")
 
 
 if __name__ == "__main__":

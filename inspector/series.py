@@ -23,6 +23,18 @@ def at(time: Array) -> rr.TimeColumn:
     return rr.TimeColumn(TIMELINE, duration=np.round(time * 1e9).astype("timedelta64[ns]"))
 
 
+def scalars(values: Real) -> list[rr.ComponentColumn]:
+    """Make columns as ``rr.Scalars.columns`` does, at a third of its cost.
+
+    Args:
+        values: Shape (samples,) or (samples, series).
+    """
+    width = values[:1].size
+    batch = rr.components.ScalarBatch(np.ascontiguousarray(values).ravel())
+    edges = np.arange(len(values) + 1, dtype=np.int32) * np.int32(width)
+    return [rr.ComponentColumn(rr.Scalars.descriptor_scalars(), batch, offsets=edges)]
+
+
 def log_lines(
     recording: rr.RecordingStream,
     path: str,
@@ -50,9 +62,7 @@ def log_lines(
         aggregation_policy="MinMax",
     )
     recording.log(path, style, static=True)
-    recording.send_columns(
-        path, indexes=[at(time)], columns=rr.Scalars.columns(scalars=np.ascontiguousarray(values))
-    )
+    recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
 
 
 def log_lane(
@@ -141,7 +151,7 @@ def _log_band(
         path,
         indexes=[at(time[kept])],
         columns=[
-            *rr.Scalars.columns(scalars=np.full(int(kept.sum()), hertz)),
+            *scalars(np.full(int(kept.sum()), hertz)),
             *rr.SeriesLines.columns(colors=rgba[kept]),
         ],
     )

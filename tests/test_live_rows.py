@@ -13,7 +13,7 @@ from inspector.live import LiveError
 from inspector.live.csvrows import CsvReader
 from inspector.live.feeding import follow
 from inspector.live.jsonrows import JsonReader
-from inspector.live.rows import LONGEST, blocks, reader_of
+from inspector.live.rows import AT_ONCE, FEW, LONGEST, blocks, reader_of, widen
 
 HEAD = b"time,elbow.velocity,wrist.velocity,elbow.position,wrist.position,load"
 
@@ -150,6 +150,29 @@ def test_lines_come_whole_and_know_their_number(size):
         for offset, line in enumerate(lines.splitlines()):
             assert line == b"line %d" % (number + offset)
     assert number + offset == 30
+
+
+def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
+    naps = []
+    monkeypatch.setattr("inspector.live.rows.sleep", naps.append)
+    monkeypatch.setattr("inspector.live.rows.perf_counter", lambda: 7.0)
+    content = b"1\n" * FEW
+    assert [came for *_, came in blocks(Trickle(content, FEW), gather=0.5)] == [7.0, 7.0]
+    assert naps == [0.0, 0.0]
+    # What came while it waited may have come at its beginning.
+    assert [came for *_, came in blocks(Trickle(b"1\n2\n3\n", 2), gather=0.5)] == [7.0, 6.5, 6.5]
+    assert naps[2:] == [0.5, 0.5, 0.5]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pipes of other systems stay as they are")
+def test_a_pipe_is_widened_and_what_is_none_is_left_alone():
+    import fcntl
+
+    reading, writing = os.pipe()
+    with os.fdopen(reading, "rb") as stream, os.fdopen(writing, "wb"):
+        widen(stream)
+        assert fcntl.fcntl(stream.fileno(), fcntl.F_GETPIPE_SZ) >= AT_ONCE
+    widen(io.BytesIO(b"rows"))
 
 
 def test_a_line_that_never_ends_is_refused():

@@ -150,6 +150,18 @@ def test_no_peak_of_the_noise_is_lost(tmp_path, library):
     assert np.max(velocity) == pytest.approx(signals["velocity"].max())
 
 
+@pytest.mark.parametrize("seconds", [1.0, 0.97])
+def test_lines_come_every_tenth_of_a_second_and_none_is_left_out(tmp_path, library, seconds):
+    signals = motion(seconds)
+    path, _, _ = shown(tmp_path, signals, cuts=[7, 500, 501], library=library)
+    time, values = read(path, "/noise/simplified", "Scalars:scalars")
+    noise = nm.simplified(signals["velocity"], signals["velocity_desired"])
+    assert time == pytest.approx(signals["time"], abs=1e-9)
+    assert np.ravel(values) == pytest.approx(noise, rel=1e-12)
+    chunks = RrdReader(path).store().stream().filter(content="/joints/velocity/0").to_chunks()
+    assert sum(not chunk.is_static for chunk in chunks) == 10
+
+
 def test_the_robot_stands_as_its_joints_say(tmp_path, library):
     signals = motion(1.0, 7)
     path, _, _ = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)

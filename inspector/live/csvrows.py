@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from math import nan
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,6 @@ class CsvReader:
         text = head.decode("utf-8-sig", errors="replace").strip().lstrip("# ")
         self._delimiter = next((mark for mark in ",;\t" if mark in text), ",")
         self._header = [cell.strip() for cell in text.split(self._delimiter)]
-        self._columns = [str(place) for place in range(len(self._header))]
         found: dict[str, dict[str, int]] = {}
         for place, column in enumerate(self._header):
             if (meaning := named(column)) is not None and meaning[0] in SIGNALS:
@@ -51,6 +51,7 @@ class CsvReader:
         }
         lower = [column.lower() for column in self._header]
         self._time = next((lower.index(name) for name in TIMES if name in lower), None)
+        self._options = self._arrow_options()
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
         """Read whole lines; those that are no rows are told and counted.
@@ -76,18 +77,25 @@ class CsvReader:
         from pyarrow import csv
 
         try:
-            table = csv.read_csv(
-                pa.py_buffer(lines),
-                read_options=csv.ReadOptions(column_names=self._columns, use_threads=False),
-                parse_options=csv.ParseOptions(delimiter=self._delimiter),
-                convert_options=csv.ConvertOptions(
-                    column_types=dict.fromkeys(self._columns, pa.float64()), null_values=UNKNOWN
-                ),
-            )
+            table = csv.read_csv(pa.py_buffer(lines), **self._options)
         except pa.ArrowInvalid:
             return None
         # Columns lie one after the other, as Arrow has them: turning them over costs a copy.
         return np.array([column.to_numpy() for column in table.columns]).T
+
+    def _arrow_options(self) -> dict[str, Any]:
+        """Say what rows are like: once, for with each chunk it would take a quarter of reading."""
+        import pyarrow as pa
+        from pyarrow import csv
+
+        columns = [str(place) for place in range(len(self._header))]
+        return {
+            "read_options": csv.ReadOptions(column_names=columns, use_threads=False),
+            "parse_options": csv.ParseOptions(delimiter=self._delimiter),
+            "convert_options": csv.ConvertOptions(
+                column_types=dict.fromkeys(columns, pa.float64()), null_values=UNKNOWN
+            ),
+        }
 
     def _careful(self, lines: bytes, first: int, note: Note) -> Array:
         rows = []

@@ -8,7 +8,7 @@ import rerun as rr
 from inspector import colors
 from inspector.live.lane import Change
 from inspector.live.strip import Columns
-from inspector.series import LINE_WIDTH, at
+from inspector.series import LINE_WIDTH, at, scalars
 from inspector.thinning import extremes
 from models import UNKNOWN, Labels
 from noisemodel.types import Array
@@ -17,7 +17,10 @@ JOINT_POINTS = 400.0
 """Points of a joint's line in a second, as a recording of ten seconds has."""
 NOISE_POINTS = 4000.0
 JOINTS_PER_PLOT = 8
+TOGETHER = 0.1
+"""Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
 UNITS = {"velocity": "rad/s", "position": "rad"}
+NOISE = "noise"
 
 
 class Drawing:
@@ -46,9 +49,16 @@ class Drawing:
             slice(first, min(first + JOINTS_PER_PLOT, len(joint_names)))
             for first in range(0, len(joint_names), JOINTS_PER_PLOT)
         ]
+        self._entities = {
+            kind: [(_joints(kind, plot), columns) for plot, columns in enumerate(self._slices)]
+            for kind in self._signals
+        }
+        self._waiting: dict[str, list[tuple[Array, Array]]] = {}
+        self._held = 0.0  # time that waits, in [s]
         for kind in self._signals:
             for plot, columns in enumerate(self._slices):
                 self._style_joints(kind, plot, joint_names[columns])
+        self._entities[NOISE] = [("/noise/simplified", slice(None))]
         self._style_lines("/noise/simplified", ["simplified [rad/s]"], [colors.NOISE])
         recording.log("/spectrogram/bands", _strip_style(hertz), static=True)
         if classes:
@@ -72,7 +82,7 @@ class Drawing:
         return list(found.items())
 
     def lines(self, time: Array, noise: Array, signals: Mapping[str, Array], rate: float) -> None:
-        """Draw the next stretch of noise and joint signals.
+        """Draw the next stretch of noise and joint signals, as soon as there are 0.1 s of them.
 
         Args:
             time: Shape (samples,), in [s].
@@ -83,18 +93,25 @@ class Drawing:
         if not len(time):
             return
         seconds = len(time) / rate
-        shown, values = extremes(time, noise[:, None], points=_points(seconds * NOISE_POINTS))
-        self._send("/noise/simplified", [at(shown)], values)
+        self._keep(NOISE, time, noise[:, None], seconds * NOISE_POINTS)
         for kind in self._signals:
             finite = np.isfinite(signals[kind]).all(axis=1)
             if not finite.any():
                 continue
             rows = slice(None) if finite.all() else finite
-            points = _points(seconds * JOINT_POINTS)
-            shown, values = extremes(time[rows], signals[kind][rows], points=points)
-            index = [at(shown)]
-            for plot, columns in enumerate(self._slices):
-                self._send(_joints(kind, plot), index, values[:, columns])
+            self._keep(kind, time[rows], signals[kind][rows], seconds * JOINT_POINTS)
+        self._held += seconds
+        if self._held >= TOGETHER:
+            self.flush()
+
+    def flush(self) -> None:
+        """Draw the lines that wait."""
+        for kind, pieces in self._waiting.items():
+            index = [at(np.concatenate([time for time, _ in pieces]))]
+            values = np.concatenate([part for _, part in pieces])
+            for path, columns in self._entities[kind]:
+                self._send(path, index, values[:, columns])
+        self._waiting, self._held = {}, 0.0
 
     def spectrogram(self, columns: Columns) -> None:
         """Draw columns of the spectrogram."""
@@ -104,7 +121,7 @@ class Drawing:
             "/spectrogram/bands",
             indexes=[at(columns.time)],
             columns=[
-                *rr.Scalars.columns(scalars=np.tile(self._hertz, (count, 1))),
+                *scalars(np.tile(self._hertz, (count, 1))),
                 *rr.SeriesLines.columns(colors=rgba).partition([bands] * count),
             ],
         )
@@ -137,9 +154,13 @@ class Drawing:
             columns=rr.TextLog.columns(text=[text], color=np.array([colour], dtype=np.uint8)),
         )
 
+    def _keep(self, kind: str, time: Array, values: Array, points: float) -> None:
+        """Thin a stretch, and let it wait; the arrays that it comes in will be used again."""
+        shown, thin = extremes(time, values, points=max(2, round(points)))
+        self._waiting.setdefault(kind, []).append((shown.copy(), thin.copy()))
+
     def _send(self, path: str, index: list[rr.TimeColumn], values: Array) -> None:
-        scalars = rr.Scalars.columns(scalars=np.ascontiguousarray(values))
-        self._recording.send_columns(path, indexes=index, columns=scalars)
+        self._recording.send_columns(path, indexes=index, columns=scalars(values))
 
     def _style_joints(self, kind: str, plot: int, names: Sequence[str]) -> None:
         desired = kind.endswith("_desired")
@@ -157,10 +178,6 @@ class Drawing:
             aggregation_policy="MinMax",
         )
         self._recording.log(path, style, static=True)
-
-
-def _points(wanted: float) -> int:
-    return max(2, round(wanted))
 
 
 def _strip_style(hertz: Array) -> rr.SeriesLines:

@@ -6,10 +6,12 @@ from typing import BinaryIO
 
 from inspector.live.errors import LiveError
 from inspector.live.interrupt import Interrupt
-from inspector.live.rows import blocks, reader_of
+from inspector.live.rows import blocks, reader_of, widen
 from inspector.live.session import LiveSession
 from inspector.live.summary import Summary
 
+GATHER = 0.02
+"""How long rows wait for more, in [s]: less than half of a session's block."""
 WANTED = "expected a CSV header and rows, or a JSON object per line"
 
 
@@ -29,8 +31,9 @@ def follow(
     Raises:
         LiveError: If there are no rows, or the first line cannot be understood.
     """
+    widen(stream)
     with Interrupt() as interrupt:
-        incoming = interrupt.until(blocks(stream))
+        incoming = interrupt.until(blocks(stream, gather=GATHER))
         lines, number, came = next(incoming, (b"", 1, 0.0))
         head, _, rest = lines.partition(b"\n")
         if not head.strip():

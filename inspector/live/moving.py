@@ -58,14 +58,19 @@ class Moving:
             [joint.mimic.multiplier if joint.mimic else 1.0 for joint in joints]
         )
         self._offset = np.array([joint.mimic.offset if joint.mimic else 0.0 for joint in joints])
+        slides = np.array([joint.joint_type == SLIDING for joint in joints], dtype=bool)[:, None]
+        axis = np.array([joint.axis for joint in joints]).reshape(-1, 3)
         self._place = np.array([joint.origin_xyz for joint in joints]).reshape(-1, 3)
         self._turn = np.array([_quaternion(joint) for joint in joints]).reshape(-1, 4)
-        self._axis = np.array([joint.axis for joint in joints]).reshape(-1, 3)
-        self._slides = np.array([joint.joint_type == SLIDING for joint in joints], dtype=bool)
+        self._slide = np.where(slides, _rotated(self._turn, axis), 0.0)
+        self._spin = np.where(slides, 0.0, _times(self._turn, np.pad(axis, ((0, 0), (0, 1)))))
+        self._half = np.where(slides, 0.0, 0.5)
         base = [(scene.WORLD, str(tree.root_link().name))] if floating else []
         links = [*((joint.parent_link, joint.child_link) for joint in joints), *base]
-        self._parents = [parent for parent, _ in links]
         self.children = [child for _, child in links]
+        self._frames = rr.Transform3D.columns(
+            parent_frame=[parent for parent, _ in links], child_frame=self.children
+        )
         self._recording = recording
         self.root = scene.WORLD if floating else str(tree.root_link().name)
 
@@ -85,12 +90,10 @@ class Moving:
         self._recording.send_columns(
             "/robot/motion",
             indexes=[series.at(np.full(len(places), time))],
-            columns=rr.Transform3D.columns(
-                translation=places,
-                quaternion=turns,
-                parent_frame=self._parents,
-                child_frame=self.children,
-            ),
+            columns=[
+                *rr.Transform3D.columns(translation=places, quaternion=turns),
+                *self._frames,
+            ],
         )
 
     def transforms(self, position: Array) -> tuple[Array, Array]:
@@ -103,11 +106,11 @@ class Moving:
             Translations, shape (moving, 3), and quaternions x, y, z, w, shape (moving, 4), of all
             joints that move: the named ones, and those that mimic one of them.
         """
-        angle = self._factor * position[self._columns] + self._offset
-        slide = np.where(self._slides, angle, 0.0)[:, None] * self._axis
-        half = np.where(self._slides, 0.0, angle)[:, None] / 2.0
-        spin = np.hstack((np.sin(half) * self._axis, np.cos(half)))
-        return self._place + _rotated(self._turn, slide), _times(self._turn, spin)
+        angle = (self._factor * position[self._columns] + self._offset)[:, None]
+        half = self._half * angle
+        # turn (axis sin half, cos half), with what does not change multiplied once
+        turned = np.sin(half) * self._spin + np.cos(half) * self._turn
+        return self._place + angle * self._slide, turned
 
 
 def _log(recording: rr.RecordingStream, tree: UrdfTree) -> None:

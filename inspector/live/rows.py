@@ -1,7 +1,8 @@
 """Rows of samples as text: CSV with a header, or a JSON object per line."""
 
 from collections.abc import Callable, Iterator, Mapping
-from time import perf_counter
+from contextlib import suppress
+from time import perf_counter, sleep
 from typing import BinaryIO, NamedTuple, Protocol
 
 from inspector.live.errors import LiveError
@@ -11,6 +12,8 @@ AT_ONCE = 1 << 18
 """Bytes that are read at once, if there are so many."""
 LONGEST = 1 << 24
 """Bytes that a line may have."""
+FEW = 1 << 15
+"""Bytes below which what is read at once is little: half of what a pipe holds by default."""
 
 
 class Rows(NamedTuple):
@@ -60,28 +63,39 @@ def reader_of(head: bytes, names: tuple[str, ...]) -> tuple[Reader, bool]:
     return CsvReader(head, names), True
 
 
-def blocks(stream: BinaryIO) -> Iterator[tuple[bytes, int, float]]:
+def widen(stream: BinaryIO) -> None:
+    """Let a pipe hold as much as is read at once: whoever writes into it need not wait for us."""
+    import fcntl
+
+    with suppress(AttributeError, OSError):  # another system; no pipe
+        fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, AT_ONCE)
+
+
+def blocks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int, float]]:
     """Go through what a stream brings, as it comes.
 
     Args:
         stream: Text in lines.
+        gather: How long little may wait for more, in [s]: to read row by row costs most.
 
     Yields:
         Whole lines that are not blank at their beginning, the number of the first, and the reading
-        of ``time.perf_counter()`` when they came.
+        of ``time.perf_counter()`` when they came, at the earliest.
 
     Raises:
         LiveError: If a line does not end.
     """
     read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
-    rest, number = b"", 1
+    rest, number, waited = b"", 1, 0.0
     while chunk := read(AT_ONCE):
-        came = perf_counter()
+        came = perf_counter() - waited
         lines, end, rest = (rest + chunk).rpartition(b"\n")
         if end:
             yield lines + end, number, came
             number += lines.count(b"\n") + 1
         elif len(rest) > LONGEST:
             raise LiveError(f"line {number} is longer than {LONGEST} bytes: this is no CSV or JSON")
+        waited = gather if len(chunk) < FEW else 0.0
+        sleep(waited)
     if rest.strip():
         yield rest + b"\n", number, perf_counter()

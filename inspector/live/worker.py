@@ -145,6 +145,7 @@ class Worker:
     def finish(self) -> None:
         """Show what waits."""
         if self._sink.alive:
+            self._drawing.flush()
             self._drawing.changes(self._lane.end())
             if (columns := self._strip.flush()) is not None:
                 self._drawing.spectrogram(columns)
