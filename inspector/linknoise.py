@@ -155,10 +155,11 @@ def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
         reach = np.minimum(np.minimum(centre, centre[::-1]), half)
         first, last = centre - reach, centre + reach + 1
         count = (last - first).astype(np.float64)
-        for joint in range(len(fast)):  # one by one they stay in the cache
-            part = velocity[stretch, joint].astype(np.float64)
-            sums = np.concatenate(([0.0], np.cumsum(part)))
-            fast[joint, stretch] = part - (sums.take(last) - sums.take(first)) / count
+        fast[:, stretch] = velocity[stretch].T
+        sums = np.zeros(len(centre) + 1)
+        for part in fast[:, stretch]:  # one by one they stay in the cache
+            np.cumsum(part, out=sums[1:])
+            part -= (sums[last] - sums[first]) / count
     return fast.T
 
 

@@ -101,6 +101,8 @@ def triangles(
     kinds = ["none"] * len(names)
     absent: list[str] = []
     for use in GEOMETRIES[geometry]:
+        if "none" not in kinds:
+            break
         pieces: dict[int, list[Array]] = defaultdict(list)
         for shape in linkshapes.read(robot.path, use):
             joint, rotation, translation = places[shape.link]

@@ -32,8 +32,11 @@ def find(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
         raise MeshError(address, f"cannot be looked up ({error.strerror})") from error
     if not found:
         raise MissingMeshError(address, f"not found in {', '.join(map(str, roots))}")
-    allowed = [root.resolve() for root in (*roots, urdf.parent)]
-    if not any(found[0].is_relative_to(root) for root in allowed):
+    allowed = (*roots, urdf.parent)
+    # Resolving takes longer than all else here, and most folders are where their names say.
+    if not any(found[0].is_relative_to(root) for root in allowed) and not any(
+        found[0].is_relative_to(root.resolve()) for root in allowed
+    ):
         raise MeshError(address, f"lies outside of {', '.join(map(str, roots))}")
     return found[0]
 

@@ -108,6 +108,22 @@ def test_a_saved_run_is_plain_arrays_in_a_zip(tmp_path):
         assert json.loads(str(plain["meta"])) == {"seed": 3}
 
 
+def test_noise_is_kept_as_it_is_and_the_rest_is_compressed(tmp_path):
+    samples = 100_000
+    run = Run(
+        time=np.arange(samples) / 1000,
+        velocity=np.random.default_rng(0).normal(size=(samples, 2)),
+        position=np.zeros((samples, 2)),
+        joint_names=("a", "b"),
+    )
+    run.save(tmp_path / "run.npz")
+    with zipfile.ZipFile(tmp_path / "run.npz") as archive:
+        kinds = {member.filename: member.compress_type for member in archive.infolist()}
+    assert kinds["velocity.npy"] == zipfile.ZIP_STORED
+    assert kinds["position.npy"] == kinds["time.npy"] == zipfile.ZIP_DEFLATED
+    assert (Run.load(tmp_path / "run.npz").velocity == run.velocity).all()
+
+
 def test_a_urdf_is_found_from_the_file_wherever_that_is_read_or_copied(tmp_path, monkeypatch):
     (tmp_path / "a" / "robots").mkdir(parents=True)
     (tmp_path / "b").mkdir()

@@ -66,6 +66,7 @@ def _lag(measured: Real, desired: Real) -> int | None:
         ends = np.searchsorted(changes, (max(-lag, 0), samples - max(lag, 0) - 1))
         moving = changes[slice(*ends)]
         moving = moving[:: max(1, len(moving) // LOOKED_AT)]
-        if len(moving) >= FARTHEST and np.mean(measured[moving + lag] == desired[moving]) >= SAME:
+        equal = np.count_nonzero(measured[moving + lag] == desired[moving])
+        if len(moving) >= FARTHEST and equal >= SAME * len(moving):
             return lag
     return None
