@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -131,11 +132,16 @@ def test_serving_ends_with_the_program_and_leaves_no_server(recording, stop):
         stdout=subprocess.PIPE,
         text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"},
+        # What a shell starts in the background is deaf to SIGINT, and so is what that starts.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     ) as program:
         url = next(line for line in program.stdout if line.startswith("open ")).split()[1]
         port = int(url.removeprefix("http://127.0.0.1:").partition("/")[0])
         program.send_signal(stop)
-        assert program.wait(timeout=20) == 0
+        try:
+            assert program.wait(timeout=20) == 0
+        finally:
+            program.kill()
     assert webview.free_port(port) == port
 
 
