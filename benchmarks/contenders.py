@@ -2,7 +2,7 @@
 
 Conventions: to train is to turn annotated frames into a function that decides on frames. All grade
 alike: a class for each frame, and a failure score, which ranks frames by how surely something is
-wrong. Of the samples, aeon's see the one of `VIEWS` that served each best.
+wrong. aeon's see the samples in one of `VIEWS`.
 """
 
 from collections.abc import Callable, Iterator
@@ -148,14 +148,14 @@ ON_FEATURES: dict[str, Callable[[], Any]] = {
     ),
 }
 ON_SAMPLES = {"MiniRocket": (minirocket, "logarithm"), "QUANT": (quant, "logarithm")}
-"""aeon's, and the view that served each best."""
+"""aeon's, and the view that each has unless all are asked for; a choice that was not tuned."""
 
 
 def contenders(*, views: bool) -> Iterator[Contender]:
     """List who takes part.
 
     Args:
-        views: Whether aeon's see the samples in each way, and not in the best alone.
+        views: Whether aeon's see the samples in each way, and not in the usual one alone.
     """
     for signals, settings in (("three", models.GENERAL), ("noise", models.SCALAR)):
         profile = settings.at(RATE)
@@ -169,7 +169,7 @@ def contenders(*, views: bool) -> Iterator[Contender]:
         )
         for name, make in ON_FEATURES.items():
             yield Contender(signals, name, profile, on_features(profile, partial(theirs, make)))
-        for name, (make, best) in ON_SAMPLES.items():
-            for view in VIEWS if views else (best,):
+        for name, (make, usual) in ON_SAMPLES.items():
+            for view in VIEWS if views else (usual,):
                 train = on_samples(VIEWS[view], make)
                 yield Contender(signals, f"{name}, {view}", profile, train, needs_aeon=True)
