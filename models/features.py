@@ -162,20 +162,22 @@ def pool(loudness: Array) -> Array:
     Returns:
         Mean, maximum and standard deviation of each band, shape (..., 3 * frequency).
     """
+    # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
     count = loudness.shape[-2]
-    mean = loudness.sum(axis=-2) / count
+    mean = np.add.reduce(loudness, -2) / count
     beside = loudness - mean[..., None, :]
-    deviation = np.sqrt(np.square(beside).sum(axis=-2) / count)
-    return np.concatenate((mean, loudness.max(axis=-2), deviation), axis=-1)
+    deviation = np.sqrt(np.add.reduce(np.square(beside), -2) / count)
+    return np.concatenate((mean, np.maximum.reduce(loudness, -2), deviation), axis=-1)
 
 
 def _relative(loudness: Array) -> Array:
     """Pool levels above the whole frame's, differences between signals, and that whole level."""
     several = loudness if loudness.ndim == 4 else loudness[:, None]
-    whole = several.mean(axis=(1, 2, 3), keepdims=True)
+    whole = np.add.reduce(several, (1, 2, 3), keepdims=True) / prod(several.shape[1:])
     spectra = np.concatenate((several - whole, several[:, 1:] - several[:, :-1]), axis=1)
     pooled = pool(spectra)
-    return np.hstack((pooled.reshape(len(pooled), prod(pooled.shape[1:])), whole.reshape(-1, 1)))
+    flat = pooled.reshape(len(pooled), prod(pooled.shape[1:]))
+    return np.concatenate((flat, whole[:, :, 0, 0]), axis=1)
 
 
 @lru_cache

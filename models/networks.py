@@ -60,16 +60,16 @@ class Networks:
             Logarithms of calibrated probabilities, then how foreign it is, shape
             (frames, classes + 1).
         """
-        beyond = (features - self.known[1]).max(axis=1, keepdims=True)
+        beyond = np.maximum.reduce(features - self.known[1], 1, keepdims=True)
         heard = np.maximum(features, self.known[0])
         answers = calibrated(self.average(heard), self.calibration)
-        return np.hstack((answers, beyond))
+        return np.concatenate((answers, beyond), axis=1)
 
     def average(self, features: Array) -> Array:
         """Average the networks' probabilities; their logarithms, shape (frames, classes)."""
         hidden = np.maximum(features @ self.hidden + self.hidden_bias[:, None], 0.0)
         answers = _log_softmax(hidden @ self.output + self.output_bias[:, None])
-        average: Array = np.log(np.exp(answers).mean(axis=0) + TINY)
+        average: Array = np.log(np.add.reduce(np.exp(answers)) / len(answers) + TINY)
         return average
 
     def choose(self, decisions: Array) -> Index:
@@ -83,8 +83,10 @@ class Networks:
             that is unknown.
         """
         answers, foreign = decisions[:, :-1], decisions[:, -1]
-        chosen = np.where(_risk(decisions) >= LIKELY, 1 + answers[:, 1:].argmax(axis=1), 0)
-        return np.where(foreign > FOREIGN, answers.shape[1], chosen)
+        chosen: Index = 1 + answers[:, 1:].argmax(axis=1)
+        chosen[_risk(decisions) < LIKELY] = 0
+        chosen[foreign > FOREIGN] = answers.shape[1]
+        return chosen
 
     def sure(self, decisions: Array) -> Mask:
         """Say which frames may raise an alarm, shape (frames,)."""
@@ -130,6 +132,6 @@ def _risk(decisions: Array) -> Array:
 
 
 def _log_softmax(values: Array) -> Array:
-    shifted = values - values.max(axis=-1, keepdims=True)
-    softmax: Array = shifted - np.log(np.exp(shifted).sum(axis=-1, keepdims=True))
+    shifted = values - np.maximum.reduce(values, -1, keepdims=True)
+    softmax: Array = shifted - np.log(np.add.reduce(np.exp(shifted), -1, keepdims=True))
     return softmax

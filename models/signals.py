@@ -46,11 +46,10 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
         lacking = [name for name in names if name not in there]
         raise MissingSignalError(lacking, there)
     chosen = [np.asarray(_take(there, name)) for name in names]
-    shapes = {signal.shape for signal in chosen}
-    if len(shapes) > 1 or chosen[0].ndim != 1:
+    if any(signal.ndim != 1 or len(signal) != len(chosen[0]) for signal in chosen):
         found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
         raise SignalError(f"a signal has another shape, {found}, expected (samples,)")
-    return chosen[0] if len(chosen) == 1 else np.stack(chosen)
+    return chosen[0] if len(chosen) == 1 else np.array(chosen)
 
 
 def check(samples: Real, valid: Mask, *, first: int = 0) -> None:

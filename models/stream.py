@@ -160,15 +160,17 @@ class Stream:
         fresh = range(self._done, complete)
         if fresh:
             places = [self._start(window) - self._base for window in fresh]
-            transformed = levels(self._windows[places], profile)
-            self._levels[[window % rows for window in fresh]] = transformed
+            # Side by side, windows of all signals are one product of matrices.
+            flat = self._windows[places].reshape(-1, profile.window)
+            kept = self._levels[0].shape
+            self._levels[np.array(fresh) % rows] = levels(flat, profile).reshape(-1, *kept)
         frames = range(self._frame, self._count - profile.length + 1, profile.hop)
         self._frame += len(frames) * profile.hop
         self._done = complete
         self._due = min(self._frame + profile.length, self._start(complete) + profile.window)
         whole = [frame for frame in frames if self._is_whole(frame)]
         first = [(frame - self._first) // profile.hop * len(self._phases) for frame in whole]
-        windows = np.add.outer(np.array(first, dtype=np.intp), self._of_frame)
+        windows = np.array(first, dtype=np.intp)[:, None] + self._of_frame
         return self._decide(whole, self._levels[windows % rows]) if whole else []
 
     @property
@@ -188,7 +190,7 @@ class Stream:
 
     def _decide(self, frames: list[int], loudness: Array) -> list[Decided]:
         """Decide on frames by the levels of their windows, shape (frames, time, …, bands)."""
-        in_time = np.ascontiguousarray(np.moveaxis(loudness, 1, -2))
+        in_time = np.ascontiguousarray(loudness.swapaxes(1, -2))
         return [(np.array(frames), self.classifier.judge(course(in_time, self._profile)))]
 
     def _labels(self, found: list[Decided]) -> Labels:
