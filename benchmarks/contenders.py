@@ -12,7 +12,9 @@ from typing import Any
 
 import numpy as np
 from sklearn.ensemble import ExtraTreesClassifier, HistGradientBoostingClassifier
-from sklearn.linear_model import LogisticRegression
+from sklearn.linear_model import LogisticRegression, RidgeClassifierCV
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 
 import models
 from models.features import feature_count, standard
@@ -120,17 +122,19 @@ def on_samples(view: Callable[[np.ndarray], np.ndarray], make: Callable[[], Any]
 
 
 def answer(machine: Any, seen: np.ndarray) -> Answer:
-    """Call the most probable class; a failure is the more certain, the less probable `ok` is."""
-    probabilities = machine.predict_proba(seen)
-    return probabilities.argmax(axis=1), 1.0 - probabilities[:, 0]
+    """Call the class of the highest grade; a failure is the more certain, the less `ok` has."""
+    grades = getattr(machine, "predict_proba", None) or machine.decision_function
+    graded = grades(seen)
+    return graded.argmax(axis=1), -graded[:, 0]
 
 
 def minirocket() -> Any:
-    """Make aeon's MiniRocket; ridge regression, its usual head, says no probabilities."""
-    from aeon.classification.convolution_based import MiniRocketClassifier
+    """Make aeon's MiniRocket with ridge regression, its usual head, that chooses its penalty."""
+    from aeon.transformations.collection.convolution_based import MiniRocket
 
-    head = LogisticRegression(C=1e-3, max_iter=200)
-    return MiniRocketClassifier(estimator=head, random_state=0)
+    penalties = np.logspace(-3.0, 6.0, 10)
+    head = RidgeClassifierCV(penalties, class_weight="balanced")
+    return make_pipeline(MiniRocket(random_state=0), StandardScaler(with_mean=False), head)
 
 
 def quant() -> Any:
