@@ -9,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from models.cutting import cut
-from models.errors import DatasetError, RateError, UnknownLabelError
+from models.errors import DatasetError, NoFrameError, RateError, UnknownLabelError
 from models.framing import frame
 from models.noisytest import read_folder
 from models.profile import TOLERANCE, Profile
@@ -52,7 +52,8 @@ class Dataset:
             RateError: If a recording has another rate than the profile.
             UnknownLabelError: If a label is no class of the profile.
             RecordingError: If a block cannot be cut.
-            DatasetError: If there is no frame at all, or a name repeats.
+            NoFrameError: If there is no frame at all.
+            DatasetError: If a name repeats.
         """
         frames, labels, runs = [], [], []
         hashes: dict[str, str] = {}
@@ -66,10 +67,7 @@ class Dataset:
                 labels += [block.label] * len(frames[-1])
                 runs += [recording.name] * len(frames[-1])
         if not labels:
-            raise DatasetError(
-                f"no annotated frame in {len(hashes)} recordings; annotate blocks of"
-                f" {', '.join(profile.classes)}"
-            )
+            raise NoFrameError(len(hashes), profile.classes)
         return cls(
             np.concatenate(frames),
             np.array(labels),

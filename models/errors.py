@@ -100,6 +100,22 @@ class DatasetError(ModelsError):
     """A data set that cannot be built, or that no classifier can be learnt from."""
 
 
+class NoFrameError(DatasetError):
+    """Recordings without a single frame that is annotated and whole.
+
+    Args:
+        count: How many recordings there are.
+        classes: What their blocks could be called.
+    """
+
+    def __init__(self, count: int, classes: Iterable[str]) -> None:
+        self.count, self.classes = count, tuple(classes)
+        super().__init__(
+            f"no annotated frame in {count} recordings; annotate blocks of"
+            f" {', '.join(self.classes)}"
+        )
+
+
 class SeenError(DatasetError):
     """Recordings that a model is to be measured by, and that it has learnt from.
 

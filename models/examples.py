@@ -1,6 +1,7 @@
 """Examples: what a machine learns from, features in place of frames."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Self
@@ -8,7 +9,7 @@ from typing import Self
 import numpy as np
 
 from models.dataset import Dataset
-from models.errors import DatasetError
+from models.errors import DatasetError, NoFrameError
 from models.features import features
 from models.profile import Profile
 from models.recording import Recording
@@ -56,11 +57,12 @@ class Examples:
 
         Args:
             recordings: Annotated signals at the profile's rate, each of another name; those
-                without an annotation are passed over.
+                without a frame are passed over.
             profile: How blocks are cut and framed, and what to compute.
 
         Raises:
-            DatasetError: If there is no frame at all, or a name repeats.
+            NoFrameError: If there is no frame at all.
+            DatasetError: If a name repeats.
             ModelsError: As `Dataset.of` does.
         """
         found: list[Self] = []
@@ -69,13 +71,10 @@ class Examples:
             if recording.name in hashes:
                 raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
             hashes[recording.name] = recording.sha256
-            if recording.blocks:
+            with suppress(NoFrameError):
                 found.append(cls.of(Dataset.of([recording], profile), profile))
         if not found:
-            raise DatasetError(
-                f"no annotated frame in {len(hashes)} recordings; annotate blocks of"
-                f" {', '.join(profile.classes)}"
-            )
+            raise NoFrameError(len(hashes), profile.classes)
         return cls(
             np.concatenate([each.features for each in found]),
             np.concatenate([each.labels for each in found]),

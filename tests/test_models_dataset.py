@@ -127,8 +127,15 @@ def test_two_recordings_of_one_name_are_refused():
         models.Dataset.of([recording(), recording()], PROFILE)
 
 
+def test_a_recording_whose_blocks_lie_all_in_gaps_is_passed_over():
+    lost = recording(Block(0.0, 1.0, "ok"), name="lost", valid=np.zeros(3000, bool))
+    examples = models.Examples.read([lost, recording(Block(0.0, 1.0, "ok"))], PROFILE)
+    assert set(examples.runs.tolist()) == {"walk"}
+    assert set(examples.hashes) == {"lost", "walk"}
+
+
 def test_no_frame_at_all_is_refused():
-    with pytest.raises(models.DatasetError, match="no annotated frame in 1 recordings"):
+    with pytest.raises(models.NoFrameError, match="no annotated frame in 1 recordings"):
         models.Dataset.of([recording()], PROFILE)
 
 

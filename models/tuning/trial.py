@@ -5,13 +5,14 @@ its signals do.
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import NamedTuple, Self
 
 import numpy as np
 
 from models.dataset import Dataset
-from models.errors import DatasetError
+from models.errors import NoFrameError
 from models.examples import Examples
 from models.profile import Profile
 from models.recording import Recording
@@ -66,23 +67,20 @@ def hear(trial: Trial, profile: Profile, *, training: bool) -> Heard:
         training: Whether to those to learn from, or to those to check.
 
     Returns:
-        What is heard; recordings without an annotation are passed over.
+        What is heard; recordings without a frame are passed over.
 
     Raises:
-        DatasetError: If there is no frame at all.
+        NoFrameError: If there is no frame at all.
         ModelsError: If a recording does not fit the profile.
     """
     wanted = np.unique(np.concatenate([split[not training] for split in trial.splits]))
     found = []
     for index in wanted.tolist():
-        if trial.recordings[index].blocks:
+        with suppress(NoFrameError):
             dataset = Dataset.of([trial.recordings[index]], profile, training=training)
             found.append((index, Examples.of(dataset, profile)))
     if not found:
-        raise DatasetError(
-            f"no annotated frame in {len(wanted)} recordings; annotate blocks of"
-            f" {', '.join(profile.classes)}"
-        )
+        raise NoFrameError(len(wanted), profile.classes)
     each = [examples for _, examples in found]
     return Heard(
         np.concatenate([examples.features for examples in each]),
