@@ -3,7 +3,8 @@
     python -m benchmarks.ablation data/ [--rate 1000] [--folds 3] [--seeds 8] [--only whole,svm]
 
 Only the training part of a data set is looked at. Groups of runs are dealt into folds; each variant
-learns from all folds but one and hears that one from end to end, in turn.
+learns from all folds but one and hears that one from end to end, in turn. Samples keep the extended
+noise as it is at 10 kHz alone, so that its variants take `--rate 10000`.
 """
 
 import argparse
@@ -18,6 +19,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
+from benchmarks.paper import RATE, files, first_seeds
 from inspector.part import Part
 from inspector.training import recordings
 from models.examples import Examples
@@ -53,20 +55,18 @@ def main() -> None:
     arguments.add_argument("data", type=Path, nargs="+")
     arguments.add_argument("--rate", type=float, default=1000.0)
     arguments.add_argument("--folds", type=int, default=3)
-    arguments.add_argument("--seeds", type=int, default=10**6, help="of each robot, the first")
+    arguments.add_argument("--seeds", type=int, help="of each robot, the first; all unless said")
     arguments.add_argument("--only", default="", help="parts of variants' names, by commas")
     options = arguments.parse_args()
     chosen = {
         name: variant
         for name, variant in VARIANTS.items()
         if any(part in name for part in options.only.split(","))
+        and (options.rate == RATE or POWER not in variant.signals)
     }
     power = any(POWER in variant.signals for variant in chosen.values())
-    read = [
-        one
-        for one in _recordings(options.data, options.rate, power=power)
-        if int(models.group_of(one.name).rpartition("-")[2]) < options.seeds
-    ]
+    paths = first_seeds(files(options.data, Part.TRAINING), options.seeds)
+    read = _recordings(paths, options.rate, power=power)
     print(f"{len(read)} runs in {len({models.group_of(one.name) for one in read})} groups")
     print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|", flush=True)
     for name, variant in chosen.items():
@@ -78,14 +78,14 @@ def main() -> None:
         print(f"| {name} | {found} | {time.process_time() - begun:.0f} |", flush=True)
 
 
-def _recordings(inputs: Sequence[Path], rate: float, *, power: bool) -> list[models.Recording]:
-    found = list(recordings(inputs, rate, Part.TRAINING))
+def _recordings(paths: Sequence[Path], rate: float, *, power: bool) -> list[models.Recording]:
+    found = list(recordings(paths, rate))
     if not power:
         return found
-    paths = {
-        path.parent.name + "/" + path.stem: path for each in inputs for path in each.rglob("*.npz")
-    }
-    return [replace(one, signal={**one.signal, POWER: _power(paths[one.name])}) for one in found]
+    return [
+        replace(one, signal={**one.signal, POWER: _power(path)})
+        for one, path in zip(found, paths, strict=True)
+    ]
 
 
 def _power(path: Path) -> np.ndarray:
