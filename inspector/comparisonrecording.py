@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import rerun as rr
-import rerun.blueprint as rrb
+from rerun.blueprint import Blueprint
 
-from inspector import colors, series
+from inspector import colors, series, unstable
 from inspector.comparison import Compared
 from inspector.comparisontable import table
 from inspector.linknoise import vibrating
 from inspector.spectrogram import spectrogram
+from inspector.unstable import Part
 from noisemodel.atomic import replacing
 from noisemodel.noise import decibel
 from noisemodel.types import Array
@@ -71,7 +72,7 @@ def levels(one: Compared, pressure: Array) -> tuple[Array, Array]:
     return one.time[firsts] + counts / 2 / one.rate, np.maximum(level, FLOOR_DB)
 
 
-def layout(found: Sequence[Compared]) -> rrb.Blueprint:
+def layout(found: Sequence[Compared]) -> Blueprint:
     """Lay out a recording: one tab per robot, in it events, levels and spectrograms.
 
     Args:
@@ -80,15 +81,8 @@ def layout(found: Sequence[Compared]) -> rrb.Blueprint:
     Returns:
         The blueprint; all time axes are linked.
     """
-    report = rrb.TextDocumentView(origin="/report", name="Table")
-    return rrb.Blueprint(
-        rrb.Tabs(*(_robot(one) for one in found), report, active_tab=0),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        rrb.TimePanel(state="collapsed", timeline=series.TIMELINE, play_state="paused"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    report = unstable.text("Table", "/report")
+    return unstable.blueprint(unstable.tabs(*map(_robot, found), report), series.TIMELINE)
 
 
 def _log(recording: rr.RecordingStream, one: Compared) -> None:
@@ -114,45 +108,29 @@ def _log(recording: rr.RecordingStream, one: Compared) -> None:
     series.log_lane(recording, f"{_root(one)}/events", stretches, states)
 
 
-def _robot(one: Compared) -> rrb.Container:
-    lane = rrb.StateTimelineView(
-        origin=_root(one), contents=["$origin/events"], name="Events", time_view=_time_axis()
-    )
-    fast = rrb.Vertical(*(_line(one, "vibration", kind) for kind in one.kinds), name="above 10 Hz")
-    whole = rrb.Vertical(*(_line(one, "level", kind) for kind in one.kinds), name="whole motion")
-    strips = rrb.Tabs(*(_strip(one, kind) for kind in one.kinds), active_tab=0)
-    return rrb.Vertical(
-        lane,
-        rrb.Tabs(fast, whole, active_tab=0),
-        strips,
-        row_shares=[1.0, 1.2 * len(one.kinds), 3.0],
-        name=one.name,
-    )
+def _robot(one: Compared) -> Part:
+    parts = {"vibration": "above 10 Hz", "level": "whole motion"}
+    levels = unstable.tabs(*(_lines(one, part, name) for part, name in parts.items()))
+    strips = unstable.tabs(*(_strip(one, kind) for kind in one.kinds))
+    lane = unstable.lanes("Events", f"{_root(one)}/events")
+    height = 1.2 * len(one.kinds)
+    return unstable.above((lane, 1.0), (levels, height), (strips, 3.0), name=one.name)
 
 
-def _line(one: Compared, part: str, kind: str) -> rrb.TimeSeriesView:
-    return rrb.TimeSeriesView(
-        origin=f"{_root(one)}/{part}/{kind}",
-        name=f"{kind} [dB re its own rms]",
-        plot_legend=rrb.PlotLegend(visible=False),
-        axis_x=_time_axis(),
-        axis_y=rrb.ScalarAxis(range=RANGE_DB),
-    )
+def _lines(one: Compared, part: str, name: str) -> Part:
+    plots = [
+        unstable.plot(
+            f"{kind} [dB re its own rms]", f"{_root(one)}/{part}/{kind}", between=RANGE_DB
+        )
+        for kind in one.kinds
+    ]
+    return unstable.above(*((plot, 1.0) for plot in plots), name=name)
 
 
-def _strip(one: Compared, kind: str) -> rrb.TimeSeriesView:
+def _strip(one: Compared, kind: str) -> Part:
     top = min(series.TOP_HZ, one.rate / 2)
-    return rrb.TimeSeriesView(
-        origin=f"{_root(one)}/spectrogram/{kind}",
-        name=f"{kind}, 0-{top:.0f} Hz",
-        plot_legend=rrb.PlotLegend(visible=False),
-        axis_x=_time_axis(),
-        axis_y=rrb.ScalarAxis(range=(0.0, top), zoom_lock=True),
-    )
-
-
-def _time_axis() -> rrb.TimeAxis:
-    return rrb.TimeAxis(link="LinkToGlobal")
+    origin = f"{_root(one)}/spectrogram/{kind}"
+    return unstable.plot(f"{kind}, 0-{top:.0f} Hz", origin, between=(0.0, top), fixed=True)
 
 
 def _root(one: Compared) -> str:

@@ -1,9 +1,7 @@
 """Show a run from Python: in a notebook's cell, else in a window."""
 
-import os
 import sys
 import tempfile
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -37,7 +35,7 @@ def show(
         InspectorError: If the robot's shape cannot be had.
         NoiseModelError: If the run cannot be read, or its robot.
     """
-    from inspector import viewer
+    from inspector import cell, viewer
 
     inside = in_notebook()
     if inside and find_spec("rerun_notebook") is None:
@@ -46,7 +44,7 @@ def show(
         )
     if inside:
         with tempfile.TemporaryDirectory() as folder:
-            _in_cell(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
+            cell.show(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
         return
     recording = viewer.scratch_path(Path("shown.npz") if isinstance(run, nm.Run) else Path(run))
     _recorded(run, recording, robot=robot, kind=kind)
@@ -81,12 +79,3 @@ def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: s
         found = inspect(Path(path), library, robot=robot, kind=kind)
         write(found, recording, overwrite=True, sound=of_recording(found))
     return recording
-
-
-def _in_cell(recording: Path, size: tuple[int, int]) -> None:
-    # Otherwise the widget fetches its code from app.rerun.io.
-    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
-    width, height = size
-    widget = import_module("rerun_notebook").Viewer(width=width, height=height)
-    import_module("IPython.display").display(widget)
-    widget.send_rrd(recording.read_bytes())

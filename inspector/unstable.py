@@ -15,7 +15,7 @@ When rerun moves on, this module follows and no other.
 """
 
 from collections.abc import Sequence
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -41,6 +41,7 @@ def plot(
     between: tuple[float, float] | None = None,
     fixed: bool = False,
     during: tuple[float, float] | None = None,
+    last: float | None = None,
 ) -> Part:
     """Plot scalars over time.
 
@@ -52,20 +53,22 @@ def plot(
         between: Range of values that is shown; that of the lines unless given.
         fixed: Whether zooming leaves that range alone.
         during: Stretch of time that is shown, in [s]; unless given, that of all other views.
+        last: Time up to the cursor that is shown in place of that, in [s].
     """
+    corner = rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop  # news is at the right
     return rrb.TimeSeriesView(
         origin=origin,
         contents=list(paths),
         name=name,
-        plot_legend=rrb.PlotLegend(rrb.Corner2D.RightTop, visible=legend),
-        axis_x=_linked() if during is None else _alone(*during),
+        plot_legend=rrb.PlotLegend(corner, visible=legend),
+        axis_x=_over(last) if during is None else _alone(*during),
         axis_y=None if between is None else rrb.ScalarAxis(range=between, zoom_lock=fixed),
     )
 
 
-def lanes(name: str, origin: str) -> Part:
-    """Draw states over time, a lane for each entity under ``origin``."""
-    return rrb.StateTimelineView(origin=origin, name=name, time_view=_linked())
+def lanes(name: str, origin: str, *, last: float | None = None) -> Part:
+    """Draw states over time, a lane for each entity under ``origin``; `plot` says what is shown."""
+    return rrb.StateTimelineView(origin=origin, name=name, time_view=_over(last))
 
 
 def bars(name: str, origin: str) -> Part:
@@ -116,9 +119,10 @@ def tabs(*parts: Part, name: str | None = None) -> Part:
     return rrb.Tabs(*parts, active_tab=0, name=name)
 
 
-def above(*parts: tuple[Part, float]) -> Part:
+def above(*parts: tuple[Part, float], name: str | None = None) -> Part:
     """Put parts above each other, each with its share of the height."""
-    return rrb.Vertical(*(part for part, _ in parts), row_shares=[share for _, share in parts])
+    shares = [share for _, share in parts]
+    return rrb.Vertical(*(part for part, _ in parts), row_shares=shares, name=name)
 
 
 def beside(*parts: tuple[Part, float]) -> Part:
@@ -127,16 +131,22 @@ def beside(*parts: tuple[Part, float]) -> Part:
 
 
 def blueprint(
-    content: Part, timeline: str, loop: tuple[float, float] | None = None
+    content: Part,
+    timeline: str,
+    loop: tuple[float, float] | None = None,
+    *,
+    following: bool = False,
 ) -> rrb.Blueprint:
-    """Fill the window with a part; panels stay closed, time stands.
+    """Fill the window with a part; panels stay closed.
 
     Args:
         content: What to show.
         timeline: Along which time runs.
         loop: Stretch of time that is selected, and that playing repeats, in [s].
+        following: Whether time goes on with what comes in; it stands unless said.
     """
-    time = rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused")
+    playing: Literal["following", "paused"] = "following" if following else "paused"
+    time = rrb.TimePanel(state="collapsed", timeline=timeline, play_state=playing)
     if loop is not None:
         time = rrb.TimePanel(
             state="collapsed",
@@ -209,8 +219,14 @@ def log_up(recording: rr.RecordingStream) -> None:
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
 
-def _linked() -> rrb.TimeAxis:
-    return rrb.TimeAxis(link="LinkToGlobal")
+def _over(last: float | None) -> rrb.TimeAxis:
+    if last is None:
+        return rrb.TimeAxis(link="LinkToGlobal")
+    shown = rrb.TimeRange(
+        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-last),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    return rrb.TimeAxis(view_range=shown)
 
 
 def _alone(start: float, stop: float) -> rrb.TimeAxis:
