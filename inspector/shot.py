@@ -133,7 +133,7 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
     Raises:
         ViewerError: If the viewer is not installed, ends, or does not answer.
     """
-    from rerun.experimental import ViewerClient
+    from inspector import unstable
 
     port = free_port()
     start = viewer.command("--headless", "--port", str(port), "--hide-welcome-screen")
@@ -154,7 +154,7 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
                     complaints.seek(0)
                     raise ViewerError(viewer.ended(code, complaints.read()))
                 try:
-                    client = ViewerClient.connect(f"rerun+http://{HOST}:{port}/proxy")
+                    client = unstable.client(f"rerun+http://{HOST}:{port}/proxy")
                     client.get_state()
                     break
                 except Exception as error:  # the client raises what it likes until the viewer is up

@@ -7,6 +7,7 @@ What churns, as seen from 0.41:
 - ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
   time that it is logged at; a static asset stays silent;
 - ``ViewCoordinates``;
+- ``rerun.experimental``, by which a viewer is asked for pictures and for what its views report;
 - columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
 
 Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
@@ -15,7 +16,7 @@ When rerun moves on, this module follows and no other.
 """
 
 from collections.abc import Sequence
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -24,6 +25,9 @@ from numpy.typing import NDArray
 
 from inspector.tensors import tensors
 from noisemodel.types import Array
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
 
 Part: TypeAlias = rrb.View | rrb.Container
 """A view, or views that are arranged."""
@@ -217,6 +221,13 @@ def log_bars(
 def log_up(recording: rr.RecordingStream) -> None:
     """Say that z points upwards, in right-handed axes."""
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+
+def client(address: str) -> "ViewerClient":
+    """Reach a viewer that runs, to ask it for its state and for pictures; raises what it likes."""
+    from rerun.experimental import ViewerClient
+
+    return ViewerClient.connect(address)
 
 
 def _over(last: float | None) -> rrb.TimeAxis:
