@@ -20,6 +20,7 @@ from typing import Any
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import noisemodel as nm
+from inspector.culprits import culprits
 from inspector.linknoise import LinkNoise, link_noise
 from inspector.origin import Origin, origins
 from scenarios import ROBOTS, ScenarioError, SimulationError, simulate
@@ -104,7 +105,7 @@ def judge(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str
         marks = {"stage": stage == ACTS.get(event["cause"], "commanded")}
         joints = limb_of(robot, event)
         if joints:
-            named = {link for link, _ in links.culprits(block, list(known))}
+            named = {link for link, _ in culprits(links, block, list(known), first=found.first)}
             marks["limb"] = bool(named & links_of(robot, joints))
             new = () if found.first is None else found.first.joints
             marks["joints"] = any(joint in joints for joint, _ in new)

@@ -1,13 +1,12 @@
 """The extended noise of a run, link by link, in bins of time."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 import noisemodel as nm
 from inspector.linkpower import QUADRATIC, Index, by_moments, by_samples, second_moments
-from models import Event
 from noisemodel.differentiate import stretches
 from noisemodel.types import Array, Mask, Real
 
@@ -17,7 +16,6 @@ BINS = 4000
 """Most bins that a run is divided into."""
 FAST = 10.0
 """Motion below this moves the robot and is not heard, in [Hz]."""
-CULPRITS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +25,7 @@ class LinkNoise:
     Attributes:
         kind: How the mean speed of a surface was taken.
         links: Names of the links, shape (links,).
+        movers: Names of the joints that move each link, shape (links,).
         time: Centres of the bins, shape (bins,), in [s].
         power: Mean power in each bin, shape (bins, links), in [W].
         vibration: That of the measured motion above 10 Hz alone, normal to the surface,
@@ -38,6 +37,7 @@ class LinkNoise:
 
     kind: str
     links: tuple[str, ...]
+    movers: tuple[frozenset[str], ...]
     time: Array
     power: Array
     vibration: Array
@@ -53,33 +53,6 @@ class LinkNoise:
     def loudest(self) -> list[int]:
         """Indices of the links, the one that vibrates with the largest peak first."""
         return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
-
-    def culprits(
-        self, failure: Event | nm.Block, others: Sequence[Event | nm.Block]
-    ) -> tuple[tuple[str, float], ...]:
-        """Name the links in which a failure shows most.
-
-        A link's excess is its power above 10 Hz during the failure, less its median outside of
-        all failures; shares are of the robot's whole excess.
-
-        Args:
-            failure: A finding, or an annotated block.
-            others: All failures of the run, found and annotated.
-
-        Returns:
-            Up to three links and their shares, the largest first.
-        """
-        inside = (self.time >= failure.start) & (self.time < failure.stop)
-        busy = np.any([(self.time >= e.start) & (self.time < e.stop) for e in others], axis=0)
-        if not inside.any():
-            return ()
-        quiet = np.median(self.vibration[~busy], axis=0) if not busy.all() else 0.0
-        excess = np.maximum(self.vibration[inside].mean(axis=0) - quiet, 0.0)
-        if not excess.sum() > 0.0:
-            return ()
-        ranked = np.argsort(-excess, kind="stable")[:CULPRITS]
-        shares = excess / excess.sum()
-        return tuple((self.links[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
 
 
 def link_noise(
@@ -125,6 +98,7 @@ def link_noise(
     return LinkNoise(
         kind=kind,
         links=surface.names,
+        movers=tuple(_movers(robot, joint) for joint in surface.joint.tolist()),
         time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
         power=np.sum(power, axis=0),
         vibration=vibration,
@@ -211,6 +185,15 @@ def _moments(
     moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
     moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
     return moments.transpose(2, 0, 1)
+
+
+def _movers(robot: nm.Robot, carrier: int) -> frozenset[str]:
+    names = set[str]()
+    while carrier:  # 0 is the universe
+        joint = robot.joints[carrier - 1]
+        names.add(joint.name)
+        carrier = joint.parent
+    return frozenset(names)
 
 
 def _remarks(run: nm.Run, robot: nm.Robot, surface: nm.Surface) -> Iterator[str]:

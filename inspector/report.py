@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 
+from inspector.culprits import culprits
 from inspector.inspection import Inspection
 from inspector.origin import flows
 from models import Event
 from noisemodel import Block
 
-ORIGIN = ("shows first in", "by joints", "band", "links with the largest excess")
+ORIGIN = ("shows first in", "by joints", "band", "links, shares of the excess")
 """Names of the columns that say where a failure comes from."""
 HEAD = ("class", "from [s]", "to [s]", *ORIGIN)
 
@@ -65,7 +66,7 @@ def origin(inspection: Inspection, failure: Event | Block) -> tuple[str, str, st
     if failure.label == "ok":
         return "", "", "", ""
     known = inspection.origins[failure]
-    return known.stage, known.joints, known.frequencies, culprits(inspection, failure)
+    return known.stage, known.joints, known.frequencies, _links(inspection, failure)
 
 
 def note(inspection: Inspection) -> str:
@@ -73,15 +74,6 @@ def note(inspection: Inspection) -> str:
     if not inspection.origins or flows(inspection.run):
         return ""
     return "No stages: the run has neither desired velocities nor named stages of the control flow."
-
-
-def culprits(inspection: Inspection, failure: Event | Block) -> str:
-    """Name the links in which a failure shows most, with their shares of the excess."""
-    if inspection.links is None or failure.label == "ok":
-        return ""
-    annotated = [block for block in inspection.run.blocks if block.label != "ok"]
-    shares = inspection.links.culprits(failure, [*inspection.events, *annotated])
-    return ", ".join(f"{link} {share:.0%}" for link, share in shares)
 
 
 def verdict(inspection: Inspection) -> str:
@@ -93,6 +85,16 @@ def verdict(inspection: Inspection) -> str:
     kinds = sorted({event.label for event in inspection.events})
     count = len(inspection.events)
     return f"{count} {'finding' if count == 1 else 'findings'}: {', '.join(kinds)}"
+
+
+def _links(inspection: Inspection, failure: Event | Block) -> str:
+    if inspection.links is None:
+        return ""
+    annotated = [block for block in inspection.run.blocks if block.label != "ok"]
+    failures: list[Event | Block] = [*inspection.events, *annotated]
+    first = inspection.origins[failure].first
+    named = culprits(inspection.links, failure, failures, first=first)
+    return ", ".join(f"{link} {share:.0%}" for link, share in named)
 
 
 def _table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> str:

@@ -25,7 +25,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspector import stagesonset
-from inspector.linknoise import CULPRITS
 from inspector.stages import Flow, flow
 from inspector.stagesnew import WARM, News, Usual
 from models import Event
@@ -54,6 +53,8 @@ ADDS = 0.25
 """Share of the largest addition from which a stage counts as adding."""
 MORE = 2.0
 """How far the power of a stage that adds exceeds the usual."""
+JOINTS = 3
+"""Joints that are named, at most."""
 FRESH = 0.005
 """Time after its onset in which a blow or jump has not spread over the robot, in [s]."""
 SLOWEST = 0.02
@@ -71,6 +72,7 @@ class First:
         lasting: Whether the failure is a vibration that lasts, and not a blow or jump.
         joints: Up to three joints in which it is new there, and their shares of the power of
             what is, the largest first.
+        onset: When a blow or jump sets in, in [s]; None of a vibration that lasts.
     """
 
     stage: str
@@ -78,6 +80,7 @@ class First:
     lag: float
     lasting: bool
     joints: tuple[tuple[str, float], ...] = ()
+    onset: float | None = None
 
 
 def first_stage(run: Run, usual: Usual, failure: Event | Block, *, reach: float) -> First | None:
@@ -144,6 +147,7 @@ def _earliest(stages: Flow, news: News, usual: Usual, first: int, last: int) -> 
         lag=(at - earliest) / rate,
         lasting=False,
         joints=_joints(stages, news.unforetold[place, earliest : earliest + stages.samples(FRESH)]),
+        onset=float(stages.time[earliest]),
     )
 
 
@@ -168,7 +172,7 @@ def _joints(stages: Flow, unforetold: Array) -> tuple[tuple[str, float], ...]:
     """Name the joints in which something is new, shape (samples, joints), and their shares."""
     power = np.square(unforetold).sum(axis=0)
     shares = power / (power.sum() or 1.0)
-    ranked = np.argsort(-shares, kind="stable")[:CULPRITS].tolist()
+    ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
     return tuple((stages.joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
 
 

@@ -1,0 +1,82 @@
+"""The links at which a failure points."""
+
+import numpy as np
+import pytest
+
+from inspector.culprits import culprits
+from inspector.linknoise import LinkNoise, link_noise
+from inspector.stagesfirst import First
+from models import Event
+from noisemodel import Robot, Run
+
+LINKS = ("body", "thigh", "foot", "other_foot")
+MOVERS = (set(), {"hip"}, {"hip", "knee"}, {"other_knee"})
+BLOW = Event("impact", 1.0, 1.4, 1.0)
+
+
+def noise(**excess):
+    """Links that hum by 1 mW all the time, and by more as told: from, to, and how much."""
+    time = np.arange(300) / 100 + 0.005
+    vibration = np.full((300, len(LINKS)), 1e-3)
+    for link, (start, stop, power) in excess.items():
+        vibration[(time > start) & (time < stop), LINKS.index(link)] += power
+    movers = tuple(map(frozenset, MOVERS))
+    return LinkNoise("normal", LINKS, movers, time, vibration, vibration, {}, ())
+
+
+def blow(*joints, onset=1.0):
+    """What is known of a blow that is new in some joints."""
+    return First("measured", "", 0.0, False, tuple((joint, 0.5) for joint in joints), onset)
+
+
+def rattling(joint):
+    """A UR5 that moves slowly; one joint rattles at 100 Hz from 1 s to 1.4 s."""
+    time = np.arange(3000) / 1000
+    velocity = 0.5 * np.cos(np.outer(time, np.linspace(0.5, 1.5, 6)))
+    position = np.sin(np.outer(time, np.linspace(0.5, 1.5, 6)))
+    during = (time >= 1.0) & (time < 1.4)
+    velocity[during, joint] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
+    names = Robot.load("ur5").joint_names
+    return Run(time=time, velocity=velocity, position=position, joint_names=names, robot="ur5")
+
+
+def test_a_rattling_joint_is_named_by_its_link():
+    for joint, link in ((5, "wrist_3_link"), (4, "wrist_2_link")):
+        named = dict(culprits(link_noise(rattling(joint)), BLOW, [BLOW]))
+        assert link in named
+        assert "shoulder_link" not in named
+        assert sum(named.values()) <= 1.0 + 1e-12
+
+
+def test_shares_are_of_the_whole_excess():
+    links = noise(body=(1.0, 1.4, 0.6), thigh=(1.0, 1.4, 0.3), foot=(1.0, 1.4, 0.1))
+    named = culprits(links, BLOW, [BLOW])
+    assert [link for link, _ in named] == ["body", "thigh", "foot"]
+    assert [share for _, share in named] == pytest.approx([0.6, 0.3, 0.1])
+
+
+def test_of_a_blow_its_beginning_counts_and_of_a_vibration_all():
+    links = noise(foot=(1.0, 1.05, 0.5), other_foot=(1.1, 1.4, 0.5))
+    assert [link for link, _ in culprits(links, BLOW, [BLOW], first=blow())] == ["foot"]
+    lasting = First("commanded", "measured", 0.001, lasting=True)
+    assert culprits(links, BLOW, [BLOW], first=lasting)[0][0] == "other_foot"
+
+
+def test_a_limb_in_which_it_is_new_is_named_though_others_are_louder():
+    loud = {
+        link: (1.0, 1.4, power) for link, power in zip(LINKS, (0.4, 0.3, 0.2, 0.1), strict=True)
+    }
+    links = noise(**loud)
+    plain = [link for link, _ in culprits(links, BLOW, [BLOW], first=blow("hip"))]
+    assert plain == ["body", "thigh", "foot"]
+    named = culprits(links, BLOW, [BLOW], first=blow("other_knee"))
+    assert [link for link, _ in named] == ["body", "thigh", "other_foot"]
+    assert [share for _, share in named] == pytest.approx([0.4, 0.3, 0.1])
+
+
+def test_a_failure_in_which_nothing_changes_points_at_no_link():
+    assert culprits(noise(), BLOW, [BLOW], first=blow("hip")) == ()
+
+
+def test_a_failure_after_all_noise_points_at_no_link():
+    assert culprits(noise(foot=(1.0, 1.4, 0.5)), Event("impact", 5.0, 5.4, 1.0), []) == ()
