@@ -9,7 +9,7 @@ in each stage, see `inspector.stagesnew`. Two kinds of failures are told apart:
   50 ms before. A stage does not show it whose peak is less than four times what was before, or
   less than a fifth of all that changes there: it passes on what the stage before it did. Nothing
   foretells the first stage, hence its peak also has to exceed by half what is usual for it, or
-  another stage has to follow within 3 ms. The earliest onset wins; of simultaneous ones, the
+  the stage next to it has to answer within 3 ms. The earliest onset wins; of simultaneous ones, the
   stage that a motion passes first.
 - A *lasting vibration* has gone round the loop many times, and its onset, such as the touch that
   starts a limit cycle, is not its source. It lies in the first stage that adds to it: whose news
@@ -48,7 +48,7 @@ PASSED_ON = 0.2
 UNHEARD = 1.5
 """How far the first stage has to exceed its usual peak."""
 ANSWERED = 0.003
-"""Time within which the next stage else has to answer the first, in [s]."""
+"""Time within which the second stage else has to answer the first, in [s]."""
 ADDS = 0.25
 """Share of the largest addition from which a stage counts as adding."""
 MORE = 2.0
@@ -135,7 +135,8 @@ def _earliest(stages: Flow, news: News, usual: Usual, first: int, last: int) -> 
     found = sorted((at, place) for at, place in onsets if at is not None)
     if found and found[0][1] == 0 and len(news.new) > 1:
         common = float(news.new[0, around].max()) <= UNHEARD * usual.peak[0]
-        if common and (len(found) == 1 or found[1][0] - found[0][0] > ANSWERED * rate):
+        answers = [at for at, place in found if place == 1]
+        if common and not any(at - found[0][0] <= ANSWERED * rate for at in answers):
             found = found[1:]
     if not found:
         return None
