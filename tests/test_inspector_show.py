@@ -2,12 +2,14 @@ import subprocess
 import sys
 import types
 from pathlib import Path
+from urllib.parse import quote
 
+import browser
 import numpy as np
 import pytest
 
 import inspector
-from inspector import notebook, viewer
+from inspector import cell, notebook, viewer
 from inspector.viewer import ViewerError
 from noisemodel import Run, RunFileError
 
@@ -74,28 +76,72 @@ def test_a_notebook_without_the_widget_is_told_what_to_install(run, monkeypatch)
         inspector.show(run)
 
 
-def test_a_notebook_gets_the_recording_and_fetches_nothing_from_outside(run, monkeypatch):
-    displayed, sent = [], []
+@pytest.fixture
+def kernel(monkeypatch):
+    """A kernel that has rerun's widget; what is displayed and sent, and how to set its code."""
+    seen = types.SimpleNamespace(widgets=[], sent=[])
 
-    class Widget:
+    class Viewer:
         def __init__(self, width, height):
             self.size = (width, height)
 
         def send_rrd(self, data):
-            sent.append(data)
+            seen.sent.append(data)
 
-    widgets = types.SimpleNamespace(Viewer=Widget)
-    display = types.SimpleNamespace(display=displayed.append)
+    seen.rerun = types.SimpleNamespace(Viewer=Viewer, ESM_MOD="// 23 MB")
+    trait = types.SimpleNamespace(tag=lambda sync: sync)
+    modules = {
+        "rerun_notebook": seen.rerun,
+        "IPython.display": types.SimpleNamespace(display=seen.widgets.append),
+        "traitlets": types.SimpleNamespace(
+            Unicode=lambda code: setattr(seen, "code", code) or trait
+        ),
+    }
     monkeypatch.setattr(notebook, "in_notebook", lambda: True)
     monkeypatch.setattr(notebook, "find_spec", lambda _: object())
-    monkeypatch.setattr(
-        notebook, "import_module", {"rerun_notebook": widgets, "IPython.display": display}.get
-    )
+    monkeypatch.setattr(cell, "import_module", modules.get)
     monkeypatch.delenv("RERUN_NOTEBOOK_ASSET", raising=False)
+    return seen
+
+
+def test_a_notebook_gets_the_recording_and_fetches_nothing_from_outside(run, kernel):
     inspector.show(run, size=(800, 500))
-    assert [widget.size for widget in displayed] == [(800, 500)]
-    assert [data[:4] for data in sent] == [b"RRF2"]
-    assert notebook.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
+    (widget,) = kernel.widgets
+    assert isinstance(widget, kernel.rerun.Viewer)
+    assert widget.size == (800, 500)
+    assert [data[:4] for data in kernel.sent] == [b"RRF2"]
+    assert cell.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
+    assert (widget._esm, kernel.code, widget._code) == (cell.LOADER, "// 23 MB", True)
+
+
+def test_a_notebook_whose_owner_names_an_address_has_the_viewer_fetched_there(run, kernel):
+    kernel.rerun.ESM_MOD = "https://viewer.example/widget.js"
+    inspector.show(run)
+    assert [type(widget) for widget in kernel.widgets] == [kernel.rerun.Viewer]
+
+
+@pytest.mark.slow
+def test_a_widget_is_ready_before_its_code_and_then_draws():
+    """Of a widget that takes two seconds to be ready, anywidget forgets what is sent to it."""
+    code = """
+        await new Promise((ready) => setTimeout(ready, 3000));
+        const render = ({ model, el }) => { el.textContent = model.get("name"); return "ended"; };
+        export default { render };
+    """
+    with browser.page() as page:
+        page.set_content("<main></main>")
+        assert page.evaluate(
+            """async ([loader, code]) => {
+                const begun = performance.now();
+                const { default: widget } = await import(`data:text/javascript,${loader}`);
+                const ready = performance.now() - begun;
+                const el = document.querySelector("main");
+                const model = { get: (name) => ({ _code: code, name: "drawn" })[name] };
+                const end = await widget.render({ model, el });
+                return [ready < 2000, el.textContent, end];
+            }""",
+            [quote(cell.LOADER), code],
+        ) == [True, "drawn", "ended"]
 
 
 def test_plain_python_is_no_notebook_and_a_kernel_is(monkeypatch):
