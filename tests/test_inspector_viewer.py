@@ -9,6 +9,7 @@ import urllib.request
 from functools import partial
 from pathlib import Path
 
+import browser
 import numpy as np
 import pytest
 
@@ -147,14 +148,7 @@ def test_serving_ends_with_the_program_and_leaves_no_server(recording, stop):
 
 @pytest.mark.slow
 def test_a_browser_draws_the_recording(recording, tmp_path):
-    playwright = pytest.importorskip("playwright.sync_api", reason="needs playwright")
-    browser = shutil.which("chromium") or shutil.which("google-chrome")
-    if browser is None:
-        pytest.skip("needs chromium")
-    software = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-    with webview.serving(recording) as served, playwright.sync_playwright() as driver:
-        window = driver.chromium.launch(executable_path=browser, args=["--no-sandbox", *software])
-        page = window.new_page(viewport={"width": 900, "height": 560})
+    with browser.page() as page, webview.serving(recording) as served:
         page.goto(f"{served.url}&renderer=webgl")
         until = time.monotonic() + 240
         sizes = [0]
@@ -162,5 +156,4 @@ def test_a_browser_draws_the_recording(recording, tmp_path):
         while time.monotonic() < until and not (sizes[-1] > 40_000 and sizes[-1] == sizes[-2]):
             page.wait_for_timeout(3000)
             sizes.append(len(page.screenshot(path=tmp_path / "web.png", timeout=60_000)))
-        window.close()
     assert sizes[-1] > 40_000
