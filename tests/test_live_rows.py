@@ -79,16 +79,33 @@ def test_without_stamps_a_malformed_row_still_takes_its_time():
     assert len(said) == 1
 
 
-def test_both_ways_of_reading_agree():
+def test_all_ways_of_reading_agree():
     random = np.random.default_rng(0)
-    table = random.normal(size=(50, 6)) * 10.0 ** random.integers(-9, 9, (50, 6))
+    table = random.normal(size=(50, 6)) * 10.0 ** random.integers(-300, 300, (50, 6))
+    table[random.uniform(size=table.shape) < 0.1] = np.nan
     lines = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
-    (fast,), said = read(CsvReader(HEAD, ()), lines)
+    padded = lines.replace(b",", b" ,", 1)
+    (bare,), said = read(CsvReader(HEAD, ()), lines)
+    (fast,), _ = read(CsvReader(HEAD, ()), padded)
     (careful,), _ = read(CsvReader(HEAD, ()), lines + b"broken\n")
     assert said == []
-    assert np.array_equal(fast.signals["velocity"], table[:, 1:3])
-    assert np.array_equal(careful.signals["velocity"], table[:, 1:3])
-    assert np.array_equal(careful.time, fast.time)
+    assert CsvReader(HEAD, ())._bare(lines) is not None
+    assert CsvReader(HEAD, ())._bare(padded) is None
+    for rows in (bare, fast, careful):
+        np.testing.assert_array_equal(rows.signals["velocity"], table[:, 1:3])
+        np.testing.assert_array_equal(rows.time, table[:, 0])
+
+
+def test_lines_may_end_as_on_windows():
+    (rows,), said = read(CsvReader(b"t;a.velocity\r\n", ()), b"0;1.5\r\n1;2.5\r\n")
+    assert rows.signals["velocity"].tolist() == [[1.5], [2.5]]
+    assert said == []
+
+
+def test_rows_of_wrong_lengths_that_add_up_are_told_all_the_same():
+    (rows,), said = read(CsvReader(HEAD, ()), b"0,1,2,3,4\n1,1,2,3,4,9,9\n2,1,2,3,4,9\n")
+    assert rows.time.tolist() == [2.0]
+    assert [line.split(":")[0] for _, line in said] == ["line 2", "line 3"]
 
 
 @pytest.mark.parametrize(

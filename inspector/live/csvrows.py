@@ -64,12 +64,43 @@ class CsvReader:
         Yields:
             The rows at once.
         """
-        table = self._fast(lines)
+        table = self._bare(lines)
+        if table is None:
+            table = self._fast(lines)
         if table is None:
             table = self._careful(lines, first, note)
         if len(table):
             signals = {name: table[:, places] for name, places in self._places.items()}
             yield Rows(signals, None if self._time is None else table[:, self._time])
+
+    def _bare(self, lines: bytes) -> Array | None:
+        """Read rows of bare numbers, in half of the time; None if a cell is anything else.
+
+        Cells are converted as one array: beginning a hundred small columns costs as much again.
+        """
+        import pyarrow as pa
+
+        if b"\r" in lines:
+            lines = lines.replace(b"\r\n", b"\n")
+        text = np.frombuffer(lines, dtype=np.uint8)
+        ends = text == ord("\n")
+        marks = ends | (text == ord(self._delimiter))
+        places = np.flatnonzero(marks)
+        lasts = places[len(self._header) - 1 :: len(self._header)]
+        rows = np.count_nonzero(ends)
+        if len(places) != rows * len(self._header) or not ends[lasts].all():
+            return None  # a row is too short or too long
+        edges = np.zeros(len(places) + 1, dtype=np.int32)  # of cells, once the marks are gone
+        edges[1:] = places - np.arange(len(places))
+        cells = pa.StringArray.from_buffers(
+            len(places), pa.py_buffer(edges), pa.py_buffer(text[~marks])
+        )
+        try:
+            numbers = cells.cast(pa.float64())
+        except pa.ArrowInvalid:  # such as cells that are empty, quoted or padded
+            return None
+        table: Array = numbers.to_numpy().reshape(rows, len(self._header))
+        return table
 
     def _fast(self, lines: bytes) -> Array | None:
         """Read rows that are all as they should be; None if one is not."""
