@@ -44,6 +44,7 @@ def rebuilt(arrays: Mapping[str, Array], profile: Profile) -> Machine:
             arrays["output"],
             arrays["output_bias"],
             arrays["calibration"],
+            arrays["frequency"],
             arrays["known"],
             profile.alarm,
         )
@@ -78,6 +79,7 @@ def shapes(
             "output": (count, units, classes),
             "output_bias": (count, classes),
             "calibration": (1 + classes,),
+            "frequency": (classes,),
             "known": (2, features),
         }
     vectors, machines = len(arrays["vectors"]), machine_count(classes, profile.multiclass)
@@ -96,6 +98,7 @@ DIMENSIONS = {
         "output": 3,
         "output_bias": 2,
         "calibration": 1,
+        "frequency": 1,
         "known": 2,
     },
     "baseline": {"good": 2, "limit": 1},

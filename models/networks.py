@@ -18,7 +18,7 @@ TINY = 1e-12
 """The least probability that is told from none."""
 FOREIGN = 2.0
 """A frame is unknown if a feature lies farther than this above what was learnt from."""
-LIKELY = 0.3
+LIKELY = 0.2
 """Probability of any failure from which a frame is called one: to miss it is the worse mistake."""
 
 
@@ -33,6 +33,7 @@ class Networks:
         output_bias: Shape (networks, classes).
         calibration: Scale of the averaged log-probabilities, then an offset for each class, shape
             (1 + classes,).
+        frequency: Share of each class in the frames that were learnt from, shape (classes,).
         known: Lowest and highest value of each feature that is known, shape (2, features).
         alarm: Probability of any failure from which a frame is sure enough to raise an alarm.
     """
@@ -42,6 +43,7 @@ class Networks:
     output: Array
     output_bias: Array
     calibration: Array
+    frequency: Array
     known: Array
     alarm: float
 
@@ -73,7 +75,10 @@ class Networks:
         return average
 
     def choose(self, decisions: Array) -> Index:
-        """Choose the most probable failure if failures are probable enough, or else `ok`.
+        """Choose a failure if failures are probable enough, or else `ok`.
+
+        Of the failures it is the one whose probability exceeds its frequency most: a rare one is
+        not to drown in a frequent one (balanced accuracy counts them alike).
 
         Args:
             decisions: What `decision` gave.
@@ -83,7 +88,7 @@ class Networks:
             that is unknown.
         """
         answers, foreign = decisions[:, :-1], decisions[:, -1]
-        chosen: Index = 1 + answers[:, 1:].argmax(axis=1)
+        chosen: Index = 1 + (answers[:, 1:] - np.log(self.frequency[1:])).argmax(axis=1)
         chosen[_risk(decisions) < LIKELY] = 0
         chosen[foreign > FOREIGN] = answers.shape[1]
         return chosen
@@ -106,6 +111,7 @@ class Networks:
             "output": self.output,
             "output_bias": self.output_bias,
             "calibration": self.calibration,
+            "frequency": self.frequency,
             "known": self.known,
         }
 

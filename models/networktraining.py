@@ -54,6 +54,7 @@ def fit_networks(features: Array, targets: Index, groups: Words, profile: Profil
         np.concatenate([network.output for network in networks]),
         np.concatenate([network.output_bias for network in networks]),
         calibration,
+        np.bincount(targets, minlength=classes) / len(targets),
         known,
         profile.alarm,
     )
@@ -111,6 +112,7 @@ def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: 
         output,
         output_bias,
         np.append(1.0, np.zeros(classes)),
+        counts / len(targets),
         np.stack((features.min(axis=0), features.max(axis=0))),
         profile.alarm,
     )

@@ -115,6 +115,21 @@ def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
     assert failures == sorted(failures, reverse=True)
 
 
+def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classifier):
+    shares = {"impact": 0.1, "oscillations": 0.4}
+    machine = replace(classifier.machines, frequency=np.array([0.5, *shares.values()]))
+    probabilities = np.log([[0.2, 0.35, 0.45], [0.2, 0.05, 0.75], [0.9, 0.09, 0.01]])
+    decisions = np.hstack((probabilities, np.zeros((3, 1))))
+    named = [classifier.classes[index] for index in machine.choose(decisions)]
+    assert named == ["impact", "oscillations", "ok"]
+
+
+def test_networks_know_how_frequent_each_class_was(classifier):
+    examples = Examples.read(RECORDINGS[:12], PROFILE)
+    shares = [(examples.labels == name).mean() for name in classifier.classes]
+    np.testing.assert_allclose(classifier.machines.frequency, shares)
+
+
 def test_what_is_louder_than_all_that_was_learnt_is_unknown(classifier):
     loud = 1e6 * np.random.default_rng(4).random(round(2 * RATE))
     labels = classifier.classify(dict.fromkeys(PROFILE.signals, loud), RATE)
