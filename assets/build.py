@@ -50,7 +50,7 @@ Made by `make models`: profile `{profile}`, {runs} runs of the training part of
 {seeds}, every scenario (`scenarios`, recipe {recipe});
 hashes of all of them are in the model file. Below is what it does on what is held out by hash of
 seeds {looked_at} to {last}, and in {hours:.3g} hours more of good motion: robots that it knows,
-seeds that neither it nor those who made it had seen.
+seeds that it had not seen (docs/classifier.md says who had looked at them, and when).
 
 What it does not know: any other robot, real drives (gears, friction that is not Coulomb's, belts),
 payloads, hands at work. What is unlike all of its runs it calls unknown, as far as that can be told
