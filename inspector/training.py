@@ -115,7 +115,8 @@ def recordings(
         part: Which of them are meant.
 
     Yields:
-        One recording per run, sample or log.
+        One recording per run, sample or log. Of a sample, no block may be annotated: what went
+        wrong in it was too faint to be called one thing or the other.
     """
     for recording in _recordings(inputs, rate):
         held_out = models.held_out(models.group_of(recording.name))
@@ -191,12 +192,9 @@ def of_sample(path: Path, rate: float) -> models.Recording:
         the run that it was made of.
 
     Raises:
-        InspectorError: If the sample has no blocks.
         ScenarioError: If it cannot be read, or has no noise of that rate.
     """
     sample = Sample.load(path, only=WHOLE).at(rate)
-    if not sample.blocks:
-        raise InspectorError(f"{path}: has no annotated blocks")
     return models.Recording(
         name=sample.name,
         signal={name: sample.signals[name] for name in WHOLE},

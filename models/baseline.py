@@ -16,10 +16,12 @@ from models.types import Array, Index
 CLASSES = ("ok", DEPARTURE)
 """A baseline knows no failure, so that it cannot name one."""
 
-MOTION: LogBands = replace(GENERAL, classes=CLASSES, machine="baseline", relative=False)
+MOTION: LogBands = replace(GENERAL, classes=CLASSES, machine="baseline", relative=False, quick=0.0)
 """For runs with measured and desired motion. Levels stay as they are: it is one robot, and how
 loud it is matters."""
-NOISE_ALONE: LogBands = replace(SCALAR, classes=CLASSES, machine="baseline", relative=False)
+NOISE_ALONE: LogBands = replace(
+    SCALAR, classes=CLASSES, machine="baseline", relative=False, quick=0.0
+)
 """For the noise alone."""
 
 CENTRES = 100

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
@@ -265,13 +266,17 @@ class Classifier:
             versions=manifest["versions"],
         )
 
+    @cached_property
+    def _names(self) -> Words:
+        return np.array((*self.classes, UNKNOWN))
+
     def _decide(self, frames: Real, index: Index) -> Array:
         return np.concatenate(
             [self.judge(features(frames[chunk], self.profile)) for chunk in _chunks(index)]
         )
 
     def _choose(self, decisions: Array) -> Words:
-        return np.array((*self.classes, UNKNOWN))[self.machines.choose(decisions)]
+        return self._names[self.machines.choose(decisions)]
 
     def _score(self, decisions: Array) -> Array:
         return self.machines.score(decisions)

@@ -6,13 +6,16 @@ over time first: all coefficients of the first band, then those of the second. W
 several signals follows one after the other.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import prod
 
 import numpy as np
+from numpy.typing import NDArray
 
 from models.errors import SignalError
 from models.profile import Profile
+from models.resolution import Resolution
 from models.types import Array, Index, Real
 
 POOLED = 3
@@ -34,7 +37,11 @@ def features(frames: Real, profile: Profile) -> Array:
     """
     _check(frames, profile)
     exact = rounded(frames, profile)
-    return course(levels(_stretches(exact, profile.window, profile.stride), profile), profile)
+    loudness = [
+        levels(_stretches(exact, each.window, each.stride), profile, each)
+        for each in profile.resolutions
+    ]
+    return course(loudness, profile)
 
 
 def rounded(samples: Real, profile: Profile) -> Array:
@@ -49,40 +56,45 @@ def rounded(samples: Real, profile: Profile) -> Array:
     return samples.astype(np.float64, copy=False)
 
 
-def levels(stretches: Array, profile: Profile) -> Array:
+def levels(stretches: Array, profile: Profile, resolution: Resolution) -> Array:
     """Tell how loud each frequency band is in each window of a Fourier transform.
 
     Args:
         stretches: Samples of the windows, shape (..., window).
         profile: What to compute.
+        resolution: The one of the profile's that the windows are of.
 
     Returns:
         Logarithms of the bands' amplitudes, shape (..., bands).
     """
-    spectrum = _amplitude(stretches)
     if profile.bands == "log":
-        amplitude = spectrum * (2.0 / _hann(profile.window).sum())
-        power = np.square(amplitude) @ band_shares(profile)
+        spectrum = _transform(stretches)
+        squares = np.square(spectrum.real) + np.square(spectrum.imag)
+        power = squares @ _power_shares(profile.rate, resolution)
         loudness: Array = np.log(np.sqrt(power) + profile.floor)
         return loudness
-    return np.log(compress(spectrum, comb=profile.bands == "comb") + profile.floor)
+    amplitude = _amplitude(stretches)
+    return np.log(compress(amplitude, comb=profile.bands == "comb") + profile.floor)
 
 
-def course(loudness: Array, profile: Profile) -> Array:
+def course(loudness: Sequence[Array], profile: Profile) -> Array:
     """Describe each frame by the course of its levels in time.
 
     Args:
-        loudness: Levels of the frames' windows, shape (frames, time, bands), or (frames, signals,
-            time, bands).
+        loudness: For each of the profile's resolutions, levels of the frames' windows, shape
+            (frames, time, bands), or (frames, signals, time, bands).
         profile: What to compute.
 
     Returns:
         Features, not yet standardised, shape (frames, features).
     """
     if profile.bands == "log":
-        described = (_relative if profile.relative else pool)(loudness)
-        return described.reshape(len(loudness), feature_count(profile))
-    flat = dct(loudness).reshape(len(loudness), feature_count(profile))
+        if profile.relative:
+            return _relative(loudness)
+        pooled = [pool(each) for each in loudness]
+        rows = [each.reshape(len(each), prod(each.shape[1:])) for each in pooled]
+        return np.concatenate(rows, axis=1)
+    flat = dct(loudness[0]).reshape(len(loudness[0]), feature_count(profile))
     return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
 
 
@@ -91,7 +103,8 @@ def feature_count(profile: Profile) -> int:
     signals = len(profile.signals)
     if profile.bands == "log":
         spectra = 2 * signals - 1 if profile.relative else signals
-        return spectra * POOLED * (len(profile.edges) - 1) + profile.relative
+        bands = sum(len(each.edges) - 1 for each in profile.resolutions)
+        return spectra * POOLED * bands + profile.relative
     return signals * (profile.bins // 3) * profile.transforms
 
 
@@ -170,32 +183,36 @@ def pool(loudness: Array) -> Array:
     return np.concatenate((mean, np.maximum.reduce(loudness, -2), deviation), axis=-1)
 
 
-def _relative(loudness: Array) -> Array:
+def _relative(loudness: Sequence[Array]) -> Array:
     """Pool levels above the whole frame's, differences between signals, and that whole level."""
-    several = loudness if loudness.ndim == 4 else loudness[:, None]
-    whole = np.add.reduce(several, (1, 2, 3), keepdims=True) / prod(several.shape[1:])
-    spectra = np.concatenate((several - whole, several[:, 1:] - several[:, :-1]), axis=1)
-    pooled = pool(spectra)
-    flat = pooled.reshape(len(pooled), prod(pooled.shape[1:]))
-    return np.concatenate((flat, whole[:, :, 0, 0]), axis=1)
+    several = [each if each.ndim == 4 else each[:, None] for each in loudness]
+    bands = [np.add.reduce(each, (1, 2)) / prod(each.shape[1:3]) for each in several]
+    every = np.concatenate(bands, axis=1)
+    whole = np.add.reduce(every, 1, keepdims=True) / every.shape[1]
+    parts = []
+    for each in several:
+        above, beside = each - whole[:, :, None, None], each[:, 1:] - each[:, :-1]
+        pooled = pool(np.concatenate((above, beside), axis=1))
+        parts.append(pooled.reshape(len(pooled), prod(pooled.shape[1:])))
+    return np.concatenate((*parts, whole), axis=1)
 
 
-@lru_cache
-def band_shares(profile: Profile) -> Array:
-    """Share of each bin in the mean power of each band between the profile's edges.
+def band_shares(rate: float, resolution: Resolution) -> Array:
+    """Share of each bin in the mean power of each band between a resolution's edges.
 
     A bin stands for half a bin's width on each side of its frequency and counts by the part of it
     that lies in the band, so that a band narrower than a bin is never empty.
 
     Args:
-        profile: A profile with band edges.
+        rate: Sample rate of the signal, in [Hz].
+        resolution: With band edges.
 
     Returns:
         Shares, each column summing to 1, shape (frequency, bands).
     """
-    width = profile.rate / profile.window
-    centre = width * np.arange(profile.bins)[:, None]
-    low, high = np.array(profile.edges[:-1]), np.array(profile.edges[1:])
+    width = rate / resolution.window
+    centre = width * np.arange(resolution.window // 2 + 1)[:, None]
+    low, high = np.array(resolution.edges[:-1]), np.array(resolution.edges[1:])
     overlap = np.minimum(centre + width / 2, high) - np.maximum(centre - width / 2, low)
     share = np.maximum(overlap, 0.0)
     normalised: Array = share / share.sum(axis=0)
@@ -206,9 +223,20 @@ def _stretches(frames: Array, window: int, stride: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(frames, window, axis=-1)[..., ::stride, :]
 
 
+@lru_cache
+def _power_shares(rate: float, resolution: Resolution) -> Array:
+    """Make the matrix from squares of a transform to mean powers, shape (frequency, bands)."""
+    amplitude = 2.0 / _hann(resolution.window).sum()
+    shares: Array = amplitude**2 * band_shares(rate, resolution)
+    return shares
+
+
+def _transform(stretches: Array) -> NDArray[np.complex128]:
+    return np.fft.rfft(stretches * _hann(stretches.shape[-1]), axis=-1)
+
+
 def _amplitude(stretches: Array) -> Array:
-    transform = np.fft.rfft(stretches * _hann(stretches.shape[-1]), axis=-1)
-    amplitude: Array = np.abs(transform)
+    amplitude: Array = np.abs(_transform(stretches))
     return amplitude
 
 

@@ -7,6 +7,11 @@ from models.features import POOLED
 from models.profile import CLASSES, Machine, Profile
 from models.signals import NOISE
 
+SPEED = 1.5
+"""Bins of a Hann window that the mean leaks into: up to here, a quick band is the speed itself."""
+WIDE = 2.0 ** (4 / 3)
+"""From the lower to the upper edge of a quick window's other bands."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LogBands:
@@ -39,6 +44,13 @@ class LogBands:
     """No band reaches beyond, in [Hz]."""
     per_octave: float = 4.0
     """Bands in an octave, where they are wider than what the window resolves."""
+    quick: float = 0.0
+    """Duration of a second, shorter window beside the first, in [s]; 0 for none. Its bands are few
+    and wide, since they tell when rather than what."""
+    quick_stride: float = 0.01
+    """Time from one of its transforms to the next, in [s]."""
+    speed: bool = False
+    """Whether the speed itself is a quick band, too: the first one, below all others."""
     floor: float = 3e-5
     """Added to a band's amplitude: what is quieter than the best encoders is all the same."""
     regularization: float = 10.0
@@ -67,6 +79,7 @@ class LogBands:
                 f"a rate of {rate:g} Hz leaves {max(len(edges) - 1, 0)} bands up to"
                 f" {rate / 2:g} Hz, expected three or more: take a rate of 100 Hz at least"
             )
+        quick = self._quick_edges(rate / 2)
         return Profile(
             name="logbands",
             classes=self.classes,
@@ -78,6 +91,9 @@ class LogBands:
             stride=round(self.stride * rate),
             bands="log",
             edges=edges,
+            quick_window=round(self.quick * rate) if quick else 0,
+            quick_stride=round(self.quick_stride * rate) if quick else 0,
+            quick_edges=quick,
             relative=self.relative,
             floor=self.floor,
             least_deviation=self.least_deviation,
@@ -103,9 +119,19 @@ class LogBands:
             edges.append(upper)
         return tuple(edges)
 
+    def _quick_edges(self, nyquist: float) -> tuple[float, ...]:
+        """List the edges of the quick window's bands, none if not even the first one fits."""
+        if not self.quick or nyquist * self.quick < SPEED:
+            return ()
+        edges = [SPEED / self.quick]
+        while (upper := edges[-1] * WIDE) <= min(self.highest, nyquist):
+            edges.append(upper)
+        return (0.0, *edges) if self.speed else tuple(edges) if len(edges) > 1 else ()
 
-SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85)
+
+SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85, quick=0.02)
 """For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
 encoders, and differs from robot to robot and from simulator to simulator."""
-GENERAL = replace(SCALAR, signals=("desired", "measured", "error"))
-"""For runs with measured and desired motion."""
+GENERAL = replace(SCALAR, signals=("desired", "measured", "error"), alarm=0.7, speed=True)
+"""For runs with measured and desired motion; good motion startles it less. The noise alone cannot
+tell a fast motion without sensor noise from a failure by its speed."""

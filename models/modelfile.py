@@ -23,7 +23,7 @@ from models.machine import DIMENSIONS
 from models.manifest import check
 from models.types import Array
 
-FORMAT = "noise-model/2"
+FORMAT = "noise-model/3"
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times what is usual."""
 

@@ -7,6 +7,7 @@ from math import isfinite
 from typing import Any, Literal, Self, TypeAlias, get_args
 
 from models.errors import ProfileError
+from models.resolution import Resolution
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 """NoisyTest's classes, in its order; `ok` is the first of every model."""
@@ -56,6 +57,12 @@ class Profile:
     """How bins become bands: three adjacent ones, NoisyTest's comb, or ``edges``."""
     edges: tuple[float, ...] = ()
     """Edges of the bands of ``log``, ascending, in [Hz]."""
+    quick_window: int = 0
+    """Samples of a second, shorter Hann window beside the first; 0 for none."""
+    quick_stride: int = 0
+    """Samples from one of its transforms to the next."""
+    quick_edges: tuple[float, ...] = ()
+    """Edges of its bands, ascending, in [Hz]."""
     relative: bool = False
     """Whether levels of ``log`` bands are told from how loud the frame is on the whole, and from
     those of the signal before: what matters then is the shape of a spectrum, and how much of a
@@ -172,7 +179,14 @@ class Profile:
     @property
     def transforms(self) -> int:
         """Fourier transforms of one frame (the paper's n_t)."""
-        return 1 + (self.length - self.window) // self.stride
+        return self.resolutions[0].transforms(self.length)
+
+    @property
+    def resolutions(self) -> tuple[Resolution, ...]:
+        """Say at which lengths of its window a frame is transformed."""
+        main = Resolution(self.window, self.stride, self.edges)
+        quick = Resolution(self.quick_window, self.quick_stride, self.quick_edges)
+        return (main, quick) if self.quick_window else (main,)
 
     @property
     def duration(self) -> float:
@@ -198,7 +212,7 @@ def _check_types(profile: Profile) -> None:
         elif kind in (int, bool, str):
             fits, wanted = type(value) is kind, f"a value of type {kind.__name__}"
         else:
-            item = float if field.name == "edges" else str
+            item = float if field.name.endswith("edges") else str
             fits = isinstance(value, tuple) and all(type(each) is item for each in value)
             wanted = f"a tuple of {item.__name__}"
         if not fits:
@@ -209,12 +223,18 @@ def _check_ranges(profile: Profile) -> None:
     for name in _POSITIVE:
         if getattr(profile, name) <= 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected more than 0")
-    for name in ("open_end", "widen_extra", "least_deviation", "decay"):
+    for name in ("open_end", "widen_extra", "least_deviation", "decay", "quick_window"):
         if getattr(profile, name) < 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
-    if profile.window > profile.length:
+    if profile.quick_window and (profile.bands != "log" or profile.quick_stride <= 0):
         raise ProfileError(
-            f"window of {profile.window} samples is longer than a frame of {profile.length}"
+            f"quick_window is {profile.quick_window} with quick_stride {profile.quick_stride} and"
+            f" bands {profile.bands!r}, expected a stride of more than 0 and 'log'"
+        )
+    longest = max(each.window for each in profile.resolutions)
+    if longest > profile.length:
+        raise ProfileError(
+            f"window of {longest} samples is longer than a frame of {profile.length}"
         )
     if not profile.signals or len(set(profile.signals)) < len(profile.signals):
         raise ProfileError(
@@ -230,14 +250,14 @@ def _check_ranges(profile: Profile) -> None:
 
 def _check_bands(profile: Profile) -> None:
     if profile.bands == "log":
-        edges = profile.edges
-        if len(edges) < 2 or any(low >= high for low, high in pairwise(edges)):
-            raise ProfileError(f"edges are {edges}, expected two or more, ascending")
-        if edges[0] < 0 or edges[-1] > profile.rate / 2:
-            raise ProfileError(
-                f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz,"
-                f" expected 0 to half the rate, {profile.rate / 2:g} Hz"
-            )
+        for edges in (each.edges for each in profile.resolutions):
+            if len(edges) < 2 or any(low >= high for low, high in pairwise(edges)):
+                raise ProfileError(f"edges are {edges}, expected two or more, ascending")
+            if edges[0] < 0 or edges[-1] > profile.rate / 2:
+                raise ProfileError(
+                    f"edges reach from {edges[0]:g} to {edges[-1]:g} Hz,"
+                    f" expected 0 to half the rate, {profile.rate / 2:g} Hz"
+                )
     elif profile.bins % 3:
         raise ProfileError(
             f"window of {profile.window} samples has {profile.bins} bins, expected a multiple"

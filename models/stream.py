@@ -1,17 +1,17 @@
 """Labels of a noise signal while it comes in, the same as those of the whole signal."""
 
-from bisect import bisect_right
 from typing import TypeAlias
 
 import numpy as np
 
 from models.classifier import Classifier
 from models.errors import RateError
-from models.features import course, levels, rounded
+from models.features import course, rounded
 from models.labels import Labels
 from models.profile import TOLERANCE
 from models.signals import Signals, check, stacked
 from models.types import Array, Index, Mask
+from models.windows import Windows
 
 Decided: TypeAlias = tuple[Index, Array]
 """Where frames start, shape (frames,), and the decisions on them, shape (frames, decisions)."""
@@ -20,8 +20,9 @@ Decided: TypeAlias = tuple[Index, Array]
 class Stream:
     """A classifier that is fed sample by sample, or in chunks of any size.
 
-    What it answers, one after the other, is what `Classifier.classify` says of the whole signal:
-    a frame's label comes with the frame's last sample. Each Fourier transform is computed once,
+    What it answers, one after the other, is what `Classifier.classify` says of the whole signal
+    (networks calculate in single precision: their scores are equal to six digits); a frame's label
+    comes with the frame's last sample. Each Fourier transform is computed once,
     as soon as its window is complete, for all frames that it belongs to. Memory does not grow.
 
     Args:
@@ -46,21 +47,11 @@ class Stream:
                 self.rate, [classifier.rate], "lower the motion's rate, or take another model"
             )
         profile = self._profile = classifier.profile
-        # Frames start every hop, and their windows at the same phases of each hop. Windows are
-        # numbered in order of time; `_of_frame` numbers those of the first frame.
-        hops, phase = np.divmod(profile.stride * np.arange(profile.transforms), profile.hop)
-        phases, rank = np.unique(phase, return_inverse=True)
-        self._of_frame = hops * len(phases) + rank
-        self._phases: list[int] = phases.tolist()
         # Room for a frame, and for as much as is taken at once.
         several = profile.signals[1:] and (len(profile.signals),)
         self._samples = np.zeros((*several, 3 * profile.length))
         self._valid = np.zeros(3 * profile.length, dtype=bool)
-        windows = np.lib.stride_tricks.sliding_window_view(self._samples, profile.window, axis=-1)
-        self._windows = np.moveaxis(windows, -2, 0)
-        rows = len(self._phases) * (2 * profile.length // profile.hop + 2)
-        # Of window i in row i modulo rows.
-        self._levels = np.zeros((rows, *levels(self._windows[0], profile).shape))
+        self._windows = [Windows(self._samples, profile, each) for each in profile.resolutions]
         nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.machines.width))
         self._nothing = self._labels([nothing])
         self._begin()
@@ -108,7 +99,8 @@ class Stream:
         self._count += jump
         self._frame += jump
         self._due += jump
-        self._done += jump // hop * len(self._phases)
+        for windows in self._windows:
+            windows.jump(jump // hop)
         self._lose(samples - min(samples, length) - jump)
 
     def finish(self) -> Labels:
@@ -122,8 +114,8 @@ class Stream:
         last = self._count - profile.length
         flush = profile.flush_end and last > self._first
         if flush and (last - self._first) % profile.hop and self._is_whole(last):
-            places = last - self._base + profile.stride * np.arange(profile.transforms)
-            found = self._decide([last], levels(self._windows[places], profile)[None])
+            place = last - self._base
+            found = self._decide([last], [windows.of_place(place) for windows in self._windows])
         self._begin()
         return self._labels(found) if found else self._nothing
 
@@ -132,8 +124,9 @@ class Stream:
         self._held = 0  # samples in the buffer
         self._first = int(self._profile.drop_first_sample)
         self._frame = self._first  # start of the next frame
-        self._done = 0  # windows that are transformed
-        self._due = self._first + self._profile.window  # count with which there is work to do
+        for windows in self._windows:
+            windows.begin()
+        self._due = self._next_due()  # count with which there is work to do
 
     def _lose(self, samples: int) -> None:
         silence = dict.fromkeys(self._profile.signals, np.zeros(samples))
@@ -154,44 +147,35 @@ class Stream:
 
     def _advance(self) -> list[Decided]:
         """Transform the windows that are complete now, and decide on the frames that are."""
-        profile, rows = self._profile, len(self._levels)
-        hops, phase = divmod(self._count - profile.window - self._first, profile.hop)
-        complete = hops * len(self._phases) + bisect_right(self._phases, phase)
-        fresh = range(self._done, complete)
-        if fresh:
-            places = [self._start(window) - self._base for window in fresh]
-            # Side by side, windows of all signals are one product of matrices.
-            flat = self._windows[places].reshape(-1, profile.window)
-            kept = self._levels[0].shape
-            self._levels[np.array(fresh) % rows] = levels(flat, profile).reshape(-1, *kept)
+        profile = self._profile
+        for windows in self._windows:
+            windows.advance(self._count - self._first, self._base - self._first)
         frames = range(self._frame, self._count - profile.length + 1, profile.hop)
         self._frame += len(frames) * profile.hop
-        self._done = complete
-        self._due = min(self._frame + profile.length, self._start(complete) + profile.window)
+        self._due = self._next_due()
         whole = [frame for frame in frames if self._is_whole(frame)]
-        first = [(frame - self._first) // profile.hop * len(self._phases) for frame in whole]
-        windows = np.array(first, dtype=np.intp)[:, None] + self._of_frame
-        return self._decide(whole, self._levels[windows % rows]) if whole else []
+        if not whole:
+            return []
+        numbers = (np.array(whole) - self._first) // profile.hop
+        return self._decide(whole, [windows.of_frames(numbers) for windows in self._windows])
+
+    def _next_due(self) -> int:
+        windows = self._first + min(windows.due for windows in self._windows)
+        return min(self._frame + self._profile.length, windows)
 
     @property
     def _base(self) -> int:
         """The sample that is first in the buffer."""
         return self._count - self._held
 
-    def _start(self, window: int) -> int:
-        """Say at which sample a window starts, by its number."""
-        hops, phase = divmod(window, len(self._phases))
-        return self._first + hops * self._profile.hop + self._phases[phase]
-
     def _is_whole(self, frame: int) -> bool:
         """Whether no gap touches the frame that starts at a sample."""
         place = frame - self._base
         return bool(self._valid[place : place + self._profile.length].all())
 
-    def _decide(self, frames: list[int], loudness: Array) -> list[Decided]:
-        """Decide on frames by the levels of their windows, shape (frames, time, …, bands)."""
-        in_time = np.ascontiguousarray(loudness.swapaxes(1, -2))
-        return [(np.array(frames), self.classifier.judge(course(in_time, self._profile)))]
+    def _decide(self, frames: list[int], loudness: list[Array]) -> list[Decided]:
+        """Decide on frames by the levels of their windows, as `course` takes them."""
+        return [(np.array(frames), self.classifier.judge(course(loudness, self._profile)))]
 
     def _labels(self, found: list[Decided]) -> Labels:
         starts, decisions = (np.concatenate(each) for each in zip(*found, strict=True))

@@ -13,8 +13,10 @@ PROFILES = [
     *(models.Profile.noisytest(kernel) for kernel in ("rbf", "linear")),
     *(models.Profile.paper(kernel) for kernel in ("rbf", "linear")),
     *(models.LogBands().at(rate) for rate in (250.0, 333.0, 1000.0, 10_000.0, 48_000.0)),
+    *(replace(models.SCALAR, speed=True).at(rate) for rate in (250.0, 1000.0, 10_000.0)),
 ]
-NAMES = [f"{each.name}-{each.kernel}-{each.rate:g}" for each in PROFILES]
+QUICK = replace(models.SCALAR, speed=True).at(1000.0)
+NAMES = [f"{each.name}-{each.machine}-{each.kernel}-{each.rate:g}" for each in PROFILES]
 
 
 def tone(profile, frequency, amplitude=1.0):
@@ -128,9 +130,30 @@ def test_log_bands_do_not_care_when_a_burst_comes():
 
 def test_each_band_shares_out_its_power_once():
     for profile in PROFILES[4:]:
-        shares = band_shares(profile)
-        assert shares.shape == (profile.bins, len(profile.edges) - 1)
-        np.testing.assert_allclose(shares.sum(axis=0), 1.0)
+        for each in profile.resolutions:
+            shares = band_shares(profile.rate, each)
+            assert shares.shape == (each.window // 2 + 1, len(each.edges) - 1)
+            np.testing.assert_allclose(shares.sum(axis=0), 1.0)
+
+
+def test_quick_windows_tell_a_short_burst_from_a_longer_murmur():
+    profile = QUICK
+    hiss = RANDOM.standard_normal(20)
+    frames = np.full((2, 400), 1.0)
+    frames[0, 190:210] += 0.3 * hiss
+    frames[1, 160:240] += 0.15 * np.resize(hiss, 80)
+    bands = len(profile.quick_edges) - 1
+    burst, murmur = models.features(frames, profile)[:, -2 * bands - 1 : -bands - 1]
+    assert (burst[1:] - murmur[1:] > 0.5).all()  # the loudest moment, in all but the speed's band
+
+
+def test_the_first_quick_band_is_the_speed_and_no_other_hears_it():
+    profile = QUICK
+    quick = len(profile.quick_edges) - 1
+    steady = models.features(np.full((1, 400), 5.0), profile)[0]
+    mean = steady[-3 * quick - 1 : -2 * quick - 1] + steady[-1]
+    np.testing.assert_allclose(mean[1:], np.log(profile.floor), atol=1e-3)
+    assert mean[0] > np.log(5.0)
 
 
 def test_a_steady_level_has_no_deviation():

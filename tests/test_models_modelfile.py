@@ -84,7 +84,7 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
 def test_plain_numpy_reads_it_too(path):
     with np.load(path, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))
-    assert manifest["format"] == "noise-model/2"
+    assert manifest["format"] == "noise-model/3"
     assert manifest["rate"] == 500.0
     assert manifest["metrics"]["training"]["subset_accuracy"] == 1.0
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
@@ -207,7 +207,7 @@ def test_a_header_that_promises_more_than_there_is_is_refused(path):
         ({"mean": np.zeros(3)}, r"array 'mean' has shape \(3,\)"),
         ({"manifest": np.zeros(3)}, "array 'manifest' is of type float64"),
         ({"manifest": np.array("{")}, "manifest is no JSON"),
-        ({"manifest": np.array("[]")}, r"is of format \[\], this version reads 'noise-model/2'"),
+        ({"manifest": np.array("[]")}, r"is of format \[\], this version reads 'noise-model/3'"),
     ],
 )
 def test_wrong_arrays_are_refused(path, changes, reason):

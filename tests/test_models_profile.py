@@ -55,6 +55,17 @@ def test_band_edges_do_not_depend_on_the_rate(rate):
     assert np.diff(low).min() >= 10.0 - 1e-9
 
 
+def test_quick_bands_begin_with_the_speed_and_drop_out_where_it_does_not_fit():
+    edges = models.GENERAL.at(1000.0).quick_edges
+    assert edges == pytest.approx((0.0, 75.0, 75.0 * 2 ** (4 / 3), 75.0 * 2 ** (8 / 3)))
+    assert edges == models.GENERAL.at(10_000.0).quick_edges[:4]
+    assert (models.GENERAL.at(1000.0).quick_window, models.GENERAL.at(1000.0).quick_stride) == (
+        20,
+        10,
+    )
+    assert models.GENERAL.at(140.0).quick_window == 0
+
+
 def test_a_rate_that_leaves_no_bands_is_refused():
     with pytest.raises(models.ProfileError, match="rate of 50 Hz leaves 1 bands up to 25 Hz"):
         models.LogBands().at(50.0)
@@ -70,6 +81,18 @@ def test_a_rate_that_leaves_no_bands_is_refused():
         ({"widen_extra": -1}, "widen_extra is -1, expected 0 or more"),
         ({"kernel": "poly"}, "kernel is 'poly', expected one of linear, rbf"),
         ({"window": 4096}, "window of 4096 samples is longer than a frame of 4000"),
+        (
+            {"quick_window": 64},
+            "quick_window is 64 with quick_stride 0 and bands 'adjacent', expected",
+        ),
+        (
+            {"bands": "log", "edges": (15.0, 30.0), "quick_window": 5000, "quick_stride": 9},
+            "window of 5000 samples is longer than a frame of 4000",
+        ),
+        (
+            {"bands": "log", "edges": (15.0, 30.0), "quick_window": 200, "quick_stride": 9},
+            r"edges are \(\), expected two or more, ascending",
+        ),
         ({"window": 512}, "has 257 bins, expected a multiple of three"),
         ({"classes": ("impact", "ok")}, "expected 'ok' and others"),
         ({"classes": ("ok", "ok")}, "expected 'ok' and others"),
