@@ -176,11 +176,15 @@ def pool(loudness: Array) -> Array:
         Mean, maximum and standard deviation of each band, shape (..., 3 * frequency).
     """
     # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
-    count = loudness.shape[-2]
-    mean = np.add.reduce(loudness, -2) / count
-    beside = loudness - mean[..., None, :]
-    deviation = np.sqrt(np.add.reduce(np.square(beside), -2) / count)
-    return np.concatenate((mean, np.maximum.reduce(loudness, -2), deviation), axis=-1)
+    count, bands = loudness.shape[-2:]
+    pooled = np.empty((*loudness.shape[:-2], POOLED * bands))
+    mean, most, deviation = (pooled[..., n * bands : (n + 1) * bands] for n in range(POOLED))
+    np.divide(np.add.reduce(loudness, -2), count, out=mean)
+    np.maximum.reduce(loudness, -2, out=most)
+    squares = loudness - mean[..., None, :]
+    np.square(squares, out=squares)
+    np.sqrt(np.add.reduce(squares, -2) / count, out=deviation)
+    return pooled
 
 
 def _relative(loudness: Sequence[Array]) -> Array:
@@ -191,8 +195,11 @@ def _relative(loudness: Sequence[Array]) -> Array:
     whole = np.add.reduce(every, 1, keepdims=True) / every.shape[1]
     parts = []
     for each in several:
-        above, beside = each - whole[:, :, None, None], each[:, 1:] - each[:, :-1]
-        pooled = pool(np.concatenate((above, beside), axis=1))
+        frames, signals, *shape = each.shape
+        spectra = np.empty((frames, 2 * signals - 1, *shape))
+        np.subtract(each, whole[:, :, None, None], out=spectra[:, :signals])
+        np.subtract(each[:, 1:], each[:, :-1], out=spectra[:, signals:])
+        pooled = pool(spectra)
         parts.append(pooled.reshape(len(pooled), prod(pooled.shape[1:])))
     return np.concatenate((*parts, whole), axis=1)
 

@@ -33,9 +33,10 @@ class Windows:
         window = resolution.window
         view = np.lib.stride_tricks.sliding_window_view(samples, window, axis=-1)
         self._windows = np.moveaxis(view, -2, 0)
-        rows = len(phases) * (2 * profile.length // profile.hop + 2)
-        # Of window i in row i modulo rows.
-        self._levels = np.zeros((rows, *levels(self._windows[0], profile, resolution).shape))
+        self._rows = len(phases) * (2 * profile.length // profile.hop + 2)
+        # Of window i in row i modulo rows; rows are beside the bands.
+        *signals, bands = levels(self._windows[0], profile, resolution).shape
+        self._levels = np.zeros((*signals, self._rows, bands))
         self._done = 0  # windows that are transformed
 
     @property
@@ -61,14 +62,15 @@ class Windows:
         hops, phase = divmod(count - self._resolution.window, self._profile.hop)
         complete = hops * len(self._phases) + bisect_right(self._phases, phase)
         fresh = range(self._done, complete)
-        if fresh:
-            places = [self._start(window) - base for window in fresh]
-            # Side by side, windows of all signals are one product of matrices.
-            flat = self._windows[places].reshape(-1, self._resolution.window)
-            found = levels(flat, self._profile, self._resolution)
-            rows = np.arange(self._done, complete) % len(self._levels)
-            self._levels[rows] = found.reshape(-1, *self._levels[0].shape)
-            self._done = complete
+        if not fresh:
+            return
+        stretches = self._windows[[self._start(window) - base for window in fresh]]
+        # Side by side, windows of all signals are one product of matrices.
+        flat = stretches.reshape(-1, self._resolution.window)
+        found = levels(flat, self._profile, self._resolution)
+        for window, each in zip(fresh, found.reshape(*stretches.shape[:-1], -1), strict=True):
+            self._levels[..., window % self._rows, :] = each
+        self._done = complete
 
     def of_frames(self, frames: Index) -> Array:
         """Give the levels of frames whose windows are done.
@@ -79,8 +81,9 @@ class Windows:
         Returns:
             Shape (frames, time, bands) or (frames, signals, time, bands).
         """
-        windows = (frames * len(self._phases))[:, None] + self._of_frame
-        return _in_time(self._levels[windows % len(self._levels)])
+        first = (frames * len(self._phases)).tolist()
+        rows = [(number + self._of_frame) % self._rows for number in first]
+        return np.array([self._levels.take(each, axis=-2) for each in rows])
 
     def of_place(self, place: int) -> Array:
         """Compute the levels of the frame that starts at a place among the samples kept.
@@ -89,14 +92,10 @@ class Windows:
             As `of_frames`, for one frame.
         """
         stretches = self._windows[place + self._in_frame]
-        return _in_time(levels(stretches, self._profile, self._resolution)[None])
+        found = levels(stretches, self._profile, self._resolution)
+        return np.ascontiguousarray(np.moveaxis(found, 0, -2))[None]
 
     def _start(self, window: int) -> int:
         """Say at which sample a window starts, by its number."""
         hops, phase = divmod(window, len(self._phases))
         return hops * self._profile.hop + self._phases[phase]
-
-
-def _in_time(levels: Array) -> Array:
-    """Bring time beside the bands, shape (frames, ..., time, bands)."""
-    return np.ascontiguousarray(levels.swapaxes(1, -2))
