@@ -115,8 +115,8 @@ def recordings(
         part: Which of them are meant.
 
     Yields:
-        One recording per run, sample or log. Of a sample, no block may be annotated: what went
-        wrong in it was too faint to be called one thing or the other.
+        One recording per run, sample or log. A sample may have no annotated block: what went wrong
+        in it was too faint to be called one thing or the other.
     """
     for recording in _recordings(inputs, rate):
         held_out = models.held_out(models.group_of(recording.name))

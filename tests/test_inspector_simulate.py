@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -216,6 +217,18 @@ def test_a_model_learns_from_a_folder_of_samples(inspector, simulated, tmp_path)
     one = data / "panda/straight-002.npz"
     status, out, _ = inspector("evaluate", model, one, "--json", "--seen-too")
     assert np.array(json.loads(out)["confusion"]).sum() == 2 * 7
+
+
+def test_a_sample_without_a_block_is_passed_over(simulated, inspector, tmp_path):
+    data, model = tmp_path / "data", tmp_path / "m.npz"
+    inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
+    one = data / "panda/straight-002.npz"
+    replace(Sample.load(one), blocks=()).save(one, overwrite=True)
+    status, out, _ = inspector("train", data, "-o", model)
+    assert (status, "Subset accuracy" in out) == (0, True)
+    status, out, _ = inspector("evaluate", model, data / "panda", "--json", "--seen-too")
+    found = json.loads(out)
+    assert (status, found["runs"], np.array(found["confusion"]).sum()) == (0, 3, 2 * 2 * 7)
 
 
 def test_samples_and_their_runs_are_heard_alike(simulated, inspector, tmp_path):
