@@ -123,10 +123,10 @@ class LogBands:
         """List the edges of the quick window's bands, none if not even the first one fits."""
         if not self.quick or nyquist * self.quick < SPEED:
             return ()
-        edges = [SPEED / self.quick]
+        edges = [0.0, SPEED / self.quick] if self.speed else [SPEED / self.quick]
         while (upper := edges[-1] * WIDE) <= min(self.highest, nyquist):
             edges.append(upper)
-        return (0.0, *edges) if self.speed else tuple(edges) if len(edges) > 1 else ()
+        return tuple(edges) if len(edges) > 1 else ()
 
 
 SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85, quick=0.02)
