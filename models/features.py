@@ -1,9 +1,8 @@
 """Features: the numbers by which a machine tells one frame from another.
 
-Conventions: a spectrogram has the axes (frames, time, frequency), and (frames, signals, time,
-frequency) if a profile listens to several signals. A feature vector of NoisyTest and the paper runs
-over time first: all coefficients of the first band, then those of the second. What there is of
-several signals follows one after the other.
+Conventions: a spectrogram has the axes (frames, time, frequency). What there is of several signals
+follows one after the other, in time as well as in a feature vector. A feature vector of NoisyTest
+and the paper runs over time first: all coefficients of the first band, then those of the second.
 """
 
 from collections.abc import Sequence
@@ -14,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import SignalError
+from models.pooling import POOLED, pooled
 from models.profile import Profile
 from models.resolution import Resolution
 from models.types import Array, Index, Real
-
-POOLED = 3
-"""Numbers that `pool` keeps of each band."""
 
 
 def features(frames: Real, profile: Profile) -> Array:
@@ -36,9 +33,10 @@ def features(frames: Real, profile: Profile) -> Array:
         SignalError: If the frames have another shape or values that are not finite.
     """
     _check(frames, profile)
-    exact = rounded(frames, profile)
+    several = len(frames), len(profile.signals), profile.length
+    exact = rounded(frames, profile).reshape(several)
     loudness = [
-        levels(_stretches(exact, each.window, each.stride), profile, each)
+        levels(np.swapaxes(_stretches(exact, each.window, each.stride), 1, 2), profile, each)
         for each in profile.resolutions
     ]
     return course(loudness, profile)
@@ -60,21 +58,33 @@ def levels(stretches: Array, profile: Profile, resolution: Resolution) -> Array:
     """Tell how loud each frequency band is in each window of a Fourier transform.
 
     Args:
-        stretches: Samples of the windows, shape (..., window).
+        stretches: Samples of the windows, shape (..., signals, window).
         profile: What to compute.
         resolution: The one of the profile's that the windows are of.
 
     Returns:
-        Logarithms of the bands' amplitudes, shape (..., bands).
+        Logarithms of the bands' amplitudes, shape (..., levels): of each signal, and then, in a
+        profile that is relative, what each signal's is above that of the one before.
     """
-    if profile.bands == "log":
-        spectrum = _transform(stretches)
-        squares = np.square(spectrum.real) + np.square(spectrum.imag)
-        power = squares @ _power_shares(profile.rate, resolution)
-        loudness: Array = np.log(np.sqrt(power) + profile.floor)
-        return loudness
-    amplitude = _amplitude(stretches)
-    return np.log(compress(amplitude, comb=profile.bands == "comb") + profile.floor)
+    rows = stretches.shape[:-2]
+    if profile.bands != "log":
+        amplitude = compress(_amplitude(stretches), comb=profile.bands == "comb")
+        return np.log(amplitude + profile.floor).reshape(*rows, prod(amplitude.shape[-2:]))
+    spectrum = _transform(stretches)
+    squares = np.square(spectrum.real)
+    squares += np.square(spectrum.imag)
+    shares = _power_shares(profile.rate, resolution)
+    # Side by side, windows of all signals are one product of matrices.
+    power = squares.reshape(-1, len(shares)) @ shares
+    np.sqrt(power, out=power)
+    power += profile.floor
+    bands = shares.shape[1]
+    own = stretches.shape[-2] * bands
+    loudness = np.empty((*rows, 2 * own - bands if profile.relative else own))
+    np.log(power.reshape(*rows, own), loudness[..., :own])
+    if profile.relative:
+        np.subtract(loudness[..., bands:own], loudness[..., : own - bands], loudness[..., own:])
+    return loudness
 
 
 def course(loudness: Sequence[Array], profile: Profile) -> Array:
@@ -82,18 +92,14 @@ def course(loudness: Sequence[Array], profile: Profile) -> Array:
 
     Args:
         loudness: For each of the profile's resolutions, levels of the frames' windows, shape
-            (frames, time, bands), or (frames, signals, time, bands).
+            (frames, time, levels).
         profile: What to compute.
 
     Returns:
         Features, not yet standardised, shape (frames, features).
     """
     if profile.bands == "log":
-        if profile.relative:
-            return _relative(loudness)
-        pooled = [pool(each) for each in loudness]
-        rows = [each.reshape(len(each), prod(each.shape[1:])) for each in pooled]
-        return np.concatenate(rows, axis=1)
+        return pooled(loudness, profile)
     flat = dct(loudness[0]).reshape(len(loudness[0]), feature_count(profile))
     return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
 
@@ -164,44 +170,6 @@ def dct(loudness: Array) -> Array:
     """
     coefficients: Array = np.swapaxes(loudness, -1, -2) @ _cosines(loudness.shape[-2])
     return coefficients
-
-
-def pool(loudness: Array) -> Array:
-    """Describe the course of each band in time by what does not depend on when things happen.
-
-    Args:
-        loudness: Levels of the bands, shape (..., time, frequency).
-
-    Returns:
-        Mean, maximum and standard deviation of each band, shape (..., 3 * frequency).
-    """
-    # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
-    count, bands = loudness.shape[-2:]
-    pooled = np.empty((*loudness.shape[:-2], POOLED * bands))
-    mean, most, deviation = (pooled[..., n * bands : (n + 1) * bands] for n in range(POOLED))
-    np.divide(np.add.reduce(loudness, -2), count, out=mean)
-    np.maximum.reduce(loudness, -2, out=most)
-    squares = loudness - mean[..., None, :]
-    np.square(squares, out=squares)
-    np.sqrt(np.add.reduce(squares, -2) / count, out=deviation)
-    return pooled
-
-
-def _relative(loudness: Sequence[Array]) -> Array:
-    """Pool levels above the whole frame's, differences between signals, and that whole level."""
-    several = [each if each.ndim == 4 else each[:, None] for each in loudness]
-    bands = [np.add.reduce(each, (1, 2)) / prod(each.shape[1:3]) for each in several]
-    every = np.concatenate(bands, axis=1)
-    whole = np.add.reduce(every, 1, keepdims=True) / every.shape[1]
-    parts = []
-    for each in several:
-        frames, signals, *shape = each.shape
-        spectra = np.empty((frames, 2 * signals - 1, *shape))
-        np.subtract(each, whole[:, :, None, None], out=spectra[:, :signals])
-        np.subtract(each[:, 1:], each[:, :-1], out=spectra[:, signals:])
-        pooled = pool(spectra)
-        parts.append(pooled.reshape(len(pooled), prod(pooled.shape[1:])))
-    return np.concatenate((*parts, whole), axis=1)
 
 
 def band_shares(rate: float, resolution: Resolution) -> Array:

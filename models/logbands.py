@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 from models.errors import ProfileError
-from models.features import POOLED
+from models.pooling import POOLED
 from models.profile import CLASSES, Machine, Profile
 from models.signals import NOISE
 

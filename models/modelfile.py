@@ -1,4 +1,4 @@
-"""The model file, version 2: one uncompressed `.npz` of plain arrays and a JSON manifest.
+"""The model file, version 3: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the machine, as
 `machine.shapes` lists them. Nothing in it is ever unpickled; sizes are checked before an array is

@@ -10,6 +10,7 @@ sensor noise is not foreign for that.
 
 from dataclasses import dataclass
 from functools import cached_property
+from math import log1p
 from typing import TypeAlias
 
 import numpy as np
@@ -67,19 +68,21 @@ class Networks:
             Logarithms of calibrated probabilities, then how foreign it is, shape
             (frames, classes + 1).
         """
-        beyond = np.maximum.reduce(features - self.known[1], 1, keepdims=True)
         heard = np.maximum(features, self.known[0])
-        answers = calibrated(self.average(heard), self.calibration)
-        return np.concatenate((answers, beyond), axis=1)
+        decisions = np.empty((len(features), self.width))
+        decisions[:, :-1] = calibrated(self.average(heard), self.calibration)
+        np.maximum.reduce(features - self.known[1], 1, out=decisions[:, -1])
+        return decisions
 
     def average(self, features: Array) -> Array:
         """Average the networks' probabilities; their logarithms, shape (frames, classes)."""
-        networks, _, units = self.hidden.shape
         weights, bias, output = self._single
-        hidden = np.maximum(features.astype(np.float32) @ weights + bias, 0.0)
-        apart = hidden.reshape(len(features), networks, units).swapaxes(0, 1)
-        answers = _log_softmax(apart @ output + self.output_bias[:, None])
-        average: Array = np.log(np.add.reduce(np.exp(answers)) / len(answers) + TINY)
+        hidden = features.astype(np.float32) @ weights
+        hidden += bias
+        np.maximum(hidden, 0.0, out=hidden)
+        answers = (hidden @ output).reshape(len(features), *self.output_bias.shape)
+        each = np.exp(_log_softmax(answers + self.output_bias))
+        average: Array = np.log(np.add.reduce(each, 1) / each.shape[1] + TINY)
         return average
 
     @cached_property
@@ -87,9 +90,22 @@ class Networks:
         """Weights and biases of all networks side by side, in single precision: less to fetch."""
         networks, features, units = self.hidden.shape
         side_by_side = self.hidden.swapaxes(0, 1).reshape(features, networks * units)
-        each = side_by_side, self.hidden_bias.reshape(-1), self.output
-        weights, bias, output = (np.ascontiguousarray(one, dtype=np.float32) for one in each)
+        classes = self.output.shape[-1]
+        block = np.zeros((networks, units, networks, classes))
+        block[range(networks), :, range(networks)] = self.output  # none hears another's units
+        each = side_by_side, self.hidden_bias, block
+        shapes = (features, -1), (-1,), (networks * units, -1)
+        weights, bias, output = (
+            np.ascontiguousarray(one.reshape(shape), dtype=np.float32)
+            for one, shape in zip(each, shapes, strict=True)
+        )
         return weights, bias, output
+
+    @cached_property
+    def _expected(self) -> Array:
+        """Logarithms of the failures' frequencies, shape (classes - 1,)."""
+        expected: Array = np.log(self.frequency[1:])
+        return expected
 
     def choose(self, decisions: Array) -> Index:
         """Choose a failure if failures are probable enough, or else `ok`.
@@ -105,14 +121,15 @@ class Networks:
             that is unknown.
         """
         answers, foreign = decisions[:, :-1], decisions[:, -1]
-        chosen: Index = 1 + (answers[:, 1:] - np.log(self.frequency[1:])).argmax(axis=1)
-        chosen[_risk(decisions) < LIKELY] = 0
+        chosen: Index = 1 + (answers[:, 1:] - self._expected).argmax(axis=1)
+        chosen[answers[:, 0] > log1p(-LIKELY)] = 0
         chosen[foreign > FOREIGN] = answers.shape[1]
         return chosen
 
     def sure(self, decisions: Array) -> Mask:
         """Say which frames may raise an alarm, shape (frames,)."""
-        alarming: Mask = (_risk(decisions) >= self.alarm) & (decisions[:, -1] <= FOREIGN)
+        alarming: Mask = decisions[:, 0] <= log1p(-self.alarm)
+        alarming &= decisions[:, -1] <= FOREIGN
         return alarming
 
     def score(self, decisions: Array) -> Array:
@@ -149,12 +166,6 @@ def calibrated(answers: Array, calibration: Array) -> Array:
     return _log_softmax(calibration[0] * answers + calibration[1:])
 
 
-def _risk(decisions: Array) -> Array:
-    """Probability of any failure, shape (frames,)."""
-    return 1.0 - np.exp(decisions[:, 0])
-
-
 def _log_softmax(values: Array) -> Array:
-    shifted = values - np.maximum.reduce(values, -1, keepdims=True)
-    softmax: Array = shifted - np.log(np.add.reduce(np.exp(shifted), -1, keepdims=True))
+    softmax: Array = values - np.logaddexp.reduce(values, -1, keepdims=True)
     return softmax

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
+from functools import cached_property
 from itertools import pairwise
 from math import isfinite
 from typing import Any, Literal, Self, TypeAlias, get_args
@@ -181,7 +182,7 @@ class Profile:
         """Fourier transforms of one frame (the paper's n_t)."""
         return self.resolutions[0].transforms(self.length)
 
-    @property
+    @cached_property
     def resolutions(self) -> tuple[Resolution, ...]:
         """Say at which lengths of its window a frame is transformed."""
         main = Resolution(self.window, self.stride, self.edges)
@@ -226,6 +227,8 @@ def _check_ranges(profile: Profile) -> None:
     for name in ("open_end", "widen_extra", "least_deviation", "decay", "quick_window"):
         if getattr(profile, name) < 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
+    if profile.alarm >= 1:
+        raise ProfileError(f"alarm is {profile.alarm!r}, expected a probability below 1")
     if profile.quick_window and (profile.bands != "log" or profile.quick_stride <= 0):
         raise ProfileError(
             f"quick_window is {profile.quick_window} with quick_stride {profile.quick_stride} and"

@@ -42,29 +42,30 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
         SignalError: If one is not one-dimensional, or they differ in length.
     """
     there = named(signals)
-    if not feeds(there, names):
-        lacking = [name for name in names if name not in there]
-        raise MissingSignalError(lacking, there)
-    chosen = [np.asarray(_take(there, name)) for name in names]
-    if any(signal.ndim != 1 or len(signal) != len(chosen[0]) for signal in chosen):
+    if lacking := [name for name in names if name not in there]:
+        if not feeds(there, names):
+            raise MissingSignalError(lacking, there)
+        there = {**there, NOISE: np.hypot(there["measured"], there["desired"])}
+    chosen = [np.asarray(there[name]) for name in names]
+    if chosen[0].ndim != 1 or len({signal.shape for signal in chosen}) > 1:
         found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
         raise SignalError(f"a signal has another shape, {found}, expected (samples,)")
     return chosen[0] if len(chosen) == 1 else np.array(chosen)
 
 
-def check(samples: Real, valid: Mask, *, first: int = 0) -> None:
+def check(samples: Real, valid: Mask | None = None, *, first: int = 0) -> None:
     """Check what is to be classified.
 
     Args:
         samples: Shape (samples,) or (signals, samples).
-        valid: False in gaps.
+        valid: False in gaps, of which there are none unless given.
         first: Number of the first sample.
 
     Raises:
         SignalError: If the shapes do not fit, or a value is not finite.
     """
     count = samples.shape[-1]
-    if valid.shape != (count,):
+    if valid is not None and valid.shape != (count,):
         raise SignalError(
             f"samples of shape {samples.shape} and validity of shape {valid.shape},"
             " expected (samples,) for both"
@@ -75,10 +76,3 @@ def check(samples: Real, valid: Mask, *, first: int = 0) -> None:
         raise SignalError(
             f"sample {first + row} of the signal is not finite ({plain[number, row]})"
         )
-
-
-def _take(there: Mapping[str, Real], name: str) -> Real:
-    if name in there:
-        return there[name]
-    noise: Real = np.hypot(there["measured"], there["desired"])
-    return noise

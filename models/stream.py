@@ -22,8 +22,9 @@ class Stream:
 
     What it answers, one after the other, is what `Classifier.classify` says of the whole signal
     (networks calculate in single precision: their scores are equal to six digits); a frame's label
-    comes with the frame's last sample. Each Fourier transform is computed once,
-    as soon as its window is complete, for all frames that it belongs to. Memory does not grow.
+    comes with the frame's last sample. Each Fourier transform is computed once, for all frames that
+    it belongs to; those of half a hop at a time, since many take little longer than one. Memory
+    does not grow.
 
     Args:
         classifier: The model.
@@ -48,12 +49,14 @@ class Stream:
             )
         profile = self._profile = classifier.profile
         # Room for a frame, and for as much as is taken at once.
-        several = profile.signals[1:] and (len(profile.signals),)
-        self._samples = np.zeros((*several, 3 * profile.length))
+        self._samples = np.zeros((len(profile.signals), 3 * profile.length))
         self._valid = np.zeros(3 * profile.length, dtype=bool)
         self._windows = [Windows(self._samples, profile, each) for each in profile.resolutions]
         nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.machines.width))
         self._nothing = self._labels([nothing])
+        # Windows may wait for each other, but not until their samples are gone.
+        longest = max(each.window for each in profile.resolutions)
+        self._patience = min(profile.hop // 2, profile.length - longest)
         self._begin()
 
     @property
@@ -76,7 +79,7 @@ class Stream:
                 model needs; none is taken.
         """
         plain = stacked(samples, self._profile.signals)
-        check(plain, np.ones(plain.shape[-1], bool) if valid is None else valid, first=self._count)
+        check(plain, valid, first=self._count)
         exact = rounded(plain, self._profile)
         found: list[Decided] = []
         for first in range(0, exact.shape[-1], self._profile.length):
@@ -160,8 +163,7 @@ class Stream:
         return self._decide(whole, [windows.of_frames(numbers) for windows in self._windows])
 
     def _next_due(self) -> int:
-        windows = self._first + min(windows.due for windows in self._windows)
-        return min(self._frame + self._profile.length, windows)
+        return min(self._frame + self._profile.length, self._count + self._patience)
 
     @property
     def _base(self) -> int:
@@ -178,5 +180,7 @@ class Stream:
         return [(np.array(frames), self.classifier.judge(course(loudness, self._profile)))]
 
     def _labels(self, found: list[Decided]) -> Labels:
-        starts, decisions = (np.concatenate(each) for each in zip(*found, strict=True))
+        starts, decisions = found[0]
+        if len(found) > 1:
+            starts, decisions = (np.concatenate(each) for each in zip(*found, strict=True))
         return self.classifier.labels(decisions, starts, self.rate, start=self.start)

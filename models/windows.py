@@ -17,7 +17,7 @@ class Windows:
     in order of time. Samples are counted from the start of the first frame.
 
     Args:
-        samples: Where the stream keeps its latest samples, shape (..., samples).
+        samples: Where the stream keeps its latest samples, shape (signals, samples).
         profile: What to compute.
         resolution: One of the profile's.
     """
@@ -30,19 +30,16 @@ class Windows:
         self._of_frame = hops * len(phases) + rank  # those of the first frame
         self._in_frame = steps
         self._phases: list[int] = phases.tolist()
-        window = resolution.window
-        view = np.lib.stride_tricks.sliding_window_view(samples, window, axis=-1)
-        self._windows = np.moveaxis(view, -2, 0)
-        self._rows = len(phases) * (2 * profile.length // profile.hop + 2)
-        # Of window i in row i modulo rows; rows are beside the bands.
-        *signals, bands = levels(self._windows[0], profile, resolution).shape
-        self._levels = np.zeros((*signals, self._rows, bands))
+        view = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, axis=-1)
+        self._windows = np.swapaxes(view, 0, 1)
+        cycle = 2 * profile.length // profile.hop + 2
+        self._rows, self._cycle = len(phases) * cycle, cycle * profile.hop
+        # Of window i in row i modulo rows; twice around, so that no slice ends at the last one.
+        around = np.arange(2 * self._rows)
+        self._row_of = around % self._rows
+        self._start_of = around // len(phases) * profile.hop + phases[around % len(phases)]
+        self._levels = np.zeros((self._rows, *levels(self._windows[0], profile, resolution).shape))
         self._done = 0  # windows that are transformed
-
-    @property
-    def due(self) -> int:
-        """Count of samples with which the next window is complete."""
-        return self._start(self._done) + self._resolution.window
 
     def begin(self) -> None:
         """Forget all windows: another signal begins."""
@@ -61,15 +58,13 @@ class Windows:
         """
         hops, phase = divmod(count - self._resolution.window, self._profile.hop)
         complete = hops * len(self._phases) + bisect_right(self._phases, phase)
-        fresh = range(self._done, complete)
-        if not fresh:
+        if complete <= self._done:
             return
-        stretches = self._windows[[self._start(window) - base for window in fresh]]
-        # Side by side, windows of all signals are one product of matrices.
-        flat = stretches.reshape(-1, self._resolution.window)
-        found = levels(flat, self._profile, self._resolution)
-        for window, each in zip(fresh, found.reshape(*stretches.shape[:-1], -1), strict=True):
-            self._levels[..., window % self._rows, :] = each
+        cycles, first = divmod(self._done, self._rows)
+        fresh = slice(first, first + complete - self._done)
+        stretches = self._windows[self._start_of[fresh] + (cycles * self._cycle - base)]
+        found = levels(stretches, self._profile, self._resolution)
+        self._levels[self._row_of[fresh]] = found
         self._done = complete
 
     def of_frames(self, frames: Index) -> Array:
@@ -79,11 +74,10 @@ class Windows:
             frames: Their numbers, by hops, shape (frames,).
 
         Returns:
-            Shape (frames, time, bands) or (frames, signals, time, bands).
+            Shape (frames, time, levels).
         """
-        first = (frames * len(self._phases)).tolist()
-        rows = [(number + self._of_frame) % self._rows for number in first]
-        return np.array([self._levels.take(each, axis=-2) for each in rows])
+        windows = (frames * len(self._phases))[:, None] + self._of_frame
+        return self._levels.take(windows, axis=0, mode="wrap")
 
     def of_place(self, place: int) -> Array:
         """Compute the levels of the frame that starts at a place among the samples kept.
@@ -91,11 +85,4 @@ class Windows:
         Returns:
             As `of_frames`, for one frame.
         """
-        stretches = self._windows[place + self._in_frame]
-        found = levels(stretches, self._profile, self._resolution)
-        return np.ascontiguousarray(np.moveaxis(found, 0, -2))[None]
-
-    def _start(self, window: int) -> int:
-        """Say at which sample a window starts, by its number."""
-        hops, phase = divmod(window, len(self._phases))
-        return hops * self._profile.hop + self._phases[phase]
+        return levels(self._windows[place + self._in_frame], self._profile, self._resolution)[None]
