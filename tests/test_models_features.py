@@ -162,6 +162,34 @@ def test_a_steady_level_has_no_deviation():
     assert np.array_equal(pooled, np.full((2, 3, 5), [[4.0], [4.0], [0.0]]))
 
 
+def test_three_signals_that_grow_alike_change_the_level_of_the_whole_frame_alone():
+    profile = models.GENERAL.at(1000.0)
+    frames = 1e6 * RANDOM.standard_normal((2, 3, 400))
+    change = models.features(8.0 * frames, profile) - models.features(frames, profile)
+    np.testing.assert_allclose(change[:, :-1], 0.0, atol=1e-6)
+    np.testing.assert_allclose(change[:, -1], np.log(8.0), atol=1e-6)
+
+
+def test_a_signal_that_grows_alone_is_told_from_the_whole_frame_and_from_its_neighbours():
+    profile = models.GENERAL.at(1000.0)
+    frames = 1e6 * RANDOM.standard_normal((1, 3, 400))
+    louder = frames * np.array([1.0, 8.0, 1.0])[:, None]
+    change = (models.features(louder, profile) - models.features(frames, profile))[0]
+    # Desired, measured and error above the frame; measured above desired, error above measured.
+    expected = np.array([-1.0, 2.0, -1.0, 3.0, -3.0]) / 3.0 * np.log(8.0)
+    first = 0
+    for each in profile.resolutions:
+        bands = len(each.edges) - 1
+        spectra = change[first : first + 15 * bands].reshape(5, 3, bands)
+        for number, wanted in enumerate((expected, expected, np.zeros(5))):  # mean, most, deviation
+            np.testing.assert_allclose(
+                spectra[:, number], np.tile(wanted[:, None], bands), atol=1e-6
+            )
+        first += 15 * bands
+    assert change[first] == pytest.approx(np.log(8.0) / 3.0, abs=1e-6)
+    assert first == len(change) - 1
+
+
 def test_a_constant_signal_sounds_only_at_zero_hertz():
     profile = models.LogBands().at(1000.0)
     features = models.features(np.full((1, 400), 5.0), profile)
