@@ -1,8 +1,9 @@
 """Features: the numbers by which a machine tells one frame from another.
 
 Conventions: a spectrogram has the axes (frames, time, frequency). What there is of several signals
-follows one after the other, in time as well as in a feature vector. A feature vector of NoisyTest
-and the paper runs over time first: all coefficients of the first band, then those of the second.
+follows one after the other, among the levels of a window as well as in a feature vector. A feature
+vector of NoisyTest and the paper runs over time first: all coefficients of the first band, then
+those of the second.
 """
 
 from collections.abc import Sequence
