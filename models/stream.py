@@ -22,9 +22,9 @@ class Stream:
 
     What it answers, one after the other, is what `Classifier.classify` says of the whole signal
     (networks calculate in single precision: their scores are equal to six digits); a frame's label
-    comes with the frame's last sample. Each Fourier transform is computed once, for all frames that
-    it belongs to; those of half a hop at a time, since many take little longer than one. Memory
-    does not grow.
+    comes with the frame's last sample. Each Fourier transform is computed once, for
+    all frames that it belongs to: many at a time, since they take little longer than one, and all
+    but the last few before the chunk that completes a frame. Memory does not grow.
 
     Args:
         classifier: The model.
@@ -55,8 +55,8 @@ class Stream:
         nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.machines.width))
         self._nothing = self._labels([nothing])
         # Windows may wait for each other, but not until their samples are gone.
-        longest = max(each.window for each in profile.resolutions)
-        self._patience = min(profile.hop // 2, profile.length - longest)
+        self._patience = profile.length - max(each.window for each in profile.resolutions)
+        self._lead = min(profile.hop // 2, *(each.stride for each in profile.resolutions))
         self._begin()
 
     @property
@@ -86,7 +86,7 @@ class Stream:
             piece = slice(first, first + self._profile.length)
             self._keep(exact[..., piece], True if valid is None else valid[piece])
             if self._count >= self._due:
-                found += self._advance()
+                found += self._advance(exact.shape[-1])
         return self._labels(found) if found else self._nothing
 
     def skip(self, samples: int) -> None:
@@ -129,7 +129,7 @@ class Stream:
         self._frame = self._first  # start of the next frame
         for windows in self._windows:
             windows.begin()
-        self._due = self._next_due()  # count with which there is work to do
+        self._due = self._next_due(0)  # count with which there is work to do
 
     def _lose(self, samples: int) -> None:
         silence = dict.fromkeys(self._profile.signals, np.zeros(samples))
@@ -148,22 +148,29 @@ class Stream:
         self._held = stop
         self._count += count
 
-    def _advance(self) -> list[Decided]:
-        """Transform the windows that are complete now, and decide on the frames that are."""
+    def _advance(self, chunk: int) -> list[Decided]:
+        """Transform the windows that are complete now, and decide on the frames that are.
+
+        Args:
+            chunk: Samples that came last; as many are expected next.
+        """
         profile = self._profile
         for windows in self._windows:
             windows.advance(self._count - self._first, self._base - self._first)
         frames = range(self._frame, self._count - profile.length + 1, profile.hop)
         self._frame += len(frames) * profile.hop
-        self._due = self._next_due()
+        self._due = self._next_due(chunk)
         whole = [frame for frame in frames if self._is_whole(frame)]
         if not whole:
             return []
         numbers = (np.array(whole) - self._first) // profile.hop
         return self._decide(whole, [windows.of_frames(numbers) for windows in self._windows])
 
-    def _next_due(self) -> int:
-        return min(self._frame + self._profile.length, self._count + self._patience)
+    def _next_due(self, chunk: int) -> int:
+        """Say with which count to go on: that before the chunk that completes a frame, and then."""
+        complete = self._frame + self._profile.length
+        early = complete - max(chunk, self._lead)
+        return min(early if early > self._count else complete, self._count + self._patience)
 
     @property
     def _base(self) -> int:
