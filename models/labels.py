@@ -59,12 +59,13 @@ class Labels:
 
         Failure frames one after the other make a stretch. One of which less than two frames are
         sure is `ok`: good motion startles a frame now and then, and what goes wrong is in several.
+        Only where the signal begins or ends, or a gap does, it may be in a single one.
         """
         if self.sure is None:
             return self.label
         failing = ~np.isin(self.label, ("ok", UNKNOWN))
         apart = self.start[1:] > self.stop[:-1]
-        kept = confirmed(failing, self.sure, apart, least=min(CONFIRM, len(self)))
+        kept = confirmed(failing, self.sure, apart)
         return np.where(failing & ~kept, "ok", self.label)
 
     @property
@@ -115,6 +116,9 @@ class Labels:
 def confirmed(failing: Mask, sure: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
     """Keep the failure frames of those stretches of which enough frames are sure.
 
+    A frame without a neighbour on one side counts twice: what goes wrong there, the neighbour
+    would hold as well.
+
     Args:
         failing: Whether a frame seems to be a failure, shape (frames,).
         sure: Whether it is sure of that, shape (frames,).
@@ -124,8 +128,10 @@ def confirmed(failing: Mask, sure: Mask, apart: Mask, *, least: int = CONFIRM) -
     Returns:
         The failure frames that are kept, shape (frames,).
     """
-    begins = failing & ~np.append(False, failing[:-1] & ~apart)[: len(failing)]
-    stretch = np.cumsum(begins)
-    enough = np.bincount(stretch[failing & sure], minlength=len(failing) + 1) >= least
+    first = np.append(True, apart)[: len(failing)]
+    last = np.append(apart, True)[: len(failing)]
+    stretch = np.cumsum(failing & (first | ~np.append(False, failing)[: len(failing)]))
+    count = np.where(first | last, 2, 1)[failing & sure]
+    enough = np.bincount(stretch[failing & sure], count, minlength=len(failing) + 1) >= least
     kept: Mask = failing & enough[stretch]
     return kept

@@ -40,7 +40,7 @@ def settled(text):
         (".Io...", "......"),
         (".IOo..", ".ioo.."),
         ("uIIu..", "uiiu.."),
-        ("IuuI..", ".uu..."),
+        (".IuuI.", "..uu.."),
     ],
 )
 def test_a_stretch_of_failures_takes_two_sure_frames(alone, together):
@@ -53,11 +53,23 @@ def test_a_stretch_of_several_classes_makes_an_event_of_each():
 
 
 def test_frames_on_both_sides_of_a_gap_are_two_stretches():
-    both = labels("II")
-    later = np.array([0.0, 5.0])
+    both = labels(".IiiI.")
+    later = 5.0 * (np.arange(6) > 2)
     far = replace(both, start=both.start + later, stop=both.stop + later)
-    assert both.settled.tolist() == ["impact", "impact"]
-    assert far.settled.tolist() == ["ok", "ok"]
+    assert (both.settled == "impact").sum() == 4
+    assert set(far.settled) == {"ok"}
+
+
+@pytest.mark.parametrize("text", ["I..", "..I", "...iI", "Iii.."])
+def test_one_sure_frame_is_enough_where_its_neighbour_is_not_there(text):
+    assert (labels(text).settled != "ok").tolist() == [letter != "." for letter in text]
+
+
+def test_one_sure_frame_is_enough_beside_a_gap():
+    starts = np.array([0.0, 0.1, 0.2, 5.0, 5.1, 5.2])
+    for text, kept in (("..I...", 1), ("...I..", 1), (".I....", 0), ("....I.", 0)):
+        found = replace(labels(text), start=starts, stop=starts + 0.4)
+        assert (found.settled == "impact").sum() == kept
 
 
 def test_the_only_frame_of_a_signal_speaks_for_itself():
