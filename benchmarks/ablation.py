@@ -41,12 +41,13 @@ VARIANTS = {
     "without quick windows": replace(GENERAL, quick=0.0),
     "the noise alone, without quick windows": replace(SCALAR, quick=0.0),
     "support vector machine": replace(GENERAL, machine="svm", least_deviation=0.5),
-    "networks of 16 units": GENERAL,
-    "networks of 256 units": GENERAL,
+    "networks": replace(GENERAL, machine="networks"),
+    "a quarter of the rounds": GENERAL,
+    "trees of 4 leaves": GENERAL,
     "with the extended noise": replace(GENERAL, signals=(*GENERAL.signals, POWER)),
     "the extended noise alone": replace(SCALAR, signals=(POWER,)),
 }
-SIZES = {"networks of 16 units": 16, "networks of 256 units": 256}
+CHANGES = {"a quarter of the rounds": {"rounds": 25}, "trees of 4 leaves": {"leaves": 4}}
 HEAD = ("variant", "balanced", "failure recall", "found at 5/h", "at 20/h", "at 100/h", "CPU-s")
 
 
@@ -72,10 +73,8 @@ def main() -> None:
     print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|", flush=True)
     for name, variant in chosen.items():
         begun = time.process_time()
-        profile = variant.at(options.rate)
-        found = _measure(
-            read, replace(profile, units=SIZES.get(name, profile.units)), options.folds
-        )
+        profile = replace(variant.at(options.rate), **CHANGES.get(name, {}))
+        found = _measure(read, profile, options.folds)
         print(f"| {name} | {found} | {time.process_time() - begun:.0f} |", flush=True)
 
 

@@ -87,13 +87,13 @@ def on_features(profile: models.Profile, learnt: Callable[..., Decide]) -> Train
 
 
 def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -> Decide:
-    """Let a machine of our own learn: networks, or support vectors."""
+    """Let a machine of our own learn: networks, trees, or support vectors."""
     groups = np.array([models.group_of(run) for run in dataset.runs.tolist()])
     machine = learn(scaled, targets(dataset), groups, profile)
 
     def decide(scaled: np.ndarray) -> Answer:
         decisions = machine.decision(scaled)
-        if profile.machine == "networks":
+        if profile.machine != "svm":
             return machine.choose(decisions), 1.0 - machine.score(decisions)[:, 0]
         # The first pairs are `ok` against each failure; votes would rank too coarsely.
         against = -decisions[:, : len(models.CLASSES) - 1]
@@ -166,7 +166,7 @@ def contenders(*, views: bool) -> Iterator[Contender]:
         gamma = 0.5 / feature_count(profile)
         vectors = replace(profile, machine="svm", regularization=100.0, gamma=gamma)
         yield Contender(
-            signals, "our networks", profile, on_features(profile, partial(ours, profile))
+            signals, f"our {profile.machine}", profile, on_features(profile, partial(ours, profile))
         )
         yield Contender(
             signals, "RBF support vectors", profile, on_features(profile, partial(ours, vectors))

@@ -1,4 +1,4 @@
-"""Hold our networks against other classifiers on the same frames: scikit-learn's, and aeon's.
+"""Hold ours against other classifiers on the same frames: scikit-learn's, and aeon's.
 
     python -m benchmarks.rockets FOLDER [--seeds 8] [--every 2] [--only WORD] [--views]
 

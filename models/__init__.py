@@ -1,6 +1,6 @@
 """Noise becomes labels: what a robot's noise signal says about its health.
 
-    frames -> |STFT| -> bands -> log -> course in time -> support vector machines -> class
+    frames -> |STFT| -> bands -> log -> course in time -> machines -> class
 
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` names each
 choice on the way: NoisyTest's own, the paper's, or ours for any rate (`LogBands`). A `Dataset`

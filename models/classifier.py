@@ -29,7 +29,7 @@ class Classifier:
     Attributes:
         profile: How a signal becomes features.
         classes: What frames can be called, in the profile's order: those it was trained with.
-        machines: What decides: support vector machines, or networks.
+        machines: What decides: support vector machines, networks, or trees.
         mean: What is subtracted from the features, shape (features,).
         scale: What they are divided by then, shape (features,).
         runs: SHA-256 of each training recording, by name.
@@ -118,7 +118,7 @@ class Classifier:
             frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
 
         Returns:
-            Decisions, shape (frames, decisions); `svm` and `networks` say what they mean.
+            Decisions, shape (frames, decisions); `svm` and `probable` say what they mean.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
@@ -132,7 +132,7 @@ class Classifier:
             frames: Stretches of noise signal, shape (frames, length).
 
         Returns:
-            Scores, shape (frames, classes): probabilities if networks decide, else see `svm.score`.
+            Scores, shape (frames, classes): see `svm.score`; of networks and trees, probabilities.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.

@@ -29,7 +29,7 @@ class LogBands:
     machine: Machine = "svm"
     """What decides."""
     alarm: float = 0.5
-    """Probability of any failure from which networks are sure enough of it to raise an alarm."""
+    """Probability of any failure from which a frame is sure enough of it to raise an alarm."""
     frame: float = 0.4
     """Duration of a frame, in [s]."""
     hop: float = 0.1
@@ -132,6 +132,10 @@ class LogBands:
 SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85, quick=0.02)
 """For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
 encoders, and differs from robot to robot and from simulator to simulator."""
-GENERAL = replace(SCALAR, signals=("desired", "measured", "error"), alarm=0.7, speed=True)
+GENERAL = replace(
+    SCALAR, signals=("desired", "measured", "error"), machine="trees", alarm=0.7, speed=True
+)
 """For runs with measured and desired motion; good motion startles it less. The noise alone cannot
-tell a fast motion without sensor noise from a failure by its speed."""
+tell a fast motion without sensor noise from a failure by its speed. Trees find more of what is like
+what they have learnt from; networks, of what is not: of a rattle on a motion without any other
+noise, say, which the noise alone cannot tell by its error."""

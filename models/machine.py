@@ -7,6 +7,7 @@ from models.baseline import Baseline
 from models.networks import Networks
 from models.profile import Profile
 from models.svm import Machines, machine_count
+from models.trees import Trees
 from models.types import Array, Index, Mask
 
 
@@ -35,26 +36,15 @@ class Machine(Protocol):
 
 def rebuilt(arrays: Mapping[str, Array], profile: Profile) -> Machine:
     """Make a machine of the arrays of a model file."""
+    own = {name: arrays[name] for name in DIMENSIONS[profile.machine]}
     if profile.machine == "baseline":
-        return Baseline(arrays["good"], arrays["limit"])
+        return Baseline(**own)
     if profile.machine == "networks":
-        return Networks(
-            arrays["hidden"],
-            arrays["hidden_bias"],
-            arrays["output"],
-            arrays["output_bias"],
-            arrays["calibration"],
-            arrays["frequency"],
-            arrays["known"],
-            profile.alarm,
-        )
+        return Networks(**own, alarm=profile.alarm)
+    if profile.machine == "trees":
+        return Trees(**own, alarm=profile.alarm)
     return Machines(
-        arrays["vectors"],
-        arrays["coefficients"],
-        arrays["intercept"],
-        profile.kernel,
-        profile.gamma,
-        profile.multiclass,
+        **own, kernel=profile.kernel, gamma=profile.gamma, multiclass=profile.multiclass
     )
 
 
@@ -82,6 +72,18 @@ def shapes(
             "frequency": (classes,),
             "known": (2, features),
         }
+    if profile.machine == "trees":
+        trees, leaves = profile.rounds * classes, profile.leaves
+        return {
+            "feature": (trees, leaves - 1),
+            "threshold": (trees, leaves - 1),
+            "left": (2, trees, leaves - 1),
+            "leaf": (trees, leaves),
+            "prior": (classes,),
+            "calibration": (1 + classes,),
+            "frequency": (classes,),
+            "known": (features,),
+        }
     vectors, machines = len(arrays["vectors"]), machine_count(classes, profile.multiclass)
     return {
         "vectors": (vectors, features),
@@ -100,6 +102,16 @@ DIMENSIONS = {
         "calibration": 1,
         "frequency": 1,
         "known": 2,
+    },
+    "trees": {
+        "feature": 2,
+        "threshold": 2,
+        "left": 3,
+        "leaf": 2,
+        "prior": 1,
+        "calibration": 1,
+        "frequency": 1,
+        "known": 1,
     },
     "baseline": {"good": 2, "limit": 1},
 }

@@ -71,3 +71,7 @@ def _check_arrays(
             )
     if not (arrays["scale"] > 0).all():
         raise ModelFileError(path, "array 'scale' holds values that are not above 0")
+    if profile.machine == "trees":
+        for name, most in (("feature", count - 1), ("left", profile.leaves)):
+            if arrays[name].min() < 0 or arrays[name].max() > most:
+                raise ModelFileError(path, f"array {name!r} holds values beyond 0 to {most}")

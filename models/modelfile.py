@@ -1,4 +1,4 @@
-"""The model file, version 3: one uncompressed `.npz` of plain arrays and a JSON manifest.
+"""The model file, version 4: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the machine, as
 `machine.shapes` lists them. Nothing in it is ever unpickled; sizes are checked before an array is
@@ -23,7 +23,7 @@ from models.machine import DIMENSIONS
 from models.manifest import check
 from models.types import Array
 
-FORMAT = "noise-model/3"
+FORMAT = "noise-model/4"
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times what is usual."""
 

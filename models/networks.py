@@ -1,35 +1,26 @@
 """Small neural networks, evaluated in NumPy, that say how probable each class is.
 
 Several networks with one hidden layer look at the same features; their probabilities are averaged
-and then calibrated. A decision is the logarithm of a class's probability, for all classes, and
-then how foreign the frame is: how far its farthest feature lies above nearly all that the networks
-have learnt from, in deviations. Far above, probabilities mean nothing. What lies below is taken for
-the least that is known: a motion quieter than any other is no failure, and a simulator without
-sensor noise is not foreign for that.
+and then calibrated. What lies below all that is known is taken for the least of it: a motion that
+is quieter than any other is no failure, and a simulator without sensor noise is not foreign for it.
 """
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import log1p
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.types import Array, Index, Mask
+from models.calibration import TINY, calibrated
+from models.probable import Probable
+from models.types import Array
 
 Single: TypeAlias = NDArray[np.float32]
 
-TINY = 1e-12
-"""The least probability that is told from none."""
-FOREIGN = 2.0
-"""A frame is unknown if a feature lies farther than this above what was learnt from."""
-LIKELY = 0.2
-"""Probability of any failure from which a frame is called one: to miss it is the worse mistake."""
 
-
-@dataclass(frozen=True, eq=False)
-class Networks:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Networks(Probable):
     """Networks whose answers are averaged, their calibration, and what they know.
 
     Attributes:
@@ -37,26 +28,14 @@ class Networks:
         hidden_bias: Shape (networks, units).
         output: Weights to the classes, shape (networks, units, classes).
         output_bias: Shape (networks, classes).
-        calibration: Scale of the averaged log-probabilities, then an offset for each class, shape
-            (1 + classes,).
-        frequency: Share of each class in the frames that were learnt from, shape (classes,).
         known: Lowest and highest value of each feature that is known, shape (2, features).
-        alarm: Probability of any failure from which a frame is sure enough to raise an alarm.
     """
 
     hidden: Array
     hidden_bias: Array
     output: Array
     output_bias: Array
-    calibration: Array
-    frequency: Array
     known: Array
-    alarm: float
-
-    @property
-    def width(self) -> int:
-        """Decisions on one frame."""
-        return len(self.calibration)
 
     def decision(self, features: Array) -> Array:
         """Say how probable each class is, and how foreign the frame.
@@ -101,42 +80,6 @@ class Networks:
         )
         return weights, bias, output
 
-    @cached_property
-    def _expected(self) -> Array:
-        """Logarithms of the failures' frequencies, shape (classes - 1,)."""
-        expected: Array = np.log(self.frequency[1:])
-        return expected
-
-    def choose(self, decisions: Array) -> Index:
-        """Choose a failure if failures are probable enough, or else `ok`.
-
-        Of the failures it is the one whose probability exceeds its frequency most: a rare one is
-        not to drown in a frequent one (balanced accuracy counts them alike).
-
-        Args:
-            decisions: What `decision` gave.
-
-        Returns:
-            Index of a class for each frame, shape (frames,); one more than the last for a frame
-            that is unknown.
-        """
-        answers, foreign = decisions[:, :-1], decisions[:, -1]
-        chosen: Index = 1 + (answers[:, 1:] - self._expected).argmax(axis=1)
-        chosen[answers[:, 0] > log1p(-LIKELY)] = 0
-        chosen[foreign > FOREIGN] = answers.shape[1]
-        return chosen
-
-    def sure(self, decisions: Array) -> Mask:
-        """Say which frames may raise an alarm, shape (frames,)."""
-        alarming: Mask = decisions[:, 0] <= log1p(-self.alarm)
-        alarming &= decisions[:, -1] <= FOREIGN
-        return alarming
-
-    def score(self, decisions: Array) -> Array:
-        """Grade all classes by their probabilities, shape (frames, classes)."""
-        probabilities: Array = np.exp(decisions[:, :-1])
-        return probabilities
-
     def arrays(self) -> dict[str, Array]:
         """Give what a model file keeps."""
         return {
@@ -148,22 +91,6 @@ class Networks:
             "frequency": self.frequency,
             "known": self.known,
         }
-
-
-def calibrated(answers: Array, calibration: Array) -> Array:
-    """Make probabilities come true: scale their logarithms, and shift each class.
-
-    Vector scaling with one scale for all classes, C. Guo et al., *On Calibration of Modern Neural
-    Networks*, 2017, Sec. 4.2.
-
-    Args:
-        answers: Logarithms of probabilities, shape (frames, classes).
-        calibration: Scale and offsets, shape (1 + classes,).
-
-    Returns:
-        Logarithms of calibrated probabilities, shape (frames, classes).
-    """
-    return _log_softmax(calibration[0] * answers + calibration[1:])
 
 
 def _log_softmax(values: Array) -> Array:

@@ -5,7 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from models.networks import Networks, calibrated
+from models.calibration import calibrate, plain
+from models.networks import Networks
 from models.profile import Profile
 from models.splitting import folds
 from models.types import Array, Index, Words
@@ -49,41 +50,15 @@ def fit_networks(features: Array, targets: Index, groups: Words, profile: Profil
         calibration = calibrate(np.concatenate(answers), heard)
     known = np.quantile(features, (USUAL, 1.0 - USUAL), axis=0)
     return Networks(
-        np.concatenate([network.hidden for network in networks]),
-        np.concatenate([network.hidden_bias for network in networks]),
-        np.concatenate([network.output for network in networks]),
-        np.concatenate([network.output_bias for network in networks]),
-        calibration,
-        np.bincount(targets, minlength=classes) / len(targets),
-        known,
-        profile.alarm,
+        hidden=np.concatenate([network.hidden for network in networks]),
+        hidden_bias=np.concatenate([network.hidden_bias for network in networks]),
+        output=np.concatenate([network.output for network in networks]),
+        output_bias=np.concatenate([network.output_bias for network in networks]),
+        known=known,
+        calibration=calibration,
+        frequency=np.bincount(targets, minlength=classes) / len(targets),
+        alarm=profile.alarm,
     )
-
-
-def calibrate(decisions: Array, targets: Index) -> Array:
-    """Find the calibration by which probabilities come true, at the least log-loss.
-
-    Args:
-        decisions: Logarithms of probabilities, shape (frames, classes).
-        targets: What the frames are, shape (frames,).
-
-    Returns:
-        Scale and offsets, as `networks.calibrated` takes them, shape (1 + classes,).
-    """
-    from scipy.optimize import minimize
-
-    rows = np.arange(len(targets))
-
-    def loss(calibration: Array) -> tuple[float, Array]:
-        answers = calibrated(decisions, calibration)
-        excess = np.exp(answers)
-        excess[rows, targets] -= 1.0
-        slope = np.append((excess * decisions).sum(), excess.sum(axis=0)) / len(targets)
-        return float(-answers[rows, targets].mean()), slope
-
-    start = np.append(1.0, np.zeros(decisions.shape[1]))
-    calibration: Array = minimize(loss, start, jac=True, method="L-BFGS-B").x
-    return calibration
 
 
 def _parts(targets: Index, groups: Words, networks: int) -> list[tuple[Index, Index]]:
@@ -107,14 +82,14 @@ def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: 
     output_bias = np.where(counts > 0, 0.0, NEVER)[None]
     output[0][:, learnt], output_bias[0, learnt] = network.coefs_[1], network.intercepts_[1]
     return Networks(
-        network.coefs_[0][None],
-        network.intercepts_[0][None],
-        output,
-        output_bias,
-        np.append(1.0, np.zeros(classes)),
-        counts / len(targets),
-        np.stack((features.min(axis=0), features.max(axis=0))),
-        profile.alarm,
+        hidden=network.coefs_[0][None],
+        hidden_bias=network.intercepts_[0][None],
+        output=output,
+        output_bias=output_bias,
+        known=np.stack((features.min(axis=0), features.max(axis=0))),
+        calibration=plain(classes),
+        frequency=counts / len(targets),
+        alarm=profile.alarm,
     )
 
 

@@ -13,12 +13,15 @@ from models.resolution import Resolution
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 """NoisyTest's classes, in its order; `ok` is the first of every model."""
 
+MOST_LEAVES = 16
+"""Leaves that a tree may have: a bit for each."""
+
 TOLERANCE = 1e-3
 """Two sample rates are the same if they differ by less than this share."""
 
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
-Machine: TypeAlias = Literal["svm", "networks", "baseline"]
+Machine: TypeAlias = Literal["svm", "networks", "trees", "baseline"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
 _CHOICES = {"bands": Bands, "kernel": Kernel, "machine": Machine, "multiclass": Multiclass}
@@ -26,7 +29,7 @@ _CHOICES = {"bands": Bands, "kernel": Kernel, "machine": Machine, "multiclass": 
 
 _POSITIVE = (
     *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
-    *("networks", "units", "epochs", "alarm"),
+    *("networks", "units", "epochs", "rounds", "learning_rate", "alarm"),
 )
 
 
@@ -74,7 +77,8 @@ class Profile:
     """Deviation that a feature is taken to have at least, when features are scaled to the mean 0
     and the deviation 1 of the training set; 0 leaves them as they are."""
     machine: Machine = "svm"
-    """What decides: support vector machines, small networks, or a distance from good runs."""
+    """What decides: support vector machines, small networks, boosted trees, or a distance from good
+    runs."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1
@@ -91,8 +95,16 @@ class Profile:
     """Penalty on the squares of a network's weights."""
     epochs: int = 30
     """How often a network sees each training frame."""
+    rounds: int = 100
+    """Rounds of boosting; each adds a tree for each class."""
+    leaves: int = 16
+    """Leaves that a tree has at most."""
+    learning_rate: float = 0.15
+    """Share of its answer that each tree adds."""
+    penalty: float = 1.0
+    """Penalty on the squares of what leaves add."""
     alarm: float = 0.5
-    """Probability of any failure from which networks are sure enough of it to raise an alarm."""
+    """Probability of any failure from which a frame is sure enough of it to raise an alarm."""
     pad_short: bool = True
     """Whether a training block shorter than a frame is padded, or else widened."""
     spread_failures: bool = False
@@ -224,9 +236,11 @@ def _check_ranges(profile: Profile) -> None:
     for name in _POSITIVE:
         if getattr(profile, name) <= 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected more than 0")
-    for name in ("open_end", "widen_extra", "least_deviation", "decay", "quick_window"):
+    for name in ("open_end", "widen_extra", "least_deviation", "decay", "penalty", "quick_window"):
         if getattr(profile, name) < 0:
             raise ProfileError(f"{name} is {getattr(profile, name)!r}, expected 0 or more")
+    if not 2 <= profile.leaves <= MOST_LEAVES:
+        raise ProfileError(f"leaves is {profile.leaves!r}, expected 2 to {MOST_LEAVES}")
     if profile.alarm >= 1:
         raise ProfileError(f"alarm is {profile.alarm!r}, expected a probability below 1")
     if profile.quick_window and (profile.bands != "log" or profile.quick_stride <= 0):

@@ -20,9 +20,8 @@ Decided: TypeAlias = tuple[Index, Array]
 class Stream:
     """A classifier that is fed sample by sample, or in chunks of any size.
 
-    What it answers, one after the other, is what `Classifier.classify` says of the whole signal
-    (networks calculate in single precision: their scores are equal to six digits); a frame's label
-    comes with the frame's last sample. Each Fourier transform is computed once, for
+    What it answers, one after the other, is what `Classifier.classify` says of the whole signal; a
+    frame's label comes with the frame's last sample. Each Fourier transform is computed once, for
     all frames that it belongs to: many at a time, since they take little longer than one, and all
     but the last few before the chunk that completes a frame. Memory does not grow.
 

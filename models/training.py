@@ -10,6 +10,7 @@ from models.machine import Machine
 from models.networktraining import fit_networks
 from models.profile import Profile
 from models.svm import Machines
+from models.treetraining import fit_trees
 from models.types import Array, Index, Words
 
 
@@ -24,12 +25,11 @@ def learn(features: Array, targets: Index, groups: Words, profile: Profile) -> M
 
     Returns:
         The machines.
-
-    Raises:
-        DatasetError: If networks cannot be calibrated, for there are too few groups.
     """
     if profile.machine == "networks":
         return fit_networks(features, targets, groups, profile)
+    if profile.machine == "trees":
+        return fit_trees(features, targets, groups, profile)
     return fit(features, targets, profile).condensed()
 
 

@@ -302,7 +302,7 @@ def test_two_processes_do_not_write_one_file(data, tmp_path):
     [
         (("--grid", "C=2:1:0.1"), "grid has no value for regularization"),
         (("--grid", "stride=401"), "stride of 401 samples is longer than a frame of 400"),
-        (("--grid", "units=8"), "units does nothing with support vector machines"),
+        (("--grid", "leaves=8"), "leaves does nothing with support vector machines"),
         (("--grid", "hop=1"), "no setting 'hop' to tune; there are window, stride"),
     ],
 )

@@ -101,8 +101,8 @@ def test_what_is_wrong_with_a_grid_is_named(texts, reason):
     [
         ("stride=4001", RBF, "stride of 4001 samples is longer than a frame of 4000"),
         ("gamma=1", models.Profile.noisytest("linear"), "gamma does nothing with the linear"),
-        ("units=8", RBF, "units does nothing with support vector machines; leave it out"),
-        ("C=1", replace(RBF, machine="networks"), "regularization does nothing with networks"),
+        ("leaves=8", RBF, "leaves does nothing with support vector machines; leave it out"),
+        ("C=1", replace(RBF, machine="trees"), "regularization does nothing with trees"),
         ("C=0", RBF, "regularization is 0.0, expected more than 0"),
         ("bands=comb,third", RBF, "bands is 'third', expected one of adjacent, comb, log"),
         ("window=512", RBF, "expected a multiple of three"),

@@ -7,11 +7,10 @@ import pytest
 
 import models
 from models.examples import Examples
-from models.networks import calibrated
-from models.networktraining import calibrate, fit_networks
+from models.networktraining import fit_networks
 
 RATE = 1000.0
-PROFILE = replace(models.GENERAL.at(RATE), units=16, epochs=40)
+PROFILE = replace(models.GENERAL.at(RATE), machine="networks", units=16, epochs=40)
 SECONDS = 6
 
 
@@ -90,40 +89,6 @@ def test_a_class_that_is_not_there_is_never_heard(classes):
     assert (scores.argmax(axis=1) == targets).mean() > 0.95
 
 
-def test_calibration_finds_how_much_too_sure_probabilities_are():
-    generator = np.random.default_rng(2)
-    true = generator.normal(size=(20_000, 3)) * 1.5
-    log_true = true - np.log(np.exp(true).sum(axis=1, keepdims=True))
-    drawn = np.array([generator.choice(3, p=np.exp(row)) for row in log_true])
-    calibration = calibrate(2.5 * log_true, drawn)
-    assert calibration[0] == pytest.approx(1 / 2.5, rel=0.05)
-    np.testing.assert_allclose(calibrated(2.5 * log_true, calibration), log_true, atol=0.2)
-
-
-def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
-    decisions = classifier.decision(
-        models.frame(
-            np.stack([RECORDINGS[13].signal[name] for name in PROFILE.signals]),
-            length=PROFILE.length,
-            hop=PROFILE.hop,
-        )
-    )
-    failures = [
-        (replace(classifier.machines, alarm=alarm).choose(decisions) > 0).sum()
-        for alarm in (0.01, 0.5, 0.99)
-    ]
-    assert failures == sorted(failures, reverse=True)
-
-
-def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classifier):
-    shares = {"impact": 0.1, "oscillations": 0.4}
-    machine = replace(classifier.machines, frequency=np.array([0.5, *shares.values()]))
-    probabilities = np.log([[0.2, 0.35, 0.45], [0.2, 0.05, 0.75], [0.9, 0.09, 0.01]])
-    decisions = np.hstack((probabilities, np.zeros((3, 1))))
-    named = [classifier.classes[index] for index in machine.choose(decisions)]
-    assert named == ["impact", "oscillations", "ok"]
-
-
 def test_networks_know_how_frequent_each_class_was(classifier):
     examples = Examples.read(RECORDINGS[:12], PROFILE)
     shares = [(examples.labels == name).mean() for name in classifier.classes]
@@ -165,12 +130,6 @@ def test_a_stream_hears_the_same(classifier, chunk):
     for name in ("start", "stop", "label"):
         np.testing.assert_array_equal(together[name], getattr(batch, name))
     np.testing.assert_allclose(together["scores"], batch.scores, atol=1e-12)
-
-
-def test_a_model_that_lacks_a_signal_says_which(classifier):
-    signals = RECORDINGS[0].signal
-    with pytest.raises(models.SignalError, match=r"no signal error; there is desired, measured"):
-        classifier.classify({name: signals[name] for name in ("desired", "measured")}, RATE)
 
 
 def test_training_twice_gives_the_same_bytes_and_they_are_read_back(classifier, tmp_path):

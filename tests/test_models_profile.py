@@ -78,6 +78,8 @@ def test_a_rate_that_leaves_no_bands_is_refused():
         ({"length": 4000.0}, "length is 4000.0, expected a value of type int"),
         ({"hop": True}, "hop is True, expected a value of type int"),
         ({"gamma": float("nan")}, "gamma is nan, expected a finite number"),
+        ({"leaves": 17}, "leaves is 17, expected 2 to 16"),
+        ({"learning_rate": 0.0}, "learning_rate is 0.0, expected more than 0"),
         ({"alarm": 1.0}, "alarm is 1.0, expected a probability below 1"),
         ({"widen_extra": -1}, "widen_extra is -1, expected 0 or more"),
         ({"kernel": "poly"}, "kernel is 'poly', expected one of linear, rbf"),

@@ -93,9 +93,9 @@ def test_two_classes_are_predicted_as_a_classifier_does(name):
     assert_equal_to_training(some_points(profile), sets(("ok", "oscillations")))
 
 
-def test_points_of_networks_predict_what_a_classifier_predicts():
-    profile = replace(PROFILES["logbands"], machine="networks", epochs=3)
-    points = Grid.of(["units=4,8"]).profiles(profile)
+def test_points_of_trees_predict_what_a_classifier_predicts():
+    profile = replace(PROFILES["logbands"], machine="trees", rounds=3)
+    points = Grid.of(["leaves=4,8"]).profiles(profile)
     assert_equal_to_training(points, sets(learn=range(12), check=range(12, 14)))
 
 
@@ -140,7 +140,7 @@ def test_measures_are_those_of_an_evaluation():
 
 
 def test_frames_that_are_unknown_are_neither_found_nor_false_alarms():
-    profile = replace(PROFILES["logbands"], machine="networks", epochs=3)
+    profile = replace(PROFILES["logbands"], machine="trees", rounds=3)
     given = sets(learn=range(12), check=range(12, 14))
     strange = [replace(each, signal=1e6 * each.signal) for each in given.check]
     asked = ask([profile], Trial.against(given.learn, strange))

@@ -94,10 +94,10 @@ def test_no_more_good_frames_than_the_share_lie_above_the_threshold(rockets):
     assert rockets.found(scored(), scores, 0.02).startswith("100.0%")  # two
 
 
-def test_networks_and_a_classifier_of_scikit_learn_get_a_row_for_each_sound(
+def test_ours_and_a_classifier_of_scikit_learn_get_a_row_for_each_sound(
     rockets, data, monkeypatch, capsys
 ):
-    for name, rows in (("networks", 2), ("logistic", 2)):
+    for name, rows in (("our", 2), ("logistic", 2)):
         given = [data, "--seeds", 4, "--every", 4, "--only", name]
         monkeypatch.setattr(sys, "argv", ["", *map(str, given)])
         rockets.main()
@@ -117,5 +117,5 @@ def test_what_to_install_is_said_before_anything_is_read(rockets, monkeypatch):
 
 def test_who_takes_part_is_said_if_nobody_has_the_name(rockets, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["", "no such folder", "--only", "perceptron"])
-    with pytest.raises(SystemExit, match="nobody is called 'perceptron'; there are our networks"):
+    with pytest.raises(SystemExit, match="nobody is called 'perceptron'; there are our trees"):
         rockets.main()

@@ -7,7 +7,7 @@ to a last one, both included, ``C=0.1:1000:x10`` multiplies, ``bands=comb,adjace
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from itertools import product
+from itertools import chain, product
 from math import floor, isfinite, log, prod
 from typing import Any, Self, TypeAlias
 
@@ -19,9 +19,12 @@ Point: TypeAlias = Mapping[str, Value]
 
 HEARD = ("window", "stride", "bands", "floor", "least_deviation")
 """What can be tuned of the features."""
-NETWORKS = ("networks", "units", "epochs", "decay", "alarm")
-VECTORS = ("multiclass", "gamma", "regularization")
-LEARNT = (*NETWORKS, *VECTORS)
+OWN = {
+    "networks": ("networks", "units", "epochs", "decay", "alarm"),
+    "trees": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
+    "support vector machines": ("multiclass", "gamma", "regularization"),
+}
+LEARNT = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
 """What can be tuned of the machines; points that differ in it alone share their features."""
 SETTINGS = HEARD + LEARNT
 """What can be tuned, which is all that comes after framing; the last varies fastest."""
@@ -136,9 +139,10 @@ class Grid:
 
 def _idle(base: Profile) -> Iterator[tuple[str, str]]:
     """Name settings that change nothing, and why."""
-    networks = base.machine == "networks"
-    for name in VECTORS if networks else NETWORKS:
-        yield name, "networks" if networks else "support vector machines"
+    machine = base.machine if base.machine in OWN else "support vector machines"
+    for name in LEARNT:
+        if name not in OWN[machine]:
+            yield name, machine
     if base.kernel == "linear":
         yield "gamma", "the linear kernel"
 

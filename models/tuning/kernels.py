@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from models import svm
-from models.networks import TINY
+from models.calibration import TINY
 from models.profile import Profile
 from models.training import balance, learn
 from models.tuning.logloss import grades
