@@ -1,4 +1,4 @@
-"""Trees say how probable each class is, and know what they do not know."""
+"""Trees answer as those that they were made of."""
 
 from dataclasses import replace
 
@@ -6,54 +6,8 @@ import numpy as np
 import pytest
 
 import models
-from models.calibration import calibrate, calibrated
-from models.examples import Examples
 from models.trees import Trees
 from models.treetraining import fit_trees
-
-RATE = 1000.0
-PROFILE = replace(models.GENERAL.at(RATE), rounds=30, leaves=8)
-SECONDS = 6
-
-
-def recording(robot, seed, label):
-    """Measured, desired and error of a motion that hums; a failure rattles what is measured."""
-    generator = np.random.default_rng([seed, len(label)])
-    time = np.arange(round(SECONDS * RATE)) / RATE
-    desired = 1.0 + 0.5 * np.sin(2 * np.pi * 0.7 * time) + 0.01 * generator.normal(size=len(time))
-    rattle = {"ok": 0.0, "impact": 0.3, "oscillations": 0.3}[label]
-    shape = np.sin(2 * np.pi * 90 * time)
-    if label == "impact":
-        shape = np.exp(-np.mod(time, 0.4) / 0.02) * generator.normal(size=len(time))
-    error = rattle * shape + 0.01 * generator.normal(size=len(time))
-    signals = {"desired": desired, "measured": desired + error, "error": np.abs(error)}
-    blocks = (models.Block(0.5, SECONDS - 0.5, label),)
-    return models.Recording(f"{robot}/{label}-{seed:03d}", signals, RATE, blocks)
-
-
-RECORDINGS = [
-    recording("panda", seed, label)
-    for seed in range(6)
-    for label in ("ok", "impact", "oscillations")
-]
-
-
-@pytest.fixture(scope="module")
-def classifier():
-    return models.Classifier.train(Examples.read(RECORDINGS[:12], PROFILE), PROFILE)
-
-
-def test_what_trees_have_learnt_they_hear_in_other_runs(classifier):
-    for each in RECORDINGS[12:]:
-        labels = classifier.classify(each.signal, RATE)
-        inside = (labels.start >= 0.5) & (labels.stop <= SECONDS - 0.5)
-        assert (labels.label[inside] == each.blocks[0].label).mean() > 0.9
-
-
-def test_scores_are_probabilities(classifier):
-    scores = classifier.classify(RECORDINGS[13].signal, RATE).scores
-    assert (scores >= 0).all()
-    np.testing.assert_allclose(scores.sum(axis=1), 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("leaves", [2, 5, 16])
@@ -65,7 +19,7 @@ def test_trees_answer_as_scikit_learns_do(leaves, classes):
     features = generator.normal(size=(500, 5))
     targets = (features[:, 0] > features[:, 2]).astype(int) + (features[:, 1] > 0.5)
     targets = np.minimum(targets, classes - 1)
-    profile = replace(PROFILE, leaves=leaves)
+    profile = replace(models.GENERAL.at(1000.0), rounds=30, leaves=leaves)
     ours = fit_trees(features, targets, np.array(["one"] * 500), profile)
     theirs = HistGradientBoostingClassifier(
         max_iter=30, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
@@ -75,13 +29,6 @@ def test_trees_answer_as_scikit_learns_do(leaves, classes):
     np.testing.assert_allclose(
         ours.score(ours.decision(asked)), theirs.predict_proba(asked), rtol=1e-9
     )
-
-
-def test_a_frame_by_itself_is_decided_on_as_among_others(classifier):
-    features = np.random.default_rng(5).normal(size=(70, len(classifier.mean)))
-    together = classifier.judge(features)
-    alone = np.concatenate([classifier.judge(row[None]) for row in features])
-    np.testing.assert_allclose(alone, together, rtol=1e-12)
 
 
 def test_two_trees_by_hand_add_up():
@@ -100,112 +47,3 @@ def test_two_trees_by_hand_add_up():
     features = np.array([[0.5, 9.0], [0.6, 2.0], [0.6, 2.1], [-1.0, 0.0]])
     expected = [[1.25, 19.75], [2.25, 19.75], [3.25, 19.75], [1.25, 9.75]]
     np.testing.assert_array_equal(trees.sums(features), expected)
-
-
-@pytest.mark.parametrize("classes", [2, 3])
-def test_a_class_that_is_not_there_is_never_heard(classes):
-    generator = np.random.default_rng(1)
-    features = generator.normal(size=(200, 4))
-    there = [0, classes]
-    targets = np.where(features[:, 0] > 0, there[1], there[0])
-    trees = fit_trees(features, targets, np.array(["one"] * 200), PROFILE)
-    scores = trees.score(trees.decision(features))
-    assert scores.shape == (200, classes + 1)
-    assert scores[:, 1:classes].max() < 1e-6
-    assert (scores.argmax(axis=1) == targets).mean() > 0.95
-
-
-def test_calibration_finds_how_much_too_sure_probabilities_are():
-    generator = np.random.default_rng(2)
-    true = generator.normal(size=(20_000, 3)) * 1.5
-    log_true = true - np.log(np.exp(true).sum(axis=1, keepdims=True))
-    drawn = np.array([generator.choice(3, p=np.exp(row)) for row in log_true])
-    calibration = calibrate(2.5 * log_true, drawn)
-    assert calibration[0] == pytest.approx(1 / 2.5, rel=0.05)
-    np.testing.assert_allclose(calibrated(2.5 * log_true, calibration), log_true, atol=0.2)
-
-
-def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
-    decisions = classifier.decision(
-        models.frame(
-            np.stack([RECORDINGS[13].signal[name] for name in PROFILE.signals]),
-            length=PROFILE.length,
-            hop=PROFILE.hop,
-        )
-    )
-    failures = [
-        (replace(classifier.machines, alarm=alarm).choose(decisions) > 0).sum()
-        for alarm in (0.01, 0.5, 0.99)
-    ]
-    assert failures == sorted(failures, reverse=True)
-
-
-def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classifier):
-    shares = {"impact": 0.1, "oscillations": 0.4}
-    machine = replace(classifier.machines, frequency=np.array([0.5, *shares.values()]))
-    probabilities = np.log([[0.2, 0.35, 0.45], [0.2, 0.05, 0.75], [0.9, 0.09, 0.01]])
-    decisions = np.hstack((probabilities, np.zeros((3, 1))))
-    named = [classifier.classes[index] for index in machine.choose(decisions)]
-    assert named == ["impact", "oscillations", "ok"]
-
-
-def test_trees_know_how_frequent_each_class_was(classifier):
-    examples = Examples.read(RECORDINGS[:12], PROFILE)
-    shares = [(examples.labels == name).mean() for name in classifier.classes]
-    np.testing.assert_allclose(classifier.machines.frequency, shares)
-
-
-def test_what_is_louder_than_all_that_was_learnt_is_unknown(classifier):
-    loud = 1e6 * np.random.default_rng(4).random(round(2 * RATE))
-    labels = classifier.classify(dict.fromkeys(PROFILE.signals, loud), RATE)
-    assert set(labels.label) == {"unknown"}
-    assert labels.events() == ()
-
-
-@pytest.mark.parametrize("level", [0.0, 0.3])
-def test_silence_and_uniform_motion_are_no_failure(classifier, level):
-    steady = np.full(round(2 * RATE), level)
-    labels = classifier.classify(dict.fromkeys(PROFILE.signals, steady), RATE)
-    assert set(labels.label) == {"ok"}
-
-
-def test_what_was_learnt_is_known(classifier):
-    labels = np.concatenate([classifier.classify(r.signal, RATE).label for r in RECORDINGS[12:]])
-    assert "unknown" not in labels
-
-
-@pytest.mark.parametrize("chunk", [1, 37, 400, 999, 5000])
-def test_a_stream_hears_the_same(classifier, chunk):
-    each = RECORDINGS[14]
-    batch = classifier.classify(each.signal, RATE)
-    stream, found = models.Stream(classifier), []
-    for first in range(0, each.samples, chunk):
-        piece = slice(first, first + chunk)
-        found.append(stream.push({name: signal[piece] for name, signal in each.signal.items()}))
-    found.append(stream.finish())
-    together = {
-        name: np.concatenate([getattr(part, name) for part in found])
-        for name in ("start", "stop", "label", "scores")
-    }
-    for name in ("start", "stop", "label"):
-        np.testing.assert_array_equal(together[name], getattr(batch, name))
-    np.testing.assert_allclose(together["scores"], batch.scores, atol=1e-12)
-
-
-def test_a_model_that_lacks_a_signal_says_which(classifier):
-    signals = RECORDINGS[0].signal
-    with pytest.raises(models.SignalError, match=r"no signal error; there is desired, measured"):
-        classifier.classify({name: signals[name] for name in ("desired", "measured")}, RATE)
-
-
-def test_training_twice_gives_the_same_bytes_and_they_are_read_back(classifier, tmp_path):
-    again = models.Classifier.train(Examples.read(RECORDINGS[:12], PROFILE), PROFILE)
-    for name, each in (("a", classifier), ("b", again)):
-        each.save(tmp_path / f"{name}.npz")
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    read = models.Classifier.load(tmp_path / "a.npz")
-    signal = RECORDINGS[13].signal
-    np.testing.assert_array_equal(
-        read.classify(signal, RATE).scores, classifier.classify(signal, RATE).scores
-    )
-    assert read.profile == PROFILE
