@@ -116,11 +116,12 @@ class Trees(Probable):
         }
 
 
-def _first_bits() -> Index:
-    """Say of each number of 16 bits which is its first one, shape (65536,)."""
+def _first_bits() -> NDArray[np.uint8]:
+    """Say of each number of 16 bits which is its first one, shape (65536,); of none, the first."""
     numbers = np.arange(1 << MOST_LEAVES)
-    first: Index = np.frexp(numbers & -numbers)[1].astype(np.intp) - 1
-    return first
+    first = np.frexp(numbers & -numbers)[1] - 1
+    found: NDArray[np.uint8] = np.maximum(first, 0).astype(np.uint8)
+    return found
 
 
 _FIRST = _first_bits()
