@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from models.calibration import TINY, calibrated
+from models.calibration import TINY
 from models.probable import Probable
 from models.types import Array
 
@@ -37,21 +37,15 @@ class Networks(Probable):
     output_bias: Array
     known: Array
 
-    def decision(self, features: Array) -> Array:
-        """Say how probable each class is, and how foreign the frame.
+    @property
+    def highest(self) -> Array:
+        """Highest value of each feature that is known, shape (features,)."""
+        highest: Array = self.known[1]
+        return highest
 
-        Args:
-            features: Feature vectors, shape (frames, features).
-
-        Returns:
-            Logarithms of calibrated probabilities, then how foreign it is, shape
-            (frames, classes + 1).
-        """
-        heard = np.maximum(features, self.known[0])
-        decisions = np.empty((len(features), self.width))
-        decisions[:, :-1] = calibrated(self.average(heard), self.calibration)
-        np.maximum.reduce(features - self.known[1], 1, out=decisions[:, -1])
-        return decisions
+    def answers(self, features: Array) -> Array:
+        """Average what is said of features, none below what is known, shape (frames, classes)."""
+        return self.average(np.maximum(features, self.known[0]))
 
     def average(self, features: Array) -> Array:
         """Average the networks' probabilities; their logarithms, shape (frames, classes)."""

@@ -1,11 +1,13 @@
 """What is made of probabilities: what a frame is called, and whether it raises an alarm."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import log1p
 
 import numpy as np
 
+from models.calibration import calibrated
 from models.types import Array, Index, Mask
 
 FOREIGN = 2.0
@@ -15,7 +17,7 @@ LIKELY = 0.2
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Probable:
+class Probable(ABC):
     """What decides by probabilities.
 
     A decision is the logarithm of a class's probability, for all classes, and then how foreign the
@@ -36,6 +38,30 @@ class Probable:
     def width(self) -> int:
         """Decisions on one frame."""
         return len(self.calibration)
+
+    @property
+    @abstractmethod
+    def highest(self) -> Array:
+        """Highest value of each feature that is known, shape (features,)."""
+
+    @abstractmethod
+    def answers(self, features: Array) -> Array:
+        """Say how likely classes are; logarithms, not calibrated, shape (frames, classes)."""
+
+    def decision(self, features: Array) -> Array:
+        """Say how probable each class is, and how foreign the frame.
+
+        Args:
+            features: Feature vectors, shape (frames, features).
+
+        Returns:
+            Logarithms of calibrated probabilities, then how foreign it is, shape
+            (frames, classes + 1).
+        """
+        decisions = np.empty((len(features), self.width))
+        decisions[:, :-1] = calibrated(self.answers(features), self.calibration)
+        np.maximum.reduce(features - self.highest, 1, out=decisions[:, -1])
+        return decisions
 
     @cached_property
     def _expected(self) -> Array:

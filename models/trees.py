@@ -16,7 +16,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from models.calibration import calibrated
 from models.probable import Probable
 from models.profile import MOST_LEAVES
 from models.types import Array, Index
@@ -50,22 +49,12 @@ class Trees(Probable):
     prior: Array
     known: Array
 
-    def decision(self, features: Array) -> Array:
-        """Say how probable each class is, and how foreign the frame.
+    @property
+    def highest(self) -> Array:
+        """Highest value of each feature that is known, shape (features,)."""
+        return self.known
 
-        Args:
-            features: Feature vectors, shape (frames, features).
-
-        Returns:
-            Logarithms of calibrated probabilities, then how foreign it is, shape
-            (frames, classes + 1).
-        """
-        decisions = np.empty((len(features), self.width))
-        decisions[:, :-1] = calibrated(self.sums(features), self.calibration)
-        np.maximum.reduce(features - self.known, 1, out=decisions[:, -1])
-        return decisions
-
-    def sums(self, features: Array) -> Array:
+    def answers(self, features: Array) -> Array:
         """Sum up the leaves that frames fall to, and the prior, shape (frames, classes)."""
         found = np.empty((len(features), len(self.prior)))
         for first in range(0, len(features), TOGETHER):

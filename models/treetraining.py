@@ -45,7 +45,7 @@ def fit_trees(features: Array, targets: Index, groups: Words, profile: Profile) 
     trees, *others = learnt
     if not parts:
         return trees
-    answers = [one.sums(features[fresh]) for one, (_, fresh) in zip(others, parts, strict=True)]
+    answers = [one.answers(features[fresh]) for one, (_, fresh) in zip(others, parts, strict=True)]
     truth = targets[np.concatenate([fresh for _, fresh in parts])]
     return replace(trees, calibration=calibrate(np.concatenate(answers), truth))
 

@@ -46,4 +46,4 @@ def test_two_trees_by_hand_add_up():
     )
     features = np.array([[0.5, 9.0], [0.6, 2.0], [0.6, 2.1], [-1.0, 0.0]])
     expected = [[1.25, 19.75], [2.25, 19.75], [3.25, 19.75], [1.25, 9.75]]
-    np.testing.assert_array_equal(trees.sums(features), expected)
+    np.testing.assert_array_equal(trees.answers(features), expected)
