@@ -30,6 +30,8 @@ def calibrated(answers: Array, calibration: Array) -> Array:
 def calibrate(answers: Array, targets: Index) -> Array:
     """Find the calibration by which probabilities come true, at the least log-loss.
 
+    Of a class that no frame is of, nothing can be told: it is not shifted.
+
     Args:
         answers: Logarithms of probabilities, or of what is proportional to them, shape
             (frames, classes).
@@ -40,17 +42,32 @@ def calibrate(answers: Array, targets: Index) -> Array:
     """
     from scipy.optimize import minimize
 
-    rows = np.arange(len(targets))
+    there, truth = np.unique(targets, return_inverse=True)
+    classes, rows = answers.shape[1], np.arange(len(targets))
+    answers = answers.take(there, axis=1)
 
     def loss(calibration: Array) -> tuple[float, Array]:
         found = calibrated(answers, calibration)
         excess = np.exp(found)
-        excess[rows, targets] -= 1.0
+        excess[rows, truth] -= 1.0
         slope = np.append((excess * answers).sum(), excess.sum(axis=0)) / len(targets)
-        return float(-found[rows, targets].mean()), slope
+        return float(-found[rows, truth].mean()), slope
 
-    calibration: Array = minimize(loss, plain(answers.shape[1]), jac=True, method="L-BFGS-B").x
+    calibration = plain(classes)
+    best = minimize(loss, plain(len(there)), jac=True, method="L-BFGS-B").x
+    calibration[[0, *(1 + there)]] = best
     return calibration
+
+
+def familiar(targets: Index, known: Index, fresh: Index) -> Index:
+    """Keep those frames whose class was learnt: of all others, every answer is wrong.
+
+    Args:
+        targets: Class of each frame, shape (frames,).
+        known: Which of them were learnt from.
+        fresh: Which of them could be asked about.
+    """
+    return fresh[np.isin(targets[fresh], targets[known])]
 
 
 def plain(classes: int) -> Array:

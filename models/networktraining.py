@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.calibration import calibrate, plain
+from models.calibration import calibrate, familiar, plain
 from models.networks import Networks
 from models.profile import Profile
 from models.splitting import folds
@@ -42,8 +42,9 @@ def fit_networks(features: Array, targets: Index, groups: Words, profile: Profil
     for seed, (train, test) in enumerate(_parts(targets, groups, profile.networks)):
         network = _fit(seed, features[train], targets[train], profile, classes)
         networks.append(network)
-        answers.append(network.average(features[test]))
-        truth.append(targets[test])
+        asked = familiar(targets, train, test)
+        answers.append(network.average(features[asked]))
+        truth.append(targets[asked])
     heard = np.concatenate(truth)
     calibration = networks[0].calibration
     if len(heard):

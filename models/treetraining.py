@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from models.calibration import calibrate, plain
+from models.calibration import calibrate, familiar, plain
 from models.profile import Profile
 from models.splitting import folds
 from models.trees import Trees
@@ -43,10 +43,11 @@ def fit_trees(features: Array, targets: Index, groups: Words, profile: Profile) 
         for known in (everything, *(known for known, _ in parts))
     )
     trees, *others = learnt
-    if not parts:
+    asked = [familiar(targets, known, fresh) for known, fresh in parts]
+    if not sum(map(len, asked)):
         return trees
-    answers = [one.answers(features[fresh]) for one, (_, fresh) in zip(others, parts, strict=True)]
-    truth = targets[np.concatenate([fresh for _, fresh in parts])]
+    answers = [one.answers(features[those]) for one, those in zip(others, asked, strict=True)]
+    truth = targets[np.concatenate(asked)]
     return replace(trees, calibration=calibrate(np.concatenate(answers), truth))
 
 

@@ -82,6 +82,31 @@ def test_a_class_that_is_not_there_is_never_heard(machine, classes):
     assert (scores.argmax(axis=1) == targets).mean() > 0.95
 
 
+@pytest.mark.parametrize("machine", PROFILES)
+def test_a_class_that_one_group_alone_has_leaves_all_others_as_sure_as_they_are(machine):
+    generator = np.random.default_rng(0)
+    features = generator.normal(size=(1200, 6))
+    groups = np.array([f"g{number % 6}" for number in range(1200)])
+    targets = (features[:, 0] > 1.0).astype(int)
+    rare = np.where((groups == "g5") & (features[:, 0] > 1.5), 2, targets)
+    sure = []
+    for truth in (targets, rare):
+        learnt = learn(features, truth, groups, PROFILES[machine])
+        good = learnt.score(learnt.decision(features))[:, 0]
+        sure.append([good[truth == 0].mean(), good[truth > 0].mean()])
+    np.testing.assert_allclose(sure[1], sure[0], atol=0.05)
+    assert learnt.calibration[3] == 0.0
+
+
+@pytest.mark.parametrize("machine", PROFILES)
+def test_groups_of_one_class_each_cannot_calibrate(machine):
+    features = np.repeat([[0.0], [1.0]], 60, axis=0)
+    targets = np.repeat([0, 1], 60)
+    groups = np.repeat(["good", "bad"], 60)
+    learnt = learn(features, targets, groups, PROFILES[machine])
+    np.testing.assert_array_equal(learnt.calibration, [1.0, 0.0, 0.0])
+
+
 def test_calibration_finds_how_much_too_sure_probabilities_are():
     generator = np.random.default_rng(2)
     true = generator.normal(size=(20_000, 3)) * 1.5
