@@ -27,7 +27,7 @@ from noisemodel.extended import extended, extended_chunks
 from noisemodel.kinematics import link_twists
 from noisemodel.lowering import lowered
 from noisemodel.noise import Noise
-from noisemodel.norms import norms
+from noisemodel.norms import by_joint, norms
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.simplified import simplified
@@ -55,6 +55,7 @@ __all__ = [
     "UnknownJointError",
     "UnknownKindError",
     "UnknownRobotError",
+    "by_joint",
     "compare",
     "extended",
     "extended_chunks",

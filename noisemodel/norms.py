@@ -33,6 +33,29 @@ def norms(run: Run) -> dict[str, Array]:
     return signals
 
 
+def by_joint(run: Run) -> dict[str, Array]:
+    """Take the velocities of those joints that are desired as well as measured.
+
+    Args:
+        run: The run.
+
+    Returns:
+        ``desired_joints``, ``measured_joints`` and ``error_joints``, their difference, each of
+        shape (joints, samples), in [rad/s]; nothing if there are no such joints.
+    """
+    names = [name for name in run.joint_names if name in run.desired_joint_names]
+    if run.velocity_desired is None or not names:
+        return {}
+    measured = run.velocity[:, [run.joint_names.index(name) for name in names]].T
+    desired = run.velocity_desired[:, [run.desired_joint_names.index(name) for name in names]].T
+    measured, desired = (each.astype(np.float64, copy=False) for each in (measured, desired))
+    return {
+        "desired_joints": desired,
+        "measured_joints": measured,
+        "error_joints": desired - measured,
+    }
+
+
 def _error(run: Run, desired: Real) -> Real:
     if run.desired_joint_names == run.joint_names:
         return np.asarray(desired - run.velocity)

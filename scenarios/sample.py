@@ -1,18 +1,19 @@
 """One compact sample: a run's noise signals, its blocks, and the recipe to make it again.
 
-A sample file is an archive of plain arrays: ``format`` ("noise-sample/2"), ``robot``, ``rate`` in
+A sample file is an archive of plain arrays: ``format`` ("noise-sample/3"), ``robot``, ``rate`` in
 [Hz], ``block_start``, ``block_stop`` and ``block_label`` as in a run file, ``meta`` (a JSON object:
 the run's own, and the ``sha256`` of its arrays), and each signal under its name, float32, of shape
 (samples,). What signals there are is said in `scenarios.signals`. Noise cannot be lowered to
 another rate as velocities can, so that the norms of the run lowered to 1 kHz are there as well,
-as ``lowered_<name>``.
+as ``lowered_<name>``, and its joints' velocities at that rate as ``desired_joints`` and
+``measured_joints``, float32, of shape (joints, samples).
 """
 
 import hashlib
 import json
 import zipfile
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -21,9 +22,9 @@ from numpy.typing import NDArray
 
 from noisemodel import Block, Run, lowered, runfile
 from scenarios.errors import SampleError, ScenarioError
-from scenarios.signals import WHOLE, Signals, norms, signals
+from scenarios.signals import WHOLE, Signals, joints, norms, signals, with_error
 
-FORMAT = "noise-sample/2"
+FORMAT = "noise-sample/3"
 LOWERED = 1000.0
 """The second rate of the signals, in [Hz]."""
 CLOSE = 1e-3
@@ -41,7 +42,9 @@ DAMAGE = (
 """What reading raises if a file is damaged, or another one than it seems."""
 RECIPE = frozenset(("scenario", "seed", "duration", "sha256"))
 """What ``meta`` cannot lack if the run is to be made again."""
-_FACTS = ("format", "robot", "rate", "meta", "block_start", "block_stop", "block_label")
+KEPT = ("desired_joints", "measured_joints")
+"""What is kept joint by joint: the error is their difference."""
+_FACTS = ("format", "robot", "rate", "meta", "block_start", "block_stop", "block_label", *KEPT)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,6 +58,8 @@ class Sample:
         lowered: Norms of the run lowered to ``LOWERED``, as a slower logger has them.
         blocks: Annotated stretches.
         meta: The recipe, and the hash of the run's arrays.
+        joints: Desired, measured and error velocities of the lowered run, each of shape
+            (joints, samples); none where the rate is another one.
     """
 
     robot: str
@@ -63,15 +68,18 @@ class Sample:
     lowered: Signals
     blocks: tuple[Block, ...]
     meta: Mapping[str, Any]
+    joints: Signals = field(default_factory=dict)
 
     @classmethod
     def of(cls, run: Run) -> Self:
         """Keep of a simulated run what a sample has."""
+        slower = lowered(run, LOWERED)
         return cls(
             robot=str(run.robot),
             rate=run.rate,
             signals=signals(run),
-            lowered=norms(lowered(run, LOWERED)),
+            lowered=norms(slower),
+            joints=joints(slower),
             blocks=run.blocks,
             meta={**run.meta, "sha256": digest(run)},
         )
@@ -94,13 +102,13 @@ class Sample:
             rate: The rate of the sample, or ``LOWERED``, in [Hz].
 
         Returns:
-            The sample with the signals that it keeps at that rate.
+            The sample with the signals that it keeps at that rate; without joints if it is its own.
 
         Raises:
             ScenarioError: If it keeps none of that rate.
         """
         if abs(rate / self.rate - 1) < CLOSE:
-            return self
+            return replace(self, joints={})
         if abs(rate / LOWERED - 1) < CLOSE:
             return replace(self, rate=LOWERED, signals=self.lowered)
         raise ScenarioError(
@@ -127,6 +135,7 @@ class Sample:
             **_columns(self.blocks),
             **self.signals,
             **{f"{PREFIX}{name}": signal for name, signal in self.lowered.items()},
+            **{name: self.joints[name] for name in KEPT if self.joints},
         }
         runfile.write(Path(path), arrays, overwrite=overwrite)
 
@@ -219,6 +228,7 @@ def _fields(path: Path, archive: Any, only: Iterable[str] | None) -> dict[str, A
         "rate": float(archive["rate"]),
         "signals": read,
         "lowered": _equal(path, low),
+        "joints": with_error(*(archive[name] for name in KEPT)) if KEPT[0] in archive else {},
         "blocks": tuple(Block(*block) for block in zip(*columns, strict=True)),
         "meta": meta,
     }

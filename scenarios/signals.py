@@ -55,6 +55,37 @@ def norms(run: Run) -> Signals:
     return _single(found)
 
 
+def joints(run: Run) -> Signals:
+    """Take the velocities of a run joint by joint.
+
+    Args:
+        run: A run as ``scenarios.simulate`` makes it, lowered.
+
+    Returns:
+        As `with_error`, of all joints.
+    """
+    assert run.velocity_desired is not None
+    desired, measured = (each.T for each in (run.velocity_desired, run.velocity))
+    return with_error(desired.astype(np.float32), measured.astype(np.float32))
+
+
+def with_error(desired: NDArray[np.float32], measured: NDArray[np.float32]) -> Signals:
+    """Name what goes joint by joint.
+
+    Args:
+        desired: Velocities, shape (joints, samples), in [rad/s].
+        measured: Velocities, shape (joints, samples), in [rad/s].
+
+    Returns:
+        ``desired_joints``, ``measured_joints`` and their difference, ``error_joints``.
+    """
+    return {
+        "desired_joints": desired,
+        "measured_joints": measured,
+        "error_joints": desired - measured,
+    }
+
+
 def _single(found: Mapping[str, Array]) -> Signals:
     return {name: signal.astype(np.float32) for name, signal in found.items()}
 

@@ -49,3 +49,27 @@ def test_errors_are_between_joints_of_one_name():
 )
 def test_what_a_run_does_not_have_makes_no_norm(signals, names):
     assert nm.norms(run(**signals)).keys() == names
+
+
+def test_joints_are_those_that_are_desired_as_well_as_measured():
+    both = nm.by_joint(run(velocity_desired=desired[:, :2], desired_joint_names=("c", "a")))
+    np.testing.assert_array_equal(both["measured_joints"], velocity[:, [0, 2]].T)
+    np.testing.assert_array_equal(both["desired_joints"], desired[:, [1, 0]].T)
+    np.testing.assert_array_equal(
+        both["error_joints"], both["desired_joints"] - both["measured_joints"]
+    )
+
+
+@pytest.mark.parametrize(
+    "signals", [{}, {"velocity_desired": desired[:, :1], "desired_joint_names": ("tool",)}]
+)
+def test_a_run_without_desired_joints_has_nothing_joint_by_joint(signals):
+    assert nm.by_joint(run(**signals)) == {}
+
+
+def test_joints_have_the_norms_of_their_run():
+    moved = run(velocity_desired=desired)
+    norms = nm.norms(moved)
+    for name in ("measured", "desired", "error"):
+        own = np.linalg.norm(nm.by_joint(moved)[f"{name}_joints"], axis=0)
+        np.testing.assert_allclose(own, norms[name], rtol=1e-12)

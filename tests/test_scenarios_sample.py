@@ -142,12 +142,25 @@ def test_a_sample_gives_its_noise_at_either_rate_and_at_no_other():
     run = random_run()
     slower = nm.lowered(run, 1000.0)
     sample = Sample.of(run)
-    assert sample.at(10_000.0) is sample
+    assert sample.at(10_000.0).signals is sample.signals
     np.testing.assert_allclose(
         sample.at(1000.0).noise, nm.simplified(slower.motion, slower.velocity_desired), rtol=2e-7
     )
     with pytest.raises(scenarios.ScenarioError, match=r"keeps its noise at 10000 Hz and 1000 Hz"):
         sample.at(500.0)
+
+
+def test_a_sample_keeps_joints_at_the_lower_rate_alone(tmp_path):
+    run = random_run()
+    Sample.of(run).save(tmp_path / "a.npz")
+    for only in (None, ("error",)):
+        sample = Sample.load(tmp_path / "a.npz", only=only)
+        assert not sample.at(10_000.0).joints
+        wanted = nm.by_joint(nm.lowered(run, 1000.0))
+        assert sample.at(1000.0).joints.keys() == wanted.keys()
+        for name, signal in sample.at(1000.0).joints.items():
+            assert signal.shape == (12, SAMPLES // 10)
+            np.testing.assert_allclose(signal, wanted[name], rtol=1e-5, atol=1e-6)
 
 
 def test_equal_runs_make_equal_files(tmp_path):
