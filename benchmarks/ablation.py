@@ -32,6 +32,7 @@ GENERAL, SCALAR = models.GENERAL, models.SCALAR
 POWER = "power"
 VARIANTS = {
     "the whole": GENERAL,
+    "joint by joint": models.EACH,
     "the noise alone": SCALAR,
     "the noise alone, levels as they are": replace(SCALAR, relative=False),
     "measured alone": replace(GENERAL, signals=("measured",)),

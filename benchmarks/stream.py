@@ -2,10 +2,11 @@
 
     python benchmarks/stream.py [--seconds 20] [--turns 9]
 
-For each model that ships and several sizes of chunks: how much faster than real time signals are
-taken, and how long it takes from the sample that completes a frame to the frame's label. Rows take
-turns, since a machine with other work to do is half as fast for seconds at a time: given are the
-medians over all turns and, behind a slash, those of the best turn.
+For each model that ships (with 12 joints, where it listens to them) and several sizes of chunks:
+how much faster than real time signals are taken, and how long it takes from the sample that
+completes a frame to the frame's label. Rows take turns, since a machine with other work to do is
+half as fast for seconds at a time: given are the medians over all turns and, behind a slash, those
+of the best turn.
 """
 
 import argparse
@@ -19,20 +20,25 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
+from models.signals import by_joint
 
 MODELS = Path(__file__).parents[1] / "assets" / "models"
+JOINTS = 12
+"""As many as a quadruped has."""
 
 
-def measure(classifier: models.Classifier, signals: np.ndarray, chunk: int) -> tuple[float, ...]:
-    """Push signals, shape (signals, samples).
+def measure(
+    classifier: models.Classifier, signals: dict[str, np.ndarray], chunk: int
+) -> tuple[float, ...]:
+    """Push signals by name, shape (samples,) or (joints, samples).
 
     CPU time in all, then the median and the 99th percentile for a label, in [s].
     """
-    stream, wall = models.Stream(classifier), []
+    stream, wall = models.Stream(classifier, joints=JOINTS), []
+    count = next(iter(signals.values())).shape[-1]
     begun = time.process_time()
-    for first in range(0, signals.shape[1], chunk):
-        piece = signals[:, first : first + chunk]
-        samples = dict(zip(classifier.profile.signals, piece, strict=True))
+    for first in range(0, count, chunk):
+        samples = {name: each[..., first : first + chunk] for name, each in signals.items()}
         start = time.perf_counter()
         if len(stream.push(samples)):
             wall.append(time.perf_counter() - start)
@@ -50,16 +56,18 @@ def main() -> None:
     random, found = np.random.default_rng(0), defaultdict(list)
     for _ in range(options.turns):
         for name, classifier in classifiers.items():
-            rate, shape = classifier.rate, (len(classifier.profile.signals), -1)
-            noise = random.standard_normal(round(options.seconds * rate) * shape[0])
-            signals = 1.0 + 0.1 * noise.reshape(shape)
+            rate, count = classifier.rate, round(options.seconds * classifier.rate)
+            signals = {
+                signal: 1.0 + 0.1 * random.standard_normal((JOINTS,) * by_joint(signal) + (count,))
+                for signal in classifier.profile.signals
+            }
             for chunk in sorted({1, round(rate / 100), classifier.profile.hop}):
-                part = signals if chunk > 1 else signals[:, : signals.shape[1] // 10]
-                whole, *times = measure(classifier, part, chunk)
-                ratio = part.shape[1] / rate / whole
-                found[name, chunk].append((ratio, *(1e3 * each for each in times)))
+                part = count if chunk > 1 else count // 10
+                some = {signal: each[..., :part] for signal, each in signals.items()}
+                whole, *times = measure(classifier, some, chunk)
+                found[name, chunk].append((part / rate / whole, *(1e3 * each for each in times)))
             begun = time.process_time()
-            classifier.classify(dict(zip(classifier.profile.signals, signals, strict=True)), rate)
+            classifier.classify(signals, rate)
             ratio = options.seconds / (time.process_time() - begun)
             found[name, "whole"].append((ratio, np.nan, np.nan))
     print(f"{'model':14} {'chunk':>6} {'x real time':>12} {'label: median, 99 % [ms]':>30}")

@@ -146,5 +146,4 @@ def _check(source: Source, first: Source) -> None:
 
 def _signals(recording: models.Recording) -> dict[str, models.types.Real]:
     """Take signals by name, without the error where what is desired is what was measured."""
-    there = models.signals.named(recording.signal)
-    return {name: each for name, each in there.items() if name != "error" or each.any()}
+    return models.signals.telling(models.signals.named(recording.signal))

@@ -7,7 +7,7 @@ from pathlib import Path
 import models
 import noisemodel as nm
 from inspector.errors import InspectorError
-from noisemodel.types import Array
+from noisemodel.types import Array, Real
 
 Library = Mapping[str, models.Classifier]
 """Models by name."""
@@ -72,17 +72,17 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
     return _known(Labelled(labels, name, remark))
 
 
-def signals_of(run: nm.Run) -> dict[str, Array]:
-    """Take the norms of a run, without the error where what is desired is what was measured.
+def signals_of(run: nm.Run) -> dict[str, Real]:
+    """Take what models listen to, without the error where what is desired is what was measured.
 
     Args:
         run: The run.
 
     Returns:
-        Signals by name, each of shape (samples,), in [rad/s].
+        Norms by name, each of shape (samples,), and velocities joint by joint, shape
+        (joints, samples), in [rad/s].
     """
-    signals = nm.norms(run)
-    return {name: signal for name, signal in signals.items() if name != "error" or signal.any()}
+    return models.signals.telling({**nm.norms(run), **nm.by_joint(run)})
 
 
 def _known(labelled: Labelled) -> Labelled:

@@ -14,6 +14,7 @@ from scenarios.sample import Sample, is_sample
 from scenarios.signals import WHOLE
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
+    "joints": lambda rate: models.EACH.at(rate),
     "general": lambda rate: models.GENERAL.at(rate),
     "scalar": lambda rate: models.SCALAR.at(rate),
     "logbands": lambda rate: models.LogBands().at(rate),
@@ -141,7 +142,7 @@ def of_run(path: Path, rate: float) -> models.Recording:
         rate: The rate to bring it to, in [Hz].
 
     Returns:
-        Its norms with its blocks.
+        Its norms and joints with its blocks.
 
     Raises:
         InspectorError: If the run is slower than that, or has no blocks.
@@ -161,7 +162,7 @@ def recording_of(path: Path, run: nm.Run, rate: float) -> models.Recording:
         rate: The rate to bring it to, in [Hz].
 
     Returns:
-        Its norms with its blocks, if it has any.
+        Its norms and joints with its blocks, if it has any.
 
     Raises:
         InspectorError: If the run is slower than that.
@@ -171,7 +172,7 @@ def recording_of(path: Path, run: nm.Run, rate: float) -> models.Recording:
     slower = nm.lowered(run, rate)
     return models.Recording(
         name=path.stem,
-        signal=nm.norms(slower),
+        signal={**nm.norms(slower), **nm.by_joint(slower)},
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in slower.blocks),
         start=float(slower.time[0]),
@@ -188,8 +189,8 @@ def of_sample(path: Path, rate: float) -> models.Recording:
         rate: A rate that it keeps its noise at, in [Hz]: noise cannot be lowered as velocities can.
 
     Returns:
-        Its norms with its blocks, named by robot, scenario and seed, with the hash of
-        the run that it was made of.
+        Its norms, and joints if it has any at that rate, with its blocks, named by robot, scenario
+        and seed, with the hash of the run that it was made of.
 
     Raises:
         ScenarioError: If it cannot be read, or has no noise of that rate.
@@ -197,7 +198,7 @@ def of_sample(path: Path, rate: float) -> models.Recording:
     sample = Sample.load(path, only=WHOLE).at(rate)
     return models.Recording(
         name=sample.name,
-        signal={name: sample.signals[name] for name in WHOLE},
+        signal={**{name: sample.signals[name] for name in WHOLE}, **sample.joints},
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in sample.blocks),
         sha256=str(sample.meta["sha256"]),

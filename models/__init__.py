@@ -40,7 +40,7 @@ from models.examples import Examples
 from models.features import features
 from models.framing import frame
 from models.labels import DEPARTURE, UNKNOWN, Event, Labels
-from models.logbands import GENERAL, SCALAR, LogBands
+from models.logbands import EACH, GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
 from models.measuring.assessment import Assessment, assess
 from models.profile import CLASSES, Profile
@@ -52,6 +52,7 @@ from models.stream import Stream
 __all__ = [
     "CLASSES",
     "DEPARTURE",
+    "EACH",
     "GENERAL",
     "NOISE",
     "SCALAR",

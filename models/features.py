@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import SignalError
-from models.pooling import POOLED, pooled
+from models.pooling import POOLED, pooled, spectra
 from models.profile import Profile
 from models.resolution import Resolution
 from models.types import Array, Index, Real
@@ -24,7 +24,7 @@ def features(frames: Real, profile: Profile) -> Array:
     """Describe each frame by the levels of its frequency bands and their course in time.
 
     Args:
-        frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
+        frames: Stretches of noise signal, shape (frames, length), or (frames, rows, length).
         profile: What to compute, and the length that frames must have.
 
     Returns:
@@ -34,8 +34,8 @@ def features(frames: Real, profile: Profile) -> Array:
         SignalError: If the frames have another shape or values that are not finite.
     """
     _check(frames, profile)
-    several = len(frames), len(profile.signals), profile.length
-    exact = rounded(frames, profile).reshape(several)
+    rows = frames.shape[1] if frames.ndim > 2 else 1
+    exact = rounded(frames, profile).reshape(len(frames), rows, profile.length)
     loudness = [
         levels(np.swapaxes(_stretches(exact, each.window, each.stride), 1, 2), profile, each)
         for each in profile.resolutions
@@ -59,13 +59,15 @@ def levels(stretches: Array, profile: Profile, resolution: Resolution) -> Array:
     """Tell how loud each frequency band is in each window of a Fourier transform.
 
     Args:
-        stretches: Samples of the windows, shape (..., signals, window).
+        stretches: Samples of the windows, shape (..., rows, window).
         profile: What to compute.
         resolution: The one of the profile's that the windows are of.
 
     Returns:
-        Logarithms of the bands' amplitudes, shape (..., levels): of each signal, and then, in a
-        profile that is relative, what each signal's is above that of the one before.
+        Logarithms of the bands' amplitudes, shape (..., levels): of each norm, and then, in a
+        profile that is relative, what each norm's is above that of the one before; then the same
+        of the loudest joint of each signal that goes joint by joint, and how far that one is above
+        the mean of all joints.
     """
     rows = stretches.shape[:-2]
     if profile.bands != "log":
@@ -80,12 +82,37 @@ def levels(stretches: Array, profile: Profile, resolution: Resolution) -> Array:
     np.sqrt(power, out=power)
     power += profile.floor
     bands = shares.shape[1]
+    if profile.norms < len(profile.signals):
+        return _with_joints(np.log(power).reshape(*rows, -1, bands), profile)
     own = stretches.shape[-2] * bands
     loudness = np.empty((*rows, 2 * own - bands if profile.relative else own))
     np.log(power.reshape(*rows, own), loudness[..., :own])
     if profile.relative:
         np.subtract(loudness[..., bands:own], loudness[..., : own - bands], loudness[..., own:])
     return loudness
+
+
+def _with_joints(found: Array, profile: Profile) -> Array:
+    """Lay out levels of all rows as `levels` says.
+
+    Args:
+        found: Shape (..., rows, bands).
+        profile: Says how many rows are norms, and how many signals go joint by joint.
+    """
+    rows, bands = found.shape[:-2], found.shape[-1]
+    norms, kinds = profile.norms, len(profile.signals) - profile.norms
+    joints = found[..., norms:, :].reshape(*rows, kinds, -1, bands)
+    loudness = np.empty((*rows, 2 * norms - 1 + 3 * kinds - 1, bands))
+    own, loudest = loudness[..., : 2 * norms - 1, :], loudness[..., 2 * norms - 1 :, :]
+    own[..., :norms, :] = found[..., :norms, :]
+    np.subtract(own[..., 1:norms, :], own[..., : norms - 1, :], own[..., norms:, :])
+    most, above = loudest[..., :kinds, :], loudest[..., -kinds:, :]
+    np.maximum.reduce(joints, -2, out=most)
+    np.subtract(most[..., 1:, :], most[..., :-1, :], loudest[..., kinds:-kinds, :])
+    np.add.reduce(joints, -2, out=above)
+    above /= joints.shape[-2]
+    np.subtract(most, above, above)
+    return loudness.reshape(*rows, -1)
 
 
 def course(loudness: Sequence[Array], profile: Profile) -> Array:
@@ -107,12 +134,10 @@ def course(loudness: Sequence[Array], profile: Profile) -> Array:
 
 def feature_count(profile: Profile) -> int:
     """Say how many features a frame has."""
-    signals = len(profile.signals)
     if profile.bands == "log":
-        spectra = 2 * signals - 1 if profile.relative else signals
         bands = sum(len(each.edges) - 1 for each in profile.resolutions)
-        return spectra * POOLED * bands + profile.relative
-    return signals * (profile.bins // 3) * profile.transforms
+        return len(spectra(profile)) * POOLED * bands + profile.relative
+    return profile.norms * (profile.bins // 3) * profile.transforms
 
 
 def standard(plain: Array, profile: Profile) -> tuple[Array, Array]:
@@ -246,9 +271,16 @@ def _cosines(count: int) -> Array:
 
 
 def _check(frames: Real, profile: Profile) -> None:
-    count = len(profile.signals)
-    shape = (profile.length,) if count == 1 else (count, profile.length)
-    if frames.shape[1:] != shape:
+    count, norms = len(profile.signals), profile.norms
+    shape: tuple[int | str, ...] = (profile.length,) if count == 1 else (count, profile.length)
+    fit = frames.shape[1:] == shape
+    if norms < count:
+        shape = f"{norms} + {count - norms} joints", profile.length
+        joints, rest = (
+            divmod(frames.shape[1] - norms, count - norms) if frames.ndim == 3 else (0, 0)
+        )
+        fit = joints > 0 and not rest and frames.shape[2] == profile.length
+    if not fit:
         raise SignalError(
             f"frames of shape {frames.shape}, expected (frames, {', '.join(map(str, shape))})"
             f" for profile {profile.name!r} at {profile.rate:g} Hz"

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from models.errors import ProfileError
 from models.pooling import POOLED
 from models.profile import CLASSES, Machine, Profile
-from models.signals import NOISE
+from models.signals import JOINTS, MOTION, NOISE
 
 SPEED = 1.5
 """Bins of a Hann window that the mean leaks into: up to here, a quick band is the speed itself."""
@@ -132,10 +132,11 @@ class LogBands:
 SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85, quick=0.02)
 """For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
 encoders, and differs from robot to robot and from simulator to simulator."""
-GENERAL = replace(
-    SCALAR, signals=("desired", "measured", "error"), machine="trees", alarm=0.7, speed=True
-)
+GENERAL = replace(SCALAR, signals=MOTION, machine="trees", alarm=0.7, speed=True)
 """For runs with measured and desired motion; good motion startles it less. The noise alone cannot
 tell a fast motion without sensor noise from a failure by its speed. Trees find more of what is like
 what they have learnt from; networks, of what is not: of a rattle on a motion without any other
 noise, say, which the noise alone cannot tell by its error."""
+
+EACH = replace(GENERAL, signals=(*MOTION, *JOINTS))
+"""For runs that name their joints: what a single one does drowns in the norm of all."""

@@ -2,12 +2,16 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from models.profile import Profile
 from models.resolution import Resolution
 from models.types import Array
+
+Spectrum: TypeAlias = Literal["norm", "loudest", "difference"]
+"""What the levels of one spectrum are of: a norm, the loudest joint, or a difference."""
 
 POOLED = 3
 """Numbers that `pool` keeps of each level."""
@@ -32,7 +36,7 @@ def pooled(loudness: Sequence[Array], profile: Profile) -> Array:
     ]
     if not profile.relative:
         return np.concatenate(rows, axis=1)
-    share, above = _whole(len(profile.signals), profile.resolutions)
+    share, above = _whole(spectra(profile), profile.resolutions)
     described = np.concatenate((*rows, np.zeros((len(rows[0]), 1))), axis=1)
     described -= (described @ share)[:, None] * above
     return described
@@ -69,22 +73,32 @@ def _by_spectrum(found: Array, bands: int) -> Array:
     return apart.swapaxes(1, 2).reshape(frames, numbers * levels)
 
 
+def spectra(profile: Profile) -> tuple[Spectrum, ...]:
+    """Say what the spectra of a window are, in the order of its levels (`features.levels`)."""
+    norms, joints = profile.norms, len(profile.signals) - profile.norms
+    found: list[Spectrum] = ["norm"] * norms
+    if profile.relative:
+        found += ["difference"] * (norms - 1)
+        found += ["loudest"] * joints
+        found += ["difference"] * max(2 * joints - 1, 0)
+    return tuple(found)
+
+
 @lru_cache
-def _whole(signals: int, resolutions: tuple[Resolution, ...]) -> tuple[Array, Array]:
+def _whole(kinds: tuple[Spectrum, ...], resolutions: tuple[Resolution, ...]) -> tuple[Array, Array]:
     """Say how levels are told from the whole frame's.
 
     Returns:
         The share of each feature in the level of the whole frame, which is the mean of all means
-        of the signals; and how often that level is subtracted from each: once from the signals'
-        means and maxima, minus once from the last feature, which thereby is the level itself.
-        Shape (features,) each.
+        of the norms; and how often that level is subtracted from each: once from the means and
+        maxima of norms and loudest joints, minus once from the last feature, which thereby is the
+        level itself. Shape (features,) each.
     """
     share, above = [], []
     for each in resolutions:
-        signal = np.repeat((1.0, 1.0, 0.0), len(each.edges) - 1)  # mean, maximum, deviation
+        level = np.repeat((1.0, 1.0, 0.0), len(each.edges) - 1)  # mean, maximum, deviation
         mean = np.repeat((1.0, 0.0, 0.0), len(each.edges) - 1)
-        differences = np.zeros((signals - 1) * len(mean))
-        share += [np.tile(mean, signals), differences]
-        above += [np.tile(signal, signals), differences]
+        share += [mean * (kind == "norm") for kind in kinds]
+        above += [level * (kind != "difference") for kind in kinds]
     shares = np.concatenate((*share, [0.0]))
     return shares / shares.sum(), np.concatenate((*above, [-1.0]))

@@ -9,6 +9,7 @@ from typing import Any, Literal, Self, TypeAlias, get_args
 
 from models.errors import ProfileError
 from models.resolution import Resolution
+from models.signals import by_joint
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 """NoisyTest's classes, in its order; `ok` is the first of every model."""
@@ -46,7 +47,8 @@ class Profile:
     classes: tuple[str, ...] = CLASSES
     """What a frame can be called, `ok` first."""
     signals: tuple[str, ...] = ("noise",)
-    """The signals that are listened to: noise estimates, norms of velocities, all in [rad/s]."""
+    """The signals that are listened to, all in [rad/s]: noise estimates, norms of velocities, and
+    after those what goes joint by joint (`signals.JOINTS`), of which the loudest joint is heard."""
     rate: float = 10_000.0
     """Sample rate of the signal, in [Hz]."""
     length: int = 4000
@@ -184,6 +186,11 @@ class Profile:
         settings = asdict(self)
         return {k: list(v) if isinstance(v, tuple) else v for k, v in settings.items()}
 
+    @cached_property
+    def norms(self) -> int:
+        """How many of the signals are norms."""
+        return sum(not by_joint(name) for name in self.signals)
+
     @property
     def bins(self) -> int:
         """Bins of one Fourier transform, from 0 Hz up to half the rate."""
@@ -256,6 +263,16 @@ def _check_ranges(profile: Profile) -> None:
     if not profile.signals or len(set(profile.signals)) < len(profile.signals):
         raise ProfileError(
             f"signals are {', '.join(profile.signals) or 'none'}, expected one or more, each once"
+        )
+    if not profile.norms or any(map(by_joint, profile.signals[: profile.norms])):
+        raise ProfileError(
+            f"signals are {', '.join(profile.signals)}, expected norms, and after them those that"
+            " go joint by joint"
+        )
+    if profile.norms < len(profile.signals) and (profile.bands != "log" or not profile.relative):
+        raise ProfileError(
+            f"signals are {', '.join(profile.signals)}, with bands {profile.bands!r} and relative"
+            f" {profile.relative}, expected 'log' and True for those that go joint by joint"
         )
     repeated = len(set(profile.classes)) < len(profile.classes)
     if repeated or len(profile.classes) < 2 or profile.classes[0] != "ok":

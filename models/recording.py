@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from models.errors import RecordingError
-from models.signals import NOISE, Signals, named
+from models.signals import NOISE, Signals, by_joint, named
 from models.types import Array, Mask
 
 
@@ -30,7 +30,8 @@ class Recording:
 
     Attributes:
         name: What the recording is called in messages and models.
-        signal: The noise estimate, shape (samples,), or signals by name, each of that shape.
+        signal: The noise estimate, shape (samples,), or signals by name, each of that shape, or
+            joint by joint of shape (joints, samples).
         rate: Sample rate, in [Hz].
         blocks: Annotations; what overlaps must agree.
         start: Time of the first sample, in [s].
@@ -65,7 +66,8 @@ class Recording:
     @property
     def samples(self) -> int:
         """How many samples there are."""
-        return len(next(iter(named(self.signal).values())))
+        count: int = next(iter(named(self.signal).values())).shape[-1]
+        return count
 
     @property
     def time(self) -> Array:
@@ -76,15 +78,17 @@ class Recording:
 
 def _check_signal(recording: Recording) -> None:
     for name, signal in named(recording.signal).items():
-        if signal.shape != (recording.samples,) or not recording.samples:
+        many = by_joint(name)
+        if signal.ndim != 1 + many or signal.shape[-1:] != (recording.samples,) or not signal.size:
+            expected = "(joints, samples)" if many else "(samples,)"
             raise RecordingError(
                 recording.name,
-                f"a signal of shape {signal.shape}, expected (samples,), one or more",
+                f"a signal of shape {signal.shape}, expected {expected}, one or more",
             )
         if not np.isfinite(signal).all():
-            row = int(np.flatnonzero(~np.isfinite(signal))[0])
-            what = f"sample {row}" if name == NOISE else f"sample {row} of {name}"
-            raise RecordingError(recording.name, f"{what} is not finite ({signal[row]})")
+            place = tuple(np.argwhere(~np.isfinite(signal))[0].tolist())
+            what = f"sample {place[-1]}" if name == NOISE else f"sample {place[-1]} of {name}"
+            raise RecordingError(recording.name, f"{what} is not finite ({signal[place]})")
     valid = recording.valid
     if valid is not None and valid.shape != (recording.samples,):
         raise RecordingError(

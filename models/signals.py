@@ -1,4 +1,9 @@
-"""Signals: what is listened to, one noise estimate or several side by side."""
+"""Signals: what is listened to, one noise estimate or several side by side.
+
+A signal is a norm, shape (samples,), or that which a norm is of, joint by joint, shape
+(joints, samples), which its name says. Side by side they are rows: norms first, and then all joints
+of one signal after those of the other.
+"""
 
 from collections.abc import Collection, Mapping, Sequence
 from typing import TypeAlias
@@ -11,13 +16,32 @@ from models.types import Mask, Real
 NOISE = "noise"
 """The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A)."""
 
+MOTION = ("desired", "measured", "error")
+"""Norms of what a run with a desired motion has."""
+
+JOINTS = tuple(f"{name}_joints" for name in MOTION)
+"""The same, joint by joint."""
+
 Signals: TypeAlias = Real | Mapping[str, Real]
-"""The noise, shape (samples,), or signals by name, each of that shape."""
+"""The noise, shape (samples,), or signals by name: norms of that shape, and what goes joint by
+joint, shape (joints, samples)."""
 
 
 def named(signals: Signals) -> Mapping[str, Real]:
     """Give each signal its name; one alone is the noise."""
     return signals if isinstance(signals, Mapping) else {NOISE: signals}
+
+
+def by_joint(name: str) -> bool:
+    """Whether a signal goes joint by joint, as its name says."""
+    return name in JOINTS
+
+
+def telling(signals: Mapping[str, Real]) -> dict[str, Real]:
+    """Leave the error out where there is none: what is desired is what was measured."""
+    return {
+        name: each for name, each in signals.items() if not name.startswith("error") or np.any(each)
+    }
 
 
 def feeds(there: Collection[str], names: Sequence[str]) -> bool:
@@ -35,11 +59,12 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
             where it is not there.
 
     Returns:
-        One signal as it is, shape (samples,); several of shape (signals, samples).
+        One norm as it is, shape (samples,); several signals as rows, shape (rows, samples).
 
     Raises:
         MissingSignalError: If one is not there.
-        SignalError: If one is not one-dimensional, or they differ in length.
+        SignalError: If one is of another shape than its name says, or they differ in length or in
+            their joints.
     """
     there = named(signals)
     if lacking := [name for name in names if name not in there]:
@@ -47,17 +72,35 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
             raise MissingSignalError(lacking, there)
         there = {**there, NOISE: np.hypot(there["measured"], there["desired"])}
     chosen = [np.asarray(there[name]) for name in names]
-    if chosen[0].ndim != 1 or len({signal.shape for signal in chosen}) > 1:
+    if not _fit(names, chosen):
         found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
-        raise SignalError(f"a signal has another shape, {found}, expected (samples,)")
+        joints = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
+        raise SignalError(f"a signal has another shape, {found}, expected (samples,){joints}")
+    if any(map(by_joint, names)):
+        return np.vstack(chosen)
     return chosen[0] if len(chosen) == 1 else np.array(chosen)
+
+
+def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
+    """Whether all norms have one shape, and all that goes joint by joint has another one."""
+    shapes: dict[bool, set[tuple[int, ...]]] = {False: set(), True: set()}
+    for name, each in zip(names, chosen, strict=True):
+        shapes[by_joint(name)].add(each.shape)
+    if any(
+        len(shape) != 1 + joints or 0 in shape[:joints]
+        for joints in shapes
+        for shape in shapes[joints]
+    ):
+        return False
+    alike = all(len(each) <= 1 for each in shapes.values())
+    return alike and len({shape[-1] for each in shapes.values() for shape in each}) == 1
 
 
 def check(samples: Real, valid: Mask | None = None, *, first: int = 0) -> None:
     """Check what is to be classified.
 
     Args:
-        samples: Shape (samples,) or (signals, samples).
+        samples: Shape (samples,) or (rows, samples).
         valid: False in gaps, of which there are none unless given.
         first: Number of the first sample.
 

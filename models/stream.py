@@ -5,7 +5,7 @@ from typing import TypeAlias
 import numpy as np
 
 from models.classifier import Classifier
-from models.errors import RateError
+from models.errors import RateError, SignalError
 from models.features import course, rounded
 from models.labels import Labels
 from models.profile import TOLERANCE
@@ -30,6 +30,7 @@ class Stream:
         rate: Sample rate of the signal, in [Hz], which must be the model's; the model's unless
             given.
         start: Time of the first sample, in [s].
+        joints: How many joints there are, if the model listens to each.
 
     Raises:
         RateError: If the model is of another rate. Motion can be lowered before it becomes noise;
@@ -37,7 +38,12 @@ class Stream:
     """
 
     def __init__(
-        self, classifier: Classifier, *, rate: float | None = None, start: float = 0.0
+        self,
+        classifier: Classifier,
+        *,
+        rate: float | None = None,
+        start: float = 0.0,
+        joints: int = 1,
     ) -> None:
         self.classifier = classifier
         self.rate = classifier.rate if rate is None else rate
@@ -48,7 +54,8 @@ class Stream:
             )
         profile = self._profile = classifier.profile
         # Room for a frame, and for as much as is taken at once.
-        self._samples = np.zeros((len(profile.signals), 3 * profile.length))
+        rows = profile.norms + (len(profile.signals) - profile.norms) * joints
+        self._samples = np.zeros((rows, 3 * profile.length))
         self._valid = np.zeros(3 * profile.length, dtype=bool)
         self._windows = [Windows(self._samples, profile, each) for each in profile.resolutions]
         nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.machines.width))
@@ -67,7 +74,8 @@ class Stream:
         """Take samples of the noise.
 
         Args:
-            samples: Any number of them, none included, shape (samples,), or of each signal by name.
+            samples: Any number of them, none included, shape (samples,), or of each signal by name,
+                of that shape or, joint by joint, (joints, samples).
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
 
         Returns:
@@ -78,15 +86,23 @@ class Stream:
                 model needs; none is taken.
         """
         plain = stacked(samples, self._profile.signals)
+        if plain.ndim > 1 and len(plain) != len(self._samples):
+            raise SignalError(
+                f"{len(plain)} rows of norms and joints came, expected {len(self._samples)}"
+            )
         check(plain, valid, first=self._count)
-        exact = rounded(plain, self._profile)
+        found = self._take(rounded(plain, self._profile), valid)
+        return self._labels(found) if found else self._nothing
+
+    def _take(self, exact: Array, valid: Mask | None) -> list[Decided]:
+        """Take samples as they are, shape (samples,) or (rows, samples)."""
         found: list[Decided] = []
         for first in range(0, exact.shape[-1], self._profile.length):
             piece = slice(first, first + self._profile.length)
             self._keep(exact[..., piece], True if valid is None else valid[piece])
             if self._count >= self._due:
                 found += self._advance(exact.shape[-1])
-        return self._labels(found) if found else self._nothing
+        return found
 
     def skip(self, samples: int) -> None:
         """Pass over a gap: the same as pushing so many samples that are not valid.
@@ -131,8 +147,7 @@ class Stream:
         self._due = self._next_due(0)  # count with which there is work to do
 
     def _lose(self, samples: int) -> None:
-        silence = dict.fromkeys(self._profile.signals, np.zeros(samples))
-        self.push(silence, np.zeros(samples, dtype=bool))
+        self._take(np.zeros((len(self._samples), samples)), np.zeros(samples, dtype=bool))
 
     def _keep(self, samples: Array, valid: Mask | bool) -> None:
         """Append at most a frame's length of samples to the buffer."""

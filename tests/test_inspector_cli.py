@@ -297,7 +297,7 @@ def test_a_profile_that_does_not_exist_at_a_rate_is_said(inspector, tmp_path):
     status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
     assert (status, "exists at 10000 Hz only" in err) == (3, True)
     status, _, err = inspector(*arguments, "best")
-    assert (status, "no profile 'best'; there are general" in err) == (3, True)
+    assert (status, "no profile 'best'; there are joints, general" in err) == (3, True)
     status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
     assert (status, "has no annotated blocks" in err) == (3, True)
 

@@ -269,7 +269,7 @@ def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
 
 
 @pytest.mark.parametrize("missing", [(), ("base_velocity",), ("velocity_desired",)])
-def test_columns_make_the_norms_that_a_run_makes(missing):
+def test_columns_make_the_norms_and_joints_that_a_run_makes(missing):
     generator = np.random.default_rng(3)
     widths = {"base_velocity": 6, "velocity": 4, "velocity_desired": 4}
     columns = {
@@ -280,7 +280,8 @@ def test_columns_make_the_norms_that_a_run_makes(missing):
     run = nm.Run(time=np.arange(50) / 1000, joint_names=("a", "b", "c", "d"), **columns)
     norms = Norms({name: width for name, width in widths.items() if name not in missing})
     found = norms.of(np.hstack([columns[name] for name in NOISY if name in columns]), norms.names)
-    wanted = nm.norms(run)
+    wanted = {**nm.norms(run), **nm.by_joint(run)}
     assert found.keys() == wanted.keys()
+    assert norms.joints == 4
     for name, signal in wanted.items():
         np.testing.assert_allclose(found[name], signal, rtol=1e-12)

@@ -219,3 +219,78 @@ def test_a_frame_that_is_not_finite_is_named():
     frames[1, 7] = np.inf
     with pytest.raises(models.SignalError, match="frame 1 holds a value that is not finite"):
         models.features(frames, models.Profile.paper())
+
+
+EACH = models.EACH.at(1000.0)
+
+
+def joined(norms, joints):
+    """Frames of rows: three norms, then all joints of three signals, (frames, 3, joints, n)."""
+    return np.concatenate((norms, joints.reshape(len(joints), -1, joints.shape[-1])), axis=1)
+
+
+def split(features):
+    """Features as (spectra, mean most deviation, bands) of each resolution."""
+    spectra, first = [], 0
+    for each in EACH.resolutions:
+        bands = len(each.edges) - 1
+        spectra.append(features[first : first + 39 * bands].reshape(13, 3, bands))
+        first += 39 * bands
+    assert first == len(features) - 1 == feature_count(EACH) - 1
+    return spectra
+
+
+def test_the_order_of_joints_does_not_matter():
+    norms, joints = RANDOM.standard_normal((2, 3, 400)), RANDOM.standard_normal((2, 3, 5, 400))
+    swapped = joints[:, :, [3, 1, 4, 0, 2]]
+    np.testing.assert_allclose(
+        models.features(joined(norms, swapped), EACH),
+        models.features(joined(norms, joints), EACH),
+        atol=1e-9,
+    )
+
+
+def test_joints_that_all_do_the_same_are_one_joint_and_none_is_above_the_others():
+    norms, one = RANDOM.standard_normal((1, 3, 400)), RANDOM.standard_normal((1, 3, 1, 400))
+    alone = models.features(joined(norms, one), EACH)[0]
+    many = models.features(joined(norms, np.tile(one, (7, 1))), EACH)[0]
+    np.testing.assert_allclose(many, alone, atol=1e-9)
+    for spectra in split(alone):
+        np.testing.assert_allclose(spectra[10:], 0.0, atol=1e-9)
+
+
+def test_joints_leave_the_features_of_the_norms_as_they_are():
+    norms, joints = RANDOM.standard_normal((1, 3, 400)), RANDOM.standard_normal((1, 3, 5, 400))
+    whole = models.features(joined(norms, joints), EACH)[0]
+    alone = models.features(norms, models.GENERAL.at(1000.0))[0]
+    first = 0
+    for spectra in split(whole):
+        own = spectra[:5].ravel()
+        np.testing.assert_allclose(own, alone[first : first + len(own)], atol=1e-12)
+        first += len(own)
+    assert whole[-1] == pytest.approx(alone[-1], abs=1e-12)
+
+
+def test_one_joint_whose_error_grows_is_told_from_the_others():
+    joints = 1e6 * RANDOM.standard_normal((1, 3, 1, 400)) * np.ones((4, 1))
+    norms = 1e6 * RANDOM.standard_normal((1, 3, 400))
+    louder = joints.copy()
+    louder[0, 2, 1] *= 8.0
+    change = models.features(joined(norms, louder), EACH) - models.features(
+        joined(norms, joints), EACH
+    )
+    # Loudest desired, measured, error; measured less desired, error less measured; above the mean.
+    expected = np.log(8.0) * np.array([0, 0, 1, 0, 1, 0, 0, 3 / 4])
+    for spectra in split(change[0]):
+        np.testing.assert_allclose(spectra[:5], 0.0, atol=1e-6)
+        for number in range(2):  # mean and maximum
+            wanted = np.tile(expected[:, None], spectra.shape[-1])
+            np.testing.assert_allclose(spectra[5:, number], wanted, atol=1e-6)
+        np.testing.assert_allclose(spectra[:, 2], 0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("rows", [3, 5, 7])
+def test_frames_without_a_whole_number_of_joints_are_refused(rows):
+    expected = rf"shape \(1, {rows}, 400\), expected \(frames, 3 \+ 3 joints, 400\)"
+    with pytest.raises(models.SignalError, match=expected):
+        models.features(np.zeros((1, rows, 400)), EACH)

@@ -1,4 +1,7 @@
-"""Networks and trees say how probable each class is, and know what they do not know."""
+"""Networks and trees say how probable each class is, and know what they do not know.
+
+They do so by norms, and trees also joint by joint.
+"""
 
 from dataclasses import replace
 
@@ -8,6 +11,7 @@ import pytest
 import models
 from models.calibration import calibrate, calibrated
 from models.examples import Examples
+from models.signals import stacked
 from models.training import learn
 
 RATE = 1000.0
@@ -15,7 +19,9 @@ PROFILE = models.GENERAL.at(RATE)
 PROFILES = {
     "networks": replace(PROFILE, machine="networks", units=16, epochs=40),
     "trees": replace(PROFILE, machine="trees", rounds=30, leaves=8),
+    "joints": replace(models.EACH.at(RATE), rounds=30, leaves=8),
 }
+JOINTS = 3
 SECONDS = 6
 
 
@@ -30,8 +36,20 @@ def recording(robot, seed, label):
         shape = np.exp(-np.mod(time, 0.4) / 0.02) * generator.normal(size=len(time))
     error = rattle * shape + 0.01 * generator.normal(size=len(time))
     signals = {"desired": desired, "measured": desired + error, "error": np.abs(error)}
+    mine = np.array([0.9, 0.1, 0.05])[:, None]
+    signals |= {
+        "desired_joints": mine * desired,
+        "measured_joints": mine * (desired + error),
+        "error_joints": mine * error,
+    }
     blocks = (models.Block(0.5, SECONDS - 0.5, label),)
     return models.Recording(f"{robot}/{label}-{seed:03d}", signals, RATE, blocks)
+
+
+def alike(signal):
+    """The same for all norms and joints."""
+    names = (*models.EACH.signals[:3],), (*models.EACH.signals[3:],)
+    return dict.fromkeys(names[0], signal) | dict.fromkeys(names[1], np.tile(signal, (JOINTS, 1)))
 
 
 RECORDINGS = [
@@ -120,7 +138,7 @@ def test_calibration_finds_how_much_too_sure_probabilities_are():
 def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
     decisions = classifier.decision(
         models.frame(
-            np.stack([RECORDINGS[13].signal[name] for name in PROFILE.signals]),
+            stacked(RECORDINGS[13].signal, classifier.profile.signals),
             length=PROFILE.length,
             hop=PROFILE.hop,
         )
@@ -149,7 +167,7 @@ def test_machines_know_how_frequent_each_class_was(classifier):
 
 def test_what_is_louder_than_all_that_was_learnt_is_unknown(classifier):
     loud = 1e6 * np.random.default_rng(4).random(round(2 * RATE))
-    labels = classifier.classify(dict.fromkeys(PROFILE.signals, loud), RATE)
+    labels = classifier.classify(alike(loud), RATE)
     assert set(labels.label) == {"unknown"}
     assert labels.events() == ()
 
@@ -157,7 +175,8 @@ def test_what_is_louder_than_all_that_was_learnt_is_unknown(classifier):
 @pytest.mark.parametrize("level", [0.0, 0.3])
 def test_silence_and_uniform_motion_are_no_failure(classifier, level):
     steady = np.full(round(2 * RATE), level)
-    labels = classifier.classify(dict.fromkeys(PROFILE.signals, steady), RATE)
+    followed = {"error_joints": np.zeros((JOINTS, len(steady)))}
+    labels = classifier.classify(alike(steady) | followed, RATE)
     assert set(labels.label) == {"ok"}
 
 
@@ -170,10 +189,11 @@ def test_what_was_learnt_is_known(classifier):
 def test_a_stream_hears_the_same(classifier, chunk):
     each = RECORDINGS[14]
     batch = classifier.classify(each.signal, RATE)
-    stream, found = models.Stream(classifier), []
+    stream, found = models.Stream(classifier, joints=JOINTS), []
     for first in range(0, each.samples, chunk):
         piece = slice(first, first + chunk)
-        found.append(stream.push({name: signal[piece] for name, signal in each.signal.items()}))
+        signals = {name: signal[..., piece] for name, signal in each.signal.items()}
+        found.append(stream.push(signals))
     found.append(stream.finish())
     together = {
         name: np.concatenate([getattr(part, name) for part in found])
@@ -186,8 +206,28 @@ def test_a_stream_hears_the_same(classifier, chunk):
 
 def test_a_model_that_lacks_a_signal_says_which(classifier):
     signals = RECORDINGS[0].signal
-    with pytest.raises(models.SignalError, match=r"no signal error; there is desired, measured"):
+    with pytest.raises(models.SignalError, match=r"no signal error.*; there is desired, measured"):
         classifier.classify({name: signals[name] for name in ("desired", "measured")}, RATE)
+
+
+def test_frames_after_a_gap_are_heard_as_if_it_were_silence_left_out(classifier):
+    signals = RECORDINGS[14].signal
+    parts = [slice(0, 2000), slice(2000, None)]
+    first, rest = ({name: each[..., part] for name, each in signals.items()} for part in parts)
+    stream = models.Stream(classifier, joints=JOINTS)
+    stream.push(first)
+    stream.skip(12_000)
+    found, alone = stream.push(rest), classifier.classify(rest, RATE)
+    np.testing.assert_allclose(found.start - 14.0, alone.start, atol=1e-9)
+    np.testing.assert_array_equal(found.label, alone.label)
+
+
+def test_a_stream_of_other_joints_is_refused():
+    classifier = models.Classifier.train(
+        Examples.read(RECORDINGS[:12], PROFILES["joints"]), PROFILES["joints"]
+    )
+    with pytest.raises(models.SignalError, match="12 rows of norms and joints came, expected 15"):
+        models.Stream(classifier, joints=4).push(RECORDINGS[0].signal)
 
 
 def test_training_twice_gives_the_same_bytes_and_they_are_read_back(classifier, tmp_path):

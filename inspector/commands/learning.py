@@ -15,7 +15,7 @@ def train(
     profile: Annotated[
         str,
         typer.Option(
-            help="general, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
+            help="joints, general, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
             " paper-linear."
         ),
     ] = "general",

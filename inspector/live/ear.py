@@ -44,7 +44,7 @@ class Ear:
             return
         self.model = next(name for name, model in library.items() if model is chosen)
         self._ratio, self._names = ratio, chosen.profile.signals
-        self._stream = models.Stream(chosen, rate=rate / ratio)
+        self._stream = models.Stream(chosen, rate=rate / ratio, joints=norms.joints)
         if ratio > 1:
             self._slower = Slower(ratio, norms.columns)
             self.remark = f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}."

@@ -1,4 +1,4 @@
-"""Noise signals of motion that comes in columns: `noisemodel.norms`, without a run."""
+"""Noise signals of motion that comes in columns: `noisemodel.norms` and joints, without a run."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -18,21 +18,25 @@ class Norms:
     Attributes:
         columns: How many columns make noise: those of ``NOISY``, in that order.
         names: Signals that there are.
+        joints: How many joints there are.
     """
 
     def __init__(self, widths: Mapping[str, int]) -> None:
         base, joints, desired = (widths.get(name, 0) for name in NOISY)
-        self.columns = base + joints + desired
+        self.columns, self.joints = base + joints + desired, joints
         moved = base + joints
         self._ways: dict[str, Callable[[Array], Array]] = {
             "noise": nm.simplified,  # of measured and desired velocities side by side
             "measured": lambda motion: nm.simplified(motion[:, :moved]),
         }
         if desired:
-            self._ways["desired"] = lambda motion: nm.simplified(motion[:, moved:])
-            self._ways["error"] = lambda motion: nm.simplified(
-                motion[:, moved:] - motion[:, base:moved]
-            )
+            self._ways |= {
+                "desired": lambda motion: nm.simplified(motion[:, moved:]),
+                "error": lambda motion: nm.simplified(motion[:, moved:] - motion[:, base:moved]),
+                "desired_joints": lambda motion: motion[:, moved:].T,
+                "measured_joints": lambda motion: motion[:, base:moved].T,
+                "error_joints": lambda motion: (motion[:, moved:] - motion[:, base:moved]).T,
+            }
         self.names = tuple(self._ways)
 
     def of(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:
@@ -43,6 +47,6 @@ class Norms:
             names: Which.
 
         Returns:
-            Signals by name, each of shape (samples,), in [rad/s].
+            Signals by name, norms of shape (samples,), joints of (joints, samples), in [rad/s].
         """
         return {name: self._ways[name](motion) for name in names}
