@@ -138,5 +138,5 @@ tell a fast motion without sensor noise from a failure by its speed. Trees find 
 what they have learnt from; networks, of what is not: of a rattle on a motion without any other
 noise, say, which the noise alone cannot tell by its error."""
 
-EACH = replace(GENERAL, signals=(*MOTION, *JOINTS))
+EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.75)
 """For runs that name their joints: what a single one does drowns in the norm of all."""

@@ -61,7 +61,9 @@ def test_the_richest_model_that_a_run_feeds_is_taken():
     assert label_run(run_of(noisy, 1000.0), LIBRARY).model == "scalar-1khz"  # desired is measured
     time, names = np.arange(3000) / 1000.0, ("a", "b", "c")
     followed = Run(time=time, velocity=noisy, velocity_desired=0 * noisy + 0.1, joint_names=names)
-    assert label_run(followed, LIBRARY).model == "general-1khz"
+    assert label_run(followed, LIBRARY).model == "joints-1khz"
+    apart = replace(followed, desired_joint_names=("tool", "wrist", "base"))
+    assert label_run(apart, LIBRARY).model == "scalar-1khz"  # no joint that is both
     measured = Run(time=time, velocity=noisy, joint_names=names)
     assert label_run(measured, LIBRARY).model == "scalar-1khz"
 
@@ -73,11 +75,11 @@ def test_a_run_like_nothing_that_was_learnt_cannot_be_judged_and_part_of_one_is_
     run = Run(
         time=np.arange(6000) / 1000.0, velocity=odd, velocity_desired=0 * odd, joint_names=names
     )
-    with pytest.raises(CannotTellError, match="nothing that model general-1khz has learnt from is"):
+    with pytest.raises(CannotTellError, match="nothing that model joints-1khz has learnt from is"):
         label_run(run, LIBRARY)
     known = np.where(run.time[:, None] < 3.0, odd, 0.1 + 1e-7 * odd)
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
-    assert "frames are like nothing that model general-1khz knows" in labelled.remark
+    assert "frames are like nothing that model joints-1khz knows" in labelled.remark
     assert "unknown" in labelled.labels.label
 
 

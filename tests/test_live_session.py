@@ -128,9 +128,9 @@ def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size):
     signals = motion(2.5)
     library = load_library(assets.model_files())
     path, _, summary = shown(tmp_path, signals, range(size, 2500, size), library=library)
-    assert summary.model == "general-1khz"
+    assert summary.model == "joints-1khz"
     run = nm.Run(joint_names=("a", "b", "c"), **signals)
-    batch = library["general-1khz"].classify(nm.norms(run), RATE)
+    batch = library["joints-1khz"].classify({**nm.norms(run), **nm.by_joint(run)}, RATE)
     _, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
     assert summary.labels == dict(Counter(batch.outright.tolist()))
