@@ -41,6 +41,27 @@ def load_library(paths: Sequence[Path]) -> Library:
     return {path.stem: models.Classifier.load(path) for path in paths}
 
 
+def for_robot(library: Library, robot: str | None) -> Library:
+    """Leave out what goes joint by joint and has learnt from other robots alone.
+
+    What single joints do carries over to a robot that was not met less than what norms do. A model
+    whose runs name no robot stays, and so do all if none would be left.
+
+    Args:
+        library: Models to choose from.
+        robot: The robot that they are to hear, if it has a name.
+    """
+    kept = {name: model for name, model in library.items() if _knows(model, robot)}
+    return kept or library
+
+
+def _knows(model: models.Classifier, robot: str | None) -> bool:
+    if not any(map(models.signals.by_joint, model.profile.signals)):
+        return True
+    met = {models.splitting.robot_of(name) for name in model.runs} - {""}
+    return not met or robot in met
+
+
 def label_run(run: nm.Run, library: Library) -> Labelled:
     """Label a run by the model of the nearest rate at or below its own that it can feed.
 
@@ -57,7 +78,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         SignalError: If the run is too short for a frame.
     """
     signals = signals_of(run)
-    name, classifier = _choose(library, run.rate, signals)
+    name, classifier = _choose(for_robot(library, run.robot), run.rate, signals)
     rate, remark = classifier.rate, ""
     if not _close(run.rate, rate):
         run = nm.lowered(run, rate)

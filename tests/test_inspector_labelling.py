@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from inspector.assets import model_files
-from inspector.labelling import CannotTellError, label_noise, label_run, load_library
+from inspector.labelling import (
+    CannotTellError,
+    for_robot,
+    label_noise,
+    label_run,
+    load_library,
+)
 from noisemodel import Run
 
 LIBRARY = load_library(model_files())
@@ -61,7 +67,9 @@ def test_the_richest_model_that_a_run_feeds_is_taken():
     assert label_run(run_of(noisy, 1000.0), LIBRARY).model == "scalar-1khz"  # desired is measured
     time, names = np.arange(3000) / 1000.0, ("a", "b", "c")
     followed = Run(time=time, velocity=noisy, velocity_desired=0 * noisy + 0.1, joint_names=names)
-    assert label_run(followed, LIBRARY).model == "joints-1khz"
+    assert label_run(followed, LIBRARY).model == "general-1khz"
+    known = replace(followed, robot="panda")
+    assert label_run(known, LIBRARY).model == "joints-1khz"
     apart = replace(followed, desired_joint_names=("tool", "wrist", "base"))
     assert label_run(apart, LIBRARY).model == "scalar-1khz"  # no joint that is both
     measured = Run(time=time, velocity=noisy, joint_names=names)
@@ -75,11 +83,11 @@ def test_a_run_like_nothing_that_was_learnt_cannot_be_judged_and_part_of_one_is_
     run = Run(
         time=np.arange(6000) / 1000.0, velocity=odd, velocity_desired=0 * odd, joint_names=names
     )
-    with pytest.raises(CannotTellError, match="nothing that model joints-1khz has learnt from is"):
+    with pytest.raises(CannotTellError, match="nothing that model general-1khz has learnt from is"):
         label_run(run, LIBRARY)
     known = np.where(run.time[:, None] < 3.0, odd, 0.1 + 1e-7 * odd)
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
-    assert "frames are like nothing that model joints-1khz knows" in labelled.remark
+    assert "frames are like nothing that model general-1khz knows" in labelled.remark
     assert "unknown" in labelled.labels.label
 
 
@@ -88,3 +96,18 @@ def test_a_run_that_feeds_no_model_is_not_judged_and_the_reason_is_said():
     run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
     with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
         label_run(run, alone)
+
+
+def test_joints_are_heard_of_robots_that_were_met_and_norms_of_all_others():
+    both = {name: LIBRARY[name] for name in ("general-1khz", "joints-1khz")}
+    assert for_robot(both, "panda") == both
+    for robot in (None, "ur5", "my.urdf"):
+        assert list(for_robot(both, robot)) == ["general-1khz"]
+    alone = {"joints-1khz": LIBRARY["joints-1khz"]}
+    assert for_robot(alone, "ur5") == alone  # who names one model means it
+
+
+def test_a_model_whose_runs_name_no_robot_hears_the_joints_of_any():
+    own = replace(LIBRARY["joints-1khz"], runs={"monday": "", "tuesday": ""})
+    library = {"general-1khz": LIBRARY["general-1khz"], "own": own}
+    assert for_robot(library, "ur5") == library

@@ -124,13 +124,15 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
 
 
 @pytest.mark.parametrize("size", [7, 1301])
-def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size):
+@pytest.mark.parametrize("name", ["general-1khz", "joints-1khz"])
+def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size, name):
     signals = motion(2.5)
-    library = load_library(assets.model_files())
+    every = load_library(assets.model_files())
+    library = {name: every[name]}
     path, _, summary = shown(tmp_path, signals, range(size, 2500, size), library=library)
-    assert summary.model == "joints-1khz"
+    assert summary.model == name
     run = nm.Run(joint_names=("a", "b", "c"), **signals)
-    batch = library["joints-1khz"].classify({**nm.norms(run), **nm.by_joint(run)}, RATE)
+    batch = library[name].classify({**nm.norms(run), **nm.by_joint(run)}, RATE)
     _, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
     assert summary.labels == dict(Counter(batch.outright.tolist()))

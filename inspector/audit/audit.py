@@ -11,7 +11,7 @@ from inspector.audit.gaps import Gaps, gaps_of
 from inspector.audit.holding import held_for
 from inspector.audit.sight import ClassSight, Sight, sights
 from inspector.audit.units import unit_doubts
-from inspector.labelling import signals_of
+from inspector.labelling import for_robot, signals_of
 from noisemodel import Run
 
 
@@ -71,7 +71,7 @@ def audit(run: Run, library: Mapping[str, models.Classifier]) -> Audit:
         bandwidth=reach,
         doubts=tuple(_doubts(part, reach)),
         notes=tuple(_notes(part, reach)),
-        classes=sights(reach, run.mask, library, signals_of(part)),
+        classes=sights(reach, run.mask, for_robot(library, run.robot), signals_of(part)),
     )
 
 

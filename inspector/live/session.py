@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector import assets
-from inspector.labelling import Library, load_library
+from inspector.labelling import Library, for_robot, load_library
 from inspector.live.block import Block, rows_of, widths_of
 from inspector.live.errors import LiveError
 from inspector.live.sink import Sink
@@ -197,7 +197,7 @@ class LiveSession:
             robot=self._robot if "position" in widths else None,
             joint_names=names,
             widths=widths,
-            library=self._library,
+            library=for_robot(self._library, self._robot),
             troubles=self._troubles,
         )
         if self._robot and "position" not in widths:
