@@ -16,9 +16,9 @@ import numpy as np
 
 import models
 import scenarios
-from inspector.part import Part
 from inspector.progress import progress
-from inspector.training import recordings, train
+from inspector.training.part import Part
+from inspector.training.training import recordings, train
 from noisemodel import Block, Run
 from scenarios.dataset import make
 from scenarios.folder import Folder

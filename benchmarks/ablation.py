@@ -20,11 +20,11 @@ import numpy as np
 
 import models
 from benchmarks.paper import RATE, files, first_seeds
-from inspector.part import Part
-from inspector.training import recordings
+from inspector.training.part import Part
+from inspector.training.training import recordings
+from models.evaluation.assessment import judge
+from models.evaluation.predictions import Heard, hear
 from models.examples import Examples
-from models.measuring.assessment import judge
-from models.measuring.heard import Heard, hear
 from models.splitting import folds
 from scenarios.sample import Sample
 

@@ -17,8 +17,8 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 import models
+from models.estimators.estimator import learn
 from models.features import feature_count, standard
-from models.training import learn
 
 RATE = 1000.0
 """Of the frames, in [Hz]."""

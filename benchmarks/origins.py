@@ -20,9 +20,9 @@ from typing import Any
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import noisemodel as nm
-from inspector.culprits import culprits
-from inspector.linknoise import LinkNoise, link_noise
-from inspector.origin import Origin, origins
+from inspector.localisation.links import culprits
+from inspector.localisation.localise import Origin, origins
+from noisemodel.links import LinkNoise, link_noise
 from scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from scenarios.limbs import limbs
 

@@ -32,12 +32,11 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
-from inspector import training
 from inspector.parallel import each
-from inspector.part import Part
-from models.measuring.assessment import judge
-from models.measuring.heard import Heard, hear
-from models.measuring.table import number, percent
+from inspector.training import training
+from inspector.training.part import Part
+from models.evaluation.assessment import judge, number, percent
+from models.evaluation.predictions import Heard, hear
 from scenarios.sample import Sample
 from scenarios.signals import WHOLE
 

@@ -31,9 +31,9 @@ from sklearn.metrics import roc_auc_score
 
 import models
 from benchmarks.contenders import RATE, Contender, contenders
-from inspector.training import of_sample
-from models.measuring.intervals import Resampling
-from models.measuring.table import percent
+from inspector.training.training import of_sample
+from models.evaluation.assessment import percent
+from models.evaluation.intervals import Resampling
 
 SHARES = (0.001, 0.01)
 """Shares of the `ok` frames that may be called a failure: 36 and 360 in an hour."""

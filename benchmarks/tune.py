@@ -21,8 +21,8 @@ import numpy as np
 from joblib.externals.loky import get_reusable_executor
 
 import models
-from inspector.tuning import Question, tune
-from inspector.tuningtable import table
+from inspector.training.tuning import Question, tune
+from inspector.training.tuningtable import table
 from models.tuning.search import ask
 
 

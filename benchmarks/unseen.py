@@ -18,9 +18,9 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import models
 from benchmarks.paper import files, first_seeds
-from inspector import training
-from inspector.part import Part
-from models.measuring.table import number, percent
+from inspector.training import training
+from inspector.training.part import Part
+from models.evaluation.assessment import number, percent
 
 BUDGET = 20.0
 """False alarms per hour that are borne."""

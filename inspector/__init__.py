@@ -6,7 +6,7 @@ if TYPE_CHECKING:
     from inspector.live import LiveSession
     from inspector.logs.importing import Imported
     from inspector.logs.library import read_log, read_logs
-    from inspector.notebook import show
+    from inspector.recording.notebook import show
 
 __all__ = ["Imported", "LiveSession", "read_log", "read_logs", "show"]
 
@@ -15,7 +15,7 @@ _HOMES = {
     "LiveSession": "inspector.live",
     "read_log": "inspector.logs.library",
     "read_logs": "inspector.logs.library",
-    "show": "inspector.notebook",
+    "show": "inspector.recording.notebook",
 }
 
 

@@ -6,21 +6,24 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands import (
-    auditing,
-    baseline,
-    comparing,
-    hearing,
-    judging,
-    learning,
-    living,
-    logs,
-    looking,
-    showing,
-    simulating,
-    travelling,
-    tuning,
-)
+from inspector.commands.audit import audit
+from inspector.commands.baseline import baseline
+from inspector.commands.classify import classify
+from inspector.commands.compare import compare
+from inspector.commands.evaluate import evaluate
+from inspector.commands.export import export
+from inspector.commands.import_ import import_
+from inspector.commands.labels import labels
+from inspector.commands.listen import listen
+from inspector.commands.live import live
+from inspector.commands.noise import noise
+from inspector.commands.report import report
+from inspector.commands.robots import robots
+from inspector.commands.shot import shot
+from inspector.commands.simulate import app as simulate
+from inspector.commands.train import train
+from inspector.commands.tune import tune
+from inspector.commands.view import view
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -51,24 +54,24 @@ def _inspector(
     """Inspect the noise that a robot's joints would make."""
 
 
-app.command()(looking.view)
-app.command()(living.live)
-app.command()(judging.classify)
-app.command()(looking.noise)
-app.command()(hearing.listen)
-app.command()(showing.shot)
-app.command()(showing.report)
-app.command("import")(logs.import_)
-app.command()(auditing.audit)
-app.command()(travelling.labels)
-app.command()(travelling.export)
-app.add_typer(simulating.app, name="simulate")
-app.command()(learning.train)
-app.command()(baseline.baseline)
-app.command()(tuning.tune)
-app.command()(learning.evaluate)
-app.command()(comparing.compare)
-app.command()(comparing.robots)
+app.command()(view)
+app.command()(live)
+app.command()(classify)
+app.command()(noise)
+app.command()(listen)
+app.command()(shot)
+app.command()(report)
+app.command("import")(import_)
+app.command()(audit)
+app.command()(labels)
+app.command()(export)
+app.add_typer(simulate, name="simulate")
+app.command()(train)
+app.command()(baseline)
+app.command()(tune)
+app.command()(evaluate)
+app.command()(compare)
+app.command()(robots)
 
 
 def main() -> None:
@@ -78,7 +81,7 @@ def main() -> None:
     try:
         app()
     except ValueError as error:
-        from inspector.verdict import EXPECTED
+        from inspector.analysis.verdict import EXPECTED
         from scenarios import ScenarioError
 
         if not isinstance(error, (*EXPECTED, ScenarioError)):

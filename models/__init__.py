@@ -12,12 +12,9 @@ This package knows no robot: a signal and its rate are all that it takes. It nee
 scikit-learn only to train.
 """
 
-from models import noisytest
-from models.baselineframes import GoodMotion
-from models.baselinelimit import Limit
-from models.baselinetraining import Learnt, learn_baseline
 from models.choice import nearest
 from models.classifier import Classifier
+from models.confusion import Evaluation
 from models.dataset import Dataset
 from models.errors import (
     DataFileError,
@@ -35,14 +32,17 @@ from models.errors import (
     SignalError,
     UnknownLabelError,
 )
-from models.evaluation import Evaluation, evaluate
+from models.evaluation.assessment import Assessment, assess
+from models.evaluation.framescore import evaluate
 from models.examples import Examples
 from models.features import features
 from models.framing import frame
 from models.labels import DEPARTURE, UNKNOWN, Event, Labels
 from models.logbands import EACH, GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
-from models.measuring.assessment import Assessment, assess
+from models.novelty.frames import GoodMotion
+from models.novelty.limit import Limit
+from models.novelty.training import Learnt, learn_baseline
 from models.profile import CLASSES, Profile
 from models.recording import Block, Recording
 from models.signals import NOISE, Signals

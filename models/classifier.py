@@ -9,14 +9,14 @@ from typing import Any, Self
 import numpy as np
 
 from models import modelfile
+from models.confusion import Evaluation
 from models.dataset import Dataset
 from models.errors import DatasetError, RateError, SignalError
-from models.evaluation import Evaluation
+from models.estimators.estimator import Machine, rebuilt
 from models.examples import CHUNK, Examples
 from models.features import features, standard
 from models.framing import frame_starts
 from models.labels import UNKNOWN, Labels
-from models.machine import Machine, rebuilt
 from models.profile import TOLERANCE, Profile
 from models.signals import Signals, check, stacked
 from models.types import Array, Index, Mask, Real, Words
@@ -68,7 +68,7 @@ class Classifier:
             DatasetError: If the frames are of fewer than two classes.
             SignalError: If the frames do not fit the profile.
         """
-        from models.training import learn, versions
+        from models.estimators.estimator import learn, versions
 
         examples = _examples(dataset, profile)
         there = set(examples.labels.tolist())

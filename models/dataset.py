@@ -2,19 +2,20 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from types import MappingProxyType
 from typing import Self
 
 import numpy as np
 
-from models.cutting import cut
-from models.errors import DatasetError, NoFrameError, RateError, UnknownLabelError
-from models.framing import frame
+from models.errors import DatasetError, NoFrameError, RateError, RecordingError, UnknownLabelError
+from models.framing import frame, pad_end
 from models.noisytest import read_folder
 from models.profile import TOLERANCE, Profile
-from models.recording import Recording
-from models.types import Real, Words
+from models.recording import Block, Recording
+from models.signals import stacked
+from models.types import Mask, Real, Words
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,3 +110,102 @@ def _check(recording: Recording, profile: Profile, hashes: Mapping[str, str]) ->
             raise UnknownLabelError(recording.name, block.label, profile.classes)
     if recording.name in hashes:
         raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
+
+
+def cut(
+    recording: Recording, block: Block, profile: Profile, *, training: bool
+) -> tuple[Real, Mask]:
+    """Take a block's samples out of a recording, one frame of them or more.
+
+    A block shorter than a frame is padded in training, lest a frame mixes failures that follow
+    each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
+    for widened ones in training too, and for failures in every place of a frame.
+
+    Args:
+        recording: Where the block lies.
+        block: One annotated stretch of it.
+        profile: How long a frame is, and how blocks are cut.
+        training: Whether the frames are to learn from.
+
+    Returns:
+        Samples, shape (samples,), or (signals, samples) if the profile listens to several, and
+        which of them are valid, shape (samples,); padding counts as valid.
+
+    Raises:
+        SignalError: If the recording lacks a signal.
+        RecordingError: If the block holds no sample, or the recording is shorter than a frame that
+            a block is widened to.
+    """
+    lost = int(profile.drop_first_sample)
+    precision = np.float32 if profile.single_precision else np.float64
+    time: Real = recording.time[lost:].astype(precision)
+    pad = training and profile.pad_short
+    spread = training and profile.spread_failures and block.label != profile.classes[0]
+    start, stop = _bounds(
+        time, _spread(block, time, profile) if spread else block, profile, pad=pad
+    )
+    samples = _samples(time, start, stop, profile)
+    whole = stacked(recording.signal, profile.signals)
+    signal: Real = whole[..., lost:][..., samples].astype(precision)
+    count = signal.shape[-1]
+    if not count:
+        raise RecordingError(
+            recording.name,
+            f"block {block.label!r} from {block.start:g} s to {block.stop:g} s holds no sample",
+        )
+    if count < profile.length and not (pad or profile.pad_widened):
+        raise RecordingError(
+            recording.name, f"{len(time)} samples are too short: one frame takes {profile.length}"
+        )
+    padding = max(profile.length - count, 0)
+    valid = np.ones(len(time), bool) if recording.valid is None else recording.valid[lost:]
+    return (
+        pad_end(signal, length=profile.length),
+        np.pad(valid[samples], (0, padding), constant_values=True),
+    )
+
+
+def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[float, float]:
+    """Say from when to when, in NoisyTest's order of operations, for its rounding to be the same.
+
+    Args:
+        time: Times of the recording's samples, shape (samples,), in [s].
+        block: The annotated block.
+        profile: How long a frame is.
+        pad: Whether a short block keeps its bounds, to be padded.
+
+    Returns:
+        Start and stop, in [s].
+    """
+    start, stop = block.start, block.stop
+    if stop == inf and len(time):
+        stop = time[-1] + profile.open_end / profile.rate
+    if pad or stop - start >= profile.duration:
+        return start, stop
+    start -= (profile.duration - (stop - start)) / 2.0
+    if not profile.pad_widened and len(time):
+        start = max(min(start, time[-1] + 1.0 / profile.rate - profile.duration), time[0])
+    return start, start + profile.duration + profile.widen_extra / profile.rate
+
+
+def _spread(block: Block, time: Real, profile: Profile) -> Block:
+    """Widen a block to all frames that hold it whole, or that it fills by half or more.
+
+    When a signal is labelled, a frame sees a failure come in at its end and leave at its start; a
+    machine that has learnt it from the middle alone takes it for another one there.
+    """
+    if not len(time):
+        return block
+    shared = min(block.stop - block.start, profile.duration / 2.0)
+    start = max(block.start + shared - profile.duration, float(time[0]))
+    stop = min(block.stop - shared + profile.duration, float(time[-1]) + 1.0 / profile.rate)
+    return Block(start, stop, block.label)
+
+
+def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
+    """Find the samples from a start to a stop, by their times or by counting them."""
+    if profile.cut_by_time:
+        inside = np.flatnonzero((time >= start) & (time <= stop))
+        return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)
+    first = max(round((start - float(time[0])) * profile.rate), 0)
+    return slice(first, first + round((stop - start) * profile.rate))

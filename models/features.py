@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from models.errors import SignalError
 from models.pooling import POOLED, pooled, spectra
-from models.profile import Profile
-from models.resolution import Resolution
+from models.profile import Profile, Resolution
 from models.types import Array, Index, Real
 
 

@@ -6,8 +6,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
-from models.profile import Profile
-from models.resolution import Resolution
+from models.profile import Profile, Resolution
 from models.types import Array
 
 Spectrum: TypeAlias = Literal["norm", "loudest", "difference"]

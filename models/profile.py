@@ -8,7 +8,6 @@ from math import isfinite
 from typing import Any, Literal, Self, TypeAlias, get_args
 
 from models.errors import ProfileError
-from models.resolution import Resolution
 from models.signals import by_joint
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
@@ -32,6 +31,25 @@ _POSITIVE = (
     *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
     *("networks", "units", "epochs", "rounds", "learning_rate", "alarm"),
 )
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """Long windows tell frequencies apart, quick ones tell when something happens.
+
+    Attributes:
+        window: Samples of the Hann window of one transform.
+        stride: Samples from one transform to the next.
+        edges: Edges of the bands, ascending, in [Hz]; none unless bands are spaced by logarithms.
+    """
+
+    window: int
+    stride: int
+    edges: tuple[float, ...]
+
+    def transforms(self, length: int) -> int:
+        """Count the transforms of so many samples."""
+        return 1 + (length - self.window) // self.stride
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,8 +5,7 @@ from bisect import bisect_right
 import numpy as np
 
 from models.features import levels
-from models.profile import Profile
-from models.resolution import Resolution
+from models.profile import Profile, Resolution
 from models.types import Array, Index
 
 

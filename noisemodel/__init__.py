@@ -9,6 +9,7 @@ from noisemodel.block import Block
 from noisemodel.catalog import ROBOTS
 from noisemodel.compare import compare
 from noisemodel.comparison import Comparison
+from noisemodel.decimation import lowered
 from noisemodel.errors import (
     CornerError,
     GeometryError,
@@ -25,7 +26,6 @@ from noisemodel.errors import (
 )
 from noisemodel.extended import extended, extended_chunks
 from noisemodel.kinematics import link_twists
-from noisemodel.lowering import lowered
 from noisemodel.noise import Noise
 from noisemodel.norms import by_joint, norms
 from noisemodel.robot import Robot

@@ -1,8 +1,10 @@
 """The robot: read once by Pinocchio, then a table of joints."""
 
+import os
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import suppress
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -12,7 +14,6 @@ import numpy as np
 from noisemodel import catalog, urdf
 from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRobotError
 from noisemodel.joints import Joint, table_of
-from noisemodel.native import kept_stderr
 from noisemodel.run import Run
 from noisemodel.types import Array, Real
 from noisemodel.urdf import Mimic
@@ -278,3 +279,20 @@ def _leader(name: str, mimics: Mapping[str, Mimic], path: Path) -> tuple[str, fl
         multiplier, offset = multiplier * mimic.multiplier, multiplier * mimic.offset + offset
         name = mimic.joint
     raise RobotError(f"{path}: joint {name!r} mimics itself")
+
+
+@contextmanager
+def kept_stderr() -> Iterator[Callable[[], str]]:
+    """Keep what the process writes to file descriptor 2 while the block runs.
+
+    Yields:
+        A function that returns what was written so far.
+    """
+    with tempfile.TemporaryFile() as kept:
+        terminal = os.dup(2)
+        os.dup2(kept.fileno(), 2)
+        try:
+            yield lambda: os.pread(kept.fileno(), 2**16, 0).decode(errors="replace")
+        finally:
+            os.dup2(terminal, 2)
+            os.close(terminal)

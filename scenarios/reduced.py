@@ -1,18 +1,33 @@
 """A robot's Pinocchio model with only those joints that its scenarios move."""
 
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import pinocchio as pin
 
 from noisemodel import Robot
+from scenarios.drivetrain import Drivetrain
 from scenarios.errors import UnsupportedModelError
 
-if TYPE_CHECKING:
-    from scenarios.robots import Simulated
+
+class Reducible(Protocol):
+    """What a robot has to say of its joints; robots of every family do."""
+
+    @property
+    def name(self) -> str:
+        """Name of the URDF, as `noisemodel.ROBOTS` lists it."""
+
+    @property
+    def drives(self) -> Drivetrain:
+        """The joints that move."""
+
+    @property
+    def held(self) -> Mapping[str, float]:
+        """Joints that are held elsewhere than at 0, and where, in [rad] or [m]."""
 
 
-def reduced_model(robot: "Simulated") -> Any:
+def reduced_model(robot: Reducible) -> Any:
     """Read a robot's Pinocchio model, all joints locked that it does not move.
 
     Args:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from models.evaluation.predictions import Heard
 from models.framing import frame_starts
 from models.labels import Labels
-from models.measuring.heard import Heard
 from models.recording import Block
 from models.splitting import group_of
 

@@ -3,7 +3,13 @@
 import sys
 from pathlib import Path
 
-from inspector.shot import headless_viewer, missing_packages, picture, settled, shoot
+from inspector.recording.screenshot import (
+    headless_viewer,
+    missing_packages,
+    picture,
+    settled,
+    shoot,
+)
 
 __all__ = ["DRIVERS", "MISSING", "headless_viewer", "picture", "settled"]
 

@@ -77,6 +77,74 @@ def test_importing_a_package_imports_no_more_than_it_should(package, never):
     assert loaded.stdout.strip() == "[]"
 
 
-def test_modules_are_short():
-    for path, _ in modules():
-        assert len(path.read_text().splitlines()) <= 300, path
+def name_of(path):
+    """A module's dotted name; a package's is that of its folder."""
+    parts = path.relative_to(ROOT).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+MODULES = {name_of(path): path for path, _ in modules()}
+
+
+def modules_imported(path):
+    """Names of our modules that a module imports, anywhere in it; packages only for their own."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in MODULES)
+        elif isinstance(node, ast.ImportFrom):
+            for alias in node.names:
+                name = f"{node.module}.{alias.name}"
+                name = name if name in MODULES else node.module
+                if name in MODULES:
+                    yield name
+
+
+def room_of(name):
+    """The folder that a module is in, or the module itself if it lies flat in its package."""
+    parts = name.split(".")
+    inside = MODULES[name].name == "__init__.py" or len(parts) > 2
+    return ".".join(parts[:2]) if inside else name
+
+
+def circle(arrows):
+    """One circle in a graph of names and those that each points to, or an empty list."""
+    done, path = set(), []
+
+    def visit(name):
+        if name in path:
+            return [*path[path.index(name) :], name]
+        if name in done:
+            return []
+        path.append(name)
+        for other in sorted(arrows.get(name, ())):
+            if found := visit(other):
+                return found
+        path.pop()
+        done.add(name)
+        return []
+
+    return next((found for name in sorted(arrows) if (found := visit(name))), [])
+
+
+def test_a_circle_is_recognised():
+    assert circle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
+    assert circle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_modules_do_not_import_each_other_in_a_circle():
+    arrows = {
+        name: {other for other in modules_imported(path) if not name.startswith(f"{other}.")}
+        for name, path in MODULES.items()
+    }
+    assert circle(arrows) == []
+
+
+@pytest.mark.parametrize("package", sorted(OURS))
+def test_rooms_import_downwards(package):
+    arrows = {}
+    for name, path in MODULES.items():
+        if name.split(".")[0] == package and name != package:
+            rooms = {room_of(other) for other in modules_imported(path) if other != package}
+            own = {room for room in rooms if room.startswith(f"{package}.")}
+            arrows.setdefault(room_of(name), set()).update(own - {room_of(name)})
+    assert circle(arrows) == []

@@ -3,9 +3,9 @@ import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
 
 from inspector.audit.bandwidth import ENCODERS, bandwidth
-from inspector.audit.holding import held_for
-from inspector.audit.rounding import step_of
-from inspector.audit.slopes import CENTRAL, SMOOTH, slope_of
+from inspector.audit.differentiation import CENTRAL, SMOOTH, slope_of
+from inspector.audit.hold import held_for
+from inspector.audit.quantisation import step_of
 from inspector.audit.spectrum import spectrum
 from noisemodel import Run
 

@@ -3,11 +3,11 @@ import pytest
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
+from inspector.analysis.verdict import Status, exit_status, judge
 from inspector.assets import demo_run, model_files
 from inspector.audit import Sight, audit, shortcomings, summary
 from inspector.audit.sight import OSCILLATIONS, band_edges, has_frame
-from inspector.labelling import CannotTellError, label_run, load_library
-from inspector.verdict import Status, exit_status, judge
+from inspector.library import CannotTellError, label_run, load_library
 from models import Profile
 from noisemodel import Run, lowered
 

@@ -2,9 +2,8 @@ import numpy as np
 import pytest
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.audit.copying import copies
-from inspector.audit.excerpt import excerpt
-from inspector.audit.gaps import gaps_of
+from inspector.audit.audit import excerpt, gaps_of
+from inspector.audit.copies import copies
 from inspector.audit.units import unit_doubts
 
 

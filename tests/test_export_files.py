@@ -9,10 +9,10 @@ import pytest
 from commandline import call
 from mcap.reader import make_reader
 
+from inspector.analysis.level import estimate
 from inspector.assets import demo_run, model_files
 from inspector.export import collect, export
-from inspector.labelling import load_library
-from inspector.loudness import estimate
+from inspector.library import load_library
 from noisemodel import Block, Run, simplified
 
 LIBRARY = load_library(model_files())

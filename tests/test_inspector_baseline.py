@@ -9,7 +9,7 @@ import pytest
 from commandline import call
 
 import models
-from inspector.baseline import learn
+from inspector.training.baseline import learn
 from noisemodel import Block, Run
 
 RATE = 1000.0

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inspector import viewer
 from inspector.assets import demo_run, model_files
 from inspector.cli import main
+from inspector.recording import viewer
 from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]

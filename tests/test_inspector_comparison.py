@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from chains import chain
 
-from inspector.comparing import (
+from inspector.comparison.compared import Compared, Failed
+from inspector.comparison.comparing import (
     Settings,
     compare_all,
     compare_robot,
@@ -13,9 +14,7 @@ from inspector.comparing import (
     sorted_out,
     sources_of,
 )
-from inspector.comparison import Compared, Failed
 from inspector.errors import InspectorError
-from inspector.motions import made_up
 from noisemodel import (
     ROBOTS,
     Block,
@@ -26,6 +25,7 @@ from noisemodel import (
     UnknownKindError,
     UnknownRobotError,
 )
+from noisemodel.excitation import made_up
 
 FEW = Settings(("simplified", "C", "paper", "normal"))
 

@@ -7,13 +7,13 @@ import rerun as rr
 from chains import chain
 from rerun.chunk import RrdReader
 
-from inspector import picture
 from inspector.cli import main
-from inspector.comparing import Settings, compare_robot
-from inspector.comparisoncsv import write_csv
-from inspector.comparisonrecording import levels, write
-from inspector.comparisontable import medians, table
-from inspector.motions import made_up
+from inspector.comparison import picture
+from inspector.comparison.comparing import Settings, compare_robot
+from inspector.comparison.csv import write_csv
+from inspector.comparison.recording import levels, write
+from inspector.comparison.table import medians, table
+from noisemodel.excitation import made_up
 
 KINDS = ("simplified", "paper", "normal")
 

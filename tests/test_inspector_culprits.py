@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from inspector.culprits import culprits
-from inspector.linknoise import LinkNoise, link_noise
-from inspector.stagesfirst import First
+from inspector.localisation.links import culprits
+from inspector.localisation.stage import First
 from models import Event
 from noisemodel import Robot, Run
+from noisemodel.links import LinkNoise, link_noise
 
 LINKS = ("body", "thigh", "foot", "other_foot")
 MOVERS = (set(), {"hip"}, {"hip", "knee"}, {"other_knee"})

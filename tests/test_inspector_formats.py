@@ -4,10 +4,10 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from inspector.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
-from inspector.origin import Origin
-from inspector.stagesfirst import First
-from inspector.verdict import Status, Verdict, exit_status
+from inspector.analysis.verdict import Status, Verdict, exit_status
+from inspector.localisation.localise import Origin
+from inspector.localisation.stage import First
+from inspector.report.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
 from models import Event
 
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "scalar-10khz")

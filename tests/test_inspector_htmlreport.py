@@ -9,12 +9,12 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from inspector import htmlreport
+from inspector.analysis.inspection import inspect
 from inspector.assets import demo_run, model_files
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.inspection import inspect
-from inspector.labelling import load_library
+from inspector.library import load_library
+from inspector.report import html
 from models import Event
 from noisemodel import Block, OutputError, Run
 
@@ -64,7 +64,7 @@ def inspected(run, tmp_path, **changes):
 
 @pytest.fixture(scope="module")
 def demo():
-    return htmlreport.page(inspect(demo_run(), load_library(model_files())), audit="rate: 10 kHz")
+    return html.page(inspect(demo_run(), load_library(model_files())), audit="rate: 10 kHz")
 
 
 def test_the_page_of_the_demo_is_valid_and_has_everything(demo):
@@ -107,7 +107,7 @@ def test_the_picture_and_the_sound_are_whole(demo):
 
 
 def test_a_run_without_robot_labels_and_findings_has_a_page_too(tmp_path):
-    page = Page(htmlreport.page(inspected(short_run(), tmp_path)))
+    page = Page(html.page(inspected(short_run(), tmp_path)))
     assert "Cannot tell" in page.words
     assert "No 3D robot: the run names none." in page.words
     assert "Links" not in page.words
@@ -115,7 +115,7 @@ def test_a_run_without_robot_labels_and_findings_has_a_page_too(tmp_path):
 
 
 def test_joints_are_ordered_by_what_vibrates_in_them(tmp_path):
-    words = Page(htmlreport.page(inspected(short_run(), tmp_path))).words
+    words = Page(html.page(inspected(short_run(), tmp_path))).words
     # Amplitudes of 1 and 0.2: powers of 25 to 1.
     assert re.search(r"elbow 96\.\d% .* wrist 3\.\d%", words)
 
@@ -124,7 +124,7 @@ def test_names_cannot_smuggle_anything_into_the_page(tmp_path):
     evil = "<script>alert(1)</script>\"'&$\\frac{$"
     run = short_run(joint_names=(evil, "wrist"), blocks=(Block(1.0, 2.0, f"<b>{evil}"),))
     found = inspected(run, tmp_path, name=evil)
-    text = htmlreport.page(found, audit=f"{evil}\x00\x1b[31m")
+    text = html.page(found, audit=f"{evil}\x00\x1b[31m")
     page = Page(text)
     assert "script" not in page.tags
     assert "b" not in page.tags
@@ -135,7 +135,7 @@ def test_names_cannot_smuggle_anything_into_the_page(tmp_path):
 def test_a_log_too_slow_for_ears_has_no_sound(tmp_path):
     time = np.arange(600) / 30
     run = short_run(time=time, velocity=np.sin(np.stack((time, 2 * time), axis=1)))
-    page = Page(htmlreport.page(inspected(run, tmp_path)))
+    page = Page(html.page(inspected(run, tmp_path)))
     assert "audio" not in page.tags
     assert "too slow for ears" in page.words
 
@@ -144,14 +144,14 @@ def test_gaps_and_silence_are_drawn(tmp_path):
     valid = np.ones(6000, dtype=bool)
     valid[2000:4000] = False
     still = short_run(velocity=np.zeros((6000, 2)), valid=valid)
-    page = Page(htmlreport.page(inspected(still, tmp_path)))
+    page = Page(html.page(inspected(still, tmp_path)))
     assert "img" in page.tags
     assert "silent: nothing reaches 1e-06 rad/s" in page.words
 
 
 def test_findings_are_listed_with_their_scores(tmp_path):
     events = (Event("impact", 1.0, 1.5, 0.9), Event("wobble", 3.0, 3.5, 0.7))
-    words = Page(htmlreport.page(inspected(short_run(), tmp_path, events=events))).words
+    words = Page(html.page(inspected(short_run(), tmp_path, events=events))).words
     assert "impact 1.00 1.50 0.90" in words
     assert "wobble 3.00 3.50 0.70" in words
 
@@ -159,21 +159,21 @@ def test_findings_are_listed_with_their_scores(tmp_path):
 def test_many_joints_are_cut_to_the_loudest_and_that_is_said(tmp_path):
     names = tuple(f"joint{i}" for i in range(30))
     run = short_run(velocity=np.ones((6000, 30)), joint_names=names)
-    words = Page(htmlreport.page(inspected(run, tmp_path))).words
+    words = Page(html.page(inspected(run, tmp_path))).words
     assert "10 quieter ones are left out." in words
 
 
 def test_a_page_that_exists_is_kept(tmp_path):
     (tmp_path / "out.html").write_text("precious")
     with pytest.raises(OutputError, match="exists already"):
-        htmlreport.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
+        html.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
     assert (tmp_path / "out.html").read_text() == "precious"
 
 
 def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
-    monkeypatch.setattr(htmlreport, "find_spec", lambda _: None)
+    monkeypatch.setattr(html, "find_spec", lambda _: None)
     with pytest.raises(InspectorError, match=r'pip install "noise-inspector\[report\]"'):
-        htmlreport.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
+        html.write(inspected(short_run(), tmp_path), tmp_path / "out.html")
 
 
 def test_the_command_line_writes_a_page(tmp_path, monkeypatch, capsys):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inspector.assets import model_files
-from inspector.labelling import (
+from inspector.library import (
     CannotTellError,
     for_robot,
     label_noise,

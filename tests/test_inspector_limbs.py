@@ -1,7 +1,7 @@
 from types import SimpleNamespace
 
-from inspector import scene
-from inspector.limbs import limbs
+from inspector.recording import robot
+from inspector.recording.limbs import limbs
 from noisemodel import Robot
 
 
@@ -21,7 +21,7 @@ def test_talos_has_two_legs_a_torso_two_arms_and_a_head(tmp_path):
         for name in Robot.load("talos").joint_names
         if name.startswith(("leg", "arm", "torso", "head")) or name == "gripper_left_joint"
     ]
-    found = limbs(names, scene.load("talos", tmp_path))
+    found = limbs(names, robot.load("talos", tmp_path))
     counts = {limb: len(joints) for limb, joints in found.items()}
     assert counts == {
         "leg_left": 6,
@@ -59,6 +59,6 @@ def test_without_a_robot_eight_neighbours_make_a_limb():
 def test_every_joint_is_in_one_limb_whatever_the_robot(tmp_path):
     for name in ("go2", "panda", "icub", "anymal"):
         names = Robot.load(name).joint_names
-        found = limbs(names, scene.load(name, tmp_path))
+        found = limbs(names, robot.load(name, tmp_path))
         assert sorted(joint for joints in found.values() for joint in joints) == sorted(names)
         assert max(map(len, found.values())) <= 10

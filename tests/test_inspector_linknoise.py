@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from inspector.linklevels import STATES, levels, shades, states
-from inspector.linknoise import link_noise, vibrating
+from inspector.recording.links import STATES, levels, shades, states
 from noisemodel import Robot, Run, Surface, extended
+from noisemodel.links import link_noise, vibrating
 
 
 def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from inspector.linknoise import link_noise
-from inspector.linkpower import by_moments, second_moments
 from noisemodel import Robot, Run, Surface, extended
+from noisemodel.linkpower import by_moments, second_moments
+from noisemodel.links import link_noise
 
 SIZE = 20
 

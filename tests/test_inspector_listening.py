@@ -9,12 +9,12 @@ import pytest
 from chains import chain
 
 import noisemodel as nm
-from inspector import listening
+from inspector.analysis.level import estimate
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.listening import Settings, common_gain, listen, said, save
-from inspector.loudness import estimate
+from inspector.sound import listening
 from inspector.sound.clip import clip
+from inspector.sound.listening import Settings, common_gain, listen, said, save
 from inspector.sound.mixing import mix
 from noisemodel import OutputError, Run
 

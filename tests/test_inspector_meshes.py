@@ -4,8 +4,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from inspector import scene
-from inspector.meshes import FACET, MeshError, drawable
+from inspector.recording import robot as scene
+from inspector.recording.robot import FACET, MeshError, drawable
 from noisemodel import meshfile
 
 TRIANGLE = b"\0" * 80 + (1).to_bytes(4, "little") + b"\0" * 50

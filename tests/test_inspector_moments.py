@@ -3,8 +3,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inspector.inspection import inspect
-from inspector.moments import worst
+from inspector.analysis.inspection import inspect
+from inspector.analysis.moments import worst
 from models import Event
 from noisemodel import Block, Run
 

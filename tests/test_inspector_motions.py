@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from chains import chain
 
-from inspector.motions import RATE, SHAKES, ends, limits, made_up
 from noisemodel import Robot
+from noisemodel.excitation import RATE, SHAKES, ends, limits, made_up
 
 ODD = (
     "panda",  # prismatic, mimic

@@ -4,17 +4,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from inspector.analysis.inspection import inspect
+from inspector.analysis.tracing import trace_all
+from inspector.analysis.verdict import Status, Verdict, judge
 from inspector.assets import demo_run, model_files
-from inspector.htmltables import found as tables
-from inspector.inspection import inspect
-from inspector.labelling import load_library
-from inspector.origin import Origin, origins
-from inspector.originband import band
-from inspector.originquiet import quiet
-from inspector.report import report, sentence
-from inspector.stagesfirst import First
-from inspector.tracing import trace_all
-from inspector.verdict import Status, Verdict, judge
+from inspector.library import load_library
+from inspector.localisation.band import band
+from inspector.localisation.localise import Origin, origins
+from inspector.localisation.quiet import quiet
+from inspector.localisation.stage import First
+from inspector.report.html import found as tables
+from inspector.report.markdown import report, sentence
 from models import Event
 from noisemodel import Block, Run
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inspector.assets import demo_run, model_files
-from inspector.labelling import load_library
+from inspector.library import load_library
 from inspector.pair import Align, PairError, changes, compare, report, summary
 from inspector.pair.alignment import align
 from inspector.pair.common import alike, part

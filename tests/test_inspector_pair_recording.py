@@ -11,7 +11,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from inspector.cli import main
-from inspector.pair import colours, compare
+from inspector.pair import colors, compare
 from inspector.pair.recording import write
 from models import Event, Labels
 from noisemodel import Block, OutputError, Run
@@ -137,8 +137,8 @@ def test_every_entity_has_its_columns_and_there_is_no_other(whole):
 def test_both_noises_lie_over_each_other_in_two_colours(whole):
     path, pair = whole
     for name, side, color in (
-        ("before", pair.before, colours.BEFORE),
-        ("after", pair.after, colours.AFTER),
+        ("before", pair.before, colors.BEFORE),
+        ("after", pair.after, colors.AFTER),
     ):
         time, noise = scalars(path, f"/noise/{name}")
         np.testing.assert_allclose(noise[:, 0], side.noise, rtol=1e-12)
@@ -228,7 +228,7 @@ def test_both_spectrograms_have_one_scale_and_the_difference_its_own(whole):
         sum(row[0].to_bytes(4, "big")[:3]) for row in before
     )
     _, change = read(path, "/spectrogram/change/05", "SeriesLines:colors")  # 240 Hz
-    shade = colours.diverging(np.array([20 * np.log10(2)]))[0]
+    shade = colors.diverging(np.array([20 * np.log10(2)]))[0]
     drawn = [row[0].to_bytes(4, "big") for row in change]
     assert bytes(shade) in drawn
     assert 1900.0 < scalars(path, "/spectrogram/change/47")[1][0, 0] < 2000.0
@@ -240,19 +240,19 @@ def test_the_robot_is_coloured_by_what_became_louder(whole):
     time, rgba = read(path, mesh, "Asset3D:albedo_factor")
     shades = {round(t, 2): row[0].to_bytes(4, "big") for t, row in zip(time, rgba, strict=True)}
     at = max(t for t in shades if t <= 0.7)
-    assert shades[at] == bytes(colours.diverging(np.array([20 * np.log10(2)]))[0])
+    assert shades[at] == bytes(colors.diverging(np.array([20 * np.log10(2)]))[0])
     time, (still,) = read(
         path, "/robot/panda/visual_geometries/panda_link0/visual_0", "Asset3D:albedo_factor"
     )
     assert time is None
-    assert still == [int.from_bytes([*colours.SAME, 255], "big")]
+    assert still == [int.from_bytes([*colors.SAME, 255], "big")]
 
 
 def test_colours_tell_louder_from_quieter_and_grow_with_the_change():
-    quieter, same, louder, much = colours.diverging(np.array([-12.0, 0.0, 3.0, 40.0]))[:, :3]
-    assert tuple(quieter) == colours.BEFORE
-    assert tuple(same) == colours.SAME
-    assert tuple(much) == colours.AFTER
+    quieter, same, louder, much = colors.diverging(np.array([-12.0, 0.0, 3.0, 40.0]))[:, :3]
+    assert tuple(quieter) == colors.BEFORE
+    assert tuple(same) == colors.SAME
+    assert tuple(much) == colors.AFTER
     assert same[0] < louder[0] < much[0]
 
 
@@ -305,7 +305,7 @@ def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
         if "/spectrogram/" not in line:
             assert not scalars(tmp_path / "out.rrd", line)[1].any(), line
     rgba = read(tmp_path / "out.rrd", "/spectrogram/change/**", "SeriesLines:colors")[1]
-    assert {row[0] for row in rgba} == {int.from_bytes([*colours.SAME, 255], "big")}
+    assert {row[0] for row in rgba} == {int.from_bytes([*colors.SAME, 255], "big")}
     assert read(tmp_path / "out.rrd", "/class/change", "StateChange:state")[1][0] == ["stayed"]
 
 

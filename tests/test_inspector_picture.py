@@ -2,10 +2,10 @@ import struct
 
 import pytest
 
+from inspector.analysis.inspection import inspect
 from inspector.assets import demo_run, model_files
-from inspector.inspection import inspect
-from inspector.labelling import load_library
-from inspector.recording import write
+from inspector.library import load_library
+from inspector.recording.recording import write
 
 picture = pytest.importorskip("picture")
 pytestmark = pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING)

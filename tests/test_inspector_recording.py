@@ -9,10 +9,10 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
+from inspector.analysis.inspection import Inspection, inspect
 from inspector.colors import LOUDNESS
 from inspector.errors import InspectorError
-from inspector.inspection import Inspection, inspect
-from inspector.recording import NOISE_POINTS, write
+from inspector.recording.recording import NOISE_POINTS, write
 from models import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
 
@@ -494,7 +494,7 @@ def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):
         raise InspectorError("broken off")
 
     found = inspected(panda_run(robot=None), tmp_path)
-    monkeypatch.setattr("inspector.recording._log_text", break_off)
+    monkeypatch.setattr("inspector.recording.recording._log_text", break_off)
     with pytest.raises(InspectorError, match="broken off"):
         write(found, tmp_path / "out.rrd")
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz"}

@@ -1,4 +1,4 @@
-from inspector.reportlinks import linked
+from inspector.recording.recording import linked
 
 ENTITIES = {"arm_2_link": "/robot/arm/visual_geometries/arm_2_link"}
 

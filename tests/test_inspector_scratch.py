@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from inspector import viewer
+from inspector.recording import viewer
 
 
 @pytest.fixture

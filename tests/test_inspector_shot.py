@@ -4,12 +4,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inspector import shot
+from inspector.analysis.inspection import inspect
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.inspection import inspect
-from inspector.recording import write
-from inspector.viewer import ViewerError
+from inspector.recording import screenshot
+from inspector.recording.recording import write
+from inspector.recording.viewer import ViewerError
 from noisemodel import OutputError, Run
 
 
@@ -23,10 +23,10 @@ def recording(folder: Path) -> Path:
 
 @pytest.mark.slow  # test_inspector_picture takes one of the demo
 def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp_path):
-    if shot.missing_packages():
-        pytest.skip(f"needs {' and '.join(shot.missing_packages())}")
+    if screenshot.missing_packages():
+        pytest.skip(f"needs {' and '.join(screenshot.missing_packages())}")
     output = tmp_path / "out.png"
-    assert shot.shoot(recording(tmp_path), output, 2.0, size=(800, 500)) == ()
+    assert screenshot.shoot(recording(tmp_path), output, 2.0, size=(800, 500)) == ()
     png = output.read_bytes()
     assert png.startswith(b"\x89PNG")
     assert struct.unpack(">II", png[16:24]) == (800, 500)
@@ -34,40 +34,42 @@ def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp
 
 
 def test_system_packages_that_are_missing_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(shot, "find_library", lambda _: None)
-    monkeypatch.setattr(shot, "DRIVER_FOLDERS", (tmp_path,))
-    monkeypatch.setattr(shot.sys, "platform", "linux")
+    monkeypatch.setattr(screenshot, "find_library", lambda _: None)
+    monkeypatch.setattr(screenshot, "DRIVER_FOLDERS", (tmp_path,))
+    monkeypatch.setattr(screenshot.sys, "platform", "linux")
     with pytest.raises(ViewerError, match="`apt-get install libvulkan1 mesa-vulkan-drivers`"):
-        shot.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
-    monkeypatch.setattr(shot, "find_library", lambda _: "libvulkan.so.1")
+        screenshot.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
+    monkeypatch.setattr(screenshot, "find_library", lambda _: "libvulkan.so.1")
     with pytest.raises(ViewerError, match="`apt-get install mesa-vulkan-drivers`"):
-        shot.require()
+        screenshot.require()
 
 
 def test_a_picture_that_exists_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(shot, "require", lambda: None)
-    (tmp_path / "run.rrd").write_bytes(shot.MAGIC)
+    monkeypatch.setattr(screenshot, "require", lambda: None)
+    (tmp_path / "run.rrd").write_bytes(screenshot.MAGIC)
     (tmp_path / "out.png").write_text("precious")
     with pytest.raises(OutputError, match="exists already"):
-        shot.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
+        screenshot.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
 
 
 def test_a_viewer_that_ends_is_one_line(monkeypatch):
     monkeypatch.setattr(
-        shot.viewer, "command", lambda *_: ["/bin/sh", "-c", "echo Error: no luck >&2; exit 7"]
+        screenshot.viewer,
+        "command",
+        lambda *_: ["/bin/sh", "-c", "echo Error: no luck >&2; exit 7"],
     )
     with (
         pytest.raises(ViewerError, match=r"ended with status 7 \(no luck\)"),
-        shot.headless_viewer(),
+        screenshot.headless_viewer(),
     ):
         pass
 
 
 def test_a_size_is_width_and_height():
-    assert shot.parse_size("1920x1080") == (1920, 1080)
+    assert screenshot.parse_size("1920x1080") == (1920, 1080)
     for wrong in ("1920", "12x12", "ax900", "99999x900"):
         with pytest.raises(InspectorError, match=f"a size of '{wrong}', expected"):
-            shot.parse_size(wrong)
+            screenshot.parse_size(wrong)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +81,7 @@ def test_a_size_is_width_and_height():
     ],
 )
 def test_what_cannot_be_shot_is_one_line(arguments, text, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(shot, "require", lambda: None)
+    monkeypatch.setattr(screenshot, "require", lambda: None)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["inspector", "shot", *arguments, "-o", "out.png"])
     with pytest.raises(SystemExit) as end:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import inspector
-from inspector import cell, notebook, viewer
-from inspector.viewer import ViewerError
+from inspector.recording import cell, notebook, viewer
+from inspector.recording.viewer import ViewerError
 from noisemodel import Run, RunFileError
 
 ROOT = Path(__file__).parents[1]

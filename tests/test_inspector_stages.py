@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from inspector import stagesonset
-from inspector.stages import flow
-from inspector.stagesfirst import first_stage
-from inspector.stagesnew import changes, usual
+from inspector.localisation import onset
+from inspector.localisation.flow import flow
+from inspector.localisation.innovation import changes, usual
+from inspector.localisation.stage import first_stage
 from models import Event
 from noisemodel import Block, Run
 
@@ -178,12 +178,12 @@ def test_slow_motion_is_no_change():
 def test_an_onset_is_the_sample_at_which_something_sets_in():
     sharp = np.full(2000, 1.0)
     sharp[1000:1100] = 50.0
-    moment = stagesonset.rise(sharp, 900, 1100, rate=10000.0)
-    assert stagesonset.onset(sharp, moment, rate=10000.0) == 1000
-    assert stagesonset.onset(np.ones(2000), 1000, rate=10000.0) is None
+    moment = onset.rise(sharp, 900, 1100, rate=10000.0)
+    assert onset.onset(sharp, moment, rate=10000.0) == 1000
+    assert onset.onset(np.ones(2000), 1000, rate=10000.0) is None
 
 
 def test_of_two_rises_the_first_counts_if_it_is_steep():
     sharp = np.full(4000, 1.0)
     sharp[1000:1100], sharp[1800:1900] = 40.0, 60.0
-    assert abs(stagesonset.rise(sharp, 600, 2000, rate=10000.0) - 1000) < 20
+    assert abs(onset.rise(sharp, 600, 2000, rate=10000.0) - 1000) < 20

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-import inspector.tuning
+import inspector.training.tuning
 import models
 
 GRID = ("--grid", "stride=25,50", "--grid", "gamma=0.001,0.01", "--grid", "C=0.1,1,10")
@@ -75,7 +75,7 @@ def counted(monkeypatch):
         points.extend(profiles)
         return models.tuning.search.measure(profiles, trial)
 
-    monkeypatch.setattr(inspector.tuning, "measure", measure)
+    monkeypatch.setattr(inspector.training.tuning, "measure", measure)
     return points
 
 

@@ -13,10 +13,10 @@ import browser
 import numpy as np
 import pytest
 
-from inspector import viewer, webview
-from inspector.inspection import inspect
-from inspector.recording import write
-from inspector.viewer import ViewerError
+from inspector.analysis.inspection import inspect
+from inspector.recording import viewer, web
+from inspector.recording.recording import write
+from inspector.recording.viewer import ViewerError
 from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]
@@ -81,7 +81,7 @@ def listening_on(pid):
 
 
 def test_a_recording_is_served_on_loopback_only_and_no_longer_than_asked(recording):
-    with webview.serving(recording) as served:
+    with web.serving(recording) as served:
         page, data = served.url.split("/?url=")
         assert page.startswith("http://127.0.0.1:")
         assert data.startswith("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A")
@@ -92,7 +92,7 @@ def test_a_recording_is_served_on_loopback_only_and_no_longer_than_asked(recordi
             assert len(addresses) == 2
             assert all(address.startswith("127.0.0.1:") for address in addresses)
     port = int(page.rpartition(":")[2])
-    assert webview.free_port(port) == port
+    assert web.free_port(port) == port
 
 
 def test_a_port_that_is_taken_is_one_line(recording):
@@ -102,7 +102,7 @@ def test_a_port_that_is_taken_is_one_line(recording):
         port = other.getsockname()[1]
         with (
             pytest.raises(ViewerError, match=f"port {port} cannot be had .*name another, or none"),
-            webview.serving(recording, port=port),
+            web.serving(recording, port=port),
         ):
             pass
 
@@ -111,13 +111,13 @@ def test_a_server_that_dies_at_once_says_why(monkeypatch, recording):
     says(monkeypatch, "echo Error: no memory >&2; exit 3")
     with (
         pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"),
-        webview.serving(recording),
+        web.serving(recording),
     ):
         pass
 
 
 def test_a_server_that_dies_later_says_so(recording):
-    with webview.serving(recording) as served:
+    with web.serving(recording) as served:
         os.killpg(served.process.pid, signal.SIGKILL)
         with pytest.raises(ViewerError, match="the viewer ended with status -9"):
             served.wait()
@@ -143,12 +143,12 @@ def test_serving_ends_with_the_program_and_leaves_no_server(recording, stop):
             assert program.wait(timeout=20) == 0
         finally:
             program.kill()
-    assert webview.free_port(port) == port
+    assert web.free_port(port) == port
 
 
 @pytest.mark.slow
 def test_a_browser_draws_the_recording(recording, tmp_path):
-    with browser.page() as page, webview.serving(recording) as served:
+    with browser.page() as page, web.serving(recording) as served:
         page.goto(f"{served.url}&renderer=webgl")
         until = time.monotonic() + 240
         sizes = [0]

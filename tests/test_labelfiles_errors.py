@@ -6,7 +6,7 @@ from commandline import call
 
 from inspector.assets import demo_run
 from inspector.errors import InspectorError
-from inspector.labelfiles import LabelFileError, read_labels, write_labels
+from inspector.labels import LabelFileError, read_labels, write_labels
 from noisemodel import Block, OutputError, Run
 
 TIME = np.arange(1000) / 100

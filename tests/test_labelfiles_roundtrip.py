@@ -3,8 +3,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from inspector.labelfiles import LabelFileError, read_labels, write_labels
-from inspector.labelfiles.formats import FORMATS
+from inspector.labels import LabelFileError, read_labels, write_labels
+from inspector.labels.formats import FORMATS
 from models import Event, noisytest
 from noisemodel import Block, Run, RunError
 

@@ -6,16 +6,17 @@ from hypothesis import strategies as st
 
 import models
 import noisemodel as nm
-from inspector import assets, scene
-from inspector.labelling import load_library
+from inspector import assets
+from inspector.library import load_library
 from inspector.live.clock import Clock
-from inspector.live.ear import Ear
+from inspector.live.decimator import Slower
+from inspector.live.labeller import Ear
 from inspector.live.lane import Lane
-from inspector.live.moving import Moving
 from inspector.live.norms import NOISY, Norms
-from inspector.live.slower import Slower
-from inspector.live.strip import QUIETEST_DB, Strip
-from inspector.live.troubles import Troubles
+from inspector.live.robot import Moving
+from inspector.live.spectrogram import QUIETEST_DB, Strip
+from inspector.live.warnings import Troubles
+from inspector.recording import robot as scene
 
 CLASSES = ("ok", "impact")
 

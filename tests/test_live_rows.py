@@ -11,9 +11,9 @@ import pytest
 
 from inspector.live import LiveError
 from inspector.live.csvrows import CsvReader
-from inspector.live.feeding import follow
+from inspector.live.feeding import follow, reader_of
 from inspector.live.jsonrows import JsonReader
-from inspector.live.rows import AT_ONCE, FEW, LONGEST, blocks, reader_of, widen
+from inspector.live.rows import AT_ONCE, FEW, LONGEST, blocks, widen
 
 HEAD = b"time,elbow.velocity,wrist.velocity,elbow.position,wrist.position,load"
 

@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 import inspector
 import noisemodel as nm
 from inspector import assets
-from inspector.labelling import load_library
+from inspector.library import load_library
 from inspector.live import LiveError
 from inspector.live.session import BLOCK
 from noisemodel import OutputError, UnknownJointError

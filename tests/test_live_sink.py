@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import inspector
-from inspector import viewer
 from inspector.live import SinkError
 from inspector.live import sink as module
 from inspector.live.sink import Sink
+from inspector.recording import viewer
 
 
 def free_port():

@@ -6,8 +6,8 @@ import pytest
 from hearings import BLOW, CLASSES, QUIET, heard, many
 
 import models
-from models.evaluation import Evaluation
-from models.measuring.assessment import judge
+from models.confusion import Evaluation
+from models.evaluation.assessment import judge
 
 RATE = 1000.0
 PROFILE = models.LogBands(classes=("ok", "oscillations")).at(RATE)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import models
-from models.baseline import MOTION, NOISE_ALONE, Baseline, cover, distance
-from models.baselinelimit import HOUR, PEAKS, alarm_peaks, limit
-from models.baselinetraining import GUARD, _parts
+from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, cover, distance
+from models.novelty.limit import HOUR, PEAKS, alarm_peaks, limit
+from models.novelty.training import GUARD, _parts
 
 RATE = 1000.0
 PROFILE = MOTION.at(RATE)

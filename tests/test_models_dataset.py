@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import models
-from models.cutting import cut
+from models.dataset import cut
 from models.recording import Block, Recording
 
 PROFILE = replace(models.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import models
-from models.evaluation import Evaluation
+from models.confusion import Evaluation
 
 TRUTH = np.array(["ok"] * 6 + ["impact"] * 2 + ["oscillations"] * 2)
 CLASSES = ("ok", "impact", "oscillations")

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from hearings import BLOW, QUIET, SWING, blocks, frames, heard, many, perfect
 
-from models.measuring.eventmeasures import measure
-from models.measuring.eventscore import score
-from models.measuring.intervals import Resampling
-from models.measuring.matching import Matched
+from models.evaluation.eventmeasures import measure
+from models.evaluation.eventscore import score
+from models.evaluation.intervals import Resampling
+from models.evaluation.matching import Matched
 
 COUNT = len(frames())
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import models
+from models.estimators.svm import fit
 from models.features import compress, dct, spectrogram
-from models.training import fit
 
 SETS = ("training", "validation", "validation_reduced_joints")
 COUNTS = {"training": [208, 22, 14, 47], "validation": [129, 11, 12, 39]}

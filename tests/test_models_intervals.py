@@ -3,7 +3,7 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from models.measuring.intervals import Resampling, garwood
+from models.evaluation.intervals import Resampling, garwood
 
 
 def each_its_own(runs):

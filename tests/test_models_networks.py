@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import models
-from models.networktraining import fit_networks
+from models.estimators.mlp import fit_networks
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")

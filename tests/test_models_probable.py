@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import models
-from models.calibration import calibrate, calibrated
+from models.estimators.calibration import calibrate, calibrated
+from models.estimators.estimator import learn
 from models.examples import Examples
 from models.signals import stacked
-from models.training import learn
 
 RATE = 1000.0
 PROFILE = models.GENERAL.at(RATE)

@@ -5,8 +5,7 @@ import pytest
 from sklearn.svm import SVC
 
 import models
-from models.svm import choose, machine_count, score
-from models.training import fit
+from models.estimators.svm import choose, fit, machine_count, score
 
 RANDOM = np.random.default_rng(3)
 CENTRES = RANDOM.standard_normal((4, 20))

@@ -2,11 +2,11 @@ import numpy as np
 import pytest
 from hearings import BLOW, CLASSES, QUIET, SWING, frames, heard, many, perfect
 
-from models.measuring.calibration import are_probabilities, reliability
-from models.measuring.eventscore import score
-from models.measuring.intervals import Resampling
-from models.measuring.matching import Matched
-from models.measuring.tradeoff import failure_score, trade_off
+from models.evaluation.calibration import are_probabilities, reliability
+from models.evaluation.eventscore import score
+from models.evaluation.intervals import Resampling
+from models.evaluation.matching import Matched
+from models.evaluation.tradeoff import failure_score, trade_off
 
 COUNT = len(frames())
 

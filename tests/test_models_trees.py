@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import models
-from models.trees import Trees
-from models.treetraining import fit_trees
+from models.estimators.trees import Trees, fit_trees
 
 
 @pytest.mark.parametrize("leaves", [2, 5, 16])

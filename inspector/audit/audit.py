@@ -1,18 +1,43 @@
 """The audit: what a log can show, and what looks wrong with it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 import models
 from inspector.audit.bandwidth import Bandwidth, bandwidth
-from inspector.audit.copying import copies
-from inspector.audit.excerpt import excerpt
-from inspector.audit.gaps import Gaps, gaps_of
-from inspector.audit.holding import held_for
+from inspector.audit.copies import copies
+from inspector.audit.hold import held_for
 from inspector.audit.sight import ClassSight, Sight, sights
 from inspector.audit.units import unit_doubts
-from inspector.labelling import for_robot, signals_of
+from inspector.library import for_robot, signals_of
 from noisemodel import Run
+from noisemodel.types import Real
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """What is missing of a run.
+
+    Attributes:
+        count: Gaps.
+        total: All of their time, in [s].
+        longest: That of the longest, in [s].
+    """
+
+    count: int = 0
+    total: float = 0.0
+    longest: float = 0.0
+
+    def __str__(self) -> str:
+        """Say it in a clause."""
+        if not self.count:
+            return "no gaps"
+        plural = "" if self.count == 1 else "s"
+        return (
+            f"{self.count} gap{plural}, {self.total:.3g} s in all, {self.longest:.3g} s the longest"
+        )
 
 
 @dataclass(frozen=True)
@@ -121,3 +146,55 @@ def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
             f"above {reach.quiet:.3g} Hz it is quieter than any encoder: filtered, or simulated"
             " without sensor noise"
         )
+
+
+def gaps_of(run: Run) -> Gaps:
+    """Count the stretches that a run marks as not valid.
+
+    Args:
+        run: The run.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], run.mask, [True]))))
+    lengths = np.diff(edges)[::2] / run.rate
+    if not len(lengths):
+        return Gaps()
+    return Gaps(len(lengths), float(lengths.sum()), float(lengths.max()))
+
+
+LONGEST = 60_000
+"""Samples of an excerpt: a minute at 1 kHz."""
+
+
+def excerpt(run: Run) -> Run:
+    """Take the part of a run around its fastest motion, so that an hour costs what minutes do.
+
+    Args:
+        run: The run.
+
+    Returns:
+        The run itself if it is short; else a part of it with its joints' motion alone.
+    """
+    if len(run.time) <= LONGEST:
+        return run
+    speed = np.einsum("sj,sj->s", run.velocity, run.velocity)
+    fastest = int(np.argmax(np.where(run.mask, speed, -1.0)))
+    start = min(max(0, fastest - LONGEST // 2), len(run.time) - LONGEST)
+    part = slice(start, start + LONGEST)
+
+    def cut(signal: Real | None) -> Real | None:
+        return None if signal is None else signal[part]
+
+    return replace(
+        run,
+        time=run.time[part],
+        velocity=run.velocity[part],
+        position=cut(run.position),
+        velocity_desired=cut(run.velocity_desired),
+        position_desired=cut(run.position_desired),
+        valid=run.mask[part],
+        effort=None,
+        base_pose=None,
+        base_velocity=None,
+        stages={},
+        blocks=(),
+    )

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from inspector.audit.audit import Audit, audit
 from inspector.errors import InspectorError
-from inspector.labelling import Library
+from inspector.library import Library
 from noisemodel import NoiseModelError, Run
 
 

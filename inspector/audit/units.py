@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from inspector.audit.slopes import derived
+from inspector.audit.differentiation import derived
 from noisemodel import Run
 from noisemodel.types import Array
 

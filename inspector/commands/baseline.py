@@ -5,7 +5,7 @@ from typing import Annotated
 import typer
 
 from inspector.commands.options import InPart, Inputs, Output, Overwrite
-from inspector.part import Part
+from inspector.training.part import Part
 
 
 def baseline(
@@ -31,7 +31,7 @@ def baseline(
     overwrite: Overwrite = False,
 ) -> None:
     """Learn from good runs alone what is good; what departs from that is then found."""
-    from inspector.baseline import learn
+    from inspector.training.baseline import learn
 
     learnt = learn(
         inputs,

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.part import Part
+from inspector.training.part import Part
 
 RunFile = Annotated[Path, typer.Argument(help="A run file (run.npz).", show_default=False)]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.")]

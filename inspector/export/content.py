@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import models
 import noisemodel as nm
-from inspector.inspection import robot_known
-from inspector.labelling import CannotTellError, Library, label_run
-from inspector.loudness import estimate
+from inspector.analysis.inspection import robot_known
+from inspector.analysis.level import estimate
+from inspector.library import CannotTellError, Library, label_run
 from noisemodel.types import Array
 
 

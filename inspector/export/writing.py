@@ -5,9 +5,9 @@ from pathlib import Path
 
 from inspector.errors import InspectorError
 from inspector.export.content import Content, collect
-from inspector.export.mcapfile import write_mcap
+from inspector.export.mcap import write_mcap
 from inspector.export.table import write_csv, write_parquet
-from inspector.labelling import Library
+from inspector.library import Library
 from noisemodel import Run
 from noisemodel.atomic import refuse_existing, replacing
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector.live.errors import LiveError
-from inspector.live.troubles import Troubles
+from inspector.live.warnings import Troubles
 from noisemodel.types import Array
 
 SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_pose")

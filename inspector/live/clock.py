@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inspector.live.troubles import Troubles
+from inspector.live.warnings import Troubles
 from noisemodel.types import Array, Mask
 
 LATE = 1.5

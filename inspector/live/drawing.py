@@ -7,8 +7,8 @@ import rerun as rr
 
 from inspector import colors
 from inspector.live.lane import Change
-from inspector.live.strip import Columns
-from inspector.series import LINE_WIDTH, at, scalars
+from inspector.live.spectrogram import Columns
+from inspector.recording.series import LINE_WIDTH, at, scalars
 from inspector.thinning import extremes
 from models import UNKNOWN, Labels
 from noisemodel.types import Array

@@ -1,12 +1,15 @@
 """A live session that is fed by rows of text."""
 
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from itertools import chain
-from typing import BinaryIO
+from types import FrameType
+from typing import Any, BinaryIO, Self, TypeVar
 
+from inspector.live.csvrows import CsvReader
 from inspector.live.errors import LiveError
-from inspector.live.interrupt import Interrupt
-from inspector.live.rows import blocks, reader_of, widen
+from inspector.live.jsonrows import JsonReader
+from inspector.live.rows import Reader, blocks, widen
 from inspector.live.session import LiveSession
 from inspector.live.summary import Summary
 
@@ -47,3 +50,66 @@ def follow(
     if not session.summary.samples:
         raise LiveError(f"the input has no samples; {WANTED}")
     return session.summary
+
+
+Item = TypeVar("Item")
+
+
+class Interrupt:
+    """While it is entered, the first Ctrl-C ends what `until` hands out, and nothing else.
+
+    The second one is as usual.
+    """
+
+    def __init__(self) -> None:
+        self._pressed = self._waits = False
+        self._before: Any = None
+
+    def __enter__(self) -> Self:
+        self._before = signal.signal(signal.SIGINT, self._press)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        signal.signal(signal.SIGINT, self._before)
+
+    def until(self, items: Iterator[Item]) -> Iterator[Item]:
+        """Pass items on until Ctrl-C is pressed.
+
+        Args:
+            items: What may have to be waited for.
+
+        Yields:
+            The items.
+        """
+        while not self._pressed:
+            self._waits = True
+            try:
+                item = next(items)
+            except (StopIteration, KeyboardInterrupt):
+                return
+            finally:
+                self._waits = False
+            yield item
+
+    def _press(self, number: int, frame: FrameType | None) -> None:
+        again, self._pressed = self._pressed, True
+        if again or self._waits:
+            raise KeyboardInterrupt
+
+
+def reader_of(head: bytes, names: tuple[str, ...]) -> tuple[Reader, bool]:
+    """Choose a format by the first line.
+
+    Args:
+        head: The line.
+        names: Names of the joints, as a person gave them.
+
+    Returns:
+        The reader, and whether the line was a header and no sample.
+
+    Raises:
+        LiveError: If the line is neither a JSON object nor a header that names velocities.
+    """
+    if head.lstrip().startswith(b"{"):
+        return JsonReader(names), False
+    return CsvReader(head, names), True

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector import unstable
-from inspector.live.strip import QUIETEST_DB, TOP_HZ
-from inspector.series import TIMELINE
-from inspector.unstable import Part
+from inspector.live.spectrogram import QUIETEST_DB, TOP_HZ
+from inspector.recording import unstable
+from inspector.recording.series import TIMELINE
+from inspector.recording.unstable import Part
 
 SHOWN = 10.0
 """Time that plots reach back, in [s]."""

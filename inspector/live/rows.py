@@ -42,27 +42,6 @@ class Reader(Protocol):
         """Read whole lines, the first of which has a number."""
 
 
-def reader_of(head: bytes, names: tuple[str, ...]) -> tuple[Reader, bool]:
-    """Choose a format by the first line.
-
-    Args:
-        head: The line.
-        names: Names of the joints, as a person gave them.
-
-    Returns:
-        The reader, and whether the line was a header and no sample.
-
-    Raises:
-        LiveError: If the line is neither a JSON object nor a header that names velocities.
-    """
-    from inspector.live.csvrows import CsvReader
-    from inspector.live.jsonrows import JsonReader
-
-    if head.lstrip().startswith(b"{"):
-        return JsonReader(names), False
-    return CsvReader(head, names), True
-
-
 def widen(stream: BinaryIO) -> None:
     """Let a pipe hold as much as is read at once: whoever writes into it need not wait for us."""
     import fcntl

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector import assets
-from inspector.labelling import Library, for_robot, load_library
+from inspector.library import Library, for_robot, load_library
 from inspector.live.block import Block, rows_of, widths_of
 from inspector.live.errors import LiveError
 from inspector.live.sink import Sink
 from inspector.live.summary import Summary
-from inspector.live.troubles import Troubles
+from inspector.live.warnings import Troubles
 from inspector.live.worker import Worker
 from noisemodel import Robot
 from noisemodel.types import Array

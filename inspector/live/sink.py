@@ -13,9 +13,9 @@ from threading import Thread
 
 import rerun as rr
 
-from inspector import viewer
 from inspector.live.errors import SinkError
-from inspector.viewer import HOST
+from inspector.recording import viewer
+from inspector.recording.viewer import HOST
 from noisemodel.atomic import replacing
 
 APPLICATION = "inspector-live"

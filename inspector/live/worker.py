@@ -9,18 +9,18 @@ from itertools import pairwise
 import numpy as np
 
 import noisemodel as nm
-from inspector.labelling import Library
+from inspector.library import Library
 from inspector.live.block import Block
 from inspector.live.clock import Clock
 from inspector.live.drawing import Drawing
-from inspector.live.ear import Ear
+from inspector.live.labeller import Ear
 from inspector.live.lane import Lane
 from inspector.live.layout import Contents, layout
-from inspector.live.moving import Moving
 from inspector.live.norms import NOISY, Norms
+from inspector.live.robot import Moving
 from inspector.live.sink import Sink
-from inspector.live.strip import Strip
-from inspector.live.troubles import Troubles
+from inspector.live.spectrogram import Strip
+from inspector.live.warnings import Troubles
 from noisemodel.types import Array, Mask
 
 REMEMBERED = 100_000

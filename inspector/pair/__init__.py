@@ -9,7 +9,7 @@ exactly nothing.
 
 from inspector.pair.alignment import Align, Alignment
 from inspector.pair.changes import Change, changes
-from inspector.pair.errors import PairError
+from inspector.pair.common import PairError
 from inspector.pair.pair import Pair, compare
 from inspector.pair.report import report, summary
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from inspector.inspection import Inspection
+from inspector.analysis.inspection import Inspection
 from inspector.pair.levels import Level, within
 from inspector.pair.pair import Pair
 from models import Event

@@ -6,11 +6,12 @@ from itertools import pairwise
 import numpy as np
 import rerun as rr
 
-from inspector import colors, series
-from inspector.inspection import Inspection
+from inspector import colors
+from inspector.analysis.inspection import Inspection
 from inspector.pair.changes import CAME, Change
-from inspector.pair.colours import KINDS
+from inspector.pair.colors import KINDS
 from inspector.pair.pair import Pair
+from inspector.recording import series
 
 
 def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> int:

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from inspector.errors import InspectorError
 from inspector.pair.alignment import Alignment
-from inspector.pair.errors import PairError
 from noisemodel import Block, Run, lowered
 from noisemodel.types import Array, Real
 
@@ -136,3 +136,7 @@ def _moved(run: Run, shift: float, start: float, stop: float) -> tuple[Block, ..
         for block in run.blocks
     ]
     return tuple(block for block in shifted if block.start < block.stop)
+
+
+class PairError(InspectorError):
+    """Two runs that cannot be laid beside each other."""

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector import unstable
-from inspector.jointplots import Plot
-from inspector.pair.colours import RANGE_DB
-from inspector.series import TIMELINE, TOP_HZ
-from inspector.unstable import Part
+from inspector.pair.colors import RANGE_DB
+from inspector.recording import unstable
+from inspector.recording.joints import Plot
+from inspector.recording.series import TIMELINE, TOP_HZ
+from inspector.recording.unstable import Part
 
 
 @dataclass(frozen=True)

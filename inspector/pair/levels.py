@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.inspection import Inspection
+from inspector.analysis.inspection import Inspection
 from inspector.pair.pair import Pair
 from inspector.pair.spectra import spectra
 from noisemodel.noise import REFERENCE_POWER, decibel

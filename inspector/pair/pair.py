@@ -7,13 +7,13 @@ from pathlib import Path
 
 import models
 import noisemodel as nm
+from inspector.analysis.inspection import Inspection, robot_known
 from inspector.errors import InspectorError
-from inspector.inspection import Inspection, robot_known
-from inspector.labelling import CannotTellError, Library, label_run
-from inspector.linknoise import LinkNoise, link_noise, vibrating
+from inspector.library import CannotTellError, Library, label_run
 from inspector.pair.alignment import Align, Alignment, align
 from inspector.pair.common import alike, together
 from noisemodel import robot as robots
+from noisemodel.links import LinkNoise, link_noise, vibrating
 from noisemodel.types import Array, Mask
 
 SIDES = ("before", "after")

@@ -9,16 +9,16 @@ import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfTree
 
-from inspector import scene, unstable
-from inspector.limbs import limbs
-from inspector.pair import classes, jointplots, linkplots, noiseplots
+from inspector.pair import classes, joints, links, noise
 from inspector.pair.changes import CAME, Change, changes
 from inspector.pair.layout import Contents, layout
 from inspector.pair.levels import STEP, steps, whole
 from inspector.pair.pair import Pair
 from inspector.pair.report import report
 from inspector.pair.sound import sounds
-from inspector.series import TIMELINE
+from inspector.recording import robot, unstable
+from inspector.recording.limbs import limbs
+from inspector.recording.series import TIMELINE
 from noisemodel.atomic import replacing
 
 APPLICATION = "inspector"
@@ -56,20 +56,20 @@ def _tree(pair: Pair, folder: Path) -> UrdfTree | None:
     if pair.links is None:
         return None
     assert run.robot is not None
-    tree = scene.load(run.robot, folder)
-    scene.check_joints(tree, run)
+    tree = robot.load(run.robot, folder)
+    robot.check_joints(tree, run)
     return tree
 
 
 def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Contents:
-    found, links = changes(pair), list[str]()
+    found, loud = changes(pair), list[str]()
     if tree is not None:
-        scene.log(recording, tree, pair.after.run, coloured=True)
-        links = linkplots.log(recording, tree, pair)
+        robot.log(recording, tree, pair.after.run, coloured=True)
+        loud = links.log(recording, tree, pair)
     lanes = classes.log(recording, pair, found)
-    noiseplots.log(recording, pair)
+    noise.log(recording, pair)
     names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
-    joints = jointplots.log(recording, pair, limbs(tuple(names), tree))
+    limb_plots = joints.log(recording, pair, limbs(tuple(names), tree))
     loop = _loudest_change(pair, found)
     heard = sounds(pair, loop[0])
     start = float(pair.time[0])
@@ -77,9 +77,9 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
         unstable.log_audio(recording, f"/sound/{name}", sound, TIMELINE, start=start)
     _log_text(recording, pair)
     return Contents(
-        joints=joints,
-        links=links,
-        root=None if tree is None else scene.root(tree, pair.after.run),
+        joints=limb_plots,
+        links=loud,
+        root=None if tree is None else robot.root(tree, pair.after.run),
         lanes=lanes,
         events=bool(found),
         sounds=tuple(heard),

@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from inspector.analysis.inspection import Inspection
+from inspector.analysis.moments import worst
 from inspector.errors import InspectorError
-from inspector.inspection import Inspection
-from inspector.listening import Settings, common_gain, said, sound_of
-from inspector.moments import worst
+from inspector.sound.listening import Settings, common_gain, said, sound_of
 from inspector.sound.sound import SMALL_RATE
 from noisemodel import Run
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 import noisemodel as nm
+from inspector.analysis.inspection import robot_known
 from inspector.errors import InspectorError
-from inspector.inspection import robot_known
 from noisemodel.noise import DENSITY, SOUND_SPEED
 from noisemodel.types import Array
 

@@ -11,10 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from models import svm
-from models.calibration import TINY
+from models.estimators import svm
+from models.estimators.calibration import TINY
+from models.estimators.estimator import learn
+from models.estimators.svm import balance
 from models.profile import Profile
-from models.training import balance, learn
 from models.tuning.logloss import grades
 from models.types import Array, Index, Words
 

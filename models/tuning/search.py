@@ -10,8 +10,8 @@ from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
+from models.confusion import Evaluation
 from models.errors import DatasetError
-from models.evaluation import Evaluation
 from models.features import standard
 from models.labels import UNKNOWN
 from models.profile import Profile

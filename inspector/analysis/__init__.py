@@ -1,0 +1,1 @@
+"""Analysis of a run: labels, findings, audit, status."""

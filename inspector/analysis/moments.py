@@ -1,0 +1,79 @@
+"""The moments of a run that are worth looking at first."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from inspector.analysis.inspection import Inspection
+from models import Event
+from noisemodel import Block
+from noisemodel.links import vibrating
+from noisemodel.types import Array
+
+STEP = 0.05
+"""Time over which loudness is taken, in [s]."""
+MOST = 3
+LOUDEST = "loudest"
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A stretch of a run, and where in it the noise is loudest.
+
+    Attributes:
+        label: Its class; ``loudest`` where nothing was found or annotated.
+        start: In [s].
+        stop: In [s].
+        peak: Middle of its loudest 50 ms, in [s].
+    """
+
+    label: str
+    start: float
+    stop: float
+    peak: float
+
+    @property
+    def failure(self) -> bool:
+        """Whether it was found, or annotated, to be one."""
+        return self.label != LOUDEST
+
+
+def worst(inspection: Inspection) -> tuple[Moment, ...]:
+    """Pick the findings whose noise vibrates most, up to three.
+
+    Where nothing was found, annotated failures take their place, and without these the loudest
+    moment of the run.
+
+    Args:
+        inspection: A run with what was found in it.
+
+    Returns:
+        The worst first, at least one.
+    """
+    run = inspection.run
+    failures: Sequence[Event | Block] = inspection.events or [
+        block for block in run.blocks if block.label != "ok"
+    ]
+    stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
+    begin, end = float(run.time[0]), float(run.time[-1])
+    time, loudness = _loudness(inspection)
+    found = []
+    for label, start, stop in stretches or [(LOUDEST, begin, end)]:
+        inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
+        if len(inside):
+            peak = inside[loudness[inside].argmax()]
+            moment = Moment(label, max(start, begin), min(stop, end), float(time[peak]))
+            found.append((float(loudness[peak]), moment))
+    found.sort(key=lambda pair: -pair[0])
+    return tuple(moment for _, moment in found[:MOST])
+
+
+def _loudness(inspection: Inspection) -> tuple[Array, Array]:
+    """Mean square of the noise above 10 Hz, every 50 ms: middles of the steps and values."""
+    run = inspection.run
+    fast = vibrating(inspection.noise[:, None], run.mask, run.rate)[:, 0]
+    size = max(1, round(STEP * run.rate))
+    firsts = np.arange(0, len(fast), size)
+    counts = np.diff(np.append(firsts, len(fast)))
+    return run.time[firsts] + counts / 2 / run.rate, np.add.reduceat(fast**2, firsts) / counts

@@ -1,0 +1,41 @@
+"""The command that says what a log can show."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import ModelFiles
+
+
+class Format(StrEnum):
+    """How audits are written."""
+
+    TEXT = "text"
+    JSON = "json"
+
+
+def audit(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(help="Run files, or logs that `import` reads.", show_default=False),
+    ],
+    format: Annotated[Format, typer.Option("--format", help="How to print.")] = Format.TEXT,  # noqa: A002
+    model: ModelFiles = None,
+) -> None:
+    """Say what logs can show; exit 0 if each shows a failure class, 4 if not, 3 bad input."""
+    from inspector import assets
+    from inspector.audit.formats import as_json, text
+    from inspector.audit.logs import audit_all
+    from inspector.library import load_library
+
+    found, failed = audit_all(logs, load_library(model or assets.model_files()))
+    if format is Format.JSON:
+        typer.echo(as_json(found, failed))
+    elif found:
+        typer.echo("\n\n".join(text(name, audit) for name, audit in found.items()))
+    for name, message in failed.items():
+        typer.echo(f"inspector: {name}: {message}", err=True)
+    blind = any(audit.blind for audit in found.values())
+    raise typer.Exit(3 if failed else 4 if blind else 0)

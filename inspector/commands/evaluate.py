@@ -1,0 +1,37 @@
+"""`inspector evaluate`: measure a model on annotated runs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import InPart, Inputs, Overwrite
+from inspector.training.part import Part
+
+
+def evaluate(
+    model: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    inputs: Inputs,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="Write JSON to this file.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option(help="Write a PNG here (needs the extra `report`).")
+    ] = None,
+    part: InPart = Part.ALL,
+    seen_too: Annotated[
+        bool, typer.Option("--seen-too", help="Take runs that it was trained on, and say so.")
+    ] = False,
+    overwrite: Overwrite = False,
+) -> None:
+    """Measure a model on annotated runs that it was not trained on."""
+    from inspector.training.evaluation import Outputs
+    from inspector.training.evaluation import as_json as json_of
+    from inspector.training.training import evaluate as evaluate_model
+
+    outputs = Outputs(output, picture, overwrite=overwrite)
+    outputs.check()
+    report = evaluate_model(model, inputs, part=part, seen_too=seen_too)
+    outputs.write(report, model)
+    typer.echo(json_of(report, model) if as_json else str(report))

@@ -1,0 +1,52 @@
+"""`inspector labels`: annotations to and from other tools."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import Overwrite, RunFile
+
+
+def labels(
+    run: RunFile,
+    to: Annotated[
+        Path | None, typer.Option("--to", help="Write the run's labels to this file.")
+    ] = None,
+    from_: Annotated[
+        Path | None, typer.Option("--from", help="Read labels from this file, in place of its own.")
+    ] = None,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The run to write, with --from.")
+    ] = None,
+    format: Annotated[  # noqa: A002
+        str, typer.Option("--format", help="noisytest, csv or audacity; else as the file ends.")
+    ] = "",
+    overwrite: Overwrite = False,
+) -> None:
+    """Print a run's annotated blocks, or take them to and from NoisyTest, CSV and Audacity."""
+    from dataclasses import replace
+
+    from inspector.errors import InspectorError
+    from inspector.labels import read_labels, write_labels
+    from noisemodel import Run
+
+    if to and from_:
+        raise typer.BadParameter("name one of --to and --from")
+    if bool(from_) != bool(output):
+        raise typer.BadParameter("--from FILE and -o RUN go together")
+    recorded = Run.load(run)
+    if from_ and output:
+        recorded = replace(recorded, blocks=read_labels(from_, recorded, format_name=format))
+        recorded.save(output, overwrite=overwrite)
+    elif not recorded.blocks:
+        raise InspectorError(
+            f"{run}: has no labels; `inspector labels --from` brings some in,"
+            " `inspector classify --labels-to` writes what is found"
+        )
+    elif to:
+        write_labels(recorded.blocks, to, format_name=format, overwrite=overwrite)
+    for block in recorded.blocks:
+        typer.echo(f"{block.label} from {block.start:.2f} s to {block.stop:.2f} s")
+    if output or to:
+        typer.echo(f"{output or to}: {len(recorded.blocks)} labels")

@@ -1,0 +1,12 @@
+"""`inspector robots`: the robots that are available by name."""
+
+import typer
+
+
+def robots() -> None:
+    """List the robots that can be had by name."""
+    from noisemodel import ROBOTS
+
+    for name, robot in ROBOTS.items():
+        base = "floating" if robot.floating_base else "fixed"
+        typer.echo(f"{name:28} {base:10} {robot.urdf}")

@@ -1,0 +1,48 @@
+"""`inspector shot`: a picture of a recording."""
+
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import Kind, ModelFiles, Output, Overwrite
+
+
+def shot(
+    run: Annotated[
+        Path, typer.Argument(help="A run file, or a recording (.rrd).", show_default=False)
+    ],
+    output: Output,
+    at: Annotated[
+        float | None,
+        typer.Option("--at", help="Time in seconds; else that of the worst finding."),
+    ] = None,
+    size: Annotated[str, typer.Option("--size", help="Width and height, in points.")] = "1440x900",
+    model: ModelFiles = None,
+    kind: Kind = "normal",
+    overwrite: Overwrite = False,
+) -> None:
+    """Write what the viewer shows as a PNG, without a display (needs a Vulkan driver)."""
+    from inspector import assets
+    from inspector.analysis.inspection import inspect
+    from inspector.library import load_library
+    from inspector.recording import screenshot as shooting
+    from inspector.recording.recording import write
+    from inspector.sound.clip import first_look
+    from noisemodel.atomic import refuse_existing
+
+    shooting.require()
+    refuse_existing(output, overwrite=overwrite)
+    points = shooting.parse_size(size)
+    with TemporaryDirectory() as folder:
+        recording, seconds = run, at or 0.0
+        if run.suffix != ".rrd":
+            found = inspect(run, load_library(model or assets.model_files()), kind=kind)
+            recording = Path(folder) / "run.rrd"
+            seconds = first_look(found) if at is None else at
+            write(found, recording)
+        complaints = shooting.shoot(recording, output, seconds, size=points, overwrite=overwrite)
+    typer.echo(f"{output}: {run} at {seconds:.2f} s")
+    for complaint in complaints:
+        typer.echo(f"  the viewer reports: {complaint}", err=True)

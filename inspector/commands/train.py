@@ -1,0 +1,32 @@
+"""`inspector train`: train a model on annotated runs."""
+
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import InPart, Inputs, Output, Overwrite
+from inspector.training.part import Part
+
+
+def train(
+    inputs: Inputs,
+    output: Output,
+    profile: Annotated[
+        str,
+        typer.Option(
+            help="joints, general, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
+            " paper-linear."
+        ),
+    ] = "general",
+    rate: Annotated[
+        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are lowered.")
+    ] = 10000.0,
+    part: InPart = Part.ALL,
+    overwrite: Overwrite = False,
+) -> None:
+    """Train a model on annotated runs."""
+    from inspector.training.training import train as train_model
+
+    report = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
+    typer.echo(str(report))
+    typer.echo(f"{output}: written; measured above on the frames that it was trained on")

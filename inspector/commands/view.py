@@ -1,0 +1,138 @@
+"""`inspector view`: show a run, or two beside each other."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inspector.commands.options import Kind, ModelFiles, Overwrite
+
+if TYPE_CHECKING:
+    from inspector.library import Library
+
+
+class Aligned(StrEnum):
+    """How a second run is laid beside the first."""
+
+    AUTO = "auto"
+    START = "start"
+    NONE = "none"
+
+
+def view(
+    run: Annotated[
+        Path | None, typer.Argument(help="A run file; without one, the demo that ships.")
+    ] = None,
+    after: Annotated[
+        Path | None, typer.Argument(help="Another, after a change: what came, went, got louder.")
+    ] = None,
+    save: Annotated[
+        Path | None, typer.Option("--save", help="Write the recording here, open nothing.")
+    ] = None,
+    model: ModelFiles = None,
+    robot: Annotated[
+        bool, typer.Option("--robot/--no-robot", help="Draw the robot, and hear its links.")
+    ] = True,
+    kind: Kind = "normal",
+    terms: Annotated[
+        bool, typer.Option("--terms", help="Show the paper's terms A, B and C one by one.")
+    ] = False,
+    web: Annotated[
+        bool, typer.Option("--web", help="Show it in a browser on this machine, until Ctrl-C.")
+    ] = False,
+    port: Annotated[
+        int, typer.Option("--port", min=0, max=65535, help="Of --web; 0 takes a free one.")
+    ] = 0,
+    align: Annotated[
+        Aligned | None,
+        typer.Option("--align", help="Two runs: by their motion (auto), starts, or clocks (none)."),
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Show a run in rerun: joints, noise, spectrogram, classes, the moving robot; or two."""
+    from inspector import assets
+    from inspector.library import load_library
+    from inspector.recording import viewer
+    from noisemodel.atomic import refuse_existing
+
+    if web and save:
+        raise typer.BadParameter("name one of --web and --save")
+    if align and not after:
+        raise typer.BadParameter("--align takes two runs")
+    if terms and after:
+        raise typer.BadParameter("--terms takes one run")
+    if port:
+        from inspector.recording import web as browser
+
+        browser.free_port(port)
+    path = run or assets.demo_run()
+    both = path if after is None else path.joinpath(*after.resolve().parts[1:])
+    target = save or viewer.scratch_path(both)
+    overwrite = overwrite or save is None
+    refuse_existing(target, overwrite=overwrite)
+    library = load_library(model or assets.model_files())
+    if after is None:
+        _one(path, target, library, robot=robot, kind=kind, terms=terms, overwrite=overwrite)
+    else:
+        how = align or Aligned.AUTO
+        _two((path, after), target, library, how, robot=robot, kind=kind, overwrite=overwrite)
+    if web:
+        from inspector.recording import web as browser
+
+        browser.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
+        return
+    if save is None and viewer.has_display():
+        problem = viewer.open_window(target)
+        if not problem:
+            return
+        typer.echo(problem, err=True)
+    typer.echo(f"recording: {target} ({target.stat().st_size / 1e6:.1f} MB)")
+    typer.echo(viewer.how_to_open(target))
+
+
+def _one(
+    path: Path,
+    target: Path,
+    library: "Library",
+    *,
+    robot: bool,
+    kind: str,
+    terms: bool,
+    overwrite: bool,
+) -> None:
+    from inspector.analysis.inspection import inspect
+    from inspector.recording.recording import write
+    from inspector.report.markdown import sentence, verdict
+    from inspector.sound.clip import of_recording
+
+    found = inspect(path, library, robot=robot, kind=kind, terms=terms)
+    write(found, target, overwrite=overwrite, sound=of_recording(found))
+    typer.echo(f"{path}: {verdict(found)}")
+    for event in found.events:
+        typer.echo(f"  {sentence(found, event)}")
+    for remark in found.remarks:
+        typer.echo(f"  {remark}")
+
+
+def _two(
+    paths: tuple[Path, Path],
+    target: Path,
+    library: "Library",
+    how: Aligned,
+    *,
+    robot: bool,
+    kind: str,
+    overwrite: bool,
+) -> None:
+    from inspector.pair import Align, changes, compare, summary
+    from inspector.pair.recording import write
+
+    pair = compare(*paths, library, how=Align(how), robot=robot, kind=kind)
+    write(pair, target, overwrite=overwrite)
+    typer.echo(f"{paths[0]} → {paths[1]}: {summary(pair)}")
+    typer.echo(f"  aligned {pair.alignment}")
+    for change in changes(pair):
+        typer.echo(f"  {change}")
+    for remark in pair.remarks:
+        typer.echo(f"  {remark}")

@@ -1,0 +1,1 @@
+"""Comparisons of noise models as tables, pictures and recordings."""

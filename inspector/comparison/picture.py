@@ -1,0 +1,161 @@
+"""Compared noise models as a picture on paper: terms, correlation, distance by frequency."""
+
+from collections.abc import Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inspector.comparison.compared import Compared
+from inspector.comparison.table import medians
+from inspector.errors import InspectorError
+from noisemodel.atomic import replacing
+from noisemodel.comparison import TERMS
+from noisemodel.types import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SHADES = ("#3b3b6d", "#d98c4a", "#f2e3c4")
+"""Of A, B and C: dark, middle and light, so that they differ in grey too."""
+INKS = ("#d55e00", "#0072b2", "#000000", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+MARKS = "ovs^DPX"
+DASHES = ("-", "--", "-", ":", "-.", (0, (1, 1)), (0, (5, 1)))
+ROW = 0.17
+"""Height of a robot, in [inch]."""
+INDEPENDENT_DB = 10.0 / np.log(10.0) * np.pi / np.sqrt(3.0)
+"""Distance of two noises with the same mean spectrum that know nothing of each other, in [dB]."""
+THIRDS = 20.0 * 2.0 ** (np.arange(25) / 3.0)
+"""Centres of thirds of octaves, from 20 to 5120 Hz, in [Hz]."""
+WIDTH, MARGIN, BELOW = 10.0, 1.3, 3.0
+DPI = 100
+
+
+def require() -> None:
+    """Refuse a picture before long work is done for it.
+
+    Raises:
+        InspectorError: If matplotlib is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        raise InspectorError('a picture needs matplotlib; `pip install "noise-inspector[report]"`')
+
+
+def draw(found: Sequence[Compared], path: Path, *, overwrite: bool = False) -> None:
+    """Draw what was found as a PNG file.
+
+    Args:
+        found: One comparison or more, of the same kinds.
+        path: The file to write.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        InspectorError: If matplotlib is not installed.
+        OutputError: If the file exists or cannot be written.
+    """
+    require()
+    from matplotlib.figure import Figure
+
+    # Robots with a fixed base first, those on top for which A and B count least.
+    order = sorted(found, key=lambda one: (one.floating_base, -_terms(one)[2]))
+    rows = ROW * max(len(order), 6)
+    figure = Figure(figsize=(WIDTH, rows + MARGIN + BELOW), dpi=DPI, layout="constrained")
+    parts = figure.subfigures(2, 1, squeeze=False, height_ratios=[rows + MARGIN, BELOW])
+    upper, lower = parts[:, 0]
+    left, right = upper.subplots(1, 2, sharey=True)
+    _shares(left, order)
+    _correlations(right, order)
+    _spectra(lower, order)
+    with replacing(path, overwrite=overwrite) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _shares(axes: "Axes", found: Sequence[Compared]) -> None:
+    terms = np.array([_terms(one) for one in found])
+    starts = np.cumsum(terms, axis=1) - terms
+    for index, (term, shade) in enumerate(zip(TERMS, SHADES, strict=True)):
+        axes.barh(
+            np.arange(len(found)),
+            terms[:, index],
+            left=starts[:, index],
+            color=shade,
+            edgecolor="black",
+            linewidth=0.3,
+            label=term,
+        )
+    names = [f"{one.name} (floating)" if one.floating_base else one.name for one in found]
+    axes.set_yticks(np.arange(len(found)), names, fontsize=7)
+    axes.set_ylim(len(found) - 0.4, -0.6)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_xlabel("share of the paper's terms A, B, C in its power")
+    _legend(axes)
+
+
+def _correlations(axes: "Axes", found: Sequence[Compared]) -> None:
+    kinds, held = found[0].kinds, found[0].reference
+    for ink, index in enumerate(_others(found)):
+        axes.plot(
+            [one.found.correlation[index, held] for one in found],
+            np.arange(len(found)),
+            MARKS[ink],
+            color=INKS[ink],
+            markerfacecolor="none" if ink % 2 else INKS[ink],
+            markersize=4.5,
+            label=kinds[index],
+        )
+    axes.set_xlim(right=1.05)
+    axes.grid(alpha=0.4)
+    axes.set_xlabel(f"correlation of the envelope with that of {kinds[held]!r}")
+    _legend(axes)
+
+
+def _spectra(figure: "Figure", found: Sequence[Compared]) -> None:
+    """Draw distance over frequency, fixed and floating bases side by side where there are both."""
+    groups = [[one for one in found if one.floating_base == floating] for floating in (False, True)]
+    groups = [group for group in groups if group]
+    panels = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
+    kinds, held = found[0].kinds, found[0].reference
+    for axes, group in zip(panels, groups, strict=True):
+        for ink, index in enumerate(_others(found)):
+            distance = medians([_by_third(one, index) for one in group])
+            axes.plot(THIRDS, distance, color=INKS[ink], ls=DASHES[ink], label=kinds[index])
+        base = "floating base" if group[0].floating_base else "fixed base"
+        axes.set_title(f"{base}, median of {len(group)}", fontsize=9)
+        axes.set_xscale("log")
+        axes.axhline(INDEPENDENT_DB, color="grey", lw=0.8, label="independent noises")
+        axes.grid(alpha=0.4)
+        axes.set_xlabel("frequency [Hz]")
+    panels[0].set_ylabel(f"distance to {kinds[held]!r} [dB]")
+    panels[0].set_ylim(0.0, 1.35 * panels[0].get_ylim()[1])
+    for axes in panels:
+        axes.legend(loc="upper center", ncols=3, frameon=False, fontsize=8)
+
+
+def _legend(axes: "Axes") -> None:
+    axes.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=7,
+        frameon=False,
+        fontsize=8,
+        handlelength=1.2,
+        columnspacing=1.0,
+    )
+
+
+def _by_third(one: Compared, kind: int) -> Array:
+    """Distance to the reference in each third of an octave, in [dB]; nan where there is none."""
+    squares = one.found.distance_by_frequency[kind, one.reference] ** 2
+    third = np.rint(3.0 * np.log2(np.maximum(one.found.frequency, 1.0) / THIRDS[0]))
+    inside = [third == index for index in range(len(THIRDS))]
+    return np.array([np.sqrt(squares[at].mean()) if at.any() else np.nan for at in inside])
+
+
+def _others(found: Sequence[Compared]) -> list[int]:
+    return [index for index in range(len(found[0].kinds)) if index != found[0].reference]
+
+
+def _terms(one: Compared) -> Array:
+    return np.asarray(one.found.terms.sum(axis=0))

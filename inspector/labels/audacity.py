@@ -1,0 +1,35 @@
+"""Audacity's label tracks: a line for each label, start, stop and text between tabs."""
+
+from collections.abc import Iterator, Sequence
+
+from inspector.labels.entry import Entry, EntryError, Span, number
+
+
+def render(spans: Sequence[Span]) -> str:
+    """Write labels as a label track.
+
+    Args:
+        spans: The labels.
+    """
+    return "".join(f"{span.start!r}\t{span.stop!r}\t{span.label}\n" for span in spans)
+
+
+def parse(text: str) -> Iterator[Entry]:
+    """Read a label track.
+
+    Args:
+        text: The track; the lines with frequencies that follow spectral selections are passed over.
+
+    Yields:
+        Its labels.
+
+    Raises:
+        EntryError: If a line is none of a label track.
+    """
+    for row, line in enumerate(text.split("\n"), start=1):
+        where, cells = f"line {row}", line.removesuffix("\r").split("\t", maxsplit=2)
+        if cells == [""] or cells[0] == "\\":
+            continue
+        if len(cells) != 3:
+            raise EntryError(f"expected start, stop and label between tabs, not {line!r}", where)
+        yield Entry(number(cells[0], where), number(cells[1], where), cells[2], where)

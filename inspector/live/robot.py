@@ -1,0 +1,142 @@
+"""The robot that moves along: one message for all of its joints."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import rerun as rr
+from rerun.urdf import UrdfJoint, UrdfTree
+
+from inspector.recording import robot as scene
+from inspector.recording import series, unstable
+from noisemodel.errors import UnknownJointError
+from noisemodel.types import Array
+
+SLIDING = "prismatic"
+
+
+class Moving:
+    """A robot in a live recording.
+
+    Args:
+        recording: Where to.
+        robot: A listed robot, or the path of a URDF.
+        joint_names: The joints that have positions.
+        floating: Whether the base moves.
+
+    Attributes:
+        root: Frame that the robot is seen from.
+        children: Links that move, in the order of `transforms`; the base, if it moves, is last.
+
+    Raises:
+        RobotError: If there is no such robot, or its URDF cannot be read.
+        MeshError: If one of its meshes cannot be read.
+        UnknownJointError: If the robot lacks a joint.
+    """
+
+    def __init__(
+        self,
+        recording: rr.RecordingStream,
+        robot: str,
+        joint_names: Sequence[str],
+        *,
+        floating: bool,
+    ) -> None:
+        with TemporaryDirectory() as folder:
+            tree = scene.load(robot, Path(folder))
+            _log(recording, tree)
+        movable = {joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"}
+        for name in joint_names:
+            if name not in movable:
+                raise UnknownJointError(name, tree.name, tuple(movable))
+        leaders = {
+            name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
+        }
+        joints = [joint for name, joint in movable.items() if leaders[name] in joint_names]
+        self._columns = [joint_names.index(leaders[joint.name]) for joint in joints]
+        self._factor = np.array(
+            [joint.mimic.multiplier if joint.mimic else 1.0 for joint in joints]
+        )
+        self._offset = np.array([joint.mimic.offset if joint.mimic else 0.0 for joint in joints])
+        slides = np.array([joint.joint_type == SLIDING for joint in joints], dtype=bool)[:, None]
+        axis = np.array([joint.axis for joint in joints]).reshape(-1, 3)
+        self._place = np.array([joint.origin_xyz for joint in joints]).reshape(-1, 3)
+        self._turn = np.array([_quaternion(joint) for joint in joints]).reshape(-1, 4)
+        self._slide = np.where(slides, _rotated(self._turn, axis), 0.0)
+        self._spin = np.where(slides, 0.0, _times(self._turn, np.pad(axis, ((0, 0), (0, 1)))))
+        self._half = np.where(slides, 0.0, 0.5)
+        base = [(scene.WORLD, str(tree.root_link().name))] if floating else []
+        links = [*((joint.parent_link, joint.child_link) for joint in joints), *base]
+        self.children = [child for _, child in links]
+        self._frames = rr.Transform3D.columns(
+            parent_frame=[parent for parent, _ in links], child_frame=self.children
+        )
+        self._recording = recording
+        self.root = scene.WORLD if floating else str(tree.root_link().name)
+
+    def show(self, time: float, position: Array, base_pose: Array | None) -> None:
+        """Move the robot.
+
+        Args:
+            time: In [s].
+            position: Of the named joints, shape (joints,), in [rad] or [m].
+            base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
+        """
+        places, turns = self.transforms(position)
+        if base_pose is not None:
+            places, turns = np.vstack((places, base_pose[:3])), np.vstack((turns, base_pose[3:]))
+        if not len(places):
+            return
+        self._recording.send_columns(
+            "/robot/motion",
+            indexes=[series.at(np.full(len(places), time))],
+            columns=[
+                *rr.Transform3D.columns(translation=places, quaternion=turns),
+                *self._frames,
+            ],
+        )
+
+    def transforms(self, position: Array) -> tuple[Array, Array]:
+        """Say where each joint's link is, as seen from the link that carries it.
+
+        Args:
+            position: Of the named joints, shape (joints,), in [rad] or [m].
+
+        Returns:
+            Translations, shape (moving, 3), and quaternions x, y, z, w, shape (moving, 4), of all
+            joints that move: the named ones, and those that mimic one of them.
+        """
+        angle = (self._factor * position[self._columns] + self._offset)[:, None]
+        half = self._half * angle
+        # turn (axis sin half, cos half), with what does not change multiplied once
+        turned = np.sin(half) * self._spin + np.cos(half) * self._turn
+        return self._place + angle * self._slide, turned
+
+
+def _log(recording: rr.RecordingStream, tree: UrdfTree) -> None:
+    unstable.log_up(recording)
+    rr.send_chunks(tree.stream(), recording=recording)
+
+
+def _quaternion(joint: UrdfJoint) -> Array:
+    """Turn the roll, pitch and yaw of a joint's origin into a quaternion."""
+    turn = np.array([0.0, 0.0, 0.0, 1.0])
+    for axis, angle in reversed(list(zip(np.eye(3), joint.origin_rpy, strict=True))):
+        spin = np.append(np.sin(angle / 2.0) * axis, np.cos(angle / 2.0))
+        turn = _times(turn, spin)
+    return turn
+
+
+def _times(left: Array, right: Array) -> Array:
+    """Multiply quaternions x, y, z, w, shape (..., 4)."""
+    u, v, a, b = left[..., :3], right[..., :3], left[..., 3:], right[..., 3:]
+    scalar = a * b - (u * v).sum(axis=-1, keepdims=True)
+    return np.concatenate((a * v + b * u + np.cross(u, v), scalar), axis=-1)
+
+
+def _rotated(turn: Array, vector: Array) -> Array:
+    """Rotate vectors by quaternions."""
+    u, w = turn[..., :3], turn[..., 3:]
+    rotated: Array = vector + 2.0 * np.cross(u, np.cross(u, vector) + w * vector)
+    return rotated

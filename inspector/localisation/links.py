@@ -1,0 +1,71 @@
+"""The links at which a failure points: those that are loud, and those in which it is new."""
+
+from collections.abc import Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from inspector.localisation.stage import First
+from models import Event
+from noisemodel import Block
+from noisemodel.links import LinkNoise
+from noisemodel.types import Array
+
+Failure: TypeAlias = Event | Block
+"""A finding, or an annotated block."""
+
+MOST = 3
+"""Links that are named."""
+FRESH = 0.05
+"""Time after its onset in which a blow or jump tells by its noise where it came in, in [s]."""
+
+
+def culprits(
+    links: LinkNoise, failure: Failure, others: Sequence[Failure], *, first: First | None = None
+) -> tuple[tuple[str, float], ...]:
+    """Name the links at which a failure points.
+
+    A link's excess is its power above 10 Hz, less its median outside of all failures. A blow or
+    jump runs through the whole robot within a step, so that what counts of it is its beginning.
+    Even then a light foot is louder than the limb that was hit, hence a second witness: the joints
+    in which the failure is new. Named is the link of the largest excess; of each such joint that
+    moves none of those that are named, the link of the largest excess that it moves; and then
+    those of the largest excess.
+
+    Args:
+        links: The noise of the run's links.
+        failure: The failure.
+        others: All failures of the run, found and annotated.
+        first: Where it shows first, if that is known.
+
+    Returns:
+        Up to three links and their shares of the robot's whole excess, the largest first.
+    """
+    excess = _excess(links, failure, others, None if first is None else first.onset)
+    ranked = [index for index in np.argsort(-excess, kind="stable").tolist() if excess[index] > 0.0]
+    named = ranked[:1]
+    for joint, _ in () if first is None else first.joints:
+        moved = [index for index in ranked if joint in links.movers[index]]
+        if not set(moved) & set(named):
+            named += moved[:1]
+    named += [index for index in ranked if index not in named]
+    loudest_first = sorted(named[:MOST], key=ranked.index)
+    return tuple((links.links[i], float(excess[i] / excess.sum())) for i in loudest_first)
+
+
+def _excess(
+    links: LinkNoise, failure: Failure, others: Sequence[Failure], onset: float | None
+) -> Array:
+    """Excess of each link, shape (links,), in [W]; 0 where nothing was measured."""
+    time, vibration = links.time, links.vibration
+    start, stop = failure.start, failure.stop
+    if onset is not None:
+        half = (time[1] - time[0]) / 2.0
+        start, stop = onset - half, onset + FRESH + half  # bins that lie in it in part count too
+    inside = (time >= start) & (time < stop)
+    busy = np.any([(time >= each.start) & (time < each.stop) for each in others], axis=0)
+    if not inside.any():
+        return np.zeros(len(links.links))
+    quiet = np.median(vibration[~busy], axis=0) if not busy.all() else 0.0
+    excess: Array = np.maximum(vibration[inside].mean(axis=0) - quiet, 0.0)
+    return excess

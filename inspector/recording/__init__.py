@@ -1,0 +1,1 @@
+"""A run as a rerun recording, and the viewers that show it."""

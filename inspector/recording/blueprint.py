@@ -1,0 +1,130 @@
+"""How a recording is laid out: robot and report at the left, everything over time at the right."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rerun.blueprint import Blueprint
+
+from inspector.recording import unstable
+from inspector.recording.details import Detail
+from inspector.recording.joints import Plot
+from inspector.recording.series import TIMELINE, TOP_HZ
+from inspector.recording.unstable import Part
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a recording holds, as far as the layout goes.
+
+    Attributes:
+        joints: Plots of joint signals.
+        details: Moments that were logged sample by sample.
+        root: Frame that the robot is seen from; None without a robot.
+        links: Whether there is noise of links.
+        terms: Whether there are the paper's terms A, B and C.
+        lanes: How many lanes of classes there are, found and annotated.
+        events: Whether any of them is listed.
+        scores: Whether there are scores.
+        sound: Whether there is a sound to listen to.
+        rate: Samples per second, in [Hz].
+        loop: Stretch of time that playing repeats, in [s].
+    """
+
+    joints: Sequence[Plot]
+    details: Sequence[Detail]
+    root: str | None
+    links: bool
+    terms: bool
+    lanes: int
+    events: bool
+    scores: bool
+    sound: bool
+    rate: float
+    loop: tuple[float, float] | None
+
+
+def layout(contents: Contents) -> Blueprint:
+    """Lay out a recording.
+
+    Args:
+        contents: What there is to show.
+
+    Returns:
+        The blueprint; all time axes are linked but those of the details.
+    """
+    over_time: list[tuple[Part, float]] = []
+    if contents.lanes:
+        over_time.append((unstable.lanes("Classes", "/class"), 0.8 + 0.8 * contents.lanes))
+    over_time += [(_noise(contents), 2.4), (_spectrogram(contents), 2.8)]
+    if contents.links:
+        over_time.append((_links(), 4.4))
+    over_time.append((_joints(contents), 2.8))
+    left = _text(contents)
+    if contents.root is not None:
+        title = "Robot, coloured by vibration" if contents.links else "Robot"
+        robot = unstable.robot(title, "/robot", contents.root)
+        left = unstable.above((robot, 3.0), (left, 2.0))
+    whole = unstable.beside((left, 2.0), (unstable.above(*over_time), 3.0))
+    return unstable.blueprint(whole, TIMELINE, contents.loop)
+
+
+def _text(contents: Contents) -> Part:
+    report = unstable.text("Report", "/report")
+    if not contents.events:
+        return report
+    return unstable.tabs(report, unstable.events("Events", "/events"))
+
+
+def _noise(contents: Contents) -> Part:
+    parts = [unstable.plot("Noise, simplified estimate [rad/s]", "/noise")]
+    if contents.links:
+        parts.append(
+            unstable.plot("Sound power, extended [dB re 1 pW]", "/power", ["/power/total"])
+        )
+    if contents.terms:
+        terms = ["/power/terms/**", "/power/total"]
+        parts.append(unstable.plot("terms A, B, C", "/power", terms, legend=True))
+    if contents.sound:
+        parts.append(unstable.audio("Listen", "/sound"))
+    return unstable.tabs(*parts)
+
+
+def _spectrogram(contents: Contents) -> Part:
+    top = min(TOP_HZ, contents.rate / 2)
+    strip = unstable.plot(
+        f"Spectrogram of the noise, 0-{top:.0f} Hz",
+        "/spectrogram/bands",
+        between=(0.0, top),
+        fixed=True,
+    )
+    whole = unstable.tensor(f"to {contents.rate / 2:.0f} Hz [dB]", "/spectrogram/levels")
+    now = unstable.bars(f"Spectrum at the cursor, 0-{top:.0f} Hz [dB]", "/spectrogram/now")
+    return unstable.tabs(strip, whole, now)
+
+
+def _links() -> Part:
+    levels = unstable.lanes("Loudest links, above 10 Hz", "/level")
+    power = unstable.plot("Their sound power [dB re 1 pW]", "/power/links", legend=True)
+    return unstable.tabs(levels, power)
+
+
+def _joints(contents: Contents) -> Part:
+    """Scores, then each limb's signals, then the details."""
+    parts = [unstable.plot("Scores", "/score", legend=True)] if contents.scores else []
+    for limb in dict.fromkeys(plot.limb for plot in contents.joints):
+        plots = [
+            unstable.plot(plot.title, "/joints", plot.paths, legend=True)
+            for plot in contents.joints
+            if plot.limb == limb
+        ]
+        parts.append(unstable.tabs(*plots, name=limb))
+    parts += [_detail(detail) for detail in contents.details]
+    return unstable.tabs(*parts)
+
+
+def _detail(detail: Detail) -> Part:
+    noise = unstable.plot("noise, raw [rad/s]", f"{detail.path}/noise", during=detail.during)
+    velocity = unstable.plot(
+        "velocity, raw [rad/s]", f"{detail.path}/velocity", legend=True, during=detail.during
+    )
+    return unstable.tabs(noise, velocity, name=detail.title)

@@ -1,0 +1,82 @@
+"""Show a run from Python: in a notebook's cell, else in a window."""
+
+import sys
+import tempfile
+from importlib.util import find_spec
+from pathlib import Path
+
+import noisemodel as nm
+from inspector.recording.viewer import ViewerError
+
+SIZE = ("auto", 760)
+"""Width and height of a notebook's viewer, in pixels; it is as wide as its cell."""
+
+
+def show(
+    run: nm.Run | str | Path,
+    *,
+    robot: bool = True,
+    kind: str = "normal",
+    size: tuple[int | str, int] = SIZE,
+) -> None:
+    """Show a run in rerun's viewer: joints, noise, spectrogram, classes, the moving robot.
+
+    In a notebook the viewer appears below the cell, after some seconds: all of it, 23 MB, comes
+    from the kernel's machine, unless ``RERUN_NOTEBOOK_ASSET`` is set, which is rerun's. From plain
+    Python a window opens, which stays when the program ends.
+
+    Args:
+        run: A run, or a run file.
+        robot: Whether to draw the robot.
+        kind: Kind of the extended noise.
+        size: Width and height of a notebook's viewer, in pixels; ``"auto"`` is as wide as the cell.
+
+    Raises:
+        ViewerError: If there is neither a notebook nor a display, or something is not installed.
+        InspectorError: If the robot's shape cannot be had.
+        NoiseModelError: If the run cannot be read, or its robot.
+    """
+    from inspector.recording import cell, viewer
+
+    inside = in_notebook()
+    if inside and find_spec("rerun_notebook") is None:
+        raise ViewerError(
+            'a notebook takes rerun\'s widget; `pip install "rerun-sdk[notebook]"` brings it'
+        )
+    if inside:
+        with tempfile.TemporaryDirectory() as folder:
+            cell.show(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
+        return
+    recording = viewer.scratch_path(Path("shown.npz") if isinstance(run, nm.Run) else Path(run))
+    _recorded(run, recording, robot=robot, kind=kind)
+    if not viewer.has_display():
+        raise ViewerError(
+            f"there is no display; the recording is in {recording},"
+            f" `inspector view --web` shows a run file in a browser"
+        )
+    problem = viewer.open_window(recording)
+    if problem:
+        raise ViewerError(f"{problem}; the recording is in {recording}")
+
+
+def in_notebook() -> bool:
+    """Whether this runs in a kernel that shows widgets, as Jupyter's does."""
+    loaded = sys.modules.get("IPython")
+    return loaded is not None and hasattr(loaded.get_ipython(), "kernel")
+
+
+def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
+    from inspector import assets
+    from inspector.analysis.inspection import inspect
+    from inspector.library import load_library
+    from inspector.recording.recording import write
+    from inspector.sound.clip import of_recording
+
+    library = load_library(assets.model_files())
+    with tempfile.TemporaryDirectory() as folder:
+        path = run if not isinstance(run, nm.Run) else Path(folder) / "run.npz"
+        if isinstance(run, nm.Run):
+            run.save(path)
+        found = inspect(Path(path), library, robot=robot, kind=kind)
+        write(found, recording, overwrite=True, sound=of_recording(found))
+    return recording

@@ -1,0 +1,154 @@
+"""A run as a rerun recording: what goes into it, in order."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import rerun as rr
+from rerun.urdf import UrdfTree
+
+from inspector import colors
+from inspector.analysis.inspection import Inspection
+from inspector.analysis.moments import worst
+from inspector.recording import classes, details, joints, robot, series, unstable
+from inspector.recording import links as link_lanes
+from inspector.recording.blueprint import Contents, layout
+from inspector.recording.limbs import limbs
+from inspector.recording.tensors import tensors
+from inspector.report.markdown import report
+from inspector.spectrogram import spectrogram
+from inspector.thinning import extremes
+from noisemodel.atomic import replacing
+
+APPLICATION = "inspector"
+NOISE_POINTS = 100_000
+
+
+def write(
+    inspection: Inspection, path: Path, *, overwrite: bool = False, sound: bytes = b""
+) -> None:
+    """Write the recording of an inspected run, whole or not at all.
+
+    The same input makes a recording of the same id: opened again, it replaces itself.
+
+    Args:
+        inspection: A run with its noise and labels.
+        path: The file to write, by convention ``*.rrd``.
+        overwrite: Whether a file that exists may be replaced.
+        sound: The run made audible, a WAV file that starts with the run; none if empty.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+        RobotError: If the run's URDF cannot be read, or lacks one of the run's joints.
+        MeshError: If one of the robot's meshes cannot be read.
+    """
+    with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
+        tree = _tree(inspection, Path(folder))
+        recording = rr.RecordingStream(APPLICATION, recording_id=inspection.sha256[:32])
+        recording.save(temporary)
+        contents = _log(recording, inspection, tree, sound)
+        recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
+        recording.flush()
+        recording.disconnect()
+
+
+def _tree(inspection: Inspection, folder: Path) -> UrdfTree | None:
+    run = inspection.run
+    if not inspection.has_robot:
+        return None
+    assert run.robot is not None
+    tree = robot.load(run.robot, folder)
+    robot.check_joints(tree, run)
+    return tree
+
+
+def _log(
+    recording: rr.RecordingStream, inspection: Inspection, tree: UrdfTree | None, sound: bytes
+) -> Contents:
+    run, links, moments = inspection.run, inspection.links, worst(inspection)
+    if tree is not None and links is not None:
+        robot.log(recording, tree, run, coloured=True)
+        link_lanes.log(recording, tree, links)
+    classes.log(recording, inspection)
+    _log_noise(recording, inspection)
+    if sound:
+        unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
+    limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
+    closeups = details.log(recording, inspection, moments)
+    _log_text(recording, inspection, {} if tree is None else robot.entities(tree))
+    failures = [moment for moment in moments if moment.failure]
+    return Contents(
+        joints=limb_plots,
+        details=closeups,
+        root=None if tree is None else robot.root(tree, run),
+        links=links is not None,
+        terms=links is not None and bool(links.terms),
+        lanes=(inspection.labels is not None) + bool(run.blocks),
+        events=any(moment.failure for moment in moments),
+        scores=inspection.labels is not None,
+        sound=bool(sound),
+        rate=run.rate,
+        loop=(failures[0].start, failures[0].stop) if failures else None,
+    )
+
+
+def _log_noise(recording: rr.RecordingStream, inspection: Inspection) -> None:
+    run, noise = inspection.run, inspection.noise
+    time, values = extremes(run.time[run.mask], noise[run.mask, None], points=NOISE_POINTS)
+    series.log_lines(
+        recording,
+        "/noise/simplified",
+        time,
+        values,
+        names=["simplified [rad/s]"],
+        colours=[colors.NOISE],
+    )
+    spectrum = spectrogram(noise, run.rate, start=float(run.time[0]), valid=run.mask)
+    series.log_heat_strip(recording, "/spectrogram/bands", spectrum)
+    series.log_bars(recording, "/spectrogram/now", spectrum)
+    upright = np.ascontiguousarray(spectrum.level[::-1], dtype=np.float32)  # row 0 is drawn on top
+    tensor = tensors(upright[None], ["frequency, high to low", "time"])
+    recording.log("/spectrogram/levels", rr.Tensor.from_fields(data=tensor), static=True)
+
+
+def _log_text(
+    recording: rr.RecordingStream, inspection: Inspection, entities: Mapping[str, str]
+) -> None:
+    run, links = inspection.run, inspection.links
+    text = linked(report(inspection), entities)
+    recording.log("/report", rr.TextDocument(text, media_type="text/markdown"), static=True)
+    recording.send_recording_name(inspection.name)
+    recording.send_property(
+        "inspector",
+        rr.AnyValues(
+            input_sha256=inspection.sha256,
+            robot=run.robot or "",
+            rate_hz=run.rate,
+            duration_s=run.duration,
+            joints=len(run.joint_names),
+            samples_in_gaps=int((~run.mask).sum()),
+            model=inspection.model,
+            link_noise="" if links is None else links.kind,
+            findings=len(inspection.events),
+        ),
+    )
+
+
+def linked(markdown: str, entities: Mapping[str, str]) -> str:
+    """Let the names of links that stand before a share point to their entities.
+
+    Args:
+        markdown: A report.
+        entities: Entity path by name of the link.
+
+    Returns:
+        The report with its names as Markdown links.
+    """
+
+    def address(found: re.Match[str]) -> str:
+        entity = entities.get(found[1], "").lstrip("/")
+        return f"[{found[1]}](recording://{entity}) {found[2]}" if entity else found[0]
+
+    return re.sub(r"(?<=[ |])([^\s|,]+) (\d+%)", address, markdown)

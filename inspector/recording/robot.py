@@ -1,0 +1,246 @@
+"""The moving robot in a recording, from its URDF."""
+
+import hashlib
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+from rerun.urdf import UrdfTree
+
+import noisemodel
+from inspector.errors import InspectorError
+from inspector.recording import series, unstable
+from noisemodel import meshfile, meshpath, robot, urdf
+from noisemodel.errors import UnknownJointError
+from noisemodel.run import Run
+
+FRAMES_PER_SECOND = 50.0
+MAX_FRAMES = 2000
+WORLD = "world"
+COLOURED = {
+    "Asset3D": "albedo_factor",
+    "Boxes3D": "colors",
+    "Capsules3D": "colors",
+    "Cylinders3D": "colors",
+    "Ellipsoids3D": "colors",
+}
+"""The shapes that a URDF becomes, and what colours each."""
+
+
+def load(name: str, folder: Path) -> UrdfTree:
+    """Read the robot that a run names, for drawing.
+
+    Args:
+        name: A listed robot, or the path of a URDF.
+        folder: Takes what rerun reads in place of the robot's own files, as late as when the tree
+            is logged: it has to stay until then.
+
+    Returns:
+        Rerun's tree of its links and joints.
+
+    Raises:
+        RobotError: If there is no such robot, or its URDF cannot be read.
+        MeshError: If one of its meshes cannot be read.
+    """
+    path = robot.locate(name)
+    urdf.read(path)
+    roots = robot.package_roots(name)
+    copy = folder / path.name
+    copy.write_text(drawable(path, roots, folder), encoding="utf-8")
+    return UrdfTree.from_file_path(
+        copy, entity_path_prefix="robot", static_transform_entity_path="/robot/fixed"
+    )
+
+
+def check_joints(tree: UrdfTree, run: Run) -> None:
+    """Refuse a run that names joints which the robot does not have.
+
+    Raises:
+        UnknownJointError: Naming the first such joint.
+    """
+    known = [joint.name for joint in tree.joints() if joint.joint_type != "fixed"]
+    for name in (*run.joint_names, *run.desired_joint_names):
+        if name not in known:
+            raise UnknownJointError(name, tree.name, known)
+
+
+def root(tree: UrdfTree, run: Run) -> str:
+    """Name the frame that a robot is seen from: its base, or the world if that moves."""
+    return WORLD if run.base_pose is not None else str(tree.root_link().name)
+
+
+def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
+    """List, for each link that moves, the URDF's links that are fixed to it, itself first.
+
+    What is fixed to the root belongs to the root.
+    """
+    groups = {tree.root_link().name: [tree.root_link().name]}
+    carrier = {tree.root_link().name: tree.root_link().name}
+    waiting = list(tree.joints())
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent_link in carrier]
+        for joint in ready:
+            fixed = joint.joint_type == "fixed"
+            carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
+            groups.setdefault(carrier[joint.child_link], []).append(joint.child_link)
+        waiting = [joint for joint in waiting if joint not in ready]
+    return groups
+
+
+def entities(tree: UrdfTree) -> dict[str, str]:
+    """Name, for each link that moves and is drawn, the entity to select."""
+    found = {}
+    for link, members in moving_links(tree).items():
+        drawn = [path for member in members for path in tree.get_visual_geometry_paths(member)]
+        if drawn:
+            found[link] = drawn[0].rpartition("/")[0]
+    return found
+
+
+def shapes(tree: UrdfTree) -> dict[str, str]:
+    """Tell the shape of each entity that is drawn, a key of ``COLOURED``."""
+    found = {}
+    for chunk in tree.stream().to_chunks():
+        for name in chunk.to_record_batch().schema.names:
+            shape, _, component = name.partition(":")
+            if shape in COLOURED and component != COLOURED[shape]:
+                found[chunk.entity_path] = shape
+    return found
+
+
+def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bool) -> None:
+    """Log a robot and its motion.
+
+    Args:
+        recording: Where to.
+        tree: The robot.
+        run: A run with positions; joints that it does not name rest.
+        coloured: Whether colours over time will follow: the URDF's own, which are static and
+            would hide them, are left out then.
+    """
+    unstable.log_up(recording)
+    drawn = tree.stream()
+    if coloured:
+        drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])
+    rr.send_chunks(drawn, recording=recording)
+    assert run.position is not None
+    step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
+    shown = np.arange(0, len(run.time), step)
+    shown = shown[run.mask[shown]]
+    columns = {name: run.position[shown, i] for i, name in enumerate(run.joint_names)}
+    for joint in tree.joints():
+        follows = joint.mimic
+        if follows is not None and follows.joint in columns:
+            angles = columns[follows.joint] * follows.multiplier + follows.offset
+        elif joint.name in columns:
+            angles = columns[joint.name]
+        else:
+            continue
+        recording.send_columns(
+            f"/robot/motion/{joint.name}",
+            indexes=[series.at(run.time[shown])],
+            columns=joint.compute_transform_columns(angles.tolist(), clamp=False),
+        )
+    if run.base_pose is not None:
+        _log_base(recording, tree, run, shown)
+
+
+def _log_base(
+    recording: rr.RecordingStream, tree: UrdfTree, run: Run, shown: NDArray[np.intp]
+) -> None:
+    assert run.base_pose is not None
+    pose = run.base_pose[shown]
+    recording.send_columns(
+        "/robot/motion/base",
+        indexes=[series.at(run.time[shown])],
+        columns=rr.Transform3D.columns(
+            translation=pose[:, :3],
+            quaternion=pose[:, 3:],
+            parent_frame=[WORLD] * len(pose),
+            child_frame=[tree.root_link().name] * len(pose),
+        ),
+    )
+
+
+DRAWN = {".stl", ".dae", ".obj", ".glb", ".gltf"}
+FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+
+
+class MeshError(InspectorError):
+    """A mesh that is missing, lies outside of the robot's folders, or cannot be read."""
+
+    def __init__(self, mesh: str, problem: str) -> None:
+        self.mesh, self.problem = mesh, problem
+        super().__init__(f"mesh {mesh}: {problem}; `--no-robot` shows the run without the robot")
+
+
+def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
+    """Rewrite a URDF for drawing.
+
+    Collision shapes, textures and simulator extensions are left out, addresses of meshes become
+    absolute: rerun refuses empty textures and needs an environment variable for ``package://``.
+
+    Args:
+        urdf: A URDF that has been checked.
+        roots: Folders in which ``package://`` addresses are looked up and meshes may lie.
+        folder: Takes the meshes that rerun cannot read, written anew as STL.
+
+    Returns:
+        The rewritten URDF.
+
+    Raises:
+        MeshError: If a mesh is missing, lies elsewhere, or is empty or cut off.
+    """
+    tree = ET.parse(urdf).getroot()  # noqa: S314
+    for parent in list(tree.iter()):
+        for child in list(parent):
+            bare = child.tag == "texture" and not child.get("filename")
+            if bare or child.tag in ("collision", "gazebo", "transmission", "sensor"):
+                parent.remove(child)
+    for mesh in tree.iter("mesh"):
+        mesh.set("filename", f"file://{_checked(mesh.get('filename', ''), urdf, roots, folder)}")
+    return ET.tostring(tree, encoding="unicode")
+
+
+def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> Path:
+    try:
+        path = meshpath.find(address, urdf, roots)
+        if path.suffix.lower() not in DRAWN:
+            known = ", ".join(sorted(DRAWN))
+            raise MeshError(address, f"of kind {path.suffix!r}, expected {known}")
+        meshfile.check_whole(path)  # the viewer would draw nothing, and say nothing
+        if path.suffix.lower() == ".dae" and not _read_by_rerun(path):
+            return _as_stl(path, folder)
+    except noisemodel.MeshError as error:
+        raise MeshError(address or "''", error.problem) from error
+    return path
+
+
+def _read_by_rerun(path: Path) -> bool:
+    """Whether rerun's reader of COLLADA draws a file; of others it draws nothing, silently.
+
+    Seen with 0.41 on the robots of example-robot-data: it takes triangles of version 1.4.1 only,
+    and turns what is not Z_UP, which URDFs do not mean.
+    """
+    text = path.read_text(encoding="utf-8", errors="replace")
+    others = re.search(r"<(polylist|polygons|tristrips|trifans)\b", text)
+    return not others and 'version="1.4.1"' in text and "<up_axis>Z_UP<" in text
+
+
+def _as_stl(path: Path, folder: Path) -> Path:
+    """Write the triangles of a mesh, as the noise model reads them, as a binary STL file."""
+    copy = folder / f"{hashlib.sha256(bytes(path)).hexdigest()[:16]}.stl"
+    if not copy.exists():
+        triangles = meshfile.read(path)
+        facets = np.zeros(len(triangles), FACET)
+        facets["corners"] = triangles
+        edges = np.diff(triangles, axis=1)
+        across = np.cross(edges[:, 0], edges[:, 1])
+        length = np.linalg.norm(across, axis=1, keepdims=True)
+        facets["normal"] = across / np.where(length > 0.0, length, 1.0)
+        copy.write_bytes(bytes(80) + len(facets).to_bytes(4, "little") + facets.tobytes())
+    return copy

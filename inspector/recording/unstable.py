@@ -1,0 +1,252 @@
+"""Every API of rerun that is marked unstable: views, their arrangement, panels, audio, bars.
+
+What churns, as seen from 0.41:
+
+- ``rerun.blueprint`` as a whole: names and arguments of views and axes change between minor
+  versions, and what a view does by default does too, hence everything here is said outright;
+- ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
+  time that it is logged at; a static asset stays silent;
+- ``ViewCoordinates``;
+- ``rerun.experimental``, by which a viewer is asked for pictures and for what its views report;
+- columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
+
+Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
+``StateChange``, ``TextLog``, ``TextDocument``, ``Tensor``, ``BarChart``, ``UrdfTree``.
+When rerun moves on, this module follows and no other.
+"""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal, TypeAlias
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from numpy.typing import NDArray
+
+from inspector.recording.tensors import tensors
+from noisemodel.types import Array
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
+
+Part: TypeAlias = rrb.View | rrb.Container
+"""A view, or views that are arranged."""
+
+BACKGROUND = (24, 26, 30)
+GRID = (70, 74, 82, 130)
+
+
+def plot(
+    name: str,
+    origin: str,
+    paths: Sequence[str] = ("$origin/**",),
+    *,
+    legend: bool = False,
+    between: tuple[float, float] | None = None,
+    fixed: bool = False,
+    during: tuple[float, float] | None = None,
+    last: float | None = None,
+) -> Part:
+    """Plot scalars over time.
+
+    Args:
+        name: Title, with the unit.
+        origin: Entity path that the lines lie under.
+        paths: Which of them are drawn.
+        legend: Whether lines are named.
+        between: Range of values that is shown; that of the lines unless given.
+        fixed: Whether zooming leaves that range alone.
+        during: Stretch of time that is shown, in [s]; unless given, that of all other views.
+        last: Time up to the cursor that is shown in place of that, in [s].
+    """
+    corner = rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop  # news is at the right
+    return rrb.TimeSeriesView(
+        origin=origin,
+        contents=list(paths),
+        name=name,
+        plot_legend=rrb.PlotLegend(corner, visible=legend),
+        axis_x=_over(last) if during is None else _alone(*during),
+        axis_y=None if between is None else rrb.ScalarAxis(range=between, zoom_lock=fixed),
+    )
+
+
+def lanes(name: str, origin: str, *, last: float | None = None) -> Part:
+    """Draw states over time, a lane for each entity under ``origin``; `plot` says what is shown."""
+    return rrb.StateTimelineView(origin=origin, name=name, time_view=_over(last))
+
+
+def bars(name: str, origin: str) -> Part:
+    """Draw the bar chart that holds at the time cursor."""
+    return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
+
+
+def tensor(name: str, origin: str) -> Part:
+    """Draw a tensor as an image that fills its view."""
+    return rrb.TensorView(
+        origin=origin,
+        name=name,
+        scalar_mapping=rrb.TensorScalarMapping(colormap="inferno", mag_filter="Linear"),
+        view_fit="fill",
+    )
+
+
+def robot(name: str, origin: str, frame: str) -> Part:
+    """Draw what moves, as seen from a frame of transforms."""
+    return rrb.Spatial3DView(
+        origin="/",
+        contents=[f"{origin}/**"],
+        name=name,
+        spatial_information=rrb.SpatialInformation(target_frame=frame),
+        background=rrb.Background(color=BACKGROUND),
+        line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=GRID),
+    )
+
+
+def text(name: str, origin: str) -> Part:
+    """Show a document."""
+    return rrb.TextDocumentView(origin=origin, name=name)
+
+
+def events(name: str, origin: str) -> Part:
+    """List log lines; a click on the time of one goes there."""
+    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin=origin, name=name, columns=columns)
+
+
+def audio(name: str, origin: str) -> Part:
+    """Draw a sound, and play it while time plays."""
+    return rrb.AudioView(origin=origin, name=name)
+
+
+def tabs(*parts: Part, name: str | None = None) -> Part:
+    """Put parts behind each other; the first is seen."""
+    return rrb.Tabs(*parts, active_tab=0, name=name)
+
+
+def above(*parts: tuple[Part, float], name: str | None = None) -> Part:
+    """Put parts above each other, each with its share of the height."""
+    shares = [share for _, share in parts]
+    return rrb.Vertical(*(part for part, _ in parts), row_shares=shares, name=name)
+
+
+def beside(*parts: tuple[Part, float]) -> Part:
+    """Put parts beside each other, each with its share of the width."""
+    return rrb.Horizontal(*(part for part, _ in parts), column_shares=[share for _, share in parts])
+
+
+def blueprint(
+    content: Part,
+    timeline: str,
+    loop: tuple[float, float] | None = None,
+    *,
+    following: bool = False,
+) -> rrb.Blueprint:
+    """Fill the window with a part; panels stay closed.
+
+    Args:
+        content: What to show.
+        timeline: Along which time runs.
+        loop: Stretch of time that is selected, and that playing repeats, in [s].
+        following: Whether time goes on with what comes in; it stands unless said.
+    """
+    playing: Literal["following", "paused"] = "following" if following else "paused"
+    time = rrb.TimePanel(state="collapsed", timeline=timeline, play_state=playing)
+    if loop is not None:
+        time = rrb.TimePanel(
+            state="collapsed",
+            timeline=timeline,
+            play_state="paused",
+            loop_mode="selection",
+            time_selection=rrb.components.AbsoluteTimeRange(*map(_nanoseconds, loop)),
+        )
+    return rrb.Blueprint(
+        content,
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        time,
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def log_audio(
+    recording: rr.RecordingStream, path: str, sound: bytes, timeline: str, *, start: float = 0.0
+) -> None:
+    """Log a sound that is played from a time on.
+
+    Args:
+        recording: Where to.
+        path: Entity path.
+        sound: A whole WAV file.
+        timeline: Along which time runs.
+        start: When the sound starts, in [s].
+    """
+    instant = np.array([_nanoseconds(start)], dtype="timedelta64[ns]")
+    recording.send_columns(
+        path,
+        indexes=[rr.TimeColumn(timeline, duration=instant)],
+        columns=rr.AssetAudio.columns(blob=[sound], media_type=["audio/wav"]),
+    )
+
+
+def log_bars(
+    recording: rr.RecordingStream,
+    path: str,
+    index: rr.TimeColumn,
+    bars: NDArray[np.float32],
+    *,
+    places: Array,
+    color: tuple[int, int, int],
+) -> None:
+    """Log a bar chart for each of several times.
+
+    Args:
+        recording: Where to.
+        path: Entity path.
+        index: The times.
+        bars: Heights, shape (times, bars).
+        places: Where the bars stand, shape (bars,).
+        color: Of all bars.
+    """
+    widths = np.diff(places, prepend=0.0)
+    heights, stands = tensors(bars), tensors(places[None])
+    style = rr.BarChart(heights[:1], abscissa=stands, color=color, widths=widths)
+    changing = rr.BarChart.descriptor_values()
+    batches = style.as_component_batches()
+    lasting = [batch for batch in batches if batch.component_descriptor() != changing]
+    recording.log(path, lasting, static=True)
+    recording.send_columns(path, indexes=[index], columns=rr.BarChart.columns(values=heights))
+
+
+def log_up(recording: rr.RecordingStream) -> None:
+    """Say that z points upwards, in right-handed axes."""
+    recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+
+
+def client(address: str) -> "ViewerClient":
+    """Reach a viewer that runs, to ask it for its state and for pictures; raises what it likes."""
+    from rerun.experimental import ViewerClient
+
+    return ViewerClient.connect(address)
+
+
+def _over(last: float | None) -> rrb.TimeAxis:
+    if last is None:
+        return rrb.TimeAxis(link="LinkToGlobal")
+    shown = rrb.TimeRange(
+        start=rrb.TimeRangeBoundary.cursor_relative(seconds=-last),
+        end=rrb.TimeRangeBoundary.cursor_relative(),
+    )
+    return rrb.TimeAxis(view_range=shown)
+
+
+def _alone(start: float, stop: float) -> rrb.TimeAxis:
+    shown = rrb.TimeRange(
+        start=rrb.TimeRangeBoundary.absolute(seconds=start),
+        end=rrb.TimeRangeBoundary.absolute(seconds=stop),
+    )
+    return rrb.TimeAxis(link="Independent", view_range=shown)
+
+
+def _nanoseconds(seconds: float) -> int:
+    return round(seconds * 1e9)

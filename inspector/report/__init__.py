@@ -1,0 +1,1 @@
+"""Verdicts and reports: Markdown, HTML, and the formats of `classify`."""

@@ -1,0 +1,147 @@
+"""Verdicts as text, JSON, JUnit XML and GitHub annotations."""
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from xml.etree import ElementTree as ET
+
+from inspector.analysis.tracing import Origins
+from inspector.analysis.verdict import Status, Verdict
+from inspector.localisation.localise import Origin
+from models import Event
+
+ANNOTATIONS = 10
+"""GitHub silently drops what goes beyond ten of a kind per step."""
+
+
+def text(verdicts: Sequence[Verdict]) -> str:
+    """Write verdicts for people, a line per run and a line per event.
+
+    Bad inputs are left out: the command line says them on stderr.
+    """
+    lines = []
+    for verdict in verdicts:
+        if verdict.status is Status.BAD_INPUT:
+            continue
+        model = f" [{verdict.model}]" if verdict.model else ""
+        message = f": {verdict.message}" if verdict.message else ""
+        lines.append(f"{verdict.path}: {verdict.status}{model}{message}")
+        lines += [f"  {_sentence(event)}" for event in verdict.events]
+    return "\n".join(lines)
+
+
+def as_json(verdicts: Sequence[Verdict], origins: Sequence[Origins] = ()) -> str:
+    """Write verdicts as ``noise-verdict/1``.
+
+    Args:
+        verdicts: What was found in runs.
+        origins: Where it comes from, for each run; not written unless given.
+    """
+    runs = [
+        {
+            "run": str(verdict.path),
+            "model": verdict.model,
+            "status": verdict.status.value,
+            "events": [
+                {
+                    "label": event.label,
+                    "start": round(event.start, 6),
+                    "stop": round(event.stop, 6),
+                    "score": round(event.score, 6),
+                    **({"origin": _origin(known[event])} if event in known else {}),
+                }
+                for event in verdict.events
+            ],
+            "message": verdict.message,
+        }
+        for verdict, known in zip(verdicts, origins or [{}] * len(verdicts), strict=True)
+    ]
+    return json.dumps({"format": "noise-verdict/1", "runs": runs}, indent=2)
+
+
+def junit(verdicts: Sequence[Verdict]) -> str:
+    """Write verdicts as JUnit XML: a test case per run."""
+    count = {status: sum(v.status is status for v in verdicts) for status in Status}
+    suite = ET.Element(
+        "testsuite",
+        name="inspector",
+        tests=str(len(verdicts)),
+        failures=str(count[Status.FINDINGS]),
+        errors=str(count[Status.BAD_INPUT]),
+        skipped=str(count[Status.CANNOT_TELL]),
+    )
+    tags = {
+        Status.FINDINGS: "failure",
+        Status.BAD_INPUT: "error",
+        Status.CANNOT_TELL: "skipped",
+    }
+    for verdict in verdicts:
+        case = ET.SubElement(suite, "testcase", classname="inspector", name=_plain(verdict.path))
+        if verdict.status in tags:
+            sentences = [_sentence(event) for event in verdict.events] or [verdict.message]
+            outcome = ET.SubElement(case, tags[verdict.status], message=_plain(sentences[0]))
+            outcome.text = _plain("\n".join(sentences))
+    root = ET.Element("testsuites")
+    root.append(suite)
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode", xml_declaration=True)
+
+
+def github(verdicts: Sequence[Verdict]) -> str:
+    """Write verdicts as GitHub workflow commands, at most ten of a kind."""
+    errors = [
+        _annotation("error", verdict, ", ".join(map(_sentence, verdict.events)) or verdict.message)
+        for verdict in verdicts
+        if verdict.status in (Status.BAD_INPUT, Status.FINDINGS)
+    ]
+    warnings = [
+        _annotation("warning", verdict, verdict.message)
+        for verdict in verdicts
+        if verdict.status is Status.CANNOT_TELL
+    ]
+    return "\n".join(_capped(errors, "error") + _capped(warnings, "warning"))
+
+
+FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
+    "text": text,
+    "json": as_json,
+    "junit": junit,
+    "github": github,
+}
+
+
+def _origin(origin: Origin) -> dict[str, object]:
+    """Say where a finding comes from: lag in [s], band in [Hz], null where it is not known."""
+    first = origin.first
+    return {
+        "stage": first and first.stage,
+        "following": first and (first.following or None),
+        "lag": first and round(first.lag, 6),
+        "joints": {} if first is None else {name: round(share, 3) for name, share in first.joints},
+        "band": origin.band and [round(frequency, 3) for frequency in origin.band],
+    }
+
+
+def _sentence(event: Event) -> str:
+    return f"{event.label} from {event.start:.2f} s to {event.stop:.2f} s"
+
+
+def _plain(value: object) -> str:
+    """Drop the control characters that XML forbids."""
+    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "", str(value))
+
+
+def _annotation(kind: str, verdict: Verdict, message: str) -> str:
+    path = _escaped(str(verdict.path)).replace(":", "%3A").replace(",", "%2C")
+    return f"::{kind} file={path}::{_escaped(f'{verdict.status}: {message}')}"
+
+
+def _escaped(value: str) -> str:
+    return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _capped(lines: list[str], kind: str) -> list[str]:
+    if len(lines) <= ANNOTATIONS:
+        return lines
+    rest = len(lines) - ANNOTATIONS + 1
+    return [*lines[: ANNOTATIONS - 1], f"::{kind}::{rest} more runs are not shown here"]

@@ -1,0 +1,291 @@
+"""A page about a run that needs no viewer: one file, which fetches nothing from anywhere."""
+
+import re
+from base64 import b64encode
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from inspector.analysis.inspection import Inspection
+from inspector.errors import InspectorError
+from inspector.report.markdown import ORIGIN, note, origin, verdict
+from inspector.sound.clip import clip, first_look
+from noisemodel.atomic import replacing
+from noisemodel.links import vibrating
+from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.types import Array
+
+HEARD = "What is heard are the joints' velocities above 20 Hz, their powers added up."
+POLICY = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'"
+"""Told to browsers, so that nothing is fetched whatever a run's names are."""
+STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; max-width: 62rem;
+  margin: 2rem auto; padding: 0 1rem; }
+h1 { margin-bottom: 0; overflow-wrap: anywhere; }
+h2 { margin: 2.2rem 0 .6rem; font-size: 1.15rem; }
+.verdict { font-size: 1.25rem; font-weight: 600; margin: .2rem 0 1.2rem; }
+.note { color: #57606a; font-size: .9rem; margin: .3rem 0; }
+.wide { overflow-x: auto; }
+img { width: 100%; height: auto; }
+audio { width: 100%; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { text-align: left; padding: .25rem 1.2rem .25rem 0; border-bottom: 1px solid #d0d7de; }
+th { font-weight: 600; }
+td.number, th.number { text-align: right; }
+li { margin: .2rem 0; }
+"""
+
+
+def require() -> None:
+    """Refuse a page before long work is done for it.
+
+    Raises:
+        InspectorError: If matplotlib is not installed.
+    """
+    if find_spec("matplotlib") is None:
+        raise InspectorError('a report needs matplotlib; `pip install "noise-inspector[report]"`')
+
+
+def write(inspection: Inspection, path: Path, *, audit: str = "", overwrite: bool = False) -> None:
+    """Write the page of an inspected run, whole or not at all.
+
+    Args:
+        inspection: A run with what was found in it.
+        path: The file to write, by convention ``*.html``.
+        audit: What the log can show, in lines.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        InspectorError: If matplotlib is not installed.
+        OutputError: If the file exists or cannot be written.
+    """
+    require()
+    text = page(inspection, audit=audit)
+    with replacing(path, overwrite=overwrite) as temporary:
+        temporary.write_text(text, encoding="utf-8")
+
+
+def page(inspection: Inspection, *, audit: str = "") -> str:
+    """Write the page of an inspected run.
+
+    Args:
+        inspection: A run with what was found in it.
+        audit: What the log can show, in lines.
+
+    Returns:
+        HTML.
+    """
+    from inspector.report.picture import picture
+
+    html = ET.Element("html", lang="en")
+    head = ET.SubElement(html, "head")
+    ET.SubElement(head, "meta", charset="utf-8")
+    ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": POLICY})
+    ET.SubElement(head, "meta", name="viewport", content="width=device-width")
+    _text(head, "title", f"{inspection.name}: {verdict(inspection)}")
+    _text(head, "style", STYLE)
+    body = ET.SubElement(html, "body")
+    _text(body, "h1", inspection.name)
+    _text(body, "p", verdict(inspection), "verdict")
+    _add_table(body, facts(inspection))
+    for table in found(inspection):
+        _add_table(body, table)
+    _text(body, "h2", "Over time")
+    image = f"data:image/png;base64,{_encoded(picture(inspection))}"
+    ET.SubElement(body, "img", src=image, alt=_described(inspection))
+    _add_sound(body, inspection)
+    for table in parts(inspection):
+        _add_table(body, table)
+    _add_list(body, "What the log can show", audit.splitlines())
+    _add_list(body, "Remarks", inspection.remarks)
+    _text(
+        body,
+        "p",
+        f"Made by noise-inspector of an input with SHA-256 {inspection.sha256}. The noise is an"
+        " estimate from the velocities of rigid links: compare it, do not quote it.",
+        "note",
+    )
+    return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
+
+
+def _add_sound(body: ET.Element, inspection: Inspection) -> None:
+    heard = clip(inspection.run, around=first_look(inspection))
+    _text(body, "h2", "To be heard")
+    if heard is None:
+        _text(body, "p", "The log is too slow for ears.", "note")
+        return
+    source = f"data:audio/wav;base64,{_encoded(heard.data)}"
+    ET.SubElement(body, "audio", controls="controls", src=source)
+    span = f"From {heard.start:.2f} s to {heard.stop:.2f} s: {heard.said}."
+    _text(body, "p", f"{span} {HEARD}", "note")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with a title.
+
+    Attributes:
+        title: Empty without one.
+        head: Names of the columns; all empty without a head.
+        rows: Cells of each row.
+        numbers: Columns that hold numbers.
+        note: A sentence below the table; empty without one.
+    """
+
+    title: str
+    head: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+    numbers: tuple[int, ...] = ()
+    note: str = ""
+
+
+def _add_table(body: ET.Element, table: Table) -> None:
+    if table.title:
+        _text(body, "h2", table.title)
+    frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
+    if any(table.head):
+        row = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
+        for place, name in enumerate(table.head):
+            _text(row, "th", name, "number" if place in table.numbers else "")
+    rows = ET.SubElement(frame, "tbody")
+    for cells in table.rows:
+        row = ET.SubElement(rows, "tr")
+        for place, cell in enumerate(cells):
+            _text(row, "td", cell, "number" if place in table.numbers else "")
+    if table.note:
+        _text(body, "p", table.note, "note")
+
+
+def _add_list(body: ET.Element, title: str, lines: tuple[str, ...] | list[str]) -> None:
+    if lines:
+        _text(body, "h2", title)
+        items = ET.SubElement(body, "ul")
+        for line in lines:
+            _text(items, "li", line.strip())
+
+
+def _text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
+    element = ET.SubElement(parent, tag, {"class": kind} if kind else {})
+    # HTML has no way to write these characters.
+    element.text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]", "\ufffd", text)
+
+
+def _described(inspection: Inspection) -> str:
+    """Say in words what the picture shows."""
+    rows = ["classes", "noise", "spectrogram of the noise"]
+    rows += ["loudest links"] if inspection.links is not None else []
+    return f"Over {inspection.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
+
+
+def _encoded(data: bytes) -> str:
+    return b64encode(data).decode("ascii")
+
+
+MOST = 20
+"""Links and joints that are listed, the loudest first."""
+
+
+def facts(inspection: Inspection) -> Table:
+    """List what the run is."""
+    run = inspection.run
+    rows = [
+        ("robot", run.robot or "not named"),
+        ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
+        ("joints", str(len(run.joint_names))),
+        ("model", inspection.model or "none"),
+        *((key, _told(run.meta[key])) for key in ("scenario", "seed", "source") if key in run.meta),
+    ]
+    return Table("", ("", ""), rows)
+
+
+def _told(value: object) -> str:
+    return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
+
+
+def found(inspection: Inspection) -> Iterator[Table]:
+    """List findings and annotated blocks, those that there are."""
+    said = note(inspection)
+    if inspection.events:
+        rows = [
+            (
+                event.label,
+                f"{event.start:.2f}",
+                f"{event.stop:.2f}",
+                f"{event.score:.2f}",
+                *_plain(origin(inspection, event)),
+            )
+            for event in inspection.events
+        ]
+        head = ("class", "from [s]", "to [s]", "score", *ORIGIN)
+        yield Table("Findings", head, rows, (1, 2, 3), said)
+    if inspection.run.blocks:
+        annotated = [
+            (
+                block.label,
+                f"{block.start:.2f}",
+                f"{block.stop:.2f}",
+                *_plain(origin(inspection, block)),
+            )
+            for block in inspection.run.blocks
+        ]
+        said = "" if inspection.events else said
+        yield Table("Annotated", ("class", "from [s]", "to [s]", *ORIGIN), annotated, (1, 2), said)
+
+
+def _plain(cells: tuple[str, ...]) -> tuple[str, ...]:
+    """Leave Markdown's marks out."""
+    return tuple(cell.replace("`", "") for cell in cells)
+
+
+def parts(inspection: Inspection) -> Iterator[Table]:
+    """List links and joints by what vibrates in them."""
+    links = inspection.links
+    if links is not None:
+        peaks = links.vibration.max(axis=0, initial=0.0)
+        levels = decibel(np.maximum(peaks, REFERENCE_POWER) / REFERENCE_POWER)
+        when = links.time[links.vibration.argmax(axis=0)]
+        yield _ranked(
+            "Links",
+            ("link", "share", "peak [dB re 1 pW]", "at [s]"),
+            links.links,
+            links.vibration.sum(axis=0),
+            [(f"{level:.1f}", f"{time:.2f}") for level, time in zip(levels, when, strict=True)],
+            "Sound power of the measured motion above 10 Hz, normal to the surface.",
+        )
+    run = inspection.run
+    fast = vibrating(run.velocity.astype(np.float64), run.mask, run.rate)
+    power = np.square(fast)
+    peaks, when = np.abs(fast).max(axis=0), run.time[power.argmax(axis=0)]
+    yield _ranked(
+        "Joints",
+        ("joint", "share", "rms [rad/s]", "peak [rad/s]", "at [s]"),
+        run.joint_names,
+        power.sum(axis=0),
+        [
+            (f"{rms:.3g}", f"{peak:.3g}", f"{time:.3f}")
+            for rms, peak, time in zip(np.sqrt(power.mean(axis=0)), peaks, when, strict=True)
+        ],
+        "Measured velocity above 10 Hz; of joints that slide in [m/s].",
+    )
+
+
+def _ranked(
+    title: str,
+    head: tuple[str, ...],
+    names: Sequence[str],
+    power: Array,
+    facts: Sequence[tuple[str, ...]],
+    note: str,
+) -> Table:
+    """Order parts by their power, and say how many are left out."""
+    share = power / (power.sum() or 1.0)
+    order = np.argsort(-power, kind="stable")[:MOST]
+    rows = [(names[i], f"{share[i]:.1%}", *facts[i]) for i in order]
+    left = len(names) - len(order)
+    note = f"{note} {left} quieter ones are left out." if left else note
+    return Table(title, head, rows, tuple(range(1, len(head))), note)

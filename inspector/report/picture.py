@@ -1,0 +1,129 @@
+"""A run over time as a picture on paper: classes, noise, spectrogram, loudest links."""
+
+import io
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inspector import colors
+from inspector.analysis.inspection import Inspection
+from inspector.spectrogram import spectrogram
+from inspector.thinning import extremes
+from noisemodel.links import LinkNoise
+from noisemodel.noise import REFERENCE_POWER, decibel
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH, DPI = 9.6, 150
+INK = "#24292f"
+POINTS = 4000
+TOP_HZ = 2000.0
+LINKS = 12
+LINK_RANGE_DB = 50.0
+ROW = 0.24
+"""Height of a class or a link, in [inch]."""
+
+
+def picture(inspection: Inspection) -> bytes:
+    """Draw an inspected run.
+
+    Args:
+        inspection: A run with what was found in it.
+
+    Returns:
+        A PNG file.
+    """
+    from matplotlib.figure import Figure
+
+    links = inspection.links
+    rows = [_class_names(inspection), [], [], links.links[:LINKS] if links else []]
+    heights = [ROW * len(rows[0]) + 0.3, 1.5, 2.4, ROW * len(rows[3]) + 0.3]
+    shown = [0, 1, 2, 3] if links else [0, 1, 2]
+    shown = shown if rows[0] else shown[1:]
+    figure = Figure(
+        figsize=(WIDTH, sum(heights[i] for i in shown) + 0.6), dpi=DPI, layout="constrained"
+    )
+    panels = figure.subplots(
+        len(shown), 1, sharex=True, squeeze=False, height_ratios=[heights[i] for i in shown]
+    )[:, 0]
+    axes = dict(zip(shown, panels, strict=True))
+    if 0 in axes:
+        _classes(axes[0], inspection)
+    _noise(axes[1], inspection)
+    _spectrogram(figure, axes[2], inspection)
+    if links:
+        _links(figure, axes[3], links)
+    run = inspection.run
+    panels[-1].set_xlim(run.time[0], run.time[-1])
+    panels[-1].set_xlabel("time [s]")
+    file = io.BytesIO()
+    figure.savefig(file, format="png", metadata={"Software": None})
+    return file.getvalue()
+
+
+def _class_names(inspection: Inspection) -> list[str]:
+    labels = inspection.labels
+    known = [] if labels is None else list(labels.classes)
+    return [*known, *sorted({block.label for block in inspection.run.blocks} - set(known))]
+
+
+def _classes(axes: "Axes", inspection: Inspection) -> None:
+    """Draw a row for each class: filled what was found, hatched what somebody annotated."""
+    names = _class_names(inspection)
+    shades = colors.of_classes(tuple(names))
+    for row, name in enumerate(names):
+        shade = tuple(channel / 255 for channel in shades[name])
+        found = [(e.start, e.stop - e.start) for e in inspection.events if e.label == name]
+        axes.broken_barh(found, (row - 0.4, 0.4), facecolor=shade, edgecolor=INK, linewidth=0.6)
+        blocks = [(b.start, b.stop - b.start) for b in inspection.run.blocks if b.label == name]
+        axes.broken_barh(
+            blocks, (row + 0.0, 0.4), facecolor="white", edgecolor=INK, linewidth=0.6, hatch="////"
+        )
+    axes.set_yticks(range(len(names)), names, parse_math=False)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.grid(axis="x", alpha=0.3)
+    hatched = "; hatched: annotated" if inspection.run.blocks else ""
+    axes.set_title(f"filled: found{hatched}", fontsize=9, loc="left")
+
+
+def _noise(axes: "Axes", inspection: Inspection) -> None:
+    run = inspection.run
+    time, noise = extremes(
+        run.time, np.where(run.mask, inspection.noise, np.nan)[:, None], points=POINTS
+    )
+    axes.plot(time, noise[:, 0], color="#0072b2", linewidth=0.7)
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("noise [rad/s]")
+    axes.grid(alpha=0.3)
+
+
+def _spectrogram(figure: "Figure", axes: "Axes", inspection: Inspection) -> None:
+    run = inspection.run
+    shown = spectrogram(inspection.noise, run.rate, start=float(run.time[0]), valid=run.mask)
+    kept = shown.frequency <= TOP_HZ
+    image = axes.pcolormesh(
+        shown.time, shown.frequency[kept], shown.level[kept], cmap="inferno", shading="nearest"
+    )
+    axes.set_ylabel("frequency [Hz]")
+    figure.colorbar(image, ax=axes, pad=0.01, aspect=15, label="noise [dB]")
+
+
+def _links(figure: "Figure", axes: "Axes", links: LinkNoise) -> None:
+    order = links.loudest[:LINKS]
+    level = decibel(np.maximum(links.vibration[:, order].T, REFERENCE_POWER) / REFERENCE_POWER)
+    top = float(level.max())
+    image = axes.pcolormesh(
+        links.time,
+        np.arange(len(order)),
+        level,
+        cmap="inferno",
+        shading="nearest",
+        vmin=top - LINK_RANGE_DB,
+        vmax=top,
+    )
+    axes.set_yticks(range(len(order)), [links.links[i] for i in order], parse_math=False)
+    axes.invert_yaxis()
+    axes.set_title("loudest links, above 10 Hz", fontsize=9, loc="left")
+    figure.colorbar(image, ax=axes, pad=0.01, aspect=15, label="[dB re 1 pW]")

@@ -1,0 +1,1 @@
+"""Models learnt and measured from files: training, baselines, tuning, evaluation."""

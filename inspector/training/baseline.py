@@ -1,0 +1,149 @@
+"""Learn from good runs alone, from files, and write a model."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+from typing import NamedTuple
+
+import models
+import noisemodel as nm
+from inspector.errors import InspectorError
+from inspector.progress import progress
+from inspector.training.part import Part
+from inspector.training.training import of_sample, recording_of
+from models.estimators.baseline import MOTION, NOISE_ALONE
+from noisemodel.atomic import refuse_existing
+from scenarios.sample import Sample, is_sample
+from scenarios.signals import WHOLE
+
+PROFILES: dict[str, models.LogBands] = {"general": MOTION, "scalar": NOISE_ALONE}
+"""What a baseline listens to, by the names of the profiles that listen to the same."""
+
+
+class Source(NamedTuple):
+    """What all good runs have in common."""
+
+    path: Path
+    """The first of them."""
+    rate: float
+    """In [Hz]."""
+    robot: str = ""
+    """Empty where nobody says it."""
+    joints: frozenset[str] = frozenset()
+    """Their names; none where there is but a noise."""
+
+
+def learn(
+    inputs: Sequence[Path],
+    output: Path,
+    *,
+    alarms: float = 1.0,
+    profile: str = "",
+    rate: float | None = None,
+    part: Part = Part.ALL,
+    overwrite: bool = False,
+) -> models.Learnt:
+    """Learn a baseline and write it.
+
+    Args:
+        inputs: Run files of good motion, samples, folders of them, or NoisyTest folders; where
+            something is annotated, what is annotated `ok` counts.
+        output: The model file to write.
+        alarms: False alarms in an hour of good motion that the user can bear.
+        profile: One of ``PROFILES``; the richest that the first run feeds unless given.
+        rate: Rate of the model, in [Hz], to which faster runs are lowered; that of the runs, which
+            must agree, unless given.
+        part: Which of the recordings to learn from.
+        overwrite: Whether a file that exists may be replaced.
+
+    Returns:
+        What was learnt.
+
+    Raises:
+        InspectorError: If runs are of different rates or robots, or there is no such profile.
+        OutputError: If the file exists or cannot be written.
+        ModelsError: If there is too little good motion.
+    """
+    if profile and profile not in PROFILES:
+        raise InspectorError(f"a baseline has no profile {profile!r}; expected general or scalar")
+    refuse_existing(output, overwrite=overwrite)
+    files = list(_files(inputs))
+    found = progress(_recordings(files, rate, part), "read", total=len(files))
+    first = next(found, None)
+    if first is None:
+        raise InspectorError(f"no run in {', '.join(map(str, inputs))}, expected good ones")
+    richest = profile or ("general" if {*MOTION.signals} <= {*_signals(first)} else "scalar")
+    chosen = PROFILES[richest].at(first.rate)
+    try:
+        good = models.GoodMotion.read(chain([first], found), chosen)
+    except models.RecordingError as error:
+        hint = "; --profile scalar takes the noise alone" if "no signal" in str(error) else ""
+        raise InspectorError(f"{error}{hint}") from error
+    learnt = models.learn_baseline(good, chosen, alarms=alarms)
+    learnt.classifier.save(output, overwrite=overwrite)
+    return learnt
+
+
+def _files(inputs: Sequence[Path]) -> Iterator[Path]:
+    """List runs and samples, and folders of NoisyTest."""
+    for path in inputs:
+        if path.is_dir() and not any(path.glob("*.toml")):
+            yield from sorted(path.rglob("*.npz"))
+        else:
+            yield path
+
+
+def _recordings(
+    files: Sequence[Path], rate: float | None, part: Part
+) -> Iterator[models.Recording]:
+    """Read recordings one after the other, all of one rate and robot."""
+    first: Source | None = None
+    for path in files:
+        for source, recording in _read(path, rate):
+            held_out = models.held_out(models.group_of(recording.name))
+            if part is Part.ALL or held_out == (part is Part.TEST):
+                first = first or source
+                _check(source, first)
+                yield replace(recording, signal=_signals(recording))
+
+
+def _read(path: Path, rate: float | None) -> Iterator[tuple[Source, models.Recording]]:
+    if path.is_dir():
+        for each in models.noisytest.read_folder(path, rate=rate):
+            yield Source(path / each.name, each.rate), each
+    elif is_sample(path):
+        own = Sample.load(path, only=WHOLE)
+        wanted = rate or own.rate
+        yield Source(path, wanted, own.robot), of_sample(path, wanted)
+    else:
+        run = nm.Run.load(path)
+        wanted = rate or run.rate
+        source = Source(path, wanted, run.robot or "", frozenset(run.joint_names))
+        yield source, recording_of(path, run, wanted)
+
+
+def _check(source: Source, first: Source) -> None:
+    """Refuse what is not of the first run's rate and robot."""
+    if abs(source.rate / first.rate - 1) > models.profile.TOLERANCE:
+        slower = min(source.rate, first.rate)
+        raise InspectorError(
+            f"{source.path}: recorded at {source.rate:g} Hz, {first.path} at {first.rate:g} Hz;"
+            f" --rate {slower:g} lowers the faster ones"
+        )
+    if source.robot and first.robot and source.robot != first.robot:
+        raise InspectorError(
+            f"{source.path}: a run of {source.robot}, but {first.path} of {first.robot};"
+            " a baseline knows one robot"
+        )
+    if source.joints and first.joints and source.joints != first.joints:
+        odd = sorted(source.joints ^ first.joints)
+        raise InspectorError(
+            f"{source.path}: has other joints than {first.path} ({', '.join(odd[:3])});"
+            " a baseline knows one robot"
+        )
+
+
+def _signals(recording: models.Recording) -> dict[str, models.types.Real]:
+    """Take signals by name, without the error where what is desired is what was measured."""
+    return models.signals.telling(models.signals.named(recording.signal))

@@ -1,0 +1,206 @@
+"""The files that the measures of a model are written to."""
+
+from dataclasses import dataclass
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inspector.colors import SERIES, Color, of_classes
+from inspector.comparison import picture
+from models import Assessment
+from noisemodel.atomic import refuse_existing, replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from models.evaluation.intervals import Estimate
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What to write; None is not written.
+
+    Attributes:
+        json: All measures, the curve, and each failure that was missed.
+        picture: A PNG file.
+        overwrite: Whether files that exist may be replaced.
+    """
+
+    json: Path | None = None
+    picture: Path | None = None
+    overwrite: bool = False
+
+    def check(self) -> None:
+        """Refuse what cannot be written before long work is done for it.
+
+        Raises:
+            OutputError: If a file exists and may not be replaced, or cannot be written.
+            InspectorError: If matplotlib is not installed.
+        """
+        for path in filter(None, (self.json, self.picture)):
+            refuse_existing(path, overwrite=self.overwrite)
+        if self.picture:
+            require()
+
+    def write(self, assessment: Assessment, model: Path) -> None:
+        """Write the files.
+
+        Args:
+            assessment: The measures.
+            model: The file of the model.
+
+        Raises:
+            OutputError: If a file exists and may not be replaced, or cannot be written.
+        """
+        if self.json:
+            with replacing(self.json, overwrite=self.overwrite) as temporary:
+                temporary.write_text(as_json(assessment, model) + "\n", encoding="utf-8")
+        if self.picture:
+            draw(assessment, self.picture, title=model.stem, overwrite=self.overwrite)
+
+
+def as_json(assessment: Assessment, model: Path) -> str:
+    """Write the measures of a model as JSON.
+
+    Args:
+        assessment: The measures.
+        model: The file of the model.
+    """
+    return dumps({"model": model.name, **assessment.as_dict()}, indent=1, allow_nan=False)
+
+
+SIZE = (11.0, 8.5)
+"""Width and height, in [inch]."""
+DPI = 100
+BLUE, ORANGE = SERIES[6], SERIES[5]
+GREY = "0.6"
+
+require = picture.require
+
+
+def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = False) -> None:
+    """Draw the measures of a model as a PNG file.
+
+    Args:
+        assessment: The measures.
+        path: The file to write.
+        title: What the model is called.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        InspectorError: If matplotlib is not installed.
+        OutputError: If the file exists or cannot be written.
+    """
+    require()
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    (confusion, intervals), (reliability, trade_off) = figure.subplots(2, 2)
+    _confusion(confusion, assessment)
+    _intervals(intervals, assessment)
+    _reliability(reliability, assessment)
+    _trade_off(trade_off, assessment)
+    seen = f", NOT A TEST: {len(assessment.seen)} were trained on" if assessment.seen else ""
+    figure.suptitle(
+        f"{title}: {assessment.runs} runs of {assessment.groups} groups,"
+        f" {assessment.events.ok_hours:.3g} h of ok motion{seen}"
+    )
+    with replacing(path, overwrite=overwrite) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _confusion(axes: "Axes", assessment: Assessment) -> None:
+    """Colour each row by its class, the stronger the larger its share of the row."""
+    evaluation = assessment.frames.evaluation
+    names, counts = evaluation.classes, evaluation.confusion
+    shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    inks = np.array([_ink(color) for color in of_classes(names).values()])
+    # As much colour as the share, on white.
+    axes.imshow(1.0 - shares[..., None] * (1.0 - inks[:, None, :]), aspect="auto")
+    for row, column in np.ndindex(counts.shape):
+        text = f"{counts[row, column]}\n{shares[row, column]:.1%}" if counts[row, column] else "0"
+        axes.text(column, row, text, ha="center", va="center", fontsize=9)
+    axes.set_xticks(range(len(names)), names, fontsize=8)
+    axes.set_yticks(range(len(names)), names, fontsize=8)
+    axes.set_xlabel("called")
+    axes.set_title("Frames of annotated blocks (share of the row)", fontsize=10)
+
+
+def _intervals(axes: "Axes", assessment: Assessment) -> None:
+    frames, events = assessment.frames, assessment.events
+    colors = of_classes(frames.evaluation.classes)
+    rows: list[tuple[str, Estimate, Color]] = [
+        (f"recall of {name}", each, colors[name]) for name, each in frames.recall.items()
+    ]
+    rows += [
+        ("balanced accuracy", frames.balanced_accuracy, (0, 0, 0)),
+        ("failure recall", frames.failure_recall, (0, 0, 0)),
+        ("failures found", events.all_found, (0, 0, 0)),
+        ("found by their own name", events.all_named, (0, 0, 0)),
+    ]
+    rows = [row for row in rows if not np.isnan(row[1].value)]
+    for place, (_, each, color) in enumerate(rows):
+        axes.hlines(place, each.low, each.high, color=_ink(color), lw=6, alpha=0.55)
+        axes.plot(each.value, place, "|", color="black", markersize=14, markeredgewidth=1.5)
+    labels = [f"{name}\n{each.runs} runs, {each.groups} groups" for name, each, _ in rows]
+    axes.set_yticks(range(len(rows)), labels, fontsize=8)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.grid(axis="x", alpha=0.4)
+    axes.set_xlim(right=1.01)
+    axes.set_title("Measures with their 95 % intervals", fontsize=10)
+
+
+def _reliability(axes: "Axes", assessment: Assessment) -> None:
+    axes.set_title("Reliability", fontsize=10)
+    axes.set_xlabel("confidence")
+    axes.set_ylabel("share of right names")
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(0.0, 1.0)
+    if assessment.reliability is None or assessment.calibration_error is None:
+        axes.text(0.5, 0.5, "the scores are no probabilities", ha="center", va="center")
+        return
+    axes.plot([0.0, 1.0], [0.0, 1.0], "--", color=GREY, lw=1)
+    table = assessment.reliability.table()
+    width = table["high"] - table["low"]
+    axes.bar(table["low"], table["right"], width, align="edge", color=_ink(BLUE), alpha=0.35)
+    axes.plot(table["confidence"], table["right"], "o", color=_ink(BLUE))
+    for x, y, count in zip(table["confidence"], table["right"], table["frames"], strict=True):
+        if count:
+            axes.annotate(f"{count:.0f}", (x, y), (0, -12), textcoords="offset points", fontsize=7)
+    error = assessment.calibration_error
+    axes.text(0.03, 0.94, f"expected calibration error {error.value:.1%}")
+
+
+def _trade_off(axes: "Axes", assessment: Assessment) -> None:
+    curve, events = assessment.trade_off.curve(), assessment.events
+    rate = np.maximum.accumulate(curve["false_alarms_per_hour"])
+    for name, label, color, done in (
+        ("failure_recall", "failure frames", BLUE, events.failure_recall),
+        ("events_found", "failures", ORANGE, events.all_found),
+    ):
+        axes.step(rate, curve[name], where="post", color=_ink(color), label=label)
+        axes.plot(events.false_alarms_per_hour.value, done.value, "o", color=_ink(color))
+    for budget in assessment.at_budgets:
+        axes.axvline(budget, color=GREY, lw=0.8, ls=":")
+    if events.ok_hours:
+        # Below one false alarm in all the time there was, nothing can be told apart.
+        least = 1.0 / events.ok_hours
+        axes.set_xscale("symlog", linthresh=least)
+        decades = 10.0 ** np.arange(np.ceil(np.log10(least)), 6.0)
+        ticks = [0.0, *decades[decades <= max(rate.max(initial=0.0), 10.0 * least)].tolist()]
+        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
+    axes.set_xlim(left=0.0)
+    axes.set_xlabel("false alarms per hour of ok motion")
+    axes.set_ylabel("share found")
+    axes.grid(alpha=0.4)
+    axes.plot([], [], "o", color="black", label="as it labels now")
+    axes.legend(loc="best", fontsize=8)
+    axes.set_ylim(0.0, 1.02)
+    axes.set_title("Found against false alarms, by a threshold", fontsize=10)
+
+
+def _ink(color: Color) -> tuple[float, float, float]:
+    red, green, blue = color
+    return red / 255.0, green / 255.0, blue / 255.0

@@ -1,0 +1,186 @@
+"""Evaluation: how often a classifier is right, in the paper's measures and in plain ones."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isnan, nan
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from models.errors import DatasetError
+from models.labels import UNKNOWN
+from models.types import Array, Words
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """Frames by what they are and what they were called; measures are shares from 0 to 1.
+
+    Attributes:
+        classes: Names of the classes.
+        confusion: Frames of class (row) that were called class (column), shape (classes, classes).
+    """
+
+    classes: tuple[str, ...]
+    confusion: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, truth: Words, called: Words, classes: Sequence[str]) -> Self:
+        """Count frames.
+
+        Args:
+            truth: What each frame is, shape (frames,).
+            called: What it was called, shape (frames,).
+            classes: Names of the classes, in their order; others that occur come after them.
+
+        Raises:
+            DatasetError: If there are no frames, or the lengths differ.
+        """
+        if len(truth) != len(called) or not len(truth):
+            raise DatasetError(
+                f"{len(truth)} labels and {len(called)} predictions, expected as many, one or more"
+            )
+        there = {str(each) for each in (*truth, *called)}
+        names = (*classes, *sorted(there - set(classes)))
+        index = {name: number for number, name in enumerate(names)}
+        confusion = np.zeros((len(names), len(names)), dtype=np.int64)
+        np.add.at(confusion, ([index[str(t)] for t in truth], [index[str(c)] for c in called]), 1)
+        return cls(names, confusion)
+
+    @property
+    def frames(self) -> int:
+        """How many frames were compared."""
+        return int(self.confusion.sum())
+
+    @property
+    def false_negative_errors(self) -> Array:
+        """Frames of a class that were called another, of ALL frames, shape (classes,)."""
+        missed: Array = (self.confusion.sum(axis=1) - self._right) / self.frames
+        return missed
+
+    @property
+    def false_positive_errors(self) -> Array:
+        """Frames of other classes that were called this one, of ALL frames, shape (classes,)."""
+        mistaken: Array = (self.confusion.sum(axis=0) - self._right) / self.frames
+        return mistaken
+
+    @property
+    def failure_detection_rate(self) -> float:
+        """The paper's: 1 less the false positive errors of `ok`."""
+        return float(1.0 - self.false_positive_errors[self._ok].sum())
+
+    @property
+    def subset_accuracy(self) -> float:
+        """Frames that were called what they are, of all frames."""
+        return float(self._right.sum() / self.frames)
+
+    @property
+    def recall(self) -> Array:
+        """Frames of a class that were called so, of its frames; NaN if it has none."""
+        recall: Array = _ratio(self._right, self.confusion.sum(axis=1))
+        return recall
+
+    @property
+    def precision(self) -> Array:
+        """Frames called a class that are of it, of those called so; NaN if there are none."""
+        precision: Array = _ratio(self._right, self.confusion.sum(axis=0))
+        return precision
+
+    @property
+    def balanced_accuracy(self) -> float:
+        """Mean recall of the classes that occur."""
+        return float(np.nanmean(self.recall))
+
+    @property
+    def failure_recall(self) -> float:
+        """Failure frames that were called some failure, of the failure frames; NaN if none."""
+        failures = self.confusion[~self._ok]
+        return float(_ratio(failures[:, self._alarming].sum(), failures.sum()))
+
+    @property
+    def false_alarm_rate(self) -> float:
+        """`ok` frames that were called a failure, of the `ok` frames; NaN if there are none."""
+        quiet = self.confusion[self._ok]
+        return float(_ratio(quiet[:, self._alarming].sum(), quiet.sum()))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give all measures as JSON can hold them, None for what is not defined."""
+
+        def by_class(values: Array) -> dict[str, float | None]:
+            return {name: _plain(value) for name, value in zip(self.classes, values, strict=True)}
+
+        return {
+            "frames": self.frames,
+            "false_negative_errors": by_class(self.false_negative_errors),
+            "false_positive_errors": by_class(self.false_positive_errors),
+            "failure_detection_rate": self.failure_detection_rate,
+            "subset_accuracy": self.subset_accuracy,
+            "classes": list(self.classes),
+            "confusion": self.confusion.tolist(),
+            "recall": by_class(self.recall),
+            "precision": by_class(self.precision),
+            "balanced_accuracy": self.balanced_accuracy,
+            "failure_recall": _plain(self.failure_recall),
+            "false_alarm_rate": _plain(self.false_alarm_rate),
+        }
+
+    def __str__(self) -> str:
+        quiet = self.confusion[self._ok].sum() / self.frames
+        width = max(26, *(len(name) + 2 for name in self.classes))
+
+        def line(title: str, cells: Sequence[object]) -> str:
+            return title.ljust(width) + "".join(str(cell).rjust(19) for cell in cells)
+
+        def shares(title: str, *values: float) -> str:
+            return line(title, ["-" if isnan(value) else f"{value:.1%}" for value in values])
+
+        return "\n".join(
+            [
+                line(f"{self.frames} frames", self.classes),
+                "",
+                "As the paper measures",
+                shares("False negative errors", *self.false_negative_errors),
+                shares("False positive errors", *self.false_positive_errors),
+                shares("Failure detection rate", self.failure_detection_rate),
+                shares("Subset accuracy", self.subset_accuracy),
+                "",
+                "Of the frames in question",
+                shares("Recall", *self.recall),
+                shares("Precision", *self.precision),
+                shares("Balanced accuracy", self.balanced_accuracy),
+                shares("Failure recall", self.failure_recall),
+                shares("False alarm rate", self.false_alarm_rate),
+                "",
+                "Frames of (row) called (column)",
+                *(
+                    line(name, row)
+                    for name, row in zip(self.classes, self.confusion.tolist(), strict=True)
+                ),
+                "",
+                f"The paper divides by all frames: calling all of them ok would detect {quiet:.1%} "
+                "of failures by its measure, and none by failure recall.",
+            ]
+        )
+
+    @property
+    def _right(self) -> NDArray[np.int64]:
+        return self.confusion.diagonal()
+
+    @property
+    def _ok(self) -> NDArray[np.bool_]:
+        return np.array([name == "ok" for name in self.classes])
+
+    @property
+    def _alarming(self) -> NDArray[np.bool_]:
+        return np.array([name not in ("ok", UNKNOWN) for name in self.classes])
+
+
+def _ratio(part: Any, whole: Any) -> Any:
+    """Divide, NaN where there is nothing to divide by."""
+    whole = np.asarray(whole, dtype=np.float64)
+    return np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
+
+
+def _plain(value: float) -> float | None:
+    return None if isnan(value) else float(value)

@@ -1,0 +1,401 @@
+"""The assessment: how well a model does on recordings, and how sure that is."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import islice
+from math import isnan
+from typing import Any
+
+import numpy as np
+
+from models.classifier import Classifier
+from models.errors import DatasetError, SeenError
+from models.evaluation import eventmeasures, eventscore, framescore
+from models.evaluation.calibration import Reliability, reliability
+from models.evaluation.eventmeasures import EventMeasures
+from models.evaluation.eventscore import EventScore
+from models.evaluation.framescore import FrameScore
+from models.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
+from models.evaluation.matching import Matched
+from models.evaluation.predictions import Heard, hear
+from models.evaluation.tradeoff import TradeOff, trade_off
+from models.recording import Recording
+from models.splitting import robot_of, seen
+from models.types import Array
+
+FORMAT = "noise-evaluation/1"
+ADVICE = "measure it on other runs, or have the report say so (--seen-too)"
+BUDGETS = (5.0, 20.0, 100.0)
+"""False alarms per hour at which it is read what could be found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Assessment:
+    """All measures of a model.
+
+    Attributes:
+        runs: How many recordings.
+        groups: How many groups of them that share their motion.
+        blocks: Annotated blocks of each class.
+        runs_with: Recordings with such a block, of each class.
+        copies: Recordings that were left out, and which other each equals, by their names.
+        seen: What the model knew of some recordings, by their names.
+        frames: Measures of the frames that are cut from blocks.
+        events: Measures of whole recordings.
+        by_robot: The same of each robot alone, if names say which there are.
+        score: The events themselves.
+        trade_off: Counts at falling thresholds.
+        at_budgets: For each budget of false alarms per hour, failure frames and failures found.
+        reliability: Confidence and truth; None if the scores are no probabilities.
+        calibration_error: Expected calibration error; None likewise.
+    """
+
+    runs: int
+    groups: int
+    blocks: dict[str, int]
+    runs_with: dict[str, int]
+    copies: dict[str, str]
+    seen: dict[str, str]
+    frames: FrameScore
+    events: EventMeasures
+    by_robot: dict[str, EventMeasures]
+    score: EventScore
+    trade_off: TradeOff
+    at_budgets: dict[float, tuple[Estimate, Estimate]]
+    reliability: Reliability | None
+    calibration_error: Estimate | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """Give everything as JSON can hold it, None for what is not defined."""
+        evaluation, table = self.frames.evaluation, self.reliability
+        return {
+            "format": FORMAT,
+            "runs": self.runs,
+            "groups": self.groups,
+            "blocks": self.blocks,
+            "runs_with": self.runs_with,
+            "copies": self.copies,
+            "seen": self.seen,
+            "classes": list(evaluation.classes),
+            "confusion": evaluation.confusion.tolist(),
+            "frames": self.frames.as_dict(),
+            "events": self.events.as_dict(),
+            "by_robot": {robot: each.as_dict() for robot, each in self.by_robot.items()},
+            "at_budgets": [
+                {
+                    "false_alarms_per_hour": budget,
+                    "failure_recall": recall.as_dict(),
+                    "events_found": found.as_dict(),
+                }
+                for budget, (recall, found) in self.at_budgets.items()
+            ],
+            "calibration_error": self.calibration_error and self.calibration_error.as_dict(),
+            "reliability": table and _columns(table.table()),
+            "curve": _columns(self.trade_off.curve()),
+            "missed": self.score.missed(),
+            "false_alarms": self.score.false_alarms(),
+        }
+
+    def __str__(self) -> str:
+        return table(self)
+
+
+def assess(
+    classifier: Classifier, recordings: Iterable[Recording], *, seen_too: bool = False
+) -> Assessment:
+    """Measure a model by recordings, each of which is let go once it was heard.
+
+    Args:
+        classifier: The model.
+        recordings: Annotated noise at its rate, each of another name. Of recordings that are equal
+            bit for bit, the first counts.
+        seen_too: Whether recordings count that the model has learnt from, or that share their
+            motion with such; the assessment lists them.
+
+    Returns:
+        All measures.
+
+    Raises:
+        SeenError: If the model knows a recording, unless that is asked for.
+        DatasetError: If there is no annotated frame, or a name repeats.
+        ModelsError: If a recording does not fit the model.
+    """
+    heard: dict[str, Heard] = {}
+    first, copies, known = dict[str, str](), dict[str, str](), dict[str, str]()
+    for recording in recordings:
+        name, digest = recording.name, recording.sha256
+        if name in heard or name in copies:
+            raise DatasetError(f"two recordings are called {name!r}; name them apart")
+        known |= seen(classifier.runs, {name: digest})
+        if known and not seen_too:
+            raise SeenError(known, 1, ADVICE)
+        if digest in first:
+            copies[name] = first[digest]
+        else:
+            first[digest] = name
+            heard[name] = hear(classifier, recording)
+    return judge(tuple(heard.values()), copies=copies, known=known)
+
+
+def judge(
+    heard: Sequence[Heard],
+    *,
+    copies: Mapping[str, str] | None = None,
+    known: Mapping[str, str] | None = None,
+) -> Assessment:
+    """Measure what a model heard.
+
+    Args:
+        heard: Recordings.
+        copies: Recordings that were left out, and which other each equals.
+        known: What the model knew of some of them.
+
+    Returns:
+        All measures.
+
+    Raises:
+        DatasetError: If there is no annotated frame.
+    """
+    if not any(len(one.truth) for one in heard):
+        raise DatasetError(f"no annotated frame in {len(heard)} recordings; annotate blocks")
+    groups = [one.group for one in heard]
+    resampling, matched = Resampling.of(groups), Matched.of(heard)
+    events, curve, table = eventscore.score(matched), trade_off(matched), reliability(matched)
+    robots = np.array([robot_of(one.name) for one in heard])
+    frames = framescore.score(heard, resampling)
+    owned = {
+        label: [sum(block.label == label for block in one.blocks) for one in heard]
+        for label in frames.evaluation.classes
+    }
+    return Assessment(
+        runs=len(heard),
+        groups=len(set(groups)),
+        blocks={label: sum(counts) for label, counts in owned.items()},
+        runs_with={label: sum(map(bool, counts)) for label, counts in owned.items()},
+        copies=dict(copies or {}),
+        seen=dict(known or {}),
+        frames=frames,
+        events=eventmeasures.measure(events, resampling),
+        by_robot={
+            robot: eventmeasures.measure(events, resampling, robots == robot)
+            for robot in sorted(set(robots.tolist()) - {""})
+        },
+        score=events,
+        trade_off=curve,
+        at_budgets=dict(zip(BUDGETS, curve.at_budgets(BUDGETS, resampling), strict=True)),
+        reliability=table,
+        calibration_error=table.error(resampling) if table else None,
+    )
+
+
+def _columns(table: Mapping[str, Array]) -> dict[str, list[float | None]]:
+    return {
+        name: [None if np.isnan(value) else float(value) for value in column]
+        for name, column in table.items()
+    }
+
+
+NAME, CELL, COUNT = 24, 27, 10
+"""Widths of the columns: names, figures with intervals, plain numbers."""
+SHOWN = 5
+"""Lines at most of missed failures, and of false alarms."""
+
+
+def table(assessment: Assessment) -> str:
+    """Write an assessment as people read it.
+
+    Args:
+        assessment: The measures.
+
+    Returns:
+        Lines of up to a hundred characters.
+    """
+    parts = [_head, _frames, _events, _errors, _by_robot, _scores, _paper, _confusion, _foot]
+    return "\n\n".join("\n".join(lines) for part in parts if (lines := part(assessment)))
+
+
+def percent(estimate: Estimate) -> str:
+    """Write a share: ``97.9% [96.1, 98.8]``."""
+    return _figure(estimate, lambda value: f"{100 * value:.1f}", "%")
+
+
+def number(estimate: Estimate, unit: str = "") -> str:
+    """Write a number of any unit: ``0.14 s [0.12, 0.15]``."""
+
+    def text(value: float) -> str:
+        return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+    return _figure(estimate, text, f" {unit}" if unit else "")
+
+
+def _head(assessment: Assessment) -> list[str]:
+    events = assessment.events
+    lines = [
+        f"{_many(assessment.runs, 'run')} in {_many(assessment.groups, 'group')} (runs of a group"
+        f" share their motion), {_many(len(assessment.score.found), 'failure')},"
+        f" {events.ok_hours:.3g} h of ok motion"
+    ]
+    if assessment.seen:
+        lines += [
+            f"NOT A TEST: {len(assessment.seen)} of these runs were trained on, or share their"
+            " motion with such:",
+            *_few([f"  {name}: {what}" for name, what in assessment.seen.items()]),
+        ]
+    if assessment.copies:
+        lines += [
+            "left out, since they equal others bit for bit:",
+            *_few([f"  {name} ({other})" for name, other in assessment.copies.items()]),
+        ]
+    return lines
+
+
+def _frames(assessment: Assessment) -> list[str]:
+    frames = assessment.frames
+    counts = frames.evaluation.confusion.sum(axis=1).tolist()
+    lines = [
+        "Frames that are cut from annotated blocks, as the paper does",
+        _row("", ["recall", "precision"], ["frames", "blocks", "runs"]),
+    ]
+    for label, count in zip(frames.evaluation.classes, counts, strict=True):
+        figures = [percent(frames.recall[label]), percent(frames.precision[label])]
+        behind = [count, assessment.blocks[label], assessment.runs_with[label]]
+        lines.append(_row(label, figures, behind))
+    return [
+        *lines,
+        _row("Balanced accuracy", [percent(frames.balanced_accuracy)]),
+        _row("Failure recall", [percent(frames.failure_recall)]),
+        _row("False alarm rate", [percent(frames.false_alarm_rate)]),
+    ]
+
+
+def _events(assessment: Assessment) -> list[str]:
+    events = assessment.events
+    lines = [
+        "Events in whole runs, as they are heard from end to end",
+        _row("", ["found", "by its own name"], ["failures", "", "runs"]),
+    ]
+    for label, found in events.found.items():
+        figures = [percent(found), percent(events.named[label])]
+        lines.append(_row(label, figures, [assessment.blocks.get(label, 0), "", found.runs]))
+    late = f"a tenth takes more than {number(events.late_delay, 's')}"
+    return [
+        *lines,
+        _row(
+            "all failures",
+            [percent(events.all_found), percent(events.all_named)],
+            [len(assessment.score.found), "", events.all_found.runs],
+        ),
+        _row("Delay of onset", [f"median {number(events.delay, 's')}, {late}"]),
+        _row("False alarms", [_per_hour(events.false_alarms, events.false_alarms_per_hour)]),
+        _row(
+            "Wrong stretches",
+            [_per_hour(events.wrong_stretches, events.wrong_stretches_per_hour)],
+        ),
+        _row("Failure recall", [f"{percent(events.failure_recall)} of the frames heard"]),
+        _row("False alarm rate", [f"{percent(events.false_alarm_rate)} of the frames heard"]),
+    ]
+
+
+def _errors(assessment: Assessment) -> list[str]:
+    missed = [
+        f"  {each['label']} in {each['run']}, {each['start']:.2f} s to {each['stop']:.2f} s"
+        for each in assessment.score.missed()
+    ]
+    false = [
+        f"  in {each['run']}, {each['start']:.2f} s to {each['stop']:.2f} s"
+        for each in assessment.score.false_alarms()
+    ]
+    lines = ["Missed", *_few(missed)] if missed else []
+    return lines + (["False alarms", *_few(false)] if false else [])
+
+
+def _by_robot(assessment: Assessment) -> list[str]:
+    if len(assessment.by_robot) < 2:
+        return []
+    lines = [
+        _row("By robot", ["failures found", "frames heard, recall"], ["false alarms per hour"])
+    ]
+    for robot, events in assessment.by_robot.items():
+        figures = [percent(events.all_found), percent(events.failure_recall)]
+        lines.append(_row(robot, figures, [number(events.false_alarms_per_hour)]))
+    return lines
+
+
+def _scores(assessment: Assessment) -> list[str]:
+    lines = [
+        "What the scores are good for, with a threshold chosen on these very runs",
+        _row("at most", ["failures found", "frames heard, recall"]),
+    ]
+    for budget, (recall, found) in assessment.at_budgets.items():
+        title = f"{budget:g} false alarms per h"
+        lines.append(_row(title, [percent(found), percent(recall)]))
+    error = assessment.calibration_error
+    figure = f"{percent(error)} in ten bins" if error else "- (the scores are no probabilities)"
+    return [*lines, _row("Calibration error", [figure])]
+
+
+def _paper(assessment: Assessment) -> list[str]:
+    frames = assessment.frames
+    evaluation = frames.evaluation
+    ok = evaluation.confusion[[name == "ok" for name in evaluation.classes]].sum()
+    lines = [
+        "As the paper measures, in shares of ALL frames",
+        _row("", ["false negative errors", "false positive errors"]),
+    ]
+    for label, negative in frames.false_negative_errors.items():
+        figures = [percent(negative), percent(frames.false_positive_errors[label])]
+        lines.append(_row(label, figures))
+    nothing = f"(calling all frames ok: {ok / evaluation.frames:.1%})"
+    return [
+        *lines,
+        _row("Failure detection rate", [percent(frames.failure_detection_rate), nothing]),
+        _row("Subset accuracy", [percent(frames.subset_accuracy)]),
+    ]
+
+
+def _confusion(assessment: Assessment) -> list[str]:
+    evaluation = assessment.frames.evaluation
+    width = max(len(name) for name in evaluation.classes) + 2
+    head = "Frames of row called".ljust(NAME)
+    return [
+        head + "".join(name.rjust(width) for name in evaluation.classes),
+        *(
+            name.ljust(NAME) + "".join(str(count).rjust(width) for count in row)
+            for name, row in zip(evaluation.classes, evaluation.confusion.tolist(), strict=True)
+        ),
+    ]
+
+
+def _foot(assessment: Assessment) -> list[str]:
+    lines = [
+        "Brackets are 95 % intervals over groups of runs, as sure as so many runs can make it at"
+        " most."
+    ]
+    if assessment.groups < LEAST_GROUPS:
+        lines.append(f"There are none where fewer than {LEAST_GROUPS} groups had anything to say.")
+    return lines
+
+
+def _figure(estimate: Estimate, text: Callable[[float], str], unit: str) -> str:
+    if isnan(estimate.value):
+        return "-"
+    bounds = f" [{text(estimate.low)}, {text(estimate.high)}]" if not isnan(estimate.low) else ""
+    return f"{text(estimate.value)}{unit}{bounds}"
+
+
+def _per_hour(count: int, rate: Estimate) -> str:
+    return f"{count}, or {number(rate, 'per hour')} of ok motion"
+
+
+def _row(name: str, figures: Sequence[str], counts: Sequence[object] = ()) -> str:
+    line = name.ljust(NAME) + "".join(figure.ljust(CELL) for figure in figures)
+    return (line + "".join(str(count).rjust(COUNT) for count in counts)).rstrip()
+
+
+def _few(lines: Sequence[str]) -> list[str]:
+    rest = len(lines) - SHOWN
+    return [*islice(lines, SHOWN), *([f"  and {rest} more"] if rest > 0 else [])]
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"

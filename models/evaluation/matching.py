@@ -1,0 +1,225 @@
+"""What each frame of whole recordings is, and which frames overlap which annotated failure.
+
+A frame *is* a failure if it holds an annotated block of it whole, or is filled by it by half or
+more (by several: that which fills most); it is `ok` if it lies wholly in `ok` blocks. Any other
+frame is unclear, and counts for nothing. Times that differ by a sample or less are the same:
+annotations are written with few digits.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Self
+
+import numpy as np
+
+from models.evaluation.predictions import Heard
+from models.labels import UNKNOWN
+from models.recording import Block
+from models.types import Array, Index, Mask, Words
+
+OK = "ok"
+UNCLEAR = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Frames of whole recordings, in order.
+
+    Attributes:
+        run: Number of the recording, shape (frames,).
+        start: When it starts, shape (frames,), in [s].
+        stop: When it stops, shape (frames,), in [s].
+        called: What the model calls it in the light of its neighbours, shape (frames,).
+        suspect: Whether it calls it a failure by itself, shape (frames,).
+        scores: What the model says of each class, shape (frames, classes).
+        truth: What it is, `UNCLEAR` where that is not said, shape (frames,).
+        quiet: Whether it lies wholly in `ok` blocks, shape (frames,).
+        failing: Whether it overlaps a failure, shape (frames,).
+    """
+
+    run: Index
+    start: Array
+    stop: Array
+    called: Words
+    suspect: Mask
+    scores: Array
+    truth: Words
+    quiet: Mask
+    failing: Mask
+
+    @property
+    def alarming(self) -> Mask:
+        """Whether the model calls a frame a failure, shape (frames,)."""
+        return ~np.isin(self.called, (OK, UNKNOWN))
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+
+@dataclass(frozen=True, eq=False)
+class Failures:
+    """Annotated blocks of failures, in order.
+
+    Attributes:
+        run: Number of the recording, shape (failures,).
+        start: When it starts, shape (failures,), in [s].
+        stop: When it stops, shape (failures,), in [s].
+        label: Its class, shape (failures,).
+        first: The first frame that overlaps it, shape (failures,).
+        end: The frame after the last one that does, ``first`` if none does, shape (failures,).
+    """
+
+    run: Index
+    start: Array
+    stop: Array
+    label: Words
+    first: Index
+    end: Index
+
+    def __len__(self) -> int:
+        return len(self.run)
+
+
+@dataclass(frozen=True, eq=False)
+class Matched:
+    """Recordings, one after another, with what is true of them.
+
+    Attributes:
+        names: Of the recordings, shape (runs,).
+        classes: What the model can call a frame.
+        confirms: Whether a failure takes more than one frame that is sure of it.
+        frames: Their frames.
+        failures: Their failures.
+        ok_annotated: `ok` time of each recording, shape (runs,), in [s].
+        ok_heard: That part of it that quiet frames cover, shape (runs,), in [s]. In `ok` blocks
+            shorter than a frame, no false alarm could be heard.
+        slack: Times that differ by less are the same, in [s].
+    """
+
+    names: tuple[str, ...]
+    classes: tuple[str, ...]
+    confirms: bool
+    frames: Frames
+    failures: Failures
+    ok_annotated: Array
+    ok_heard: Array
+    slack: float
+
+    @classmethod
+    def of(cls, heard: Sequence[Heard]) -> Self:
+        """Match what was heard with what was annotated.
+
+        Args:
+            heard: Recordings, one or more.
+        """
+        slack = 1.5 * max(one.step for one in heard)
+        frames, failures, annotated, covered = [], [], [], []
+        count = 0
+        for number, one in enumerate(heard):
+            found, bad, ok = _match(one, number, count, slack)
+            frames.append(found)
+            failures.append(bad)
+            annotated.append(sum(block.stop - block.start for block in ok))
+            covered.append(_covered(found))
+            count += len(found)
+        return cls(
+            tuple(one.name for one in heard),
+            heard[0].labels.classes,
+            heard[0].labels.sure is not None,
+            Frames(*_joined(frames)),
+            Failures(*_joined(failures)),
+            np.array(annotated, dtype=np.float64),
+            np.array(covered),
+            slack,
+        )
+
+    def by_run(self, run: Index) -> Array:
+        """Count things by the recording that each is of, shape (runs,)."""
+        return np.bincount(run, minlength=len(self.names)).astype(np.float64)
+
+
+def _match(
+    one: Heard, number: int, before: int, slack: float
+) -> tuple[Frames, Failures, list[Block]]:
+    """Match the frames of one recording.
+
+    Args:
+        one: The recording.
+        number: Its number.
+        before: Frames of the recordings before it.
+        slack: Times that differ by less are the same, in [s].
+
+    Returns:
+        Its frames, its failures, and its `ok` blocks, merged.
+    """
+    start, stop = one.labels.start, one.labels.stop
+    ok = _merged([block for block in one.blocks if block.label == OK])
+    bad = [block for block in one.blocks if block.label != OK]
+    quiet = _overlap(start, stop, ok).sum(axis=1) > stop - start - slack
+    shared = _overlap(start, stop, bad)
+    touched = shared > slack
+    first = touched.argmax(axis=0) if len(start) else np.zeros(len(bad), dtype=np.intp)
+    own = np.full(len(start), number)
+    frames = Frames(
+        own,
+        start,
+        stop,
+        one.labels.settled,
+        ~np.isin(one.labels.label, (OK, UNKNOWN)),
+        one.labels.scores,
+        np.where(quiet, OK, _failure_of(shared, start, stop, bad, slack)),
+        quiet,
+        np.any(touched, axis=1),
+    )
+    failures = Failures(
+        np.full(len(bad), number),
+        np.array([block.start for block in bad], dtype=np.float64),
+        np.array([block.stop for block in bad], dtype=np.float64),
+        np.array([block.label for block in bad], dtype=str),
+        before + first,
+        before + first + touched.sum(axis=0),
+    )
+    return frames, failures, ok
+
+
+def _overlap(start: Array, stop: Array, blocks: Sequence[Block]) -> Array:
+    """Time that frames share with blocks, shape (frames, blocks), in [s]."""
+    begins = np.array([block.start for block in blocks], dtype=np.float64)
+    ends = np.array([block.stop for block in blocks], dtype=np.float64)
+    shared = np.minimum(stop[:, None], ends) - np.maximum(start[:, None], begins)
+    return np.asarray(np.maximum(shared, 0.0), dtype=np.float64)
+
+
+def _failure_of(
+    shared: Array, start: Array, stop: Array, bad: Sequence[Block], slack: float
+) -> Words:
+    """Name the failure that each frame is, if it is one."""
+    if not bad:
+        return np.full(len(start), UNCLEAR)
+    whole = np.array([block.stop - block.start for block in bad])
+    enough = shared > np.minimum(whole, (stop - start)[:, None] / 2.0) - slack
+    filled = np.where(enough & (shared > 0.0), shared, 0.0)
+    names = np.array([block.label for block in bad])
+    return np.where(filled.any(axis=1), names[filled.argmax(axis=1)], UNCLEAR)
+
+
+def _merged(blocks: Sequence[Block]) -> list[Block]:
+    """Merge blocks that overlap or touch, so that no time counts twice."""
+    merged: list[Block] = []
+    for block in blocks:
+        if merged and block.start <= merged[-1].stop:
+            merged[-1] = merged[-1]._replace(stop=max(merged[-1].stop, block.stop))
+        else:
+            merged.append(block)
+    return merged
+
+
+def _covered(frames: Frames) -> float:
+    """Time that quiet frames cover, in [s]."""
+    start, stop = frames.start[frames.quiet], frames.stop[frames.quiet]
+    return float((stop - np.maximum(start, np.append(-np.inf, stop[:-1]))).sum())
+
+
+def _joined(parts: Sequence[Frames] | Sequence[Failures]) -> list[np.ndarray]:
+    names = [field.name for field in fields(parts[0])]
+    return [np.concatenate([getattr(part, name) for part in parts]) for name in names]

@@ -1,0 +1,1 @@
+"""Novelty: learnt from good runs alone, how far a frame is from them."""

@@ -1,0 +1,126 @@
+"""The limit of a baseline: how far is too far, for so many false alarms in an hour.
+
+Conventions: an *alarm* is a stretch of frames beyond the limit that overlap or touch, as everywhere
+in this house. Alarms are rare and good motion is short, so that the limit lies beyond what was
+heard more often than not: the tail of the distances is then taken for exponential. From a level
+that few alarms exceed, by `mean` on average, alarms become e times rarer with each further `mean`
+(peaks over a threshold; J. Pickands, *Statistical Inference Using Extreme Order Statistics*, 1975,
+with the shape 0).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from models.novelty.frames import GoodMotion
+from models.types import Array
+
+HOUR = 3600.0
+TAIL = 0.1
+"""Share of the frames that is a tail at most."""
+PEAKS = 30
+"""Alarms by which an exponential tail is fitted at most."""
+LEVELS = 200
+"""Levels at which alarms are counted, at most."""
+LEAST = 0.1
+"""No limit is below, in deviations: copies of one run know nothing of chance."""
+NONE_HEARD = 3.0
+"""Alarms that may well be due where none was heard (Poisson: 95 %)."""
+
+
+@dataclass(frozen=True)
+class Limit:
+    """How far is too far, and how that is known.
+
+    Attributes:
+        distance: The limit, in deviations.
+        budget: False alarms in an hour of good motion that were asked for.
+        hours: Good motion that there was, in [h].
+        alarms: Alarms at the limit in that, by baselines that had not learnt from the part.
+        level: The level from which on the tail is taken for exponential, in deviations.
+        peaks: Alarms at that level.
+    """
+
+    distance: float
+    budget: float
+    hours: float
+    alarms: int
+    level: float
+    peaks: int
+
+    @property
+    def shown(self) -> float:
+        """False alarms in an hour that so much good motion cannot exclude, even without one."""
+        return NONE_HEARD / self.hours
+
+    @property
+    def extrapolated(self) -> bool:
+        """Whether there was too little good motion to see whether the budget is kept."""
+        return self.shown > self.budget
+
+    def __str__(self) -> str:
+        lines = [
+            f"limit {self.distance:.2f} deviations, for {self.budget:g} false alarms per hour;"
+            f" {self.alarms} in {self.hours:.3g} h, each part heard by a baseline without it"
+        ]
+        if self.extrapolated:
+            lines.append(
+                f"{self.hours:.3g} h of good motion can show no fewer than {self.shown:.3g} alarms"
+                f" per hour: the limit is extrapolated from {self.peaks} alarms beyond"
+                f" {self.level:.2f} deviations, as if their tail were exponential"
+            )
+        return "\n".join(lines)
+
+
+def limit(distance: Array, good: GoodMotion, budget: float) -> Limit:
+    """Find the limit for a budget of false alarms.
+
+    Args:
+        distance: Of each frame from good motion, by a baseline that has not learnt from it, shape
+            (frames,), in deviations.
+        good: The frames.
+        budget: False alarms in an hour.
+    """
+    hours = good.seconds / HOUR
+    allowed = max(PEAKS, int(budget * hours))
+    level = _level(distance, good, allowed)
+    peaks = alarm_peaks(distance, good, level)
+    # N(t) = N(u) exp(-(t - u) / mean) = budget hours
+    mean = float((peaks - level).mean()) if len(peaks) else 0.0
+    found = level + mean * np.log(max(len(peaks) / (budget * hours), 1.0))
+    found = max(float(found), LEAST)
+    alarms = len(alarm_peaks(distance, good, found))
+    return Limit(found, budget, hours, alarms, level, len(peaks))
+
+
+def alarm_peaks(distance: Array, good: GoodMotion, level: float) -> Array:
+    """Give the largest distance in each alarm at a level.
+
+    Args:
+        distance: Of each frame, shape (frames,).
+        good: The frames.
+        level: What frames have to exceed.
+
+    Returns:
+        Shape (alarms,).
+    """
+    own = np.flatnonzero(distance > level)
+    if not len(own):
+        return np.zeros(0)
+    before, after = own[:-1], own[1:]
+    slack = 1e-6 * (good.stop[0] - good.start[0])
+    apart = good.start[after] > good.stop[before] + slack
+    first = np.append(0, np.flatnonzero(apart | (good.runs[after] != good.runs[before])) + 1)
+    peaks: Array = np.maximum.reduceat(distance[own], first)
+    return peaks
+
+
+def _level(distance: Array, good: GoodMotion, allowed: int) -> float:
+    """Find the lowest level in the tail above which there are never more alarms than allowed."""
+    falling = np.sort(distance)[::-1]
+    last = max(round(TAIL * len(falling)), 1)
+    ranks = np.unique(np.geomspace(1, last, LEVELS).round().astype(np.intp)) - 1
+    levels = falling[ranks]
+    counts = [len(alarm_peaks(distance, good, float(level))) for level in levels]
+    affordable = np.maximum.accumulate(counts) <= allowed
+    return float(levels[affordable][-1])

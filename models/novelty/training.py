@@ -1,0 +1,120 @@
+"""Learn a baseline from good runs alone."""
+
+from dataclasses import asdict, dataclass
+from math import isfinite
+
+import numpy as np
+
+from models.classifier import Classifier
+from models.errors import DatasetError, ProfileError
+from models.estimators.baseline import Baseline, cover, distance
+from models.estimators.estimator import versions
+from models.features import standard
+from models.novelty.frames import GoodMotion
+from models.novelty.limit import Limit, limit
+from models.profile import Profile
+from models.splitting import folds
+from models.types import Array, Index
+
+FOLDS = 10
+"""Parts of the good motion that are left out in turn, at most."""
+GUARD = 1.0
+"""Time before and after a part of a single run that is learnt from neither, in [s]."""
+LEAST = 5.0
+"""Good motion that there has to be, in [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """A baseline, and what it was learnt from.
+
+    Attributes:
+        classifier: The model.
+        limit: How far is too far, and how that is known.
+        runs: Recordings that it was learnt from.
+        groups: How many groups of them that share their motion; 1 means that parts of one stand
+            for runs that are not there.
+        annotated: Recordings of which only what is annotated `ok` was taken.
+    """
+
+    classifier: Classifier
+    limit: Limit
+    runs: int
+    groups: int
+    annotated: int
+
+    def __str__(self) -> str:
+        lines = [
+            f"learnt from {self.limit.hours:.3g} h of good motion in {_many(self.runs, 'run')}"
+        ]
+        if self.annotated:
+            annotated = _many(self.annotated, "run")
+            lines.append(f"of {annotated} that somebody annotated, what is annotated `ok` alone")
+        if self.groups == 1:
+            lines.append(
+                "its parts were left out in turn: how much another run differs, it cannot say"
+            )
+        return "\n".join([*lines, str(self.limit)])
+
+
+def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -> Learnt:
+    """Learn a baseline; the limit is set by parts that are left out in turn.
+
+    Args:
+        good: Good motion, cut by the same profile.
+        profile: What to compute: ``MOTION`` or ``NOISE_ALONE`` at some rate.
+        alarms: False alarms in an hour of good motion that the user can bear.
+
+    Returns:
+        The baseline; equal input gives an equal one.
+
+    Raises:
+        ProfileError: If the alarms are not above 0.
+        DatasetError: If there is too little good motion.
+    """
+    if not (isfinite(alarms) and alarms > 0):
+        raise ProfileError(f"{alarms:g} alarms per hour, expected more than 0: say, 1")
+    if good.seconds < LEAST:
+        raise DatasetError(
+            f"{good.seconds:.3g} s of good motion are too short to learn from, expected {LEAST:g} s"
+            " or more: give longer runs, or more of them"
+        )
+    found = limit(_unseen(good, profile), good, alarms)
+    mean, scale = standard(good.features, profile)
+    machine = Baseline(cover((good.features - mean) / scale), np.array([found.distance]))
+    groups = len(set(good.groups.tolist()))
+    metrics = {"baseline": {**asdict(found), "groups": groups, "runs": len(good.hashes)}}
+    classifier = Classifier(
+        profile, profile.classes, machine, mean, scale, dict(good.hashes), metrics, versions()
+    )
+    return Learnt(classifier, found, len(good.hashes), groups, len(good.annotated))
+
+
+def _unseen(good: GoodMotion, profile: Profile) -> Array:
+    """Say how far each frame is from good motion that its part does not belong to."""
+    apart = np.zeros(len(good))
+    for train, test in _parts(good):
+        mean, scale = standard(good.features[train], profile)
+        centres = cover((good.features[train] - mean) / scale)
+        apart[test] = distance((good.features[test] - mean) / scale, centres)
+    return apart
+
+
+def _parts(good: GoodMotion) -> list[tuple[Index, Index]]:
+    """List frames to learn from and to leave out: by groups, or by the time of a single one."""
+    groups = good.groups.tolist()
+    if (count := len(set(groups))) > 1:
+        return folds(groups, min(count, FOLDS))
+    parts = []
+    for test in np.array_split(np.arange(len(good)), FOLDS):
+        near = np.zeros(len(good), dtype=bool)
+        for run in np.unique(good.runs[test]):
+            own = test[good.runs[test] == run]
+            begin, end = good.start[own].min() - GUARD, good.stop[own].max() + GUARD
+            near |= (good.runs == run) & (good.stop > begin) & (good.start < end)
+        parts.append((np.flatnonzero(~near), test))
+    return parts
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"

@@ -1,0 +1,206 @@
+"""The extended noise of a run, link by link, in bins of time."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+import noisemodel as nm
+from noisemodel.differentiate import stretches
+from noisemodel.linkpower import QUADRATIC, Index, by_moments, by_samples, second_moments
+from noisemodel.types import Array, Mask, Real
+
+BIN = 0.01
+"""Shortest bin, in [s]."""
+BINS = 4000
+"""Most bins that a run is divided into."""
+FAST = 10.0
+"""Motion below this moves the robot and is not heard, in [Hz]."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinkNoise:
+    """Sound power of each link.
+
+    Attributes:
+        kind: How the mean speed of a surface was taken.
+        links: Names of the links, shape (links,).
+        movers: Names of the joints that move each link, shape (links,).
+        time: Centres of the bins, shape (bins,), in [s].
+        power: Mean power in each bin, shape (bins, links), in [W].
+        vibration: That of the measured motion above 10 Hz alone, normal to the surface,
+            shape (bins, links), in [W].
+        terms: Total power by each of the paper's terms A, B and C, shape (bins,), in [W]; empty
+            unless asked for.
+        remarks: What the surface lacks, a sentence each.
+    """
+
+    kind: str
+    links: tuple[str, ...]
+    movers: tuple[frozenset[str], ...]
+    time: Array
+    power: Array
+    vibration: Array
+    terms: dict[str, Array]
+    remarks: tuple[str, ...]
+
+    @property
+    def total(self) -> Array:
+        """Power of the whole robot, shape (bins,), in [W]."""
+        return np.asarray(self.power.sum(axis=1))
+
+    @property
+    def loudest(self) -> list[int]:
+        """Indices of the links, the one that vibrates with the largest peak first."""
+        return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
+
+
+def link_noise(
+    run: nm.Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
+) -> LinkNoise:
+    """Compute the extended noise of a run.
+
+    Args:
+        run: A run of a robot that is known, with positions.
+        kind: "paper", "A", "B", "C", "mean", "rms" or "normal", as ``noisemodel.extended`` has
+            them.
+        geometry: "visual", "collision", "hull" or "auto".
+        terms: Whether to add up the paper's terms A, B and C, one by one.
+
+    Returns:
+        The noise; measured and desired motion add up.
+
+    Raises:
+        RobotError: If the robot cannot be read, or lacks one of the run's joints.
+        GeometryError: If its surface cannot be had.
+    """
+    assert run.robot is not None
+    floating = True if run.base_pose is not None else None
+    robot = nm.Robot.load(run.robot, floating_base=floating)
+    surface = nm.Surface.of(robot, geometry)
+    bins = _edges(run)
+    middles = _middles(run, bins)
+
+    q, wanted = robot.configuration(middles)[0], robot.desired(middles)
+    fast = _moments(robot, run, vibrating(run.motion, run.mask, run.rate), bins)
+    motions, told = [("normal", fast)], []
+    if kind in QUADRATIC:
+        motions.append((kind, _moments(robot, run, run.motion, bins)))
+        if run.velocity_desired is not None:
+            told = [(kind, _moments(robot, run, run.velocity_desired, bins, desired=True))]
+    if run.position_desired is None:  # told to move where it is: one pose for all
+        motions, told = [*motions, *told], []
+    vibration, *power = by_moments(robot, surface, q, motions)
+    if told and wanted is not None:
+        power += by_moments(robot, surface, wanted[0], told)
+    if kind not in QUADRATIC:
+        power = [by_samples(robot, surface, run, kind, bins)]
+    return LinkNoise(
+        kind=kind,
+        links=surface.names,
+        movers=tuple(_movers(robot, joint) for joint in surface.joint.tolist()),
+        time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
+        power=np.sum(power, axis=0),
+        vibration=vibration,
+        terms={
+            term: by_samples(robot, surface, run, term, bins).sum(axis=1)
+            for term in ("ABC" if terms else "")
+        },
+        remarks=tuple(_remarks(run, robot, surface)),
+    )
+
+
+def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
+    """Leave the slow part of a motion out: its running mean over a tenth of a second.
+
+    Args:
+        velocity: Shape (samples, nv).
+        valid: False in gaps, shape (samples,); no mean reaches over one.
+        rate: Samples per second, in [Hz].
+
+    Returns:
+        What vibrates at 10 Hz and above, and little of what is slower, shape (samples, nv).
+    """
+    fast = np.zeros(velocity.shape[::-1])
+    half = max(1, round(rate / FAST / 2))
+    for stretch in stretches(valid, len(velocity)):
+        centre = np.arange(stretch.stop - stretch.start)
+        # Towards the ends the mean is taken over less, so that it stays in the middle.
+        reach = np.minimum(np.minimum(centre, centre[::-1]), half)
+        first, last = centre - reach, centre + reach + 1
+        count = (last - first).astype(np.float64)
+        fast[:, stretch] = velocity[stretch].T
+        sums = np.zeros(len(centre) + 1)
+        for part in fast[:, stretch]:  # one by one they stay in the cache
+            np.cumsum(part, out=sums[1:])
+            part -= (sums[last] - sums[first]) / count
+    return fast.T
+
+
+def _edges(run: nm.Run) -> Index:
+    """First sample of each bin, and the end; there are two bins or more."""
+    samples = len(run.time)
+    size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
+    return np.append(np.arange(0, samples, size), samples)
+
+
+def _middles(run: nm.Run, bins: Index) -> nm.Run:
+    """Take one sample of each bin: the middle one of those that are valid."""
+    samples = (bins[:-1] + bins[1:]) // 2
+    for index in np.flatnonzero(~run.mask[samples]):
+        valid = bins[index] + np.flatnonzero(run.mask[bins[index] : bins[index + 1]])
+        if len(valid):
+            samples[index] = valid[len(valid) // 2]
+
+    def at(signal: Real | None) -> Real | None:
+        return None if signal is None else signal[samples]
+
+    return nm.Run(
+        time=np.arange(len(samples)) * int(bins[1]) / run.rate,
+        velocity=run.velocity[samples],
+        joint_names=run.joint_names,
+        position=at(run.position),
+        velocity_desired=at(run.velocity_desired),
+        position_desired=at(run.position_desired),
+        desired_joint_names=run.desired_joint_names,
+        valid=run.mask[samples],
+        base_pose=at(run.base_pose),
+        robot=run.robot,
+    )
+
+
+def _moments(
+    robot: nm.Robot, run: nm.Run, velocity: Real, bins: Index, *, desired: bool = False
+) -> Array:
+    """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
+    first = {joint.name: joint.first_v for joint in robot.joints}
+    names = run.desired_joint_names if desired else run.joint_names
+    entries = [first[name] for name in names]
+    if not desired and run.base_velocity is not None:
+        if robot.floating_base:
+            entries = [*range(6), *entries]
+        else:
+            velocity = velocity[:, 6:]
+    products = second_moments(velocity, run.mask, size=int(bins[1]))
+    moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
+    moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
+    return moments.transpose(2, 0, 1)
+
+
+def _movers(robot: nm.Robot, carrier: int) -> frozenset[str]:
+    names = set[str]()
+    while carrier:  # 0 is the universe
+        joint = robot.joints[carrier - 1]
+        names.add(joint.name)
+        carrier = joint.parent
+    return frozenset(names)
+
+
+def _remarks(run: nm.Run, robot: nm.Robot, surface: nm.Surface) -> Iterator[str]:
+    resting = [name for name in robot.joint_names if name not in run.joint_names]
+    if resting:
+        yield f"The run does not name {', '.join(resting)}: they rest."
+    if surface.bare:
+        yield f"Links without geometry make no noise: {', '.join(surface.bare)}."
+    if robot.floating_base and run.base_velocity is None:
+        yield "The run has no base velocity: the link noise is that of a base at rest."
