@@ -22,8 +22,8 @@ import models
 from benchmarks.paper import RATE, files, first_seeds
 from inspector.training.part import Part
 from inspector.training.training import recordings
-from models.evaluation.assessment import judge
-from models.evaluation.predictions import Heard, hear
+from models.evaluation.assessment import measure
+from models.evaluation.predictions import Predictions, predict
 from models.examples import Examples
 from models.splitting import folds
 from scenarios.sample import Sample
@@ -41,8 +41,8 @@ VARIANTS = {
     "quiet levels too (floor 3e-5 rad/s)": replace(GENERAL, floor=3e-5),
     "without quick windows": replace(GENERAL, quick=0.0),
     "the noise alone, without quick windows": replace(SCALAR, quick=0.0),
-    "support vector machine": replace(GENERAL, machine="svm", least_deviation=0.5),
-    "networks": replace(GENERAL, machine="networks"),
+    "support vector machine": replace(GENERAL, estimator="svm", least_deviation=0.5),
+    "networks": replace(GENERAL, estimator="networks"),
     "a quarter of the rounds": GENERAL,
     "trees of 4 leaves": GENERAL,
     "with the extended noise": replace(GENERAL, signals=(*GENERAL.signals, POWER)),
@@ -98,15 +98,15 @@ def _power(path: Path) -> np.ndarray:
 def _measure(read: Sequence[models.Recording], profile: models.Profile, count: int) -> str:
     """Learn and hear in turn; the cells of a row of the table."""
     examples = Examples.read(read, profile)
-    heard: list[Heard] = []
+    heard: list[Predictions] = []
     for train, test in folds([models.group_of(one.name) for one in read], count):
         names = {read[item].name for item in train}
         rows = np.array([run in names for run in examples.runs.tolist()])
         hashes = {name: examples.hashes[name] for name in names}
         part = Examples(examples.features[rows], examples.labels[rows], examples.runs[rows], hashes)
         classifier = models.Classifier.train(part, profile)
-        heard += [hear(classifier, read[item]) for item in test]
-    found = judge(heard)
+        heard += [predict(classifier, read[item]) for item in test]
+    found = measure(heard)
     shares = [
         found.frames.balanced_accuracy,
         found.frames.failure_recall,

@@ -89,15 +89,15 @@ def on_features(profile: models.Profile, learnt: Callable[..., Decide]) -> Train
 def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -> Decide:
     """Let a machine of our own learn: networks, trees, or support vectors."""
     groups = np.array([models.group_of(run) for run in dataset.runs.tolist()])
-    machine = learn(scaled, targets(dataset), groups, profile)
+    estimator = learn(scaled, targets(dataset), groups, profile)
 
     def decide(scaled: np.ndarray) -> Answer:
-        decisions = machine.decision(scaled)
-        if profile.machine != "svm":
-            return machine.choose(decisions), 1.0 - machine.score(decisions)[:, 0]
+        decisions = estimator.decision(scaled)
+        if profile.estimator != "svm":
+            return estimator.choose(decisions), 1.0 - estimator.score(decisions)[:, 0]
         # The first pairs are `ok` against each failure; votes would rank too coarsely.
         against = -decisions[:, : len(models.CLASSES) - 1]
-        return machine.choose(decisions), against.max(axis=1)
+        return estimator.choose(decisions), against.max(axis=1)
 
     return decide
 
@@ -115,15 +115,15 @@ def on_samples(view: Callable[[np.ndarray], np.ndarray], make: Callable[[], Any]
         return np.ascontiguousarray(view(several), dtype=np.float32)
 
     def train(dataset: models.Dataset) -> Decide:
-        machine = make().fit(seen(dataset.frames), targets(dataset))
-        return lambda frames: answer(machine, seen(frames))
+        estimator = make().fit(seen(dataset.frames), targets(dataset))
+        return lambda frames: answer(estimator, seen(frames))
 
     return train
 
 
-def answer(machine: Any, seen: np.ndarray) -> Answer:
+def answer(estimator: Any, seen: np.ndarray) -> Answer:
     """Call the class of the highest grade; a failure is the more certain, the less `ok` has."""
-    grades = getattr(machine, "predict_proba", None) or machine.decision_function
+    grades = getattr(estimator, "predict_proba", None) or estimator.decision_function
     graded = grades(seen)
     return graded.argmax(axis=1), -graded[:, 0]
 
@@ -164,9 +164,12 @@ def contenders(*, views: bool) -> Iterator[Contender]:
     for signals, settings in (("three", models.GENERAL), ("noise", models.SCALAR)):
         profile = settings.at(RATE)
         gamma = 0.5 / feature_count(profile)
-        vectors = replace(profile, machine="svm", regularization=100.0, gamma=gamma)
+        vectors = replace(profile, estimator="svm", regularization=100.0, gamma=gamma)
         yield Contender(
-            signals, f"our {profile.machine}", profile, on_features(profile, partial(ours, profile))
+            signals,
+            f"our {profile.estimator}",
+            profile,
+            on_features(profile, partial(ours, profile)),
         )
         yield Contender(
             signals, "RBF support vectors", profile, on_features(profile, partial(ours, vectors))

@@ -96,7 +96,7 @@ def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:
     return {name for name, index in carried if known.joints[index - 1].name in joints}
 
 
-def judge(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str, bool]]]:
+def decide(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str, bool]]]:
     """Judge each event: cause, what was found, and whether stage, limb and band are right."""
     robot, known = str(run.robot), origins(run, ())
     for event, block in labelled(run):
@@ -135,7 +135,7 @@ def main() -> None:
                 run = run_of(options.folder, robot, scenario, int(seed), options.seconds)
                 if run is None:
                     continue
-                for cause, found, marks in judge(run, link_noise(run)):
+                for cause, found, marks in decide(run, link_noise(run)):
                     if options.each:
                         print(
                             f"{robot}-{scenario}-{seed} {cause}: {found.stage} {found.band}", marks

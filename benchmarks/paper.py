@@ -35,8 +35,8 @@ import models
 from inspector.parallel import each
 from inspector.training import training
 from inspector.training.part import Part
-from models.evaluation.assessment import judge, number, percent
-from models.evaluation.predictions import Heard, hear
+from models.evaluation.assessment import measure, number, percent
+from models.evaluation.predictions import Predictions, predict
 from scenarios.sample import Sample
 from scenarios.signals import WHOLE
 
@@ -181,19 +181,19 @@ def measured(
     return Measured(name, len(classifier.runs), scored(heard, names), reduced)
 
 
-def listened(classifier: models.Classifier, found: Iterable[models.Recording]) -> list[Heard]:
+def listened(classifier: models.Classifier, found: Iterable[models.Recording]) -> list[Predictions]:
     """Let a model hear what it was not trained on; of equal recordings, the first."""
-    heard: dict[str, Heard] = {}
+    heard: dict[str, Predictions] = {}
     for recording in found:
         models.check_apart(classifier.runs, {recording.name: recording.sha256})
         if recording.sha256 not in heard:
-            heard[recording.sha256] = hear(classifier, recording)
+            heard[recording.sha256] = predict(classifier, recording)
     return list(heard.values())
 
 
-def scored(heard: Sequence[Heard], test: Collection[str]) -> Score:
+def scored(heard: Sequence[Predictions], test: Collection[str]) -> Score:
     """Measure by frames on the test alone, and by alarms on all."""
-    return Score(judge([one for one in heard if one.name in test]), judge(heard))
+    return Score(measure([one for one in heard if one.name in test]), measure(heard))
 
 
 def trained(profile: str, paths: Sequence[Path], folder: Path) -> Path:

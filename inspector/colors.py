@@ -5,7 +5,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from models import DEPARTURE, UNKNOWN
+from models import ANOMALY, UNKNOWN
 
 Color: TypeAlias = tuple[int, int, int]
 
@@ -14,7 +14,7 @@ CLASSES: dict[str, Color] = {
     "impact": (213, 94, 0),
     "highaccelerations": (240, 228, 66),
     "oscillations": (86, 180, 233),
-    DEPARTURE: (115, 45, 165),
+    ANOMALY: (115, 45, 165),
     UNKNOWN: (60, 60, 60),
 }
 OTHERS: tuple[Color, ...] = ((204, 121, 167), (230, 159, 0), (0, 114, 178), (190, 190, 190))

@@ -81,7 +81,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
     name, classifier = _choose(for_robot(library, run.robot), run.rate, signals)
     rate, remark = classifier.rate, ""
     if not _close(run.rate, rate):
-        run = nm.lowered(run, rate)
+        run = nm.decimated(run, rate)
         signals = signals_of(run)
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
     labels = classifier.classify(signals, rate, start=float(run.time[0]), valid=run.mask)

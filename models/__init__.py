@@ -37,7 +37,7 @@ from models.evaluation.framescore import evaluate
 from models.examples import Examples
 from models.features import features
 from models.framing import frame
-from models.labels import DEPARTURE, UNKNOWN, Event, Labels
+from models.labels import ANOMALY, UNKNOWN, Event, Labels
 from models.logbands import EACH, GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
 from models.novelty.frames import GoodMotion
@@ -50,8 +50,8 @@ from models.splitting import check_apart, folds, group_of, held_out, leave_one_o
 from models.stream import Stream
 
 __all__ = [
+    "ANOMALY",
     "CLASSES",
-    "DEPARTURE",
     "EACH",
     "GENERAL",
     "NOISE",

@@ -12,7 +12,7 @@ from models import modelfile
 from models.confusion import Evaluation
 from models.dataset import Dataset
 from models.errors import DatasetError, RateError, SignalError
-from models.estimators.estimator import Machine, rebuilt
+from models.estimators.estimator import Estimator, rebuilt
 from models.examples import CHUNK, Examples
 from models.features import features, standard
 from models.framing import frame_starts
@@ -39,7 +39,7 @@ class Classifier:
 
     profile: Profile
     classes: tuple[str, ...]
-    machines: Machine
+    estimator: Estimator
     mean: Array
     scale: Array
     runs: Mapping[str, str] = field(default_factory=dict)
@@ -81,13 +81,15 @@ class Classifier:
         mean, scale = standard(examples.features, profile)
         targets = np.array([classes.index(label) for label in examples.labels.tolist()])
         scaled = (examples.features - mean) / scale
-        machines = learn(scaled, targets, examples.groups, profile)
-        classifier = cls(profile, classes, machines, mean, scale, dict(examples.hashes))
+        estimator = learn(scaled, targets, examples.groups, profile)
+        classifier = cls(profile, classes, estimator, mean, scale, dict(examples.hashes))
         sets = {"training": examples}
         if validation is not None:
             sets["validation"] = _examples(validation, profile)
         metrics = {
-            name: Evaluation.of(each.labels, classifier.hear(each.features), classes).as_dict()
+            name: Evaluation.of(
+                each.labels, classifier.predict_features(each.features), classes
+            ).as_dict()
             for name, each in sets.items()
         }
         return replace(classifier, metrics=metrics, versions=versions())
@@ -196,10 +198,10 @@ class Classifier:
             self._choose(decisions),
             self._score(decisions),
             self.classes,
-            self.machines.sure(decisions),
+            self.estimator.above_threshold(decisions),
         )
 
-    def judge(self, plain: Array) -> Array:
+    def decide(self, plain: Array) -> Array:
         """Decide on features.
 
         Args:
@@ -208,9 +210,9 @@ class Classifier:
         Returns:
             Decisions, shape (frames, decisions).
         """
-        return self.machines.decision((plain - self.mean) / self.scale)
+        return self.estimator.decision((plain - self.mean) / self.scale)
 
-    def hear(self, plain: Array) -> Words:
+    def predict_features(self, plain: Array) -> Words:
         """Name the class of each frame by its features.
 
         Args:
@@ -220,7 +222,7 @@ class Classifier:
             Class names, shape (frames,).
         """
         chunks = _chunks(np.arange(len(plain)))
-        return np.concatenate([self._choose(self.judge(plain[chunk])) for chunk in chunks])
+        return np.concatenate([self._choose(self.decide(plain[chunk])) for chunk in chunks])
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
@@ -240,7 +242,7 @@ class Classifier:
             "metrics": dict(self.metrics),
             "versions": dict(self.versions),
         }
-        arrays = {**self.machines.arrays(), "mean": self.mean, "scale": self.scale}
+        arrays = {**self.estimator.arrays(), "mean": self.mean, "scale": self.scale}
         modelfile.write(path, manifest, arrays, overwrite=overwrite)
 
     @classmethod
@@ -272,14 +274,14 @@ class Classifier:
 
     def _decide(self, frames: Real, index: Index) -> Array:
         return np.concatenate(
-            [self.judge(features(frames[chunk], self.profile)) for chunk in _chunks(index)]
+            [self.decide(features(frames[chunk], self.profile)) for chunk in _chunks(index)]
         )
 
     def _choose(self, decisions: Array) -> Words:
-        return self._names[self.machines.choose(decisions)]
+        return self._names[self.estimator.choose(decisions)]
 
     def _score(self, decisions: Array) -> Array:
-        return self.machines.score(decisions)
+        return self.estimator.score(decisions)
 
 
 def _examples(dataset: Dataset | Examples, profile: Profile) -> Examples:

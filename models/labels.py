@@ -8,7 +8,7 @@ from models.types import Array, Index, Mask, Words
 
 UNKNOWN = "unknown"
 """What a frame is called that is like nothing the classifier has learnt from."""
-DEPARTURE = "departure"
+ANOMALY = "anomaly"
 """What a baseline, which has learnt from good runs alone, calls a frame that is unlike them."""
 
 CONFIRM = 2
@@ -42,7 +42,7 @@ class Labels:
         label: Its class, or `unknown`, as the frame alone tells, shape (frames,).
         scores: How certain each class is, shape (frames, classes); comparable within one model.
         classes: Names of the classes, `ok` first.
-        sure: Whether a frame is sure enough of a failure to raise an alarm, shape (frames,); None
+        above_threshold: Whether a frame is above the alarm threshold, shape (frames,); None
             if each frame that is called a failure is.
     """
 
@@ -51,32 +51,32 @@ class Labels:
     label: Words
     scores: Array
     classes: tuple[str, ...]
-    sure: Mask | None = None
+    above_threshold: Mask | None = None
 
     @property
-    def settled(self) -> Words:
+    def debounced(self) -> Words:
         """What each frame is called in the light of its neighbours, shape (frames,).
 
         Failure frames one after the other make a stretch. One of which less than two frames are
         sure is `ok`: good motion startles a frame now and then, and what goes wrong is in several.
         Only where the signal begins or ends, or a gap does, it may be in a single one.
         """
-        if self.sure is None:
+        if self.above_threshold is None:
             return self.label
         failing = ~np.isin(self.label, ("ok", UNKNOWN))
         apart = self.start[1:] > self.stop[:-1]
-        kept = confirmed(failing, self.sure, apart)
+        kept = confirmed(failing, self.above_threshold, apart)
         return np.where(failing & ~kept, "ok", self.label)
 
     @property
-    def outright(self) -> Words:
+    def raw(self) -> Words:
         """What each frame is called by itself, a failure only where it is sure, shape (frames,).
 
         That is all that can be said while the frames after it are still to come.
         """
-        if self.sure is None:
+        if self.above_threshold is None:
             return self.label
-        keep = self.sure | np.isin(self.label, ("ok", UNKNOWN))
+        keep = self.above_threshold | np.isin(self.label, ("ok", UNKNOWN))
         return np.where(keep, self.label, "ok")
 
     def score(self, frame: int) -> float:
@@ -93,9 +93,9 @@ class Labels:
             different classes; events of one class never do.
         """
         found: list[Event] = []
-        settled = self.settled
+        debounced = self.debounced
         for label in (name for name in self.classes if name != "ok"):
-            own = np.flatnonzero(settled == label)
+            own = np.flatnonzero(debounced == label)
             apart = np.flatnonzero(self.start[own[1:]] > self.stop[own[:-1]]) + 1
             found += [self._event(group) for group in np.split(own, apart) if len(group)]
         return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
@@ -113,7 +113,7 @@ class Labels:
         return "\n".join([*heard, f"in {len(self)} frames"])
 
 
-def confirmed(failing: Mask, sure: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
+def confirmed(failing: Mask, above_threshold: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
     """Keep the failure frames of those stretches of which enough frames are sure.
 
     A frame without a neighbour on one side counts twice: what goes wrong there, the neighbour
@@ -121,7 +121,7 @@ def confirmed(failing: Mask, sure: Mask, apart: Mask, *, least: int = CONFIRM) -
 
     Args:
         failing: Whether a frame seems to be a failure, shape (frames,).
-        sure: Whether it is sure of that, shape (frames,).
+        above_threshold: Whether it is above the alarm threshold, shape (frames,).
         apart: Whether a frame and the next neither overlap nor touch, shape (frames - 1,).
         least: How many sure frames are enough.
 
@@ -131,7 +131,9 @@ def confirmed(failing: Mask, sure: Mask, apart: Mask, *, least: int = CONFIRM) -
     first = np.append(True, apart)[: len(failing)]
     last = np.append(apart, True)[: len(failing)]
     stretch = np.cumsum(failing & (first | ~np.append(False, failing)[: len(failing)]))
-    count = np.where(first | last, 2, 1)[failing & sure]
-    enough = np.bincount(stretch[failing & sure], count, minlength=len(failing) + 1) >= least
+    count = np.where(first | last, 2, 1)[failing & above_threshold]
+    enough = (
+        np.bincount(stretch[failing & above_threshold], count, minlength=len(failing) + 1) >= least
+    )
     kept: Mask = failing & enough[stretch]
     return kept

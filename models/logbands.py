@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from models.errors import ProfileError
 from models.pooling import POOLED
-from models.profile import CLASSES, Machine, Profile
+from models.profile import CLASSES, EstimatorKind, Profile
 from models.signals import JOINTS, MOTION, NOISE
 
 SPEED = 1.5
@@ -26,7 +26,7 @@ class LogBands:
     """What is listened to."""
     relative: bool = False
     """Whether levels are told from the whole frame's, and from those of the signal before."""
-    machine: Machine = "svm"
+    estimator: EstimatorKind = "svm"
     """What decides."""
     alarm: float = 0.5
     """Probability of any failure from which a frame is sure enough of it to raise an alarm."""
@@ -97,7 +97,7 @@ class LogBands:
             relative=self.relative,
             floor=self.floor,
             least_deviation=self.least_deviation,
-            machine=self.machine,
+            estimator=self.estimator,
             alarm=self.alarm,
             kernel="rbf",
             regularization=self.regularization,
@@ -129,10 +129,10 @@ class LogBands:
         return tuple(edges) if len(edges) > 1 else ()
 
 
-SCALAR = LogBands(relative=True, floor=1e-3, machine="networks", alarm=0.85, quick=0.02)
+SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.85, quick=0.02)
 """For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
 encoders, and differs from robot to robot and from simulator to simulator."""
-GENERAL = replace(SCALAR, signals=MOTION, machine="trees", alarm=0.7, speed=True)
+GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.7, speed=True)
 """For runs with measured and desired motion; good motion startles it less. The noise alone cannot
 tell a fast motion without sensor noise from a failure by its speed. Trees find more of what is like
 what they have learnt from; networks, of what is not: of a rattle on a motion without any other

@@ -1,8 +1,8 @@
-"""The model file, version 4: one uncompressed `.npz` of plain arrays and a JSON manifest.
+"""The model file, version 5: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
-Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the machine, as
-`machine.shapes` lists them. Nothing in it is ever unpickled; sizes are checked before an array is
-made. The same model is the same bytes.
+Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
+`estimator.shapes` lists them. Nothing in it is ever unpickled; sizes are checked before an array is
+made. The same model is the same bytes. Version 4 is read too: it differs in two names.
 """
 
 import io
@@ -21,10 +21,12 @@ from models.atomic import write_bytes
 from models.errors import ModelFileError, ProfileError
 from models.estimators.estimator import DIMENSIONS, shapes
 from models.features import feature_count
+from models.labels import ANOMALY
 from models.profile import Profile
 from models.types import Array
 
-FORMAT = "noise-model/4"
+FORMAT = "noise-model/5"
+OLD_FORMAT = "noise-model/4"
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times what is usual."""
 
@@ -132,10 +134,29 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
         manifest = json.loads(text)
     except ValueError as error:
         raise ModelFileError(path, f"manifest is no JSON ({error})") from error
-    if not isinstance(manifest, dict) or manifest.get("format") != FORMAT:
-        other = manifest.get("format") if isinstance(manifest, dict) else manifest
-        raise ModelFileError(path, f"is of format {other!r}, this version reads {FORMAT!r}")
-    return manifest
+    given = manifest.get("format") if isinstance(manifest, dict) else manifest
+    if given not in (FORMAT, OLD_FORMAT):
+        raise ModelFileError(
+            path,
+            f"is of format {given!r}, this version reads {FORMAT!r} and {OLD_FORMAT!r}:"
+            " train it again, or read it by the version that wrote it",
+        )
+    return _renamed(manifest) if given == OLD_FORMAT else dict(manifest)
+
+
+def _renamed(manifest: dict[str, Any]) -> dict[str, Any]:
+    """Give the entries of version 4 the names of version 5."""
+
+    def renamed(classes: Any) -> Any:
+        old = isinstance(classes, list)
+        return [ANOMALY if name == "departure" else name for name in classes] if old else classes
+
+    profile = manifest.get("profile")
+    if isinstance(profile, dict):
+        names = {"machine": "estimator"}
+        profile = {names.get(name, name): value for name, value in profile.items()}
+        profile["classes"] = renamed(profile.get("classes"))
+    return {**manifest, "profile": profile, "classes": renamed(manifest.get("classes"))}
 
 
 _JSON_TYPES = {
@@ -186,9 +207,9 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
 def _check_arrays(
     path: str | Path, profile: Profile, classes: int, arrays: Mapping[str, Array]
 ) -> None:
-    if lacking := sorted(DIMENSIONS[profile.machine].keys() - arrays.keys()):
+    if lacking := sorted(DIMENSIONS[profile.estimator].keys() - arrays.keys()):
         raise ModelFileError(
-            path, f"its profile asks for {profile.machine}, but it has no {', '.join(lacking)}"
+            path, f"its profile asks for {profile.estimator}, but it has no {', '.join(lacking)}"
         )
     count = feature_count(profile)
     wanted = shapes(arrays, profile, features=count, classes=classes)
@@ -199,7 +220,7 @@ def _check_arrays(
             )
     if not (arrays["scale"] > 0).all():
         raise ModelFileError(path, "array 'scale' holds values that are not above 0")
-    if profile.machine == "trees":
+    if profile.estimator == "trees":
         for name, most in (("feature", count - 1), ("left", profile.leaves)):
             if arrays[name].min() < 0 or arrays[name].max() > most:
                 raise ModelFileError(path, f"array {name!r} holds values beyond 0 to {most}")

@@ -21,10 +21,10 @@ TOLERANCE = 1e-3
 
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
-Machine: TypeAlias = Literal["svm", "networks", "trees", "baseline"]
+EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "baseline"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
-_CHOICES = {"bands": Bands, "kernel": Kernel, "machine": Machine, "multiclass": Multiclass}
+_CHOICES = {"bands": Bands, "kernel": Kernel, "estimator": EstimatorKind, "multiclass": Multiclass}
 
 
 _POSITIVE = (
@@ -96,7 +96,7 @@ class Profile:
     least_deviation: float = 0.0
     """Deviation that a feature is taken to have at least, when features are scaled to the mean 0
     and the deviation 1 of the training set; 0 leaves them as they are."""
-    machine: Machine = "svm"
+    estimator: EstimatorKind = "svm"
     """What decides: support vector machines, small networks, boosted trees, or a distance from good
     runs."""
     kernel: Kernel = "rbf"

@@ -58,7 +58,7 @@ class Stream:
         self._samples = np.zeros((rows, 3 * profile.length))
         self._valid = np.zeros(3 * profile.length, dtype=bool)
         self._windows = [Windows(self._samples, profile, each) for each in profile.resolutions]
-        nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.machines.width))
+        nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.estimator.width))
         self._nothing = self._labels([nothing])
         # Windows may wait for each other, but not until their samples are gone.
         self._patience = profile.length - max(each.window for each in profile.resolutions)
@@ -198,7 +198,7 @@ class Stream:
 
     def _decide(self, frames: list[int], loudness: list[Array]) -> list[Decided]:
         """Decide on frames by the levels of their windows, as `course` takes them."""
-        return [(np.array(frames), self.classifier.judge(course(loudness, self._profile)))]
+        return [(np.array(frames), self.classifier.decide(course(loudness, self._profile)))]
 
     def _labels(self, found: list[Decided]) -> Labels:
         starts, decisions = found[0]

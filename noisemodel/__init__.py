@@ -9,7 +9,7 @@ from noisemodel.block import Block
 from noisemodel.catalog import ROBOTS
 from noisemodel.compare import compare
 from noisemodel.comparison import Comparison
-from noisemodel.decimation import lowered
+from noisemodel.decimation import decimated
 from noisemodel.errors import (
     CornerError,
     GeometryError,
@@ -57,10 +57,10 @@ __all__ = [
     "UnknownRobotError",
     "by_joint",
     "compare",
+    "decimated",
     "extended",
     "extended_chunks",
     "link_twists",
-    "lowered",
     "norms",
     "simplified",
     "surface_speed",

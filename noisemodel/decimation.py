@@ -13,7 +13,7 @@ EDGE = 10
 """Samples at the lower rate that the low-pass filter reaches to either side."""
 
 
-def lowered(run: Run, rate: float) -> Run:
+def decimated(run: Run, rate: float) -> Run:
     """Low-pass and decimate the velocities of a run.
 
     The noise of a run at a lower rate is computed after this: it is not the decimated noise.

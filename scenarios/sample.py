@@ -20,7 +20,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel import Block, Run, lowered, runfile
+from noisemodel import Block, Run, decimated, runfile
 from scenarios.errors import SampleError, ScenarioError
 from scenarios.signals import WHOLE, Signals, joints, norms, signals, with_error
 
@@ -55,7 +55,7 @@ class Sample:
         robot: A name in ``scenarios.ROBOTS``.
         rate: Sample rate, in [Hz].
         signals: Noise signals by name, each of shape (samples,).
-        lowered: Norms of the run lowered to ``LOWERED``, as a slower logger has them.
+        decimated: Norms of the run decimated to ``LOWERED``, as a slower logger has them.
         blocks: Annotated stretches.
         meta: The recipe, and the hash of the run's arrays.
         joints: Desired, measured and error velocities of the lowered run, each of shape
@@ -65,7 +65,7 @@ class Sample:
     robot: str
     rate: float
     signals: Signals
-    lowered: Signals
+    decimated: Signals
     blocks: tuple[Block, ...]
     meta: Mapping[str, Any]
     joints: Signals = field(default_factory=dict)
@@ -73,12 +73,12 @@ class Sample:
     @classmethod
     def of(cls, run: Run) -> Self:
         """Keep of a simulated run what a sample has."""
-        slower = lowered(run, LOWERED)
+        slower = decimated(run, LOWERED)
         return cls(
             robot=str(run.robot),
             rate=run.rate,
             signals=signals(run),
-            lowered=norms(slower),
+            decimated=norms(slower),
             joints=joints(slower),
             blocks=run.blocks,
             meta={**run.meta, "sha256": digest(run)},
@@ -110,7 +110,7 @@ class Sample:
         if abs(rate / self.rate - 1) < CLOSE:
             return replace(self, joints={})
         if abs(rate / LOWERED - 1) < CLOSE:
-            return replace(self, rate=LOWERED, signals=self.lowered)
+            return replace(self, rate=LOWERED, signals=self.decimated)
         raise ScenarioError(
             f"{self.name}: keeps its noise at {self.rate:g} Hz and {LOWERED:g} Hz and no"
             f" velocities, so that it cannot be brought to {rate:g} Hz; scenarios.again makes its"
@@ -134,7 +134,7 @@ class Sample:
             "meta": json.dumps(dict(self.meta), sort_keys=True),
             **_columns(self.blocks),
             **self.signals,
-            **{f"{PREFIX}{name}": signal for name, signal in self.lowered.items()},
+            **{f"{PREFIX}{name}": signal for name, signal in self.decimated.items()},
             **{name: self.joints[name] for name in KEPT if self.joints},
         }
         runfile.write(Path(path), arrays, overwrite=overwrite)
@@ -227,7 +227,7 @@ def _fields(path: Path, archive: Any, only: Iterable[str] | None) -> dict[str, A
         "robot": str(archive["robot"]),
         "rate": float(archive["rate"]),
         "signals": read,
-        "lowered": _equal(path, low),
+        "decimated": _equal(path, low),
         "joints": with_error(*(archive[name] for name in KEPT)) if KEPT[0] in archive else {},
         "blocks": tuple(Block(*block) for block in zip(*columns, strict=True)),
         "meta": meta,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from models.evaluation.predictions import Heard
+from models.evaluation.predictions import Predictions
 from models.framing import frame_starts
 from models.labels import Labels
 from models.recording import Block
@@ -47,7 +47,7 @@ def heard(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, star
     if scores is None:
         scores = np.array([np.eye(4)[CLASSES.index(label)] - 0.5 for label in called])
     truth = np.array([block.label for block in blocks])
-    return Heard(
+    return Predictions(
         name,
         group_of(name),
         1.0 / RATE,

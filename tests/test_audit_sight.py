@@ -9,7 +9,7 @@ from inspector.audit import Sight, audit, shortcomings, summary
 from inspector.audit.sight import OSCILLATIONS, band_edges, has_frame
 from inspector.library import CannotTellError, label_run, load_library
 from models import Profile
-from noisemodel import Run, lowered
+from noisemodel import Run, decimated
 
 LIBRARY = load_library(model_files())
 FAILURES = ("impact", "highaccelerations", "oscillations")
@@ -152,7 +152,7 @@ def test_one_class_out_of_sight_is_a_remark(tmp_path):
 def test_simulated_runs_have_no_flaws_at_any_rate():
     run = Run.load(demo_run())
     for rate in (10_000.0, 5000.0, 1000.0):
-        found = audit(lowered(run, rate), LIBRARY)
+        found = audit(decimated(run, rate), LIBRARY)
         assert found.doubts == ()
         assert found.bandwidth.usable == rate / 2
 

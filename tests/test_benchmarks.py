@@ -47,7 +47,7 @@ def sample(robot, scenario, seed):
         robot=robot,
         rate=RATE,
         signals=signals,
-        lowered={name: signal[::10] for name, signal in signals.items()},
+        decimated={name: signal[::10] for name, signal in signals.items()},
         blocks=tuple(Block(float(t), t + 1.0, label) for t, label in enumerate(CLASSES)),
         meta={**meta, "sha256": f"{robot}{scenario}{seed}"},
     )

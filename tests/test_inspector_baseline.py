@@ -53,7 +53,7 @@ def test_what_departs_from_good_runs_is_a_finding(folder):
     bad, fine = json.loads(out)["runs"]
     assert status == 1
     (event,) = bad["events"]
-    assert event["label"] == "departure"
+    assert event["label"] == "anomaly"
     assert event["start"] == pytest.approx(2.8, abs=0.25)
     assert event["stop"] == pytest.approx(4.2, abs=0.25)
     assert (fine["status"], fine["model"]) == ("ok", "robot")
@@ -65,7 +65,7 @@ def test_findings_go_into_label_files(folder, tmp_path):
         "--labels-to", tmp_path, "--labels-format", "csv",
     )  # fmt: skip
     (written,) = tmp_path.iterdir()
-    assert "departure" in written.read_text()
+    assert "anomaly" in written.read_text()
 
 
 def test_a_baseline_is_measured_by_failures_of_any_name(folder):
@@ -74,7 +74,7 @@ def test_a_baseline_is_measured_by_failures_of_any_name(folder):
     assert status == 0
     assert measured["events"]["all_found"]["value"] == 1.0
     assert measured["events"]["false_alarms"] == 0
-    assert measured["classes"] == ["ok", "departure"]
+    assert measured["classes"] == ["ok", "anomaly"]
 
 
 def test_only_what_is_annotated_ok_is_learnt(folder, tmp_path):

@@ -9,7 +9,7 @@ from commandline import call
 from hearings import BLOW, CLASSES, QUIET, SWING, frames, heard, many, perfect
 
 from inspector.training import evaluation
-from models.evaluation.assessment import judge
+from models.evaluation.assessment import measure
 
 
 def run(path, seed, *, label="oscillations"):
@@ -141,7 +141,7 @@ def test_pictures_show_what_there_is_and_leave_out_what_is_not(tmp_path, monkeyp
     ]
     silent = [heard("a", SWING[1:2], ["ok"] * len(frames()))]  # no ok motion, and nothing found
     for recordings in (probable, many(6), silent):
-        evaluation.draw(judge(recordings), tmp_path / "p.png", title="m", overwrite=True)
+        evaluation.draw(measure(recordings), tmp_path / "p.png", title="m", overwrite=True)
     texts = [
         {text.get_text() for text in figure.findobj() if hasattr(text, "get_text")}
         for figure in drawn

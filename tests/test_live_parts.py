@@ -95,7 +95,7 @@ def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
     parts = [slower.push(piece, np.ones(len(piece), dtype=bool)) for piece in pieces]
     lower = np.concatenate([values for values, _ in parts])
     valid = np.concatenate([valid for _, valid in parts])
-    whole = nm.lowered(run, 1000.0).velocity[: len(lower)]
+    whole = nm.decimated(run, 1000.0).velocity[: len(lower)]
     assert not valid[:10].any()
     assert valid[10:].all()
     assert samples // ratio - len(lower) in (9, 10)
@@ -135,7 +135,7 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
     velocity = walk(6000, 2000.0)
     velocity[3000:4500] += 0.05 * np.sin(2 * np.pi * 90 * np.arange(1500) / 2000)[:, None]
     run = nm.Run(time=np.arange(6000) / 2000, velocity=velocity, joint_names=("a", "b", "c"))
-    lower = nm.lowered(run, 1000.0)
+    lower = nm.decimated(run, 1000.0)
     (model,) = (each for each in library.values() if each.rate == 1000.0)
     batch = model.classify(nm.simplified(lower.velocity), 1000.0)
     ear = Ear(library, 2000.0, Norms({"velocity": 3}))

@@ -118,7 +118,7 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
     assert "oscillations" in batch.label
     _, states = read(path, "/class/found", "StateChange:state")
-    told = batch.outright
+    told = batch.raw
     changes = [label for i, label in enumerate(told) if i == 0 or label != told[i - 1]]
     assert [state[0] for state in states] == [*changes, ""]
 
@@ -135,7 +135,7 @@ def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size, name):
     batch = library[name].classify({**nm.norms(run), **nm.by_joint(run)}, RATE)
     _, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
-    assert summary.labels == dict(Counter(batch.outright.tolist()))
+    assert summary.labels == dict(Counter(batch.raw.tolist()))
 
 
 def test_no_peak_of_the_noise_is_lost(tmp_path, library):

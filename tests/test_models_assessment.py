@@ -7,7 +7,7 @@ from hearings import BLOW, CLASSES, QUIET, heard, many
 
 import models
 from models.confusion import Evaluation
-from models.evaluation.assessment import judge
+from models.evaluation.assessment import measure
 
 RATE = 1000.0
 PROFILE = models.LogBands(classes=("ok", "oscillations")).at(RATE)
@@ -61,7 +61,7 @@ def test_measures_with_intervals_are_the_measures_without():
         heard(f"talos/blow-{seed:03d}", BLOW, cut=cut[seed % 3] if seed else ["unknown"] * 3)
         for seed in range(7)
     ]
-    frames = judge(runs).frames
+    frames = measure(runs).frames
     plain = Evaluation.of(
         np.concatenate([run.truth for run in runs]),
         np.concatenate([run.called for run in runs]),
@@ -84,7 +84,7 @@ def test_measures_with_intervals_are_the_measures_without():
 
 
 def test_perfection_is_one_and_its_interval_says_by_how_few_runs():
-    found = judge(many(6))
+    found = measure(many(6))
     for each in (found.frames.balanced_accuracy, found.frames.failure_recall):
         assert each.value == each.high == 1.0
     assert found.frames.failure_recall.low == pytest.approx(0.025 ** (1 / 12))
@@ -152,7 +152,7 @@ def text_of(assessment):
 
 
 def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
-    lines = text_of(judge([*many(6), heard("talos/good-009", QUIET, ["impact"] * 47)]))
+    lines = text_of(measure([*many(6), heard("talos/good-009", QUIET, ["impact"] * 47)]))
     assert "ok 100.0% [82.4, 100.0] 100.0% [82.4, 100.0] 31 31 19" in lines
     assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6 6" in lines
     assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6" in lines
@@ -165,26 +165,26 @@ def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
 
 
 def test_it_prints_the_papers_measures_under_the_papers_names():
-    lines = text_of(judge(many(6, ["ok"] * 47)))
+    lines = text_of(measure(many(6, ["ok"] * 47)))
     assert any(line.startswith("Failure detection rate 100.0%") for line in lines)
     assert any("(calling all frames ok: 71.4%)" in line for line in lines)
 
 
 def test_it_says_why_there_are_no_intervals():
-    text = str(judge(many(2)))
+    text = str(measure(many(2)))
     assert "There are none where fewer than 5 groups had anything to say." in text
     assert "Balanced accuracy       100.0%\n" in text
 
 
 def test_robots_are_told_apart_where_there_are_several():
     one, other = many(6), [heard(f"go2/blow-{seed:03d}", BLOW, ["ok"] * 47) for seed in range(6)]
-    assert "By robot" not in str(judge(one))
-    lines = text_of(judge([*one, *other]))
+    assert "By robot" not in str(measure(one))
+    lines = text_of(measure([*one, *other]))
     assert "go2 0.0% [0.0, 45.9] 0.0% [0.0, 45.9] 0 [0, 553]" in lines
     assert any(line.startswith("talos 100.0% [73.5, 100.0]") for line in lines)
 
 
 def test_lines_are_short_and_lists_too():
-    text = str(judge(many(40, ["ok"] * 47)))
+    text = str(measure(many(40, ["ok"] * 47)))
     assert max(map(len, text.splitlines())) <= 120
     assert "and 75 more" in text

@@ -45,17 +45,17 @@ def motion(apart, run=None, hop=1.0):
     return models.GoodMotion(np.zeros((len(apart), 1)), run, start, start + 0.4, {})
 
 
-def test_what_good_runs_do_is_no_departure_and_a_rattle_is_one_when_it_happens(learnt):
+def test_what_good_runs_do_is_no_anomaly_and_a_rattle_is_one_when_it_happens(learnt):
     model = learnt.classifier
     assert model.classify(signals(11), RATE).events() == ()
     (event,) = model.classify(signals(12, rattle=0.3), RATE).events()
-    assert event.label == models.DEPARTURE
+    assert event.label == models.ANOMALY
     assert 3.5 < event.start <= 4.0
     assert 6.0 <= event.stop < 6.5
     assert event.score > 1.0
 
 
-def test_silence_is_no_departure_and_neither_is_a_quieter_motion(learnt):
+def test_silence_is_no_anomaly_and_neither_is_a_quieter_motion(learnt):
     still = dict.fromkeys(PROFILE.signals, np.zeros(3000))
     assert learnt.classifier.classify(still, RATE).events() == ()
     good = signals(11)
@@ -160,14 +160,14 @@ def test_a_baseline_is_a_model_file_and_the_same_runs_give_the_same_bytes(learnt
     again.classifier.save(tmp_path / "two.npz")
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
     loaded = models.Classifier.load(tmp_path / "one.npz")
-    assert isinstance(loaded.machines, Baseline)
+    assert isinstance(loaded.estimator, Baseline)
     heard, known = (m.classify(signals(12, 0.3), RATE) for m in (loaded, learnt.classifier))
     np.testing.assert_array_equal(heard.scores, known.scores)
 
 
 def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
-    odd = replace(learnt.classifier.machines, limit=np.ones(2))
-    replace(learnt.classifier, machines=odd).save(tmp_path / "odd.npz")
+    odd = replace(learnt.classifier.estimator, limit=np.ones(2))
+    replace(learnt.classifier, estimator=odd).save(tmp_path / "odd.npz")
     with pytest.raises(models.ModelFileError, match=r"array 'limit' has shape \(2,\)"):
         models.Classifier.load(tmp_path / "odd.npz")
 
@@ -182,10 +182,10 @@ def test_a_stream_hears_what_the_whole_signal_says(learnt):
     labels = np.concatenate([each.label for each in heard])
     batch = learnt.classifier.classify(whole, RATE)
     np.testing.assert_array_equal(labels, batch.label[: len(labels)])
-    assert models.DEPARTURE in labels
+    assert models.ANOMALY in labels
 
 
-def test_a_failure_of_any_name_is_found_by_a_departure(learnt):
+def test_a_failure_of_any_name_is_found_by_a_anomaly(learnt):
     blocks = ((0.0, 3.5, "ok"), (4.0, 6.0, "oscillations"), (6.5, 8.0, "ok"))
     tests = [recording(f"bad{seed}", seed, 0.3, blocks) for seed in (21, 22)]
     measured = models.assess(learnt.classifier, tests)

@@ -17,7 +17,7 @@ PROFILES = [
     *(replace(models.SCALAR, speed=True).at(rate) for rate in (250.0, 1000.0, 10_000.0)),
 ]
 QUICK = replace(models.SCALAR, speed=True).at(1000.0)
-NAMES = [f"{each.name}-{each.machine}-{each.kernel}-{each.rate:g}" for each in PROFILES]
+NAMES = [f"{each.name}-{each.estimator}-{each.kernel}-{each.rate:g}" for each in PROFILES]
 
 
 def tone(profile, frequency, amplitude=1.0):

@@ -102,7 +102,7 @@ def test_what_is_wrong_with_a_grid_is_named(texts, reason):
         ("stride=4001", RBF, "stride of 4001 samples is longer than a frame of 4000"),
         ("gamma=1", models.Profile.noisytest("linear"), "gamma does nothing with the linear"),
         ("leaves=8", RBF, "leaves does nothing with support vector machines; leave it out"),
-        ("C=1", replace(RBF, machine="trees"), "regularization does nothing with trees"),
+        ("C=1", replace(RBF, estimator="trees"), "regularization does nothing with trees"),
         ("C=0", RBF, "regularization is 0.0, expected more than 0"),
         ("bands=comb,third", RBF, "bands is 'third', expected one of adjacent, comb, log"),
         ("window=512", RBF, "expected a multiple of three"),

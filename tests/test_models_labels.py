@@ -13,18 +13,22 @@ CLASSES = ("ok", "impact", "oscillations")
 HOP, LENGTH = 0.1, 0.4
 
 
-def labels(text, *, sure=None):
+def labels(text, *, above_threshold=None):
     """Frames of classes by their first letters, `ok` as a dot; upper case where they are sure."""
     names = {".": "ok", **{name[0]: name for name in (*CLASSES[1:], UNKNOWN)}}
     start = HOP * np.arange(len(text))
     called = np.array([names[letter.lower()] for letter in text])
-    certain = np.array([letter.isupper() for letter in text]) if sure is None else sure
+    certain = (
+        np.array([letter.isupper() for letter in text])
+        if above_threshold is None
+        else above_threshold
+    )
     scores = np.zeros((len(text), len(CLASSES)))
     return Labels(start, start + LENGTH, called, scores, CLASSES, certain)
 
 
-def settled(text):
-    return "".join("." if name == "ok" else name[0] for name in labels(text).settled.tolist())
+def debounced(text):
+    return "".join("." if name == "ok" else name[0] for name in labels(text).debounced.tolist())
 
 
 @pytest.mark.parametrize(
@@ -44,7 +48,7 @@ def settled(text):
     ],
 )
 def test_a_stretch_of_failures_takes_two_sure_frames(alone, together):
-    assert settled(alone) == together
+    assert debounced(alone) == together
 
 
 def test_a_stretch_of_several_classes_makes_an_event_of_each():
@@ -56,36 +60,36 @@ def test_frames_on_both_sides_of_a_gap_are_two_stretches():
     both = labels(".IiiI.")
     later = 5.0 * (np.arange(6) > 2)
     far = replace(both, start=both.start + later, stop=both.stop + later)
-    assert (both.settled == "impact").sum() == 4
-    assert set(far.settled) == {"ok"}
+    assert (both.debounced == "impact").sum() == 4
+    assert set(far.debounced) == {"ok"}
 
 
 @pytest.mark.parametrize("text", ["I..", "..I", "...iI", "Iii.."])
 def test_one_sure_frame_is_enough_where_its_neighbour_is_not_there(text):
-    assert (labels(text).settled != "ok").tolist() == [letter != "." for letter in text]
+    assert (labels(text).debounced != "ok").tolist() == [letter != "." for letter in text]
 
 
 def test_one_sure_frame_is_enough_beside_a_gap():
     starts = np.array([0.0, 0.1, 0.2, 5.0, 5.1, 5.2])
     for text, kept in (("..I...", 1), ("...I..", 1), (".I....", 0), ("....I.", 0)):
         found = replace(labels(text), start=starts, stop=starts + 0.4)
-        assert (found.settled == "impact").sum() == kept
+        assert (found.debounced == "impact").sum() == kept
 
 
 def test_the_only_frame_of_a_signal_speaks_for_itself():
-    assert labels("I").settled.tolist() == ["impact"]
-    assert labels("i").settled.tolist() == ["ok"]
+    assert labels("I").debounced.tolist() == ["impact"]
+    assert labels("i").debounced.tolist() == ["ok"]
 
 
 def test_without_sureness_each_frame_speaks_for_itself():
-    plain = replace(labels("i.iui"), sure=None)
-    assert plain.settled is plain.label
-    assert plain.outright is plain.label
+    plain = replace(labels("i.iui"), above_threshold=None)
+    assert plain.debounced is plain.label
+    assert plain.raw is plain.label
     assert len(plain.events()) == 1
 
 
 def test_while_frames_come_in_the_sure_ones_are_failures():
-    assert labels(".iIIiu.").outright.tolist() == [
+    assert labels(".iIIiu.").raw.tolist() == [
         "ok", "ok", "impact", "impact", "ok", "unknown", "ok",
     ]  # fmt: skip
 
@@ -94,11 +98,11 @@ def test_what_is_confirmed_is_never_more_than_what_seemed_to_fail():
     generator = np.random.default_rng(3)
     for _ in range(50):
         failing, apart = generator.random(40) < 0.6, generator.random(39) < 0.1
-        sure = failing & (generator.random(40) < 0.4)
-        kept = [confirmed(failing, sure, apart, least=least) for least in (0, 1, 2, 3)]
+        above_threshold = failing & (generator.random(40) < 0.4)
+        kept = [confirmed(failing, above_threshold, apart, least=least) for least in (0, 1, 2, 3)]
         assert (kept[0] == failing).all()
         assert all((more >= less).all() for more, less in pairwise(kept))
-        assert (kept[1] >= sure).all()
+        assert (kept[1] >= above_threshold).all()
 
 
 def test_no_frames_are_confirmed_of_none():

@@ -66,7 +66,7 @@ def refused(path, reason):
         {"kernel": "linear"},
         {"multiclass": "one-vs-rest"},
         {"least_deviation": 0.0},
-        {"machine": "trees", "rounds": 3, "leaves": 4},
+        {"estimator": "trees", "rounds": 3, "leaves": 4},
     ],
 )
 def test_a_model_that_was_saved_decides_as_before(tmp_path, changes):
@@ -90,7 +90,7 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
 def test_plain_numpy_reads_it_too(path):
     with np.load(path, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))
-    assert manifest["format"] == "noise-model/4"
+    assert manifest["format"] == "noise-model/5"
     assert manifest["rate"] == 500.0
     assert manifest["metrics"]["training"]["subset_accuracy"] == 1.0
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
@@ -213,7 +213,10 @@ def test_a_header_that_promises_more_than_there_is_is_refused(path):
         ({"mean": np.zeros(3)}, r"array 'mean' has shape \(3,\)"),
         ({"manifest": np.zeros(3)}, "array 'manifest' is of type float64"),
         ({"manifest": np.array("{")}, "manifest is no JSON"),
-        ({"manifest": np.array("[]")}, r"is of format \[\], this version reads 'noise-model/4'"),
+        (
+            {"manifest": np.array("[]")},
+            r"is of format \[\], this version reads 'noise-model/5' and 'noise-model/4'",
+        ),
     ],
 )
 def test_wrong_arrays_are_refused(path, changes, reason):
@@ -250,9 +253,9 @@ def test_wrong_manifests_are_refused(path, changes, reason):
     ],
 )
 def test_trees_that_look_where_nothing_is_are_refused(path, name, value, reason):
-    classifier = trained(replace(PROFILE, machine="trees", rounds=3, leaves=4))
+    classifier = trained(replace(PROFILE, estimator="trees", rounds=3, leaves=4))
     classifier.save(path, overwrite=True)
-    array = classifier.machines.arrays()[name].copy()
+    array = classifier.estimator.arrays()[name].copy()
     array.flat[5] = value
     rewrite(path, **{name: array})
     refused(path, reason)

@@ -17,8 +17,8 @@ from models.signals import stacked
 RATE = 1000.0
 PROFILE = models.GENERAL.at(RATE)
 PROFILES = {
-    "networks": replace(PROFILE, machine="networks", units=16, epochs=40),
-    "trees": replace(PROFILE, machine="trees", rounds=30, leaves=8),
+    "networks": replace(PROFILE, estimator="networks", units=16, epochs=40),
+    "trees": replace(PROFILE, estimator="trees", rounds=30, leaves=8),
     "joints": replace(models.EACH.at(RATE), rounds=30, leaves=8),
 }
 JOINTS = 3
@@ -80,19 +80,19 @@ def test_scores_are_probabilities(classifier):
 
 def test_a_frame_by_itself_is_decided_on_as_among_others(classifier):
     features = np.random.default_rng(5).normal(size=(70, len(classifier.mean)))
-    together = classifier.judge(features)
-    alone = np.concatenate([classifier.judge(row[None]) for row in features])
+    together = classifier.decide(features)
+    alone = np.concatenate([classifier.decide(row[None]) for row in features])
     np.testing.assert_allclose(alone, together, rtol=1e-5)
 
 
 @pytest.mark.parametrize("classes", [2, 3])
-@pytest.mark.parametrize("machine", PROFILES)
-def test_a_class_that_is_not_there_is_never_heard(machine, classes):
+@pytest.mark.parametrize("estimator", PROFILES)
+def test_a_class_that_is_not_there_is_never_heard(estimator, classes):
     generator = np.random.default_rng(1)
     features = generator.normal(size=(200, 4))
     there = [0, classes]
     targets = np.where(features[:, 0] > 0, there[1], there[0])
-    patient = replace(PROFILES[machine], epochs=300, decay=0.0)
+    patient = replace(PROFILES[estimator], epochs=300, decay=0.0)
     learnt = learn(features, targets, np.array(["one"] * 200), patient)
     scores = learnt.score(learnt.decision(features))
     assert scores.shape == (200, classes + 1)
@@ -100,28 +100,28 @@ def test_a_class_that_is_not_there_is_never_heard(machine, classes):
     assert (scores.argmax(axis=1) == targets).mean() > 0.95
 
 
-@pytest.mark.parametrize("machine", PROFILES)
-def test_a_class_that_one_group_alone_has_leaves_all_others_as_sure_as_they_are(machine):
+@pytest.mark.parametrize("estimator", PROFILES)
+def test_a_class_that_one_group_alone_has_leaves_all_others_as_sure_as_they_are(estimator):
     generator = np.random.default_rng(0)
     features = generator.normal(size=(1200, 6))
     groups = np.array([f"g{number % 6}" for number in range(1200)])
     targets = (features[:, 0] > 1.0).astype(int)
     rare = np.where((groups == "g5") & (features[:, 0] > 1.5), 2, targets)
-    sure = []
+    above_threshold = []
     for truth in (targets, rare):
-        learnt = learn(features, truth, groups, PROFILES[machine])
+        learnt = learn(features, truth, groups, PROFILES[estimator])
         good = learnt.score(learnt.decision(features))[:, 0]
-        sure.append([good[truth == 0].mean(), good[truth > 0].mean()])
-    np.testing.assert_allclose(sure[1], sure[0], atol=0.05)
+        above_threshold.append([good[truth == 0].mean(), good[truth > 0].mean()])
+    np.testing.assert_allclose(above_threshold[1], above_threshold[0], atol=0.05)
     assert learnt.calibration[3] == 0.0
 
 
-@pytest.mark.parametrize("machine", PROFILES)
-def test_groups_of_one_class_each_cannot_calibrate(machine):
+@pytest.mark.parametrize("estimator", PROFILES)
+def test_groups_of_one_class_each_cannot_calibrate(estimator):
     features = np.repeat([[0.0], [1.0]], 60, axis=0)
     targets = np.repeat([0, 1], 60)
     groups = np.repeat(["good", "bad"], 60)
-    learnt = learn(features, targets, groups, PROFILES[machine])
+    learnt = learn(features, targets, groups, PROFILES[estimator])
     np.testing.assert_array_equal(learnt.calibration, [1.0, 0.0, 0.0])
 
 
@@ -144,7 +144,7 @@ def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
         )
     )
     failures = [
-        (replace(classifier.machines, alarm=alarm).choose(decisions) > 0).sum()
+        (replace(classifier.estimator, alarm=alarm).choose(decisions) > 0).sum()
         for alarm in (0.01, 0.5, 0.99)
     ]
     assert failures == sorted(failures, reverse=True)
@@ -152,17 +152,17 @@ def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
 
 def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classifier):
     shares = {"impact": 0.1, "oscillations": 0.4}
-    machine = replace(classifier.machines, frequency=np.array([0.5, *shares.values()]))
+    estimator = replace(classifier.estimator, frequency=np.array([0.5, *shares.values()]))
     probabilities = np.log([[0.2, 0.35, 0.45], [0.2, 0.05, 0.75], [0.9, 0.09, 0.01]])
     decisions = np.hstack((probabilities, np.zeros((3, 1))))
-    named = [classifier.classes[index] for index in machine.choose(decisions)]
+    named = [classifier.classes[index] for index in estimator.choose(decisions)]
     assert named == ["impact", "oscillations", "ok"]
 
 
 def test_machines_know_how_frequent_each_class_was(classifier):
     examples = Examples.read(RECORDINGS[:12], PROFILE)
     shares = [(examples.labels == name).mean() for name in classifier.classes]
-    np.testing.assert_allclose(classifier.machines.frequency, shares)
+    np.testing.assert_allclose(classifier.estimator.frequency, shares)
 
 
 def test_what_is_louder_than_all_that_was_learnt_is_unknown(classifier):

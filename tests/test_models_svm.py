@@ -71,12 +71,12 @@ def test_one_vs_rest_is_a_machine_for_each_class_with_its_own_c(kernel, classes)
     profile = replace(models.Profile.paper(kernel), gamma=0.02)
     features, targets = blobs(classes)
     decisions = fit(features, targets, profile).condensed().decision(features)
-    for machine in range(classes):
+    for estimator in range(classes):
         # C_cls = C N / (classes N_cls), paper Sec. III-B
-        own = profile.regularization * len(targets) / (classes * (targets == machine).sum())
-        svc = SVC(C=own, kernel=kernel, gamma=0.02).fit(features, targets == machine)
+        own = profile.regularization * len(targets) / (classes * (targets == estimator).sum())
+        svc = SVC(C=own, kernel=kernel, gamma=0.02).fit(features, targets == estimator)
         expected = svc.decision_function(features)
-        np.testing.assert_allclose(decisions[:, machine], expected, atol=1e-9, rtol=0)
+        np.testing.assert_allclose(decisions[:, estimator], expected, atol=1e-9, rtol=0)
     chosen = choose(decisions, classes=classes, multiclass="one-vs-rest")
     assert np.array_equal(chosen, decisions.argmax(axis=1))
     assert score(decisions, classes=classes, multiclass="one-vs-rest") is decisions

@@ -122,9 +122,9 @@ def test_intervals_of_what_is_read_shrink_with_more_groups():
 
 
 def test_probabilities_and_margins_are_told_apart():
-    sure = np.array([[0.7, 0.1, 0.2, 0.0], [0.0, 0.0, 0.5, 0.5]])
-    assert are_probabilities(sure)
-    assert failure_score(sure, CLASSES).tolist() == pytest.approx([0.3, 1.0])
+    above_threshold = np.array([[0.7, 0.1, 0.2, 0.0], [0.0, 0.0, 0.5, 0.5]])
+    assert are_probabilities(above_threshold)
+    assert failure_score(above_threshold, CLASSES).tolist() == pytest.approx([0.3, 1.0])
     votes = np.array([[3.1, 2.0, 1.0, -0.1]])
     assert not are_probabilities(votes)
     assert failure_score(votes, CLASSES).tolist() == pytest.approx([-1.1])

@@ -94,7 +94,7 @@ def test_two_classes_are_predicted_as_a_classifier_does(name):
 
 
 def test_points_of_trees_predict_what_a_classifier_predicts():
-    profile = replace(PROFILES["logbands"], machine="trees", rounds=3)
+    profile = replace(PROFILES["logbands"], estimator="trees", rounds=3)
     points = Grid.of(["leaves=4,8"]).profiles(profile)
     assert_equal_to_training(points, sets(learn=range(12), check=range(12, 14)))
 
@@ -140,7 +140,7 @@ def test_measures_are_those_of_an_evaluation():
 
 
 def test_frames_that_are_unknown_are_neither_found_nor_false_alarms():
-    profile = replace(PROFILES["logbands"], machine="trees", rounds=3)
+    profile = replace(PROFILES["logbands"], estimator="trees", rounds=3)
     given = sets(learn=range(12), check=range(12, 14))
     strange = [replace(each, signal=1e6 * each.signal) for each in given.check]
     asked = ask([profile], Trial.against(given.learn, strange))
@@ -156,10 +156,10 @@ def test_a_measure_of_nothing_is_none_in_json():
 
 
 def test_the_log_loss_decides_between_equals():
-    sure, unsure = Measures(0.9, 0.2, 1.0, 0.0, 0.8), Measures(0.9, 0.3, 1.0, 0.0, 0.9)
-    assert min(unsure, sure, key=order("balanced-accuracy")) is sure
-    assert min(unsure, sure, key=order("subset-accuracy")) is unsure
-    assert min(unsure, sure, key=order("log-loss")) is sure
+    above_threshold, unsure = Measures(0.9, 0.2, 1.0, 0.0, 0.8), Measures(0.9, 0.3, 1.0, 0.0, 0.9)
+    assert min(unsure, above_threshold, key=order("balanced-accuracy")) is above_threshold
+    assert min(unsure, above_threshold, key=order("subset-accuracy")) is unsure
+    assert min(unsure, above_threshold, key=order("log-loss")) is above_threshold
 
 
 @pytest.mark.parametrize("criterion", CRITERIA)

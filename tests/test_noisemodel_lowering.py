@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from noisemodel import Block, Run, RunError, lowered
+from noisemodel import Block, Run, RunError, decimated
 
 
 def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
@@ -12,7 +12,7 @@ def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
 
 @pytest.mark.parametrize("rate", [5000.0, 1000.0, 2500.0, 300.0])
 def test_a_slow_motion_stays_what_it_was(rate):
-    slow = lowered(run_of(20.0), rate)
+    slow = decimated(run_of(20.0), rate)
     assert slow.rate == pytest.approx(rate)
     inner = slice(20, -20)
     expected = np.sin(2 * np.pi * 20.0 * (slow.time - 5.0))
@@ -21,7 +21,7 @@ def test_a_slow_motion_stays_what_it_was(rate):
 
 
 def test_what_a_slower_logger_cannot_see_is_gone_not_folded():
-    slow = lowered(run_of(900.0), 1000.0)
+    slow = decimated(run_of(900.0), 1000.0)
     assert np.abs(slow.velocity[20:-20]).max() < 1e-2
 
 
@@ -29,13 +29,13 @@ def test_the_noise_of_a_lowered_run_is_not_the_lowered_noise():
     # |sin| of 900 Hz has power at 0 Hz; a slower logger's velocities would have none.
     noise = np.abs(run_of(900.0).velocity).mean()
     assert noise > 0.6
-    assert np.abs(lowered(run_of(900.0), 1000.0).velocity[20:-20]).mean() < 1e-2
+    assert np.abs(decimated(run_of(900.0), 1000.0).velocity[20:-20]).mean() < 1e-2
 
 
 def test_a_constant_velocity_stays_constant_to_the_edges():
     time = np.arange(10_000) / 10_000
     run = Run(time=time, velocity=np.full((10_000, 1), 2.0), joint_names=("a",))
-    np.testing.assert_allclose(lowered(run, 1000.0).velocity, 2.0, atol=2e-3)
+    np.testing.assert_allclose(decimated(run, 1000.0).velocity, 2.0, atol=2e-3)
 
 
 def test_all_velocities_are_lowered_and_nothing_else_is_kept():
@@ -52,7 +52,7 @@ def test_all_velocities_are_lowered_and_nothing_else_is_kept():
         meta={"seed": 1},
         robot="panda",
     )
-    slow = lowered(run, 1000.0)
+    slow = decimated(run, 1000.0)
     np.testing.assert_array_equal(slow.velocity, slow.velocity_desired)
     np.testing.assert_array_equal(slow.velocity, slow.stages["planned"])
     assert slow.base_velocity.shape == (3000, 6)
@@ -63,7 +63,7 @@ def test_all_velocities_are_lowered_and_nothing_else_is_kept():
 def test_what_a_gap_reaches_into_is_not_valid():
     valid = np.ones(30_000, dtype=bool)
     valid[15_000:15_100] = False
-    slow = lowered(run_of(20.0, valid=valid), 1000.0)
+    slow = decimated(run_of(20.0, valid=valid), 1000.0)
     assert not slow.valid[1490:1520].any()
     assert slow.valid[:1490].all()
     assert slow.valid[1520:].all()
@@ -72,14 +72,14 @@ def test_what_a_gap_reaches_into_is_not_valid():
 
 def test_the_same_rate_changes_nothing():
     run = run_of(20.0)
-    assert lowered(run, 10_000.0) is run
+    assert decimated(run, 10_000.0) is run
 
 
 def test_a_rate_is_never_raised():
     with pytest.raises(RunError, match="a run of 1000 Hz cannot be lowered to 2000 Hz"):
-        lowered(run_of(20.0, rate=1000), 2000.0)
+        decimated(run_of(20.0, rate=1000), 2000.0)
 
 
 def test_too_little_motion_is_said():
     with pytest.raises(RunError, match="0.001 s of motion are too short for 1000 Hz"):
-        lowered(run_of(20.0, seconds=0.001), 1000.0)
+        decimated(run_of(20.0, seconds=0.001), 1000.0)

@@ -44,7 +44,7 @@ def data(tmp_path_factory):
                     robot=robot,
                     rate=10_000.0,
                     signals=signals,
-                    lowered={name: signal[::10] for name, signal in signals.items()},
+                    decimated={name: signal[::10] for name, signal in signals.items()},
                     blocks=tuple(
                         Block(2.0 * at, 2.0 * at + 2.0, label)
                         for at, label in enumerate(models.CLASSES)

@@ -131,16 +131,16 @@ def test_a_sample_is_read_as_it_was_written(tmp_path):
 def test_a_sample_has_the_norms_of_the_lowered_run_too(tmp_path):
     run = random_run()
     Sample.of(run).save(tmp_path / "a.npz")
-    slower = nm.lowered(run, 1000.0)
-    lowered = Sample.load(tmp_path / "a.npz", only=("error", "measured_FL_FOOT")).lowered
-    assert list(lowered) == ["error", "measured_FL_FOOT"]
+    slower = nm.decimated(run, 1000.0)
+    decimated = Sample.load(tmp_path / "a.npz", only=("error", "measured_FL_FOOT")).decimated
+    assert list(decimated) == ["error", "measured_FL_FOOT"]
     exact = np.linalg.norm(slower.velocity_desired - slower.velocity, axis=1)
-    np.testing.assert_allclose(lowered["error"], exact, rtol=1e-6)
+    np.testing.assert_allclose(decimated["error"], exact, rtol=1e-6)
 
 
 def test_a_sample_gives_its_noise_at_either_rate_and_at_no_other():
     run = random_run()
-    slower = nm.lowered(run, 1000.0)
+    slower = nm.decimated(run, 1000.0)
     sample = Sample.of(run)
     assert sample.at(10_000.0).signals is sample.signals
     np.testing.assert_allclose(
@@ -156,7 +156,7 @@ def test_a_sample_keeps_joints_at_the_lower_rate_alone(tmp_path):
     for only in (None, ("error",)):
         sample = Sample.load(tmp_path / "a.npz", only=only)
         assert not sample.at(10_000.0).joints
-        wanted = nm.by_joint(nm.lowered(run, 1000.0))
+        wanted = nm.by_joint(nm.decimated(run, 1000.0))
         assert sample.at(1000.0).joints.keys() == wanted.keys()
         for name, signal in sample.at(1000.0).joints.items():
             assert signal.shape == (12, SAMPLES // 10)

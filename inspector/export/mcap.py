@@ -126,7 +126,7 @@ def _frames(content: Content, stamp: Any) -> Iterator[Message]:
     if content.labels is None:
         return
     labels = content.labels
-    rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.settled.tolist(), strict=True)
+    rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.debounced.tolist(), strict=True)
     for (start, stop, label), scores in zip(rows, labels.scores.tolist(), strict=True):
         message = {"label": label, "start": start, "stop": stop}
         each = dict(zip(labels.classes, scores, strict=True))

@@ -113,6 +113,6 @@ def _framed(time: Array, labels: models.Labels) -> Iterator[tuple[str, Any]]:
 
     yield "frame_start", column(labels.start)
     yield "frame_stop", column(labels.stop)
-    yield "label", column(labels.settled.astype(object))
+    yield "label", column(labels.debounced.astype(object))
     for place, name in enumerate(labels.classes):
         yield f"score_{name}", column(labels.scores[:, place])

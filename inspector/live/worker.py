@@ -168,7 +168,7 @@ class Worker:
                 labels,
                 start=labels.start + shift,
                 stop=labels.stop + shift,
-                label=labels.outright,
+                label=labels.raw,
             )
             self._heard.update(labels.label.tolist())
             changes = self._lane.take(labels)

@@ -64,7 +64,7 @@ def _found(side: Inspection) -> list[tuple[float, float, str]]:
     halfway = (centres[1:] + centres[:-1]) / 2
     begins = np.maximum(np.append(-np.inf, halfway), centres - reach)
     ends = np.minimum(np.append(halfway, np.inf), centres + reach)
-    return list(zip(begins.tolist(), ends.tolist(), map(str, labels.settled), strict=True))
+    return list(zip(begins.tolist(), ends.tolist(), map(str, labels.debounced), strict=True))
 
 
 def _annotated(side: Inspection) -> list[tuple[float, float, str]]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from inspector.errors import InspectorError
 from inspector.pair.alignment import Alignment
-from noisemodel import Block, Run, lowered
+from noisemodel import Block, Run, decimated
 from noisemodel.types import Array, Real
 
 SAME_RATE = 1e-3
@@ -91,7 +91,7 @@ def _at_rate(run: Run, rate: float) -> Run:
     """Lower a run, but keep the positions that its links are placed by."""
     if run.rate <= rate * (1 + SAME_RATE):
         return run
-    slower = lowered(run, rate)
+    slower = decimated(run, rate)
     nearest = np.round(np.arange(len(slower.time)) * run.rate / rate).astype(int)
     nearest = np.minimum(nearest, len(run.time) - 1)
 

@@ -170,7 +170,7 @@ def _heard(pair: Pair, side: Inspection, fast: Array, name: str) -> tuple[float,
     """Say how long a class was heard in a run, and how loud that was."""
     labels = side.labels
     assert labels is not None
-    own = labels.settled == name
+    own = labels.debounced == name
     hop = float(np.median(np.diff(labels.start))) if len(labels) > 1 else 0.0
     first, last = _samples(pair, labels.start[own]), _samples(pair, labels.stop[own])
     energy = np.concatenate(([0.0], np.cumsum(fast**2)))

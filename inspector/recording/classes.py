@@ -46,7 +46,7 @@ def _stretches(labels: Labels) -> Iterator[tuple[float, float, str]]:
     yield from zip(
         [*(centres[:1] - hop / 2), *begins],
         [*ends, *(centres[-1:] + hop / 2)],
-        map(str, labels.settled),
+        map(str, labels.debounced),
         strict=True,
     )
 

@@ -60,7 +60,7 @@ def train(
         raise InspectorError(f"{error}; --profile scalar takes the noise alone") from error
     classifier = models.Classifier.train(examples, chosen)
     classifier.save(output, overwrite=overwrite)
-    called = classifier.hear(examples.features)
+    called = classifier.predict_features(examples.features)
     return models.Evaluation.of(examples.labels, called, classifier.classes)
 
 
@@ -169,7 +169,7 @@ def recording_of(path: Path, run: nm.Run, rate: float) -> models.Recording:
     """
     if run.rate < rate * (1 - 1e-3):
         raise InspectorError(f"{path}: recorded at {run.rate:g} Hz, the model needs {rate:g} Hz")
-    slower = nm.lowered(run, rate)
+    slower = nm.decimated(run, rate)
     return models.Recording(
         name=path.stem,
         signal={**nm.norms(slower), **nm.by_joint(slower)},

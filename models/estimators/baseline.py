@@ -9,18 +9,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from models.labels import DEPARTURE
+from models.labels import ANOMALY
 from models.logbands import GENERAL, SCALAR, LogBands
 from models.types import Array, Index
 
-CLASSES = ("ok", DEPARTURE)
+CLASSES = ("ok", ANOMALY)
 """A baseline knows no failure, so that it cannot name one."""
 
-MOTION: LogBands = replace(GENERAL, classes=CLASSES, machine="baseline", relative=False, quick=0.0)
+MOTION: LogBands = replace(
+    GENERAL, classes=CLASSES, estimator="baseline", relative=False, quick=0.0
+)
 """For runs with measured and desired motion. Levels stay as they are: it is one robot, and how
 loud it is matters."""
 NOISE_ALONE: LogBands = replace(
-    SCALAR, classes=CLASSES, machine="baseline", relative=False, quick=0.0
+    SCALAR, classes=CLASSES, estimator="baseline", relative=False, quick=0.0
 )
 """For the noise alone."""
 
@@ -65,7 +67,7 @@ class Baseline:
         beyond: Index = (decisions[:, 0] > 1.0).astype(np.intp)
         return beyond
 
-    def sure(self, decisions: Array) -> None:
+    def above_threshold(self, decisions: Array) -> None:
         """Leave it at what each frame is called: the limit is set for single frames."""
 
     def score(self, decisions: Array) -> Array:

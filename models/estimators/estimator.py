@@ -8,13 +8,13 @@ import numpy as np
 
 from models.estimators.baseline import Baseline
 from models.estimators.mlp import Networks, fit_networks
-from models.estimators.svm import Machines, fit, machine_count
+from models.estimators.svm import SupportVectorMachines, fit, machine_count
 from models.estimators.trees import Trees, fit_trees
 from models.profile import Profile
 from models.types import Array, Index, Mask, Words
 
 
-class Machine(Protocol):
+class Estimator(Protocol):
     """What decides on standardised features."""
 
     @property
@@ -27,7 +27,7 @@ class Machine(Protocol):
     def choose(self, decisions: Array) -> Index:
         """Choose a class for each frame, shape (frames,); beyond the last is unknown."""
 
-    def sure(self, decisions: Array) -> Mask | None:
+    def above_threshold(self, decisions: Array) -> Mask | None:
         """Say which frames may raise an alarm, shape (frames,); None: all that are failures."""
 
     def score(self, decisions: Array) -> Array:
@@ -37,16 +37,16 @@ class Machine(Protocol):
         """Give what a model file keeps."""
 
 
-def rebuilt(arrays: Mapping[str, Array], profile: Profile) -> Machine:
+def rebuilt(arrays: Mapping[str, Array], profile: Profile) -> Estimator:
     """Make a machine of the arrays of a model file."""
-    own = {name: arrays[name] for name in DIMENSIONS[profile.machine]}
-    if profile.machine == "baseline":
+    own = {name: arrays[name] for name in DIMENSIONS[profile.estimator]}
+    if profile.estimator == "baseline":
         return Baseline(**own)
-    if profile.machine == "networks":
+    if profile.estimator == "networks":
         return Networks(**own, alarm=profile.alarm)
-    if profile.machine == "trees":
+    if profile.estimator == "trees":
         return Trees(**own, alarm=profile.alarm)
-    return Machines(
+    return SupportVectorMachines(
         **own, kernel=profile.kernel, gamma=profile.gamma, multiclass=profile.multiclass
     )
 
@@ -62,9 +62,9 @@ def shapes(
         features: Features of a frame.
         classes: How many classes there are.
     """
-    if profile.machine == "baseline":
+    if profile.estimator == "baseline":
         return {"good": (max(len(arrays["good"]), 1), features), "limit": (1,)}
-    if profile.machine == "networks":
+    if profile.estimator == "networks":
         count, units = profile.networks, profile.units
         return {
             "hidden": (count, features, units),
@@ -75,7 +75,7 @@ def shapes(
             "frequency": (classes,),
             "known": (2, features),
         }
-    if profile.machine == "trees":
+    if profile.estimator == "trees":
         trees, leaves = profile.rounds * classes, profile.leaves
         return {
             "feature": (trees, leaves - 1),
@@ -121,7 +121,7 @@ DIMENSIONS = {
 """Arrays of each kind of machine in a model file, and their dimensions."""
 
 
-def learn(features: Array, targets: Index, groups: Words, profile: Profile) -> Machine:
+def learn(features: Array, targets: Index, groups: Words, profile: Profile) -> Estimator:
     """Learn what a profile asks for.
 
     Args:
@@ -133,9 +133,9 @@ def learn(features: Array, targets: Index, groups: Words, profile: Profile) -> M
     Returns:
         The machines.
     """
-    if profile.machine == "networks":
+    if profile.estimator == "networks":
         return fit_networks(features, targets, groups, profile)
-    if profile.machine == "trees":
+    if profile.estimator == "trees":
         return fit_trees(features, targets, groups, profile)
     return fit(features, targets, profile).condensed()
 

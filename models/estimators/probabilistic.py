@@ -88,7 +88,7 @@ class Probable(ABC):
         chosen[foreign > FOREIGN] = answers.shape[1]
         return chosen
 
-    def sure(self, decisions: Array) -> Mask:
+    def above_threshold(self, decisions: Array) -> Mask:
         """Say which frames may raise an alarm, shape (frames,)."""
         alarming: Mask = decisions[:, 0] <= log1p(-self.alarm)
         alarming &= decisions[:, -1] <= FOREIGN

@@ -18,7 +18,7 @@ from models.types import Array, Index
 
 
 @dataclass(frozen=True, eq=False)
-class Machines:
+class SupportVectorMachines:
     """All two-class machines of a classifier, over the same vectors.
 
     Attributes:
@@ -54,7 +54,7 @@ class Machines:
         """Choose a class for each frame, see `choose`."""
         return choose(decisions, classes=self.classes, multiclass=self.multiclass)
 
-    def sure(self, decisions: Array) -> None:
+    def above_threshold(self, decisions: Array) -> None:
         """Leave it at what each frame is called."""
 
     def score(self, decisions: Array) -> Array:
@@ -157,7 +157,7 @@ def _sides(classes: int) -> tuple[Array, Array]:
     return unit[first], unit[second]
 
 
-def fit(features: Array, targets: Index, profile: Profile) -> Machines:
+def fit(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
     """Learn support vector machines.
 
     Args:
@@ -172,7 +172,7 @@ def fit(features: Array, targets: Index, profile: Profile) -> Machines:
     return fit_machines(features, targets, profile)
 
 
-def _one_vs_one(features: Array, targets: Index, profile: Profile) -> Machines:
+def _one_vs_one(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
     """Train a machine for each pair of classes, C times N / (classes N_c) for each class."""
     svc = _svc(profile, profile.regularization, dict(enumerate(balance(targets))))
     svc.fit(features, targets)
@@ -187,7 +187,7 @@ def _one_vs_one(features: Array, targets: Index, profile: Profile) -> Machines:
             coefficients[machine, columns] = svc.dual_coef_[row, columns]
     # With two classes, scikit-learn turns the sign so that positive means the second.
     sign = -1.0 if len(pairs) == 1 else 1.0
-    return Machines(
+    return SupportVectorMachines(
         svc.support_vectors_,
         sign * coefficients,
         sign * svc.intercept_,
@@ -197,7 +197,7 @@ def _one_vs_one(features: Array, targets: Index, profile: Profile) -> Machines:
     )
 
 
-def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> Machines:
+def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
     """Train a machine for each class, with C_cls = C N / (classes N_cls) (paper, Sec. III-B)."""
     weights = balance(targets)
     coefficients, intercept = np.zeros((len(weights), len(targets))), np.zeros(len(weights))
@@ -207,7 +207,7 @@ def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> Machines:
         coefficients[machine, svc.support_] = svc.dual_coef_[0]
         intercept[machine] = svc.intercept_[0]
     used = np.flatnonzero(coefficients.any(axis=0))
-    return Machines(
+    return SupportVectorMachines(
         features[used],
         coefficients[:, used],
         intercept,

@@ -17,7 +17,7 @@ from models.evaluation.eventscore import EventScore
 from models.evaluation.framescore import FrameScore
 from models.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
 from models.evaluation.matching import Matched
-from models.evaluation.predictions import Heard, hear
+from models.evaluation.predictions import Predictions, predict
 from models.evaluation.tradeoff import TradeOff, trade_off
 from models.recording import Recording
 from models.splitting import robot_of, seen
@@ -120,7 +120,7 @@ def assess(
         DatasetError: If there is no annotated frame, or a name repeats.
         ModelsError: If a recording does not fit the model.
     """
-    heard: dict[str, Heard] = {}
+    heard: dict[str, Predictions] = {}
     first, copies, known = dict[str, str](), dict[str, str](), dict[str, str]()
     for recording in recordings:
         name, digest = recording.name, recording.sha256
@@ -133,12 +133,12 @@ def assess(
             copies[name] = first[digest]
         else:
             first[digest] = name
-            heard[name] = hear(classifier, recording)
-    return judge(tuple(heard.values()), copies=copies, known=known)
+            heard[name] = predict(classifier, recording)
+    return measure(tuple(heard.values()), copies=copies, known=known)
 
 
-def judge(
-    heard: Sequence[Heard],
+def measure(
+    heard: Sequence[Predictions],
     *,
     copies: Mapping[str, str] | None = None,
     known: Mapping[str, str] | None = None,

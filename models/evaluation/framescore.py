@@ -11,7 +11,7 @@ from models.confusion import Evaluation
 from models.dataset import Dataset
 from models.evaluation.intervals import Estimate, Resampling, ratio
 from models.evaluation.matching import OK
-from models.evaluation.predictions import Heard
+from models.evaluation.predictions import Predictions
 from models.labels import UNKNOWN
 from models.types import Array, Index, Mask
 
@@ -55,7 +55,7 @@ class FrameScore:
         return plain
 
 
-def score(heard: Sequence[Heard], resampling: Resampling) -> FrameScore:
+def score(heard: Sequence[Predictions], resampling: Resampling) -> FrameScore:
     """Count the frames that were cut from annotated blocks.
 
     Args:
@@ -113,7 +113,7 @@ def _balanced(counts: Array, resampling: Resampling) -> Estimate:
     return resampling.bounded(float(value), drawn, [frames[:, number] > 0 for number in there])
 
 
-def _confusions(heard: Sequence[Heard], names: Sequence[str]) -> Array:
+def _confusions(heard: Sequence[Predictions], names: Sequence[str]) -> Array:
     """Count the frames of each recording, shape (runs, classes, classes)."""
     counts = np.zeros((len(heard), len(names), len(names)))
     for number, one in enumerate(heard):

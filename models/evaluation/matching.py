@@ -12,7 +12,7 @@ from typing import Self
 
 import numpy as np
 
-from models.evaluation.predictions import Heard
+from models.evaluation.predictions import Predictions
 from models.labels import UNKNOWN
 from models.recording import Block
 from models.types import Array, Index, Mask, Words
@@ -106,7 +106,7 @@ class Matched:
     slack: float
 
     @classmethod
-    def of(cls, heard: Sequence[Heard]) -> Self:
+    def of(cls, heard: Sequence[Predictions]) -> Self:
         """Match what was heard with what was annotated.
 
         Args:
@@ -125,7 +125,7 @@ class Matched:
         return cls(
             tuple(one.name for one in heard),
             heard[0].labels.classes,
-            heard[0].labels.sure is not None,
+            heard[0].labels.above_threshold is not None,
             Frames(*_joined(frames)),
             Failures(*_joined(failures)),
             np.array(annotated, dtype=np.float64),
@@ -139,7 +139,7 @@ class Matched:
 
 
 def _match(
-    one: Heard, number: int, before: int, slack: float
+    one: Predictions, number: int, before: int, slack: float
 ) -> tuple[Frames, Failures, list[Block]]:
     """Match the frames of one recording.
 
@@ -164,7 +164,7 @@ def _match(
         own,
         start,
         stop,
-        one.labels.settled,
+        one.labels.debounced,
         ~np.isin(one.labels.label, (OK, UNKNOWN)),
         one.labels.scores,
         np.where(quiet, OK, _failure_of(shared, start, stop, bad, slack)),

@@ -8,14 +8,14 @@ import numpy as np
 from models.classifier import Classifier
 from models.dataset import Dataset
 from models.errors import DatasetError
-from models.labels import DEPARTURE, Labels
+from models.labels import ANOMALY, Labels
 from models.recording import Block, Recording
 from models.splitting import group_of
 from models.types import Words
 
 
 @dataclass(frozen=True, eq=False)
-class Heard:
+class Predictions:
     """One recording, as it was annotated and as a model heard it.
 
     Attributes:
@@ -37,7 +37,7 @@ class Heard:
     labels: Labels
 
 
-def hear(classifier: Classifier, recording: Recording) -> Heard:
+def predict(classifier: Classifier, recording: Recording) -> Predictions:
     """Let a model hear a recording.
 
     Args:
@@ -51,10 +51,10 @@ def hear(classifier: Classifier, recording: Recording) -> Heard:
     Raises:
         ModelsError: If the recording does not fit the model.
     """
-    if DEPARTURE in classifier.classes:
+    if ANOMALY in classifier.classes:
         recording = replace(recording, blocks=tuple(map(_unnamed, recording.blocks)))
     truth, called = _of_blocks(classifier, recording)
-    return Heard(
+    return Predictions(
         recording.name,
         group_of(recording.name),
         1.0 / recording.rate,
@@ -66,7 +66,7 @@ def hear(classifier: Classifier, recording: Recording) -> Heard:
 
 
 def _unnamed(block: Block) -> Block:
-    return block if block.label == "ok" else block._replace(label=DEPARTURE)
+    return block if block.label == "ok" else block._replace(label=ANOMALY)
 
 
 def _whole(classifier: Classifier, recording: Recording) -> Labels:

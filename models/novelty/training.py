@@ -81,11 +81,11 @@ def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -
         )
     found = limit(_unseen(good, profile), good, alarms)
     mean, scale = standard(good.features, profile)
-    machine = Baseline(cover((good.features - mean) / scale), np.array([found.distance]))
+    estimator = Baseline(cover((good.features - mean) / scale), np.array([found.distance]))
     groups = len(set(good.groups.tolist()))
     metrics = {"baseline": {**asdict(found), "groups": groups, "runs": len(good.hashes)}}
     classifier = Classifier(
-        profile, profile.classes, machine, mean, scale, dict(good.hashes), metrics, versions()
+        profile, profile.classes, estimator, mean, scale, dict(good.hashes), metrics, versions()
     )
     return Learnt(classifier, found, len(good.hashes), groups, len(good.annotated))
 

@@ -139,10 +139,10 @@ class Grid:
 
 def _idle(base: Profile) -> Iterator[tuple[str, str]]:
     """Name settings that change nothing, and why."""
-    machine = base.machine if base.machine in OWN else "support vector machines"
+    estimator = base.estimator if base.estimator in OWN else "support vector machines"
     for name in LEARNT:
-        if name not in OWN[machine]:
-            yield name, machine
+        if name not in OWN[estimator]:
+            yield name, estimator
     if base.kernel == "linear":
         yield "gamma", "the linear kernel"
 

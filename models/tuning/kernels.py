@@ -49,15 +49,15 @@ def answers(
     Yields:
         The answer of each point.
     """
-    if profiles[0].machine != "svm" or len(known) > LARGEST:
+    if profiles[0].estimator != "svm" or len(known) > LARGEST:
         for profile in profiles:
-            machine = learn(known, targets, groups, profile)
-            decisions = machine.decision(fresh)
-            chosen = machine.choose(decisions)
-            if profile.machine == "svm":
+            estimator = learn(known, targets, groups, profile)
+            decisions = estimator.decision(fresh)
+            chosen = estimator.choose(decisions)
+            if profile.estimator == "svm":
                 yield Answer(chosen, _graded(decisions, targets, profile))
             else:
-                yield Answer(chosen, np.log(machine.score(decisions) + TINY))
+                yield Answer(chosen, np.log(estimator.score(decisions) + TINY))
         return
     near, far = known @ known.T, fresh @ known.T
     rbf = profiles[0].kernel == "rbf"
@@ -85,8 +85,8 @@ def _decisions(learnt: Array, asked: Array, targets: Index, profile: Profile) ->
         # With two classes, scikit-learn turns the sign so that positive means the second.
         return decisions if decisions.ndim == 2 else -decisions[:, None]
     each = [
-        _svc(profile.regularization * weight).fit(learnt, targets == machine)
-        for machine, weight in enumerate(weights.tolist())
+        _svc(profile.regularization * weight).fit(learnt, targets == estimator)
+        for estimator, weight in enumerate(weights.tolist())
     ]
     return np.stack([svc.decision_function(asked) for svc in each], axis=1)
 

@@ -17,7 +17,7 @@ from models.labels import UNKNOWN
 from models.profile import Profile
 from models.tuning.kernels import Answer, answers
 from models.tuning.logloss import balanced_log_loss
-from models.tuning.trial import Heard, Trial, hear
+from models.tuning.trial import Predictions, Trial, predict_features
 from models.types import Index, Words
 
 Criterion: TypeAlias = Literal["balanced-accuracy", "log-loss", "subset-accuracy"]
@@ -119,8 +119,8 @@ def ask(profiles: Sequence[Profile], trial: Trial) -> Asked:
             learn.
         ModelsError: If a recording does not fit the profile.
     """
-    known = hear(trial, profiles[0], training=True)
-    fresh = hear(trial, profiles[0], training=False)
+    known = predict_features(trial, profiles[0], training=True)
+    fresh = predict_features(trial, profiles[0], training=False)
     classes = _classes(known, fresh, profiles[0])
     chosen = np.empty((len(profiles), len(fresh.labels)), dtype=np.intp)
     graded = np.empty((*chosen.shape, len(classes)))
@@ -139,14 +139,14 @@ def ask(profiles: Sequence[Profile], trial: Trial) -> Asked:
     return Asked(classes, _indices(fresh.labels, classes), fresh.runs, said, len(known.labels))
 
 
-def _classes(known: Heard, fresh: Heard, profile: Profile) -> tuple[str, ...]:
+def _classes(known: Predictions, fresh: Predictions, profile: Profile) -> tuple[str, ...]:
     there = {*known.labels.tolist(), *fresh.labels.tolist()}
     if len(there) < 2:
         raise DatasetError(f"all frames are {', '.join(there)}; tuning takes two classes")
     return tuple(name for name in profile.classes if name in there)
 
 
-def _check_learnt(learnt: Words, fresh: Heard, classes: Sequence[str]) -> None:
+def _check_learnt(learnt: Words, fresh: Predictions, classes: Sequence[str]) -> None:
     if missing := [name for name in classes if name not in learnt]:
         runs = sorted(set(fresh.runs[fresh.labels == missing[0]].tolist()))
         raise DatasetError(

@@ -39,7 +39,7 @@ class Trial:
         return cls([*training, *validation], [(every[: len(training)], every[len(training) :])])
 
 
-class Heard(NamedTuple):
+class Predictions(NamedTuple):
     """What is heard in recordings, frame by frame."""
 
     features: Array
@@ -58,7 +58,7 @@ class Heard(NamedTuple):
         return np.isin(self.owner, recordings)
 
 
-def hear(trial: Trial, profile: Profile, *, training: bool) -> Heard:
+def predict_features(trial: Trial, profile: Profile, *, training: bool) -> Predictions:
     """Listen to the recordings of one side, one after the other.
 
     Args:
@@ -82,7 +82,7 @@ def hear(trial: Trial, profile: Profile, *, training: bool) -> Heard:
     if not found:
         raise NoFrameError(len(wanted), profile.classes)
     each = [examples for _, examples in found]
-    return Heard(
+    return Predictions(
         np.concatenate([examples.features for examples in each]),
         np.concatenate([examples.labels for examples in each]),
         np.concatenate([examples.runs for examples in each]),
