@@ -199,6 +199,7 @@ class Classifier:
             self._score(decisions),
             self.classes,
             self.estimator.above_threshold(decisions),
+            self.estimator.novel(decisions),
         )
 
     def decide(self, plain: Array) -> Array:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import DatasetError
-from models.labels import UNKNOWN
 from models.types import Array, Words
 
 
@@ -94,15 +93,15 @@ class Evaluation:
 
     @property
     def failure_recall(self) -> float:
-        """Failure frames that were called some failure, of the failure frames; NaN if none."""
+        """Failure frames that were not called `ok`, of the failure frames; NaN if none."""
         failures = self.confusion[~self._ok]
-        return float(_ratio(failures[:, self._alarming].sum(), failures.sum()))
+        return float(_ratio(failures[:, ~self._ok].sum(), failures.sum()))
 
     @property
     def false_alarm_rate(self) -> float:
-        """`ok` frames that were called a failure, of the `ok` frames; NaN if there are none."""
+        """`ok` frames that were not called `ok`, of the `ok` frames; NaN if there are none."""
         quiet = self.confusion[self._ok]
-        return float(_ratio(quiet[:, self._alarming].sum(), quiet.sum()))
+        return float(_ratio(quiet[:, ~self._ok].sum(), quiet.sum()))
 
     def as_dict(self) -> dict[str, Any]:
         """Give all measures as JSON can hold them, None for what is not defined."""
@@ -170,10 +169,6 @@ class Evaluation:
     @property
     def _ok(self) -> NDArray[np.bool_]:
         return np.array([name == "ok" for name in self.classes])
-
-    @property
-    def _alarming(self) -> NDArray[np.bool_]:
-        return np.array([name not in ("ok", UNKNOWN) for name in self.classes])
 
 
 def _ratio(part: Any, whole: Any) -> Any:

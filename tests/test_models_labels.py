@@ -1,10 +1,12 @@
-"""A finding takes two sure frames; what stands beside them joins in."""
+"""A finding takes two frames of evidence; what stands beside them joins in."""
 
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from models import UNKNOWN, Labels
 from models.labels import confirmed
@@ -17,9 +19,9 @@ def labels(text, *, above_threshold=None):
     """Frames of classes by their first letters, `ok` as a dot; upper case where they are sure."""
     names = {".": "ok", **{name[0]: name for name in (*CLASSES[1:], UNKNOWN)}}
     start = HOP * np.arange(len(text))
-    called = np.array([names[letter.lower()] for letter in text])
+    called = np.array([names[letter.lower()] for letter in text], dtype=str)
     certain = (
-        np.array([letter.isupper() for letter in text])
+        np.array([letter.isupper() for letter in text], dtype=bool)
         if above_threshold is None
         else above_threshold
     )
@@ -43,11 +45,17 @@ def debounced(text):
         ("i.OOii", "..ooii"),
         (".Io...", "......"),
         (".IOo..", ".ioo.."),
-        ("uIIu..", "uiiu.."),
-        (".IuuI.", "..uu.."),
+        ("uIIu..", "iiii.."),
+        (".IuuI.", ".iiii."),
+        (".Iu...", ".ii..."),
+        (".iu...", "..u..."),
+        (".u....", ".u...."),
+        ("..uu..", "..uu.."),
+        (".IuuuO", ".iiioo"),
+        (".Iu.uu", ".ii.uu"),
     ],
 )
-def test_a_stretch_of_failures_takes_two_sure_frames(alone, together):
+def test_a_stretch_takes_two_frames_of_evidence(alone, together):
     assert debounced(alone) == together
 
 
@@ -82,10 +90,10 @@ def test_the_only_frame_of_a_signal_speaks_for_itself():
 
 
 def test_without_sureness_each_frame_speaks_for_itself():
-    plain = replace(labels("i.iui"), above_threshold=None)
+    plain = replace(labels("i.iOi"), above_threshold=None)
     assert plain.debounced is plain.label
     assert plain.raw is plain.label
-    assert len(plain.events()) == 1
+    assert [event.label for event in plain.events()] == ["impact", "oscillations"]
 
 
 def test_while_frames_come_in_the_sure_ones_are_failures():
@@ -108,3 +116,74 @@ def test_what_is_confirmed_is_never_more_than_what_seemed_to_fail():
 def test_no_frames_are_confirmed_of_none():
     none = np.zeros(0, dtype=bool)
     assert confirmed(none, none, none).shape == (0,)
+
+
+@pytest.mark.parametrize(
+    ("text", "events"),
+    [
+        ("..uu....", ["unknown"]),
+        ("..u..u..", []),
+        ("u.......", ["unknown"]),
+        ("..Iu....", ["impact"]),
+        ("..iuui..", ["impact"]),
+        ("..I.uu..", ["unknown"]),
+    ],
+)
+def test_two_frames_out_of_distribution_in_a_row_are_a_finding(text, events):
+    found = labels(text)
+    assert [event.label for event in found.events()] == events
+    quiet = replace(found, unknown_is_finding=False)
+    assert "unknown" not in [event.label for event in quiet.events()]
+    assert quiet.label is found.label
+
+
+def test_unknown_frames_that_are_ignored_are_no_evidence():
+    assert replace(labels("..Iu...."), unknown_is_finding=False).events() == ()
+    assert len(replace(labels("..IIu..."), unknown_is_finding=False).events()) == 1
+
+
+def test_an_event_says_whether_it_is_out_of_distribution():
+    found = labels(".II...II..uu.")
+    novel = np.zeros(13, dtype=bool)
+    novel[[7, 10, 11]] = True
+    events = replace(found, novel=novel).events()
+    assert [(event.label, event.novel) for event in events] == [("impact", True), ("unknown", True)]
+    late = replace(found, novel=np.arange(13) == 10).events()
+    assert [event.novel for event in late] == [False, True]
+    assert "out of distribution" in str(events[1])
+
+
+LETTERS = st.text(alphabet=".iIoOu", max_size=30)
+
+
+@given(LETTERS)
+def test_no_frame_out_of_distribution_is_ever_ok(text):
+    found = labels(text)
+    assert not (found.debounced[found.label == UNKNOWN] == "ok").any()
+
+
+@given(LETTERS, st.data())
+def test_a_frame_that_becomes_louder_never_takes_a_finding_away(text, data):
+    """Louder: `ok` becomes failure or unknown, a failure becomes sure, and either way stays so."""
+    louder = {".": ".iIoOu", "i": "iIoOu", "o": "iIoOu", "I": "IOu", "O": "IOu", "u": "uIO"}
+    changed = "".join(data.draw(st.sampled_from(louder[letter])) for letter in text)
+    before, after = labels(text), labels(changed)
+    assert (after.flagged >= before.flagged).all()
+    assert bool(after.events()) >= bool(before.events())
+
+
+@given(LETTERS)
+def test_flagged_frames_are_those_of_the_events(text):
+    found = labels(text)
+    inside = np.zeros(len(text), dtype=bool)
+    for event in found.events():
+        own = found.debounced == event.label
+        inside |= own & (found.start >= event.start - 1e-9) & (found.stop <= event.stop + 1e-9)
+    assert (inside >= found.flagged).all()
+
+
+def test_labels_are_a_table_of_frames():
+    table = labels(".IIu").to_arrow()
+    assert table.column("debounced").to_pylist() == ["ok", "impact", "impact", "impact"]
+    assert table.column("novel").null_count == 4
+    assert table.column("score.impact").to_pylist() == [0.0] * 4

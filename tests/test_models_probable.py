@@ -165,11 +165,12 @@ def test_machines_know_how_frequent_each_class_was(classifier):
     np.testing.assert_allclose(classifier.estimator.frequency, shares)
 
 
-def test_what_is_louder_than_all_that_was_learnt_is_unknown(classifier):
+def test_what_is_louder_than_all_that_was_learnt_is_unknown_and_a_finding(classifier):
     loud = 1e6 * np.random.default_rng(4).random(round(2 * RATE))
     labels = classifier.classify(alike(loud), RATE)
     assert set(labels.label) == {"unknown"}
-    assert labels.events() == ()
+    assert [(event.label, event.novel) for event in labels.events()] == [("unknown", True)]
+    assert replace(labels, unknown_is_finding=False).events() == ()
 
 
 @pytest.mark.parametrize("level", [0.0, 0.3])

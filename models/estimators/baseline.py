@@ -70,6 +70,9 @@ class Baseline:
     def above_threshold(self, decisions: Array) -> None:
         """Leave it at what each frame is called: the limit is set for single frames."""
 
+    def novel(self, decisions: Array) -> None:
+        """Leave it out: an anomaly is what is out of distribution."""
+
     def score(self, decisions: Array) -> Array:
         """Grade both classes: `ok` always 1, a departure by its distance in limits.
 

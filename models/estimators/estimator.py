@@ -30,6 +30,9 @@ class Estimator(Protocol):
     def above_threshold(self, decisions: Array) -> Mask | None:
         """Say which frames may raise an alarm, shape (frames,); None: all that are failures."""
 
+    def novel(self, decisions: Array) -> Mask | None:
+        """Say which frames are out of distribution, shape (frames,); None: not measured."""
+
     def score(self, decisions: Array) -> Array:
         """Grade all classes for each frame, shape (frames, classes)."""
 

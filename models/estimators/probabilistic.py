@@ -1,4 +1,4 @@
-"""What is made of probabilities: what a frame is called, and whether it raises an alarm."""
+"""Decisions by probabilities: the class of a frame, the alarm threshold, and novelty."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -10,8 +10,8 @@ import numpy as np
 from models.estimators.calibration import calibrated
 from models.types import Array, Index, Mask
 
-FOREIGN = 2.0
-"""A frame is unknown if a feature lies farther than this above what was learnt from."""
+NOVELTY_LIMIT = 2.0
+"""A frame is out of distribution if its novelty score exceeds this."""
 LIKELY = 0.2
 """Probability of any failure from which a frame is called one: to miss it is the worse mistake."""
 
@@ -20,14 +20,14 @@ LIKELY = 0.2
 class Probable(ABC):
     """What decides by probabilities.
 
-    A decision is the logarithm of a class's probability, for all classes, and then how foreign the
-    frame is: how far its farthest feature lies above nearly all that was learnt from, in
-    deviations. Far above, probabilities mean nothing.
+    A decision is the logarithm of a class's probability, for all classes, and then the novelty
+    score: how far the frame's farthest feature lies above nearly all that was learnt from, in
+    deviations. Far above, a low probability of failure means nothing.
 
     Attributes:
         calibration: Scale of answers, then an offset for each class, shape (1 + classes,).
         frequency: Share of each class in the frames that were learnt from, shape (classes,).
-        alarm: Probability of any failure from which a frame is sure enough to raise an alarm.
+        alarm: Probability of any failure from which a frame is above the alarm threshold.
     """
 
     calibration: Array
@@ -49,13 +49,13 @@ class Probable(ABC):
         """Say how likely classes are; logarithms, not calibrated, shape (frames, classes)."""
 
     def decision(self, features: Array) -> Array:
-        """Say how probable each class is, and how foreign the frame.
+        """Say how probable each class is, and how novel the frame.
 
         Args:
             features: Feature vectors, shape (frames, features).
 
         Returns:
-            Logarithms of calibrated probabilities, then how foreign it is, shape
+            Logarithms of calibrated probabilities, then the novelty score, shape
             (frames, classes + 1).
         """
         decisions = np.empty((len(features), self.width))
@@ -72,27 +72,31 @@ class Probable(ABC):
     def choose(self, decisions: Array) -> Index:
         """Choose a failure if failures are probable enough, or else `ok`.
 
-        Of the failures it is the one whose probability exceeds its frequency most: a rare one is
-        not to drown in a frequent one (balanced accuracy counts them alike).
+        Of the failures it is the one whose probability exceeds its frequency most: a rare class is
+        not masked by a frequent one (balanced accuracy weighs them alike).
 
         Args:
             decisions: On frames, shape (frames, classes + 1).
 
         Returns:
             Index of a class for each frame, shape (frames,); one more than the last for a frame
-            that is unknown.
+            that is out of distribution and below the alarm threshold.
         """
-        answers, foreign = decisions[:, :-1], decisions[:, -1]
-        chosen: Index = 1 + (answers[:, 1:] - self._expected).argmax(axis=1)
-        chosen[answers[:, 0] > log1p(-LIKELY)] = 0
-        chosen[foreign > FOREIGN] = answers.shape[1]
+        logarithms = decisions[:, :-1]
+        chosen: Index = 1 + (logarithms[:, 1:] - self._expected).argmax(axis=1)
+        chosen[logarithms[:, 0] > log1p(-LIKELY)] = 0
+        chosen[self.novel(decisions) & ~self.above_threshold(decisions)] = logarithms.shape[1]
         return chosen
 
     def above_threshold(self, decisions: Array) -> Mask:
-        """Say which frames may raise an alarm, shape (frames,)."""
-        alarming: Mask = decisions[:, 0] <= log1p(-self.alarm)
-        alarming &= decisions[:, -1] <= FOREIGN
-        return alarming
+        """Say which frames are above the alarm threshold, whatever their novelty, (frames,)."""
+        above: Mask = decisions[:, 0] <= log1p(-self.alarm)
+        return above
+
+    def novel(self, decisions: Array) -> Mask:
+        """Say which frames are out of distribution, shape (frames,)."""
+        novel: Mask = decisions[:, -1] > NOVELTY_LIMIT
+        return novel
 
     def score(self, decisions: Array) -> Array:
         """Grade all classes by their probabilities, shape (frames, classes)."""

@@ -57,6 +57,9 @@ class SupportVectorMachines:
     def above_threshold(self, decisions: Array) -> None:
         """Leave it at what each frame is called."""
 
+    def novel(self, decisions: Array) -> None:
+        """Leave it out: support vector machines have no measure of novelty."""
+
     def score(self, decisions: Array) -> Array:
         """Grade all classes for each frame, see `score`."""
         return score(decisions, classes=self.classes, multiclass=self.multiclass)

@@ -80,7 +80,7 @@ def measure(score: EventScore, resampling: Resampling, only: Mask | None = None)
     def share(part: Mask, whole: Mask, run: Index) -> Estimate:
         return resampling.share(count(run[part & whole]), count(run[whole]))
 
-    flagged = frames.alarming
+    flagged = frames.flagged
     failing = (frames.truth != OK) & (frames.truth != UNCLEAR)
     every = np.ones(len(failures), dtype=bool)
     classes = [name for name in matched.classes if name != OK]

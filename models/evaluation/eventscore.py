@@ -1,6 +1,7 @@
 """Events: which failures a model finds in whole recordings, how soon, and how often it errs.
 
-Conventions: an *alarm* is a stretch of frames that are called any failure and overlap or touch. An
+Conventions: an *alarm* is a stretch of frames that belong to a finding, of whichever class or
+`unknown`, and overlap or touch. An
 annotated failure is *found* if an alarm overlaps it, and *named* if a frame of its own class does;
 its *delay* is the time from its start until the first overlapping frame of an alarm is complete.
 An alarm is *false* if a frame of it lies wholly in `ok` blocks and it overlaps no failure.
@@ -91,7 +92,7 @@ def score(matched: Matched) -> EventScore:
         matched: The recordings.
     """
     frames, failures = matched.frames, matched.failures
-    flagged = frames.alarming
+    flagged = frames.flagged
     found = hit(matched, flagged)
     named = np.zeros(len(failures), dtype=bool)
     for label in np.unique(failures.label).tolist():

@@ -12,7 +12,6 @@ from models.dataset import Dataset
 from models.evaluation.intervals import Estimate, Resampling, ratio
 from models.evaluation.matching import OK
 from models.evaluation.predictions import Predictions
-from models.labels import UNKNOWN
 from models.types import Array, Index, Mask
 
 
@@ -25,8 +24,8 @@ class FrameScore:
         recall: Of each class.
         precision: Of each class.
         balanced_accuracy: Mean recall of the classes that occur.
-        failure_recall: Failure frames that are called some failure, of the failure frames.
-        false_alarm_rate: `ok` frames that are called a failure, of the `ok` frames.
+        failure_recall: Failure frames that are not called `ok`, of the failure frames.
+        false_alarm_rate: `ok` frames that are not called `ok`, of the `ok` frames.
         false_negative_errors: Of each class, as the paper counts them, of ALL frames.
         false_positive_errors: Of each class, as the paper counts them, of ALL frames.
         failure_detection_rate: The paper's: 1 less the false positive errors of `ok`.
@@ -76,9 +75,6 @@ def score(heard: Sequence[Predictions], resampling: Resampling) -> FrameScore:
     truth, called = np.meshgrid(numbers, numbers, indexing="ij")
     right, all_frames = truth == called, np.ones(truth.shape, dtype=bool)
     ok, called_ok = truth == names.index(OK), called == names.index(OK)
-    alarming = ~called_ok
-    if UNKNOWN in names:
-        alarming &= called != names.index(UNKNOWN)
 
     def share(part: Mask, whole: Mask) -> Estimate:
         return resampling.share(counts[:, part].sum(axis=1), counts[:, whole].sum(axis=1))
@@ -94,8 +90,8 @@ def score(heard: Sequence[Predictions], resampling: Resampling) -> FrameScore:
         recall=each(truth, right),
         precision=each(called, right),
         balanced_accuracy=_balanced(counts, resampling),
-        failure_recall=share(~ok & alarming, ~ok),
-        false_alarm_rate=share(ok & alarming, ok),
+        failure_recall=share(~ok & ~called_ok, ~ok),
+        false_alarm_rate=share(ok & ~called_ok, ok),
         false_negative_errors=each(truth, ~right, all_frames),
         false_positive_errors=each(called, ~right, all_frames),
         failure_detection_rate=share(~(called_ok & ~right), all_frames),

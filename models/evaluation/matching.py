@@ -13,7 +13,7 @@ from typing import Self
 import numpy as np
 
 from models.evaluation.predictions import Predictions
-from models.labels import UNKNOWN
+from models.labels import Labels
 from models.recording import Block
 from models.types import Array, Index, Mask, Words
 
@@ -30,7 +30,9 @@ class Frames:
         start: When it starts, shape (frames,), in [s].
         stop: When it stops, shape (frames,), in [s].
         called: What the model calls it in the light of its neighbours, shape (frames,).
-        suspect: Whether it calls it a failure by itself, shape (frames,).
+        suspect: Whether it is not `ok` by itself, shape (frames,).
+        novel: Whether it is out of distribution, shape (frames,).
+        flagged: Whether it belongs to a finding, shape (frames,).
         scores: What the model says of each class, shape (frames, classes).
         truth: What it is, `UNCLEAR` where that is not said, shape (frames,).
         quiet: Whether it lies wholly in `ok` blocks, shape (frames,).
@@ -42,15 +44,12 @@ class Frames:
     stop: Array
     called: Words
     suspect: Mask
+    novel: Mask
+    flagged: Mask
     scores: Array
     truth: Words
     quiet: Mask
     failing: Mask
-
-    @property
-    def alarming(self) -> Mask:
-        """Whether the model calls a frame a failure, shape (frames,)."""
-        return ~np.isin(self.called, (OK, UNKNOWN))
 
     def __len__(self) -> int:
         return len(self.run)
@@ -87,7 +86,7 @@ class Matched:
     Attributes:
         names: Of the recordings, shape (runs,).
         classes: What the model can call a frame.
-        confirms: Whether a failure takes more than one frame that is sure of it.
+        confirms: Whether a finding takes more than one frame of evidence.
         frames: Their frames.
         failures: Their failures.
         ok_annotated: `ok` time of each recording, shape (runs,), in [s].
@@ -165,7 +164,9 @@ def _match(
         start,
         stop,
         one.labels.debounced,
-        ~np.isin(one.labels.label, (OK, UNKNOWN)),
+        one.labels.label != OK,
+        _novel(one.labels),
+        one.labels.flagged,
         one.labels.scores,
         np.where(quiet, OK, _failure_of(shared, start, stop, bad, slack)),
         quiet,
@@ -180,6 +181,10 @@ def _match(
         before + first + touched.sum(axis=0),
     )
     return frames, failures, ok
+
+
+def _novel(labels: Labels) -> Mask:
+    return np.zeros(len(labels), dtype=bool) if labels.novel is None else labels.novel
 
 
 def _overlap(start: Array, stop: Array, blocks: Sequence[Block]) -> Array:

@@ -2,8 +2,9 @@
 
 Conventions: a frame's *failure score* is 1 - P(ok) if the scores are probabilities, or else the
 largest score of a failure less that of `ok`. At a threshold, the frames with larger scores count as
-failures, and all is counted as in `eventscore`. If the model takes two sure frames for an alarm, it
-is they whose scores are larger; frames beside them that it calls failures join in. Thresholds are
+failures, and all is counted as in `eventscore`. If a finding takes two frames of evidence, it is
+they whose scores are larger, or which are out of distribution; frames beside them that are not `ok`
+join in. Thresholds are
 scores of quiet frames, the highest first: in between, nothing but recall changes. Alarms that grow
 together as the threshold sinks become fewer; lest that is a merit, a threshold costs what the
 dearest of those above it costs.
@@ -21,7 +22,7 @@ from models.evaluation.calibration import are_probabilities
 from models.evaluation.eventscore import alarms, hit
 from models.evaluation.intervals import Estimate, Resampling, ratio
 from models.evaluation.matching import OK, UNCLEAR, Matched
-from models.labels import UNKNOWN, confirmed
+from models.labels import confirmed
 from models.types import Array, Index, Mask
 
 POINTS = 200
@@ -108,7 +109,6 @@ def trade_off(matched: Matched) -> TradeOff:
     """
     frames, failures = matched.frames, matched.failures
     risk = failure_score(frames.scores, matched.classes)
-    risk[frames.called == UNKNOWN] = risk.min()  # what is unknown raises no alarm
     failing = (frames.truth != OK) & (frames.truth != UNCLEAR)
     quiet = np.unique(risk[frames.quiet])[::-1]
     ranks = np.unique(np.geomspace(1, max(len(quiet), 1), POINTS).round().astype(np.intp)) - 1
@@ -131,6 +131,7 @@ def _flagged(matched: Matched, above: Mask) -> Mask:
     if not matched.confirms:
         return above
     frames = matched.frames
+    above = above | frames.novel  # `unknown` where it is not above: evidence all the same
     apart = frames.start[1:] > frames.stop[:-1] + matched.slack
     apart |= frames.run[1:] != frames.run[:-1]
     return confirmed(above | frames.suspect, above, apart)
