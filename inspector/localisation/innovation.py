@@ -15,7 +15,7 @@ from inspector.localisation.flow import Flow, flow
 from inspector.localisation.quiet import quiet
 from models import Event
 from noisemodel import Block, Run
-from noisemodel.types import Array, Indices
+from noisemodel.types import Array, Indices, Mask
 
 SPAN = 0.001
 """Time over which a velocity's change is taken, in [s]."""
@@ -128,17 +128,33 @@ def changes(stages: Flow) -> Array:
     Returns:
         Shape (stages, samples, joints), in [rad/s²]; 0 next to gaps.
     """
-    velocity, step = stages.velocity, stages.samples(SPAN)
-    trail = max(stages.samples(TRAIL), 2 * step)
+    return sudden(stages.velocity, stages.valid, stages.rate)
+
+
+def sudden(velocity: Array, valid: Mask, rate: float) -> Array:
+    """Change over 1 ms, less the mean of such changes over the past 20 ms.
+
+    Args:
+        velocity: Shape (..., samples, joints), in [rad/s].
+        valid: False in gaps, shape (samples,).
+        rate: Samples per second, in [Hz].
+
+    Returns:
+        Of the same shape, in [rad/s²]; 0 next to gaps.
+    """
+    step = max(1, round(SPAN * rate))
+    trail = max(1, round(TRAIL * rate), 2 * step)
     change = np.zeros_like(velocity)
-    together = stages.valid[step:] & stages.valid[:-step]
-    change[:, step:] = (velocity[:, step:] - velocity[:, :-step]) * stages.rate / step
-    change[:, step:][:, ~together] = 0.0
-    sums = np.cumsum(np.pad(change, ((0, 0), (1, 0), (0, 0))), axis=1)
-    last = np.arange(1, change.shape[1] + 1)
+    together = valid[step:] & valid[:-step]
+    change[..., step:, :] = (velocity[..., step:, :] - velocity[..., :-step, :]) * rate / step
+    change[..., step:, :][..., ~together, :] = 0.0
+    samples = change.shape[-2]
+    sums = np.zeros((*change.shape[:-2], samples + 1, change.shape[-1]))
+    np.cumsum(change, axis=-2, out=sums[..., 1:, :])
+    last = np.arange(1, samples + 1)
     first = np.maximum(0, last - trail)
-    change -= (sums[:, last] - sums[:, first]) / (last - first)[:, None]
-    change[:, ~stages.valid] = 0.0
+    change -= (sums[..., last, :] - sums[..., first, :]) / (last - first)[:, None]
+    change[..., ~valid, :] = 0.0
     return change
 
 
