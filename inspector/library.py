@@ -73,8 +73,8 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         Labels on the time axis of the run.
 
     Raises:
-        CannotTellError: If the run is slower than every model, feeds none, has no frame without a
-            gap, or is like nothing that the model has learnt from.
+        CannotTellError: If the run is slower than every model, feeds none, or has no frame without
+            a gap.
         SignalError: If the run is too short for a frame.
     """
     signals = signals_of(run)
@@ -90,7 +90,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
             " takes to tell anything"
         )
-    return _known(Labelled(labels, name, remark))
+    return _counted(Labelled(labels, name, remark))
 
 
 def signals_of(run: nm.Run) -> dict[str, Real]:
@@ -106,15 +106,13 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
     return models.signals.telling({**nm.norms(run), **nm.by_joint(run)})
 
 
-def _known(labelled: Labelled) -> Labelled:
-    """Say how much of the run is like nothing that the model has learnt from."""
+def _counted(labelled: Labelled) -> Labelled:
+    """Say how many frames are out of distribution."""
     labels = labelled.labels
-    unknown = int((labels.label == models.UNKNOWN).sum())
-    if unknown == len(labels):
-        raise CannotTellError(f"nothing that model {labelled.model} has learnt from is like it")
-    if not unknown:
+    novel = 0 if labels.novel is None else int(labels.novel.sum())
+    if not novel:
         return labelled
-    line = f"{unknown} of {len(labels)} frames are like nothing that model {labelled.model} knows."
+    line = f"{novel} of {len(labels)} frames are out of distribution for model {labelled.model}."
     return replace(labelled, remark=" ".join(filter(None, (labelled.remark, line))))
 
 
@@ -142,7 +140,7 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
             f" model {name} without joint velocities"
         )
     labels = classifier.classify(noise, classifier.rate, start=float(time[0]))
-    return Labelled(labels, name)
+    return _counted(Labelled(labels, name))
 
 
 def _choose(

@@ -1,5 +1,6 @@
 """The classifier: a profile, its machines, and where they were learnt."""
 
+import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -35,6 +36,7 @@ class Classifier:
         runs: SHA-256 of each training recording, by name.
         metrics: Measures of the training set, and of a validation set if one was given.
         versions: Of the software that trained it.
+        sha256: SHA-256 of the file that it was loaded from; empty if it was not.
     """
 
     profile: Profile
@@ -45,6 +47,7 @@ class Classifier:
     runs: Mapping[str, str] = field(default_factory=dict)
     metrics: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
+    sha256: str = ""
 
     @classmethod
     def train(
@@ -267,6 +270,7 @@ class Classifier:
             runs=manifest["runs"],
             metrics=manifest["metrics"],
             versions=manifest["versions"],
+            sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
         )
 
     @cached_property

@@ -53,14 +53,14 @@ def test_the_noise_is_what_the_other_commands_say(demo):
         content.simplified, simplified(demo.motion, demo.velocity_desired)
     )
     np.testing.assert_array_equal(content.extended, estimate(demo, "C").power.sum(axis=1))
-    assert content.model == "general-10khz"
-    assert {event.label for event in content.events} >= {"impact"}
+    assert content.analysis.model == "general-10khz"
+    assert {event.label for event in content.analysis.findings} >= {"impact"}
     assert content.remarks == ()
 
 
 def test_what_is_missing_is_said():
     content = collect(plain_run(rate=200.0), LIBRARY)
-    assert content.labels is None
+    assert content.analysis.labels is None
     assert content.extended is None
     no_labels, no_robot = content.remarks
     assert "200 Hz" in no_labels
@@ -85,12 +85,12 @@ def test_the_frames_can_be_had_back_from_the_table(exported):
     folder, content = exported
     table = pyarrow.parquet.read_table(folder / "demo.parquet").to_pylist()
     frames = {row["frame_start"]: row for row in table if row["frame_start"] is not None}
-    assert list(frames) == content.labels.start.tolist()
+    assert list(frames) == content.analysis.labels.start.tolist()
     rows = list(frames.values())
-    assert [row["frame_stop"] for row in rows] == content.labels.stop.tolist()
-    assert [row["label"] for row in rows] == content.labels.label.tolist()
-    scores = [[row[f"score_{name}"] for name in content.labels.classes] for row in rows]
-    np.testing.assert_array_equal(scores, content.labels.scores)
+    assert [row["frame_stop"] for row in rows] == content.analysis.labels.stop.tolist()
+    assert [row["label"] for row in rows] == content.analysis.labels.label.tolist()
+    scores = [[row[f"score_{name}"] for name in content.analysis.labels.classes] for row in rows]
+    np.testing.assert_array_equal(scores, content.analysis.labels.scores)
 
 
 def test_a_sample_has_the_frame_whose_middle_is_nearest(exported):
@@ -153,7 +153,10 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
     with (folder / "demo.mcap").open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary.statistics.message_count == (
-        len(demo.time) + len(content.labels) + len(content.events) + len(demo.blocks)
+        len(demo.time)
+        + len(content.analysis.labels)
+        + len(content.analysis.findings)
+        + len(demo.blocks)
     )
     assert {channel.message_encoding for channel in summary.channels.values()} == {"json"}
     for channel in summary.channels.values():
@@ -174,12 +177,12 @@ def test_mcap_says_the_noise_to_the_bit(exported, demo):
 def test_mcap_says_labels_scores_findings_and_annotations(exported, demo):
     folder, content = exported
     frames = [message for _, message in messages(folder / "demo.mcap", "/labels")]
-    assert [frame["label"] for frame in frames] == content.labels.label.tolist()
+    assert [frame["label"] for frame in frames] == content.analysis.labels.label.tolist()
     scores = [list(frame["scores"].values()) for frame in frames]
-    assert scores == content.labels.scores.tolist()
+    assert scores == content.analysis.labels.scores.tolist()
     found = [message for _, message in messages(folder / "demo.mcap", "/findings")]
     assert [(e["label"], e["start"], e["stop"], e["score"]) for e in found] == [
-        (e.label, e.start, e.stop, e.score) for e in content.events
+        (e.label, e.start, e.stop, e.score) for e in content.analysis.findings
     ]
     annotated = [message for _, message in messages(folder / "demo.mcap", "/annotations")]
     assert [Block(**message) for message in annotated] == list(demo.blocks)

@@ -99,7 +99,8 @@ def test_a_rate_below_every_model_shows_everything_but_the_lanes(inspector, tmp_
     run = bare_run(tmp_path / "slow.npz", rate=200.0, seconds=5.0)
     status, out, _ = inspector("view", run, "--save", tmp_path / "slow.rrd")
     assert status == 0
-    assert "No class lanes" in out
+    assert "cannot-tell: rate of 200 Hz" in out
+    assert "No labels: rate of 200 Hz" in out
     assert (tmp_path / "slow.rrd").exists()
     status, out, _ = inspector("classify", run)
     assert status == 4
@@ -124,15 +125,15 @@ def test_noisytests_logs_are_classified(inspector, tmp_path):
 
 
 def test_where_a_finding_comes_from_is_said_on_request(inspector):
-    status, out, _ = inspector("classify", demo_run(), "--format", "json", "--origins")
+    status, out, _ = inspector("classify", demo_run(), "--format", "json", "--localise")
     (run,) = json.loads(out)["runs"]
     assert status == 1
-    assert all(event["origin"]["stage"] in ("desired", "measured") for event in run["events"])
+    assert all(event["localisation"]["stage"] in ("desired", "measured") for event in run["events"])
     status, out, _ = inspector("classify", demo_run(), "--format", "json")
-    assert "origin" not in out
-    status, _, err = inspector("classify", demo_run(), "--origins")
+    assert "localisation" not in out
+    status, _, err = inspector("classify", demo_run(), "--localise")
     assert status == 2
-    assert "--origins takes --format json" in err
+    assert "--localise takes --format json" in err
 
 
 def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
@@ -158,11 +159,10 @@ def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
     assert "gone.npz: cannot be read (No such file or directory)" in lines[1]
 
 
-def test_a_run_too_short_for_a_frame_is_bad_input(inspector, tmp_path):
-    status, _, err = inspector("classify", bare_run(tmp_path / "short.npz", seconds=0.2))
-    assert status == 3
-    assert "2000" in err
-    assert "4000" in err
+def test_a_run_too_short_for_a_frame_cannot_be_told(inspector, tmp_path):
+    status, out, _ = inspector("classify", bare_run(tmp_path / "short.npz", seconds=0.2))
+    assert status == 4
+    assert "cannot-tell: a signal of 2000 samples is too short: a frame takes 4000" in out
 
 
 @pytest.mark.parametrize("format_", ["junit", "github", "json"])

@@ -1,21 +1,25 @@
 import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 
-from inspector.analysis.verdict import Status, Verdict, exit_status
+from inspector.analysis.analyse import Status, Unknown
+from inspector.analysis.verdict import Verdict, exit_status
 from inspector.localisation.localise import Origin
 from inspector.localisation.stage import First
 from inspector.report.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
 from models import Event
 
+BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "scalar-10khz")
 LOUD = Verdict(
     Path("loud.npz"),
     Status.FINDINGS,
     "scalar-10khz",
-    (Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8)),
+    (BLOW, RATTLE),
+    model_sha256="1f2e",
 )
 SLOW = Verdict(Path("slow.npz"), Status.CANNOT_TELL, message="30 Hz is below every model")
 BROKEN = Verdict(Path("broken,1.npz"), Status.BAD_INPUT, message="not a run file: 100%\nbad")
@@ -39,25 +43,31 @@ def test_text_says_what_was_found_and_when():
     lines = text([QUIET, LOUD]).splitlines()
     assert lines[0] == "quiet.npz: ok [scalar-10khz]"
     assert lines[2] == "  impact from 1.00 s to 1.50 s"
+    assert lines[3] == "  oscillations from 2.00 s to 3.00 s, out of distribution"
 
 
-def test_json_is_noise_verdict_1():
+def test_json_is_noise_verdict_2():
     verdicts = json.loads(as_json([LOUD, SLOW]))
-    assert verdicts["format"] == "noise-verdict/1"
+    assert verdicts["format"] == "noise-verdict/2"
     loud, slow = verdicts["runs"]
-    assert loud["events"][1] == {"label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8}
-    assert (loud["run"], loud["status"], loud["model"]) == ("loud.npz", "findings", "scalar-10khz")
+    assert loud["events"][1] == {
+        "label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8, "novel": True,
+    }  # fmt: skip
+    assert loud["events"][0]["novel"] is False
+    assert (loud["run"], loud["status"], loud["unknown"]) == ("loud.npz", "findings", "finding")
+    assert (loud["model"], loud["model_sha256"]) == ("scalar-10khz", "1f2e")
     assert (slow["status"], slow["events"]) == ("cannot-tell", [])
     assert slow["message"] == "30 Hz is below every model"
 
 
-def test_json_says_where_findings_come_from_if_it_is_told():
+def test_json_has_the_localisation_of_findings_that_were_localised():
     joints = (("knee", 0.75), ("hip", 0.25))
     blow = Origin(First("desired", "measured", 0.002, lasting=False, joints=joints), (85.0, 130.0))
     known = {LOUD.events[0]: blow, LOUD.events[1]: Origin(None, None)}
-    quiet, loud = json.loads(as_json([QUIET, LOUD], [{}, known]))["runs"]
+    localised = replace(LOUD, localisations=known)
+    quiet, loud = json.loads(as_json([QUIET, localised]))["runs"]
     assert quiet["events"] == []
-    assert loud["events"][0]["origin"] == {
+    assert loud["events"][0]["localisation"] == {
         "stage": "desired",
         "following": "measured",
         "lag": 0.002,
@@ -65,7 +75,7 @@ def test_json_says_where_findings_come_from_if_it_is_told():
         "band": [85.0, 130.0],
     }
     unknown = {"stage": None, "following": None, "lag": None, "joints": {}, "band": None}
-    assert loud["events"][1]["origin"] == unknown
+    assert loud["events"][1]["localisation"] == unknown
 
 
 def test_junit_counts_and_tells_why():
@@ -78,7 +88,26 @@ def test_junit_counts_and_tells_why():
     }
     failure = suite.find("testcase[@name='loud.npz']/failure")
     assert failure.get("message") == "impact from 1.00 s to 1.50 s"
-    assert "oscillations from 2.00 s to 3.00 s" in failure.text
+    assert "oscillations from 2.00 s to 3.00 s, out of distribution" in failure.text
+
+
+WRITERS = pytest.mark.parametrize("write", FORMATS.values(), ids=FORMATS)
+
+
+@WRITERS
+def test_no_format_is_silent_about_a_finding_or_its_novelty(write):
+    written = write([LOUD])
+    for event in LOUD.events:
+        assert event.label in written
+    assert ("out of distribution" in written) or ('"novel": true' in written)
+
+
+@WRITERS
+@pytest.mark.parametrize("verdict", [QUIET, LOUD])
+def test_ignored_unknown_frames_are_said_in_every_format(write, verdict):
+    ignoring = replace(verdict, unknown=Unknown.IGNORE, message="Unknown frames are ignored.")
+    assert "ignore" in write([ignoring])
+    assert "ignore" not in write([verdict])
 
 
 def test_junit_drops_control_characters_that_xml_forbids():

@@ -9,7 +9,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from inspector.analysis.inspection import inspect
+from inspector.analysis.analyse import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.cli import main
 from inspector.errors import InspectorError
@@ -59,12 +59,12 @@ def short_run(**changes):
 
 def inspected(run, tmp_path, **changes):
     run.save(tmp_path / "run.npz", overwrite=True)
-    return dataclasses.replace(inspect(tmp_path / "run.npz", {}), **changes)
+    return dataclasses.replace(analyse_file(tmp_path / "run.npz", {}), **changes)
 
 
 @pytest.fixture(scope="module")
 def demo():
-    return html.page(inspect(demo_run(), load_library(model_files())), audit="rate: 10 kHz")
+    return html.page(analyse_file(demo_run(), load_library(model_files())), audit="rate: 10 kHz")
 
 
 def test_the_page_of_the_demo_is_valid_and_has_everything(demo):
@@ -108,7 +108,7 @@ def test_the_picture_and_the_sound_are_whole(demo):
 
 def test_a_run_without_robot_labels_and_findings_has_a_page_too(tmp_path):
     page = Page(html.page(inspected(short_run(), tmp_path)))
-    assert "Cannot tell" in page.words
+    assert "cannot-tell: rate of 1000 Hz" in page.words
     assert "No 3D robot: the run names none." in page.words
     assert "Links" not in page.words
     assert "Findings" not in page.words
@@ -151,7 +151,7 @@ def test_gaps_and_silence_are_drawn(tmp_path):
 
 def test_findings_are_listed_with_their_scores(tmp_path):
     events = (Event("impact", 1.0, 1.5, 0.9), Event("wobble", 3.0, 3.5, 0.7))
-    words = Page(html.page(inspected(short_run(), tmp_path, events=events))).words
+    words = Page(html.page(inspected(short_run(), tmp_path, findings=events, spans=events))).words
     assert "impact 1.00 1.50 0.90" in words
     assert "wobble 3.00 3.50 0.70" in words
 

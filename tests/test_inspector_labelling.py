@@ -76,19 +76,23 @@ def test_the_richest_model_that_a_run_feeds_is_taken():
     assert label_run(measured, LIBRARY).model == "scalar-1khz"
 
 
-def test_a_run_like_nothing_that_was_learnt_cannot_be_judged_and_part_of_one_is_said():
+def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
     generator = np.random.default_rng(0)
     odd = 1e4 * generator.normal(size=(6000, 3))
     names = ("a", "b", "c")
     run = Run(
         time=np.arange(6000) / 1000.0, velocity=odd, velocity_desired=0 * odd, joint_names=names
     )
-    with pytest.raises(CannotTellError, match="nothing that model general-1khz has learnt from is"):
-        label_run(run, LIBRARY)
+    whole = label_run(run, LIBRARY)
+    assert "ok" not in whole.labels.label
+    assert whole.labels.novel.all()
+    count = len(whole.labels)
+    said = f"{count} of {count} frames are out of distribution for model general-1khz."
+    assert whole.remark == said
     known = np.where(run.time[:, None] < 3.0, odd, 0.1 + 1e-7 * odd)
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
-    assert "frames are like nothing that model general-1khz knows" in labelled.remark
-    assert "unknown" in labelled.labels.label
+    assert "frames are out of distribution for model general-1khz" in labelled.remark
+    assert set(labelled.labels.label[~labelled.labels.novel]) == {"ok"}
 
 
 def test_a_run_that_feeds_no_model_is_not_judged_and_the_reason_is_said():

@@ -3,7 +3,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from inspector.analysis.inspection import inspect
+from inspector.analysis.analyse import analyse_file
 from inspector.analysis.moments import worst
 from models import Event
 from noisemodel import Block, Run
@@ -17,7 +17,7 @@ def inspected(tmp_path, *, blocks=(), events=(), **changes):
     fields = {"time": time, "velocity": velocity[:, None], "joint_names": ("a",), "blocks": blocks}
     path = tmp_path / "run.npz"
     Run(**(fields | changes)).save(path)
-    return dataclasses.replace(inspect(path, {}), events=tuple(events))
+    return dataclasses.replace(analyse_file(path, {}), findings=tuple(events), spans=tuple(events))
 
 
 KNOCK, RATTLE = Event("impact", 0.9, 1.2, 3.0), Event("oscillations", 2.0, 3.0, 1.0)

@@ -1,12 +1,10 @@
 import dataclasses
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from inspector.analysis.inspection import inspect
-from inspector.analysis.tracing import trace_all
-from inspector.analysis.verdict import Status, Verdict, judge
+from inspector.analysis.analyse import analyse_file
+from inspector.analysis.verdict import judge
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.localisation.band import band
@@ -15,7 +13,6 @@ from inspector.localisation.quiet import quiet
 from inspector.localisation.stage import First
 from inspector.report.html import found as tables
 from inspector.report.markdown import report, sentence
-from models import Event
 from noisemodel import Block, Run
 
 RATE, SECONDS = 2000.0, 6.0
@@ -42,7 +39,7 @@ def shaken_run(low=80, high=100, *, blocks=(SHAKE,), **changed):
 
 def inspected(run, tmp_path, **changed):
     run.save(tmp_path / "run.npz", overwrite=True)
-    return dataclasses.replace(inspect(tmp_path / "run.npz", {}), **changed)
+    return dataclasses.replace(analyse_file(tmp_path / "run.npz", {}), **changed)
 
 
 @pytest.mark.parametrize(("low", "high"), [(20, 40), (80, 100), (300, 320)])
@@ -99,38 +96,33 @@ def test_every_failure_has_an_origin_and_what_is_ok_has_none():
 
 def test_findings_are_traced_to_what_a_view_of_their_run_says():
     library = load_library(model_files())
-    verdict = judge(demo_run(), library)
+    verdict = judge(demo_run(), library, localise=True)
     assert verdict.events
-    (known,) = trace_all([verdict], library)
-    seen = inspect(demo_run(), library, robot=False)
-    assert known == {event: seen.origins[event] for event in verdict.events}
-
-
-def test_a_noise_without_its_run_is_traced_to_nothing():
-    heard = Verdict(Path("noise.log"), Status.FINDINGS, "m", (Event("impact", 1.0, 1.5, 0.9),))
-    assert trace_all([heard], {}) == [{}]
+    seen = analyse_file(demo_run(), library, links=False)
+    assert verdict.events == seen.findings
+    assert verdict.localisations == {event: seen.localisations[event] for event in seen.findings}
 
 
 def test_the_report_says_stage_and_band_of_each_failure(tmp_path):
-    inspection = inspected(shaken_run(), tmp_path)
-    assert "| class | from [s] | to [s] | shows first in | by joints | band |" in report(inspection)
-    low, high = inspection.origins[SHAKE].band
+    analysis = inspected(shaken_run(), tmp_path)
+    assert "| class | from [s] | to [s] | shows first in | by joints | band |" in report(analysis)
+    low, high = analysis.localisations[SHAKE].band
     assert (
         f"| oscillations | 2.00 | 3.50 | `measured` | knee 100% | {low:.0f}-{high:.0f} Hz |"
-        in report(inspection)
+        in report(analysis)
     )
-    assert sentence(inspection, SHAKE).startswith(
+    assert sentence(analysis, SHAKE).startswith(
         f"oscillations, 2.00 s to 3.50 s: first in `measured` by knee 100%; {low:.0f}-{high:.0f} Hz"
     )
-    assert "No stages" not in report(inspection)
+    assert "No stages" not in report(analysis)
 
 
 def test_a_run_without_desired_velocities_says_once_that_it_has_no_stages(tmp_path):
     blocks = (SHAKE, Block(4.0, 4.2, "impact"))
-    inspection = inspected(shaken_run(velocity_desired=None, blocks=blocks), tmp_path)
-    assert all(known.first is None for known in inspection.origins.values())
-    assert report(inspection).count("No stages") == 1
-    (annotated,) = tables(inspection)
+    analysis = inspected(shaken_run(velocity_desired=None, blocks=blocks), tmp_path)
+    assert all(known.first is None for known in analysis.localisations.values())
+    assert report(analysis).count("No stages") == 1
+    (annotated,) = tables(analysis)
     assert annotated.note.startswith("No stages")
 
 

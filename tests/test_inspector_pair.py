@@ -70,7 +70,7 @@ def test_a_run_and_itself_differ_by_nothing(itself):
 
 def test_what_a_run_and_itself_have_in_common_stayed(itself):
     found = changes(itself)
-    assert len(found) == len(itself.before.events) > 0
+    assert len(found) == len(itself.before.findings) > 0
     assert {change.kind for change in found} == {"stayed"}
     assert f"findings: 0 came, 0 went, {len(found)} stayed; vibration +0.0 dB" in summary(itself)
 
@@ -116,8 +116,8 @@ def test_events_of_one_class_that_overlap_stayed_and_the_others_came_or_went(its
     after = events(("impact", 0.8, 1.2), ("oscillations", 1.3, 1.6))
     pair = dataclasses.replace(
         itself,
-        before=dataclasses.replace(itself.before, events=before),
-        after=dataclasses.replace(itself.after, events=after),
+        before=dataclasses.replace(itself.before, findings=before, spans=before),
+        after=dataclasses.replace(itself.after, findings=after, spans=after),
     )
     assert [(c.kind, c.label, c.start, c.stop) for c in changes(pair)] == [
         ("went", "impact", 0.2, 0.6),
@@ -133,7 +133,7 @@ def test_annotated_failures_are_matched_where_no_model_can_tell(tmp_path):
     assert (change.kind, change.label, change.start) == ("came", "oscillations", 0.5)
     assert "annotated failures: 1 came, 0 went, 0 stayed" in summary(pair)
     assert "## Annotated events" in report(pair)
-    assert any(remark.startswith("Both: no class lanes") for remark in pair.remarks)
+    assert any(remark.startswith("Both: No labels: rate of 5000 Hz") for remark in pair.remarks)
 
 
 def test_a_class_is_as_long_and_as_loud_as_its_frames(tmp_path):

@@ -64,7 +64,9 @@ def whole(tmp_path_factory):
     folder = tmp_path_factory.mktemp("whole")
     pair = compared(folder, panda(), panda(2.0))
     events = (Event("impact", 0.5, 1.0, 0.9),)
-    after = replace(pair.after, labels=some_labels(slice(5, 8)), events=events, model="a model")
+    after = replace(
+        pair.after, labels=some_labels(slice(5, 8)), findings=events, spans=events, model="a model"
+    )
     before = replace(pair.before, labels=some_labels(slice(0)), model="a model")
     pair = replace(pair, before=before, after=after)
     write(pair, folder / "out.rrd")

@@ -2,7 +2,7 @@ import struct
 
 import pytest
 
-from inspector.analysis.inspection import inspect
+from inspector.analysis.analyse import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.recording.recording import write
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING)
 
 def test_the_viewer_draws_the_demo_and_reports_no_error(tmp_path):
     path = tmp_path / "demo.rrd"
-    write(inspect(demo_run(), load_library(model_files())), path)
+    write(analyse_file(demo_run(), load_library(model_files())), path)
     for _ in range(2):  # a busy machine may draw too late for the first viewer
         with picture.headless_viewer() as client:
             png = picture.picture(client, path, 2.0)

@@ -9,7 +9,7 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from inspector.analysis.inspection import Inspection, inspect
+from inspector.analysis.analyse import Analysis, Status, analyse_file
 from inspector.colors import LOUDNESS
 from inspector.errors import InspectorError
 from inspector.recording.recording import NOISE_POINTS, write
@@ -43,12 +43,15 @@ def panda_run(**changes):
     return Run(**(fields | changes))
 
 
-def inspected(run, tmp_path, labels=None, **options) -> Inspection:
+def inspected(run, tmp_path, labels=None, **options) -> Analysis:
     path = tmp_path / "run.npz"
     run.save(path, overwrite=True)
     events = (Event("impact", 0.5, 1.0, 0.9),) if labels else ()
-    found = inspect(path, {}, **options)
-    return dataclasses.replace(found, labels=labels, events=events, model="a model")
+    found = analyse_file(path, {}, **options)
+    status = Status.FINDINGS if events else found.status
+    return dataclasses.replace(
+        found, status=status, labels=labels, findings=events, spans=events, model="a model"
+    )
 
 
 def some_labels():
@@ -316,7 +319,7 @@ def one_legged(folder: Path) -> Path:
 def test_the_report_says_what_was_found(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
-    assert "1 finding: impact" in text[0]
+    assert "**findings: 1 impact**" in text[0]
     assert "| impact | 0.50 | 1.00 | `desired` | " in text[0]
     assert "](recording://robot/panda/visual_geometries/panda_link" in text[0]
     assert "| scenario | made up |" in text[0]
@@ -326,13 +329,13 @@ def test_the_report_says_what_was_found(whole):
 def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
     path = tmp_path / "out.rrd"
     np.savez(tmp_path / "bare.npz", time=np.arange(300) / 250, velocity=np.ones((300, 2)))
-    write(inspect(tmp_path / "bare.npz", {}), path)
+    write(analyse_file(tmp_path / "bare.npz", {}), path)
     found = entities(path)
     assert {"/noise/simplified", "/spectrogram/levels", "/joints/velocity/0"} <= found
     assert {f"/spectrogram/bands/{band:02d}" for band in range(48)} <= found
     assert not any(entity.startswith(("/robot", "/class")) for entity in found)
     _, (text,) = read(path, "/report", "TextDocument:text")
-    assert "Cannot tell" in text[0]
+    assert "cannot-tell: rate of 250 Hz" in text[0]
     assert "No 3D robot: the run names none." in text[0]
     assert "no desired velocities" in text[0]
 
@@ -420,7 +423,7 @@ def test_an_unreadable_mesh_is_named_and_the_run_can_be_shown_without(tmp_path):
     )
     with pytest.raises(InspectorError, match="mesh gone.stl: not found.*--no-robot"):
         inspected(run, tmp_path)
-    write(inspected(run, tmp_path, robot=False), tmp_path / "out.rrd")
+    write(inspected(run, tmp_path, links=False), tmp_path / "out.rrd")
     assert "/noise/simplified" in entities(tmp_path / "out.rrd")
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from inspector.analysis.inspection import inspect
+from inspector.analysis.analyse import analyse_file
 from inspector.cli import main
 from inspector.errors import InspectorError
 from inspector.recording import screenshot
@@ -17,7 +17,7 @@ def recording(folder: Path) -> Path:
     time = np.arange(4000) / 1000
     run = Run(time=time, velocity=np.sin(300 * time)[:, None], joint_names=("elbow",))
     run.save(folder / "run.npz")
-    write(inspect(folder / "run.npz", {}), folder / "run.rrd")
+    write(analyse_file(folder / "run.npz", {}), folder / "run.rrd")
     return folder / "run.rrd"
 
 

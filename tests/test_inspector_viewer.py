@@ -13,7 +13,7 @@ import browser
 import numpy as np
 import pytest
 
-from inspector.analysis.inspection import inspect
+from inspector.analysis.analyse import analyse_file
 from inspector.recording import viewer, web
 from inspector.recording.recording import write
 from inspector.recording.viewer import ViewerError
@@ -27,7 +27,7 @@ def recording(tmp_path):
     time_ = np.arange(4000) / 1000
     run = Run(time=time_, velocity=np.sin(300 * time_)[:, None], joint_names=("elbow",))
     run.save(tmp_path / "run.npz")
-    write(inspect(tmp_path / "run.npz", {}), tmp_path / "run.rrd")
+    write(analyse_file(tmp_path / "run.npz", {}), tmp_path / "run.rrd")
     return tmp_path / "run.rrd"
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 import noisemodel as nm
-from inspector.analysis.inspection import robot_known
+from inspector.analysis.analyse import robot_known
 from noisemodel import Run
 from noisemodel.atomic import replacing
 from noisemodel.types import Array, Real

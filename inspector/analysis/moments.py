@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from models import Event
 from noisemodel import Block
 from noisemodel.links import vibrating
@@ -39,25 +39,25 @@ class Moment:
         return self.label != LOUDEST
 
 
-def worst(inspection: Inspection) -> tuple[Moment, ...]:
+def worst(analysis: Analysis) -> tuple[Moment, ...]:
     """Pick the findings whose noise vibrates most, up to three.
 
     Where nothing was found, annotated failures take their place, and without these the loudest
     moment of the run.
 
     Args:
-        inspection: A run with what was found in it.
+        analysis: A run with what was found in it.
 
     Returns:
         The worst first, at least one.
     """
-    run = inspection.run
-    failures: Sequence[Event | Block] = inspection.events or [
+    run = analysis.run
+    failures: Sequence[Event | Block] = analysis.findings or [
         block for block in run.blocks if block.label != "ok"
     ]
     stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
     begin, end = float(run.time[0]), float(run.time[-1])
-    time, loudness = _loudness(inspection)
+    time, loudness = _loudness(analysis)
     found = []
     for label, start, stop in stretches or [(LOUDEST, begin, end)]:
         inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
@@ -69,10 +69,10 @@ def worst(inspection: Inspection) -> tuple[Moment, ...]:
     return tuple(moment for _, moment in found[:MOST])
 
 
-def _loudness(inspection: Inspection) -> tuple[Array, Array]:
+def _loudness(analysis: Analysis) -> tuple[Array, Array]:
     """Mean square of the noise above 10 Hz, every 50 ms: middles of the steps and values."""
-    run = inspection.run
-    fast = vibrating(inspection.noise[:, None], run.mask, run.rate)[:, 0]
+    run = analysis.run
+    fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]
     size = max(1, round(STEP * run.rate))
     firsts = np.arange(0, len(fast), size)
     counts = np.diff(np.append(firsts, len(fast)))

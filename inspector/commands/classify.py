@@ -18,6 +18,13 @@ class Format(StrEnum):
     GITHUB = "github"
 
 
+class OnUnknown(StrEnum):
+    """What becomes of frames that are out of distribution and below the alarm threshold."""
+
+    FINDING = "finding"
+    IGNORE = "ignore"
+
+
 def classify(
     runs: Annotated[
         list[Path], typer.Argument(help="Run files, or NoisyTest's logs.", show_default=False)
@@ -31,31 +38,33 @@ def classify(
     labels_format: Annotated[
         str, typer.Option(help="Of those files: noisytest, csv or audacity.")
     ] = "audacity",
-    origins: Annotated[
-        bool, typer.Option("--origins", help="In JSON, say where each finding comes from.")
+    localise: Annotated[
+        bool, typer.Option("--localise", help="In JSON, add the localisation of each finding.")
     ] = False,
+    unknown: Annotated[
+        OnUnknown,
+        typer.Option(help="Frames out of distribution, two or more: a finding, or ignored."),
+    ] = OnUnknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:
     """Label runs; exit 0 if all are quiet, 1 findings, 3 bad input, 4 cannot tell."""
     from inspector import assets
-    from inspector.analysis.tracing import trace_all
+    from inspector.analysis.analyse import Unknown
     from inspector.analysis.verdict import exit_status, judge_all
     from inspector.labels.findings import label_paths, write_findings
     from inspector.library import load_library
     from inspector.progress import progress
-    from inspector.report.formats import FORMATS, as_json
+    from inspector.report.formats import FORMATS
 
-    if origins and format is not Format.JSON:
-        raise typer.BadParameter("--origins takes --format json")
+    if localise and format is not Format.JSON:
+        raise typer.BadParameter("--localise takes --format json")
     library = load_library(model or assets.model_files())
     targets = {}
     if labels_to:
         targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)
-    verdicts = list(progress(judge_all(runs, library, jobs=jobs), "classify", total=len(runs)))
-    if origins:
-        typer.echo(as_json(verdicts, trace_all(verdicts, library, jobs=jobs)))
-    else:
-        typer.echo(FORMATS[format](verdicts))
+    judged = judge_all(runs, library, unknown=Unknown(unknown.value), localise=localise, jobs=jobs)
+    verdicts = list(progress(judged, "classify", total=len(runs)))
+    typer.echo(FORMATS[format](verdicts))
     if targets:
         write_findings(verdicts, targets, format_name=labels_format, overwrite=overwrite)
     for bad in verdicts:

@@ -27,6 +27,7 @@ def export(
 
     library = load_library(model or assets.model_files())
     found = write(Run.load(run), output, library, kind=kind, overwrite=overwrite)
+    typer.echo(f"{run}: {found.analysis.headline}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")
     typer.echo(f"{output}: {found}")

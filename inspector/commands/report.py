@@ -19,18 +19,17 @@ def report(
 ) -> None:
     """Write a page with pictures, tables and sound, for those without a viewer."""
     from inspector import assets
-    from inspector.analysis.inspection import inspect
-    from inspector.audit import audit
+    from inspector.analysis.analyse import analyse_file
     from inspector.audit.formats import text
     from inspector.library import load_library
     from inspector.report import html
-    from inspector.report.markdown import verdict
     from noisemodel.atomic import refuse_existing
 
     html.require()
     refuse_existing(output, overwrite=overwrite)
     library = load_library(model or assets.model_files())
-    found = inspect(run, library, robot=robot, kind=kind)
-    seen = text(found.name, audit(found.run, library))
+    found = analyse_file(run, library, links=robot, kind=kind)
+    assert found.audit is not None
+    seen = text(found.name, found.audit)
     html.write(found, output, audit=seen, overwrite=overwrite)
-    typer.echo(f"{output}: {verdict(found)} ({output.stat().st_size / 1e6:.1f} MB)")
+    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")

@@ -25,7 +25,7 @@ def shot(
 ) -> None:
     """Write what the viewer shows as a PNG, without a display (needs a Vulkan driver)."""
     from inspector import assets
-    from inspector.analysis.inspection import inspect
+    from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library
     from inspector.recording import screenshot as shooting
     from inspector.recording.recording import write
@@ -38,7 +38,7 @@ def shot(
     with TemporaryDirectory() as folder:
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
-            found = inspect(run, load_library(model or assets.model_files()), kind=kind)
+            found = analyse_file(run, load_library(model or assets.model_files()), kind=kind)
             recording = Path(folder) / "run.rrd"
             seconds = first_look(found) if at is None else at
             write(found, recording)

@@ -101,15 +101,15 @@ def _one(
     terms: bool,
     overwrite: bool,
 ) -> None:
-    from inspector.analysis.inspection import inspect
+    from inspector.analysis.analyse import analyse_file
     from inspector.recording.recording import write
-    from inspector.report.markdown import sentence, verdict
+    from inspector.report.markdown import sentence
     from inspector.sound.clip import of_recording
 
-    found = inspect(path, library, robot=robot, kind=kind, terms=terms)
+    found = analyse_file(path, library, links=robot, kind=kind, terms=terms)
     write(found, target, overwrite=overwrite, sound=of_recording(found))
-    typer.echo(f"{path}: {verdict(found)}")
-    for event in found.events:
+    typer.echo(f"{path}: {found.headline}")
+    for event in found.findings:
         typer.echo(f"  {sentence(found, event)}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")

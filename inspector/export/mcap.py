@@ -59,7 +59,8 @@ def write_mcap(content: Content, path: Path) -> None:
             data = json.dumps(message, allow_nan=False).encode()
             writer.add_message(channels[topic], log_time=stamp, data=data, publish_time=stamp)
         writer.add_metadata(
-            "noise-inspector", {"model": content.model, "extended": content.kind, "time": "s"}
+            "noise-inspector",
+            {"model": content.analysis.model, "extended": content.kind, "time": "s"},
         )
         writer.finish()
 
@@ -71,10 +72,10 @@ def origin(content: Content) -> int:
         content: What is exported.
     """
     try:
-        start = int(Decimal(str(content.run.meta.get("start", 0))) * NANOSECONDS)
+        start = int(Decimal(str(content.analysis.run.meta.get("start", 0))) * NANOSECONDS)
     except (InvalidOperation, ValueError, OverflowError):
         start = 0
-    first = round(float(content.run.time[0]) * NANOSECONDS)
+    first = round(float(content.analysis.run.time[0]) * NANOSECONDS)
     return max(start if start < LATEST else 0, -first)
 
 
@@ -84,12 +85,12 @@ def _topics(content: Content) -> dict[str, dict[str, Any]]:
     topics: dict[str, dict[str, Any]] = {
         "/noise": noise if content.extended is None else noise | {"extended": NUMBER}
     }
-    if content.labels is not None:
-        scores = dict.fromkeys(content.labels.classes, NUMBER)
+    if content.analysis.labels is not None:
+        scores = dict.fromkeys(content.analysis.labels.classes, NUMBER)
         topics["/labels"] = SPAN | {"scores": {"type": "object", "properties": scores}}
-    if content.events:
+    if content.analysis.findings:
         topics["/findings"] = SPAN | {"score": NUMBER}
-    if content.run.blocks:
+    if content.analysis.run.blocks:
         topics["/annotations"] = SPAN
     return topics
 
@@ -108,8 +109,8 @@ def _messages(content: Content) -> Iterator[Iterator[Message]]:
 
     yield _noise(content, stamp)
     yield _frames(content, stamp)
-    yield spans("/findings", content.events, "score")
-    yield spans("/annotations", content.run.blocks)
+    yield spans("/findings", content.analysis.findings, "score")
+    yield spans("/annotations", content.analysis.run.blocks)
 
 
 def _noise(content: Content, stamp: Any) -> Iterator[Message]:
@@ -123,9 +124,9 @@ def _noise(content: Content, stamp: Any) -> Iterator[Message]:
 
 
 def _frames(content: Content, stamp: Any) -> Iterator[Message]:
-    if content.labels is None:
+    if content.analysis.labels is None:
         return
-    labels = content.labels
+    labels = content.analysis.labels
     rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.debounced.tolist(), strict=True)
     for (start, stop, label), scores in zip(rows, labels.scores.tolist(), strict=True):
         message = {"label": label, "start": start, "stop": stop}

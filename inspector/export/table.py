@@ -41,7 +41,7 @@ def arrow_table(content: Content) -> Any:
         pa.field(name, pa.array(values).type, metadata=_unit(name))
         for name, values in columns.items()
     ]
-    about = {"format": "noise-export/1", "model": content.model, "extended": content.kind}
+    about = {"format": "noise-export/1", "model": content.analysis.model, "extended": content.kind}
     return pa.table(
         [pa.array(values) for values in columns.values()], pa.schema(fields, metadata=about)
     )
@@ -85,15 +85,15 @@ def _columns(content: Content) -> Iterator[tuple[str, Any]]:
     yield "simplified", content.simplified
     if content.extended is not None:
         yield "extended", content.extended
-    if content.run.blocks:
+    if content.analysis.run.blocks:
         yield "annotated", _annotated(content)
-    if content.labels is not None:
-        yield from _framed(content.time, content.labels)
+    if content.analysis.labels is not None:
+        yield from _framed(content.time, content.analysis.labels)
 
 
 def _annotated(content: Content) -> list[str | None]:
     labels: list[str | None] = [None] * len(content.time)
-    for block in content.run.blocks:
+    for block in content.analysis.run.blocks:
         first, last = np.searchsorted(content.time, (block.start, block.stop))
         labels[first:last] = [block.label] * int(last - first)
     return labels

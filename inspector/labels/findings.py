@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from inspector.analysis.verdict import Status, Verdict
+from inspector.analysis.analyse import Status
+from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError
 from inspector.labels.formats import format_of, write_labels
 from noisemodel.atomic import refuse_existing

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.pair.levels import Level, within
 from inspector.pair.pair import Pair
 from models import Event
@@ -56,10 +56,10 @@ def changes(pair: Pair) -> tuple[Change, ...]:
     return tuple(sorted(found, key=lambda change: (change.start, change.stop, change.label)))
 
 
-def failures(pair: Pair, side: Inspection) -> Sequence[Event | Block]:
+def failures(pair: Pair, side: Analysis) -> Sequence[Event | Block]:
     """List what of a run is matched: its findings, or its annotated failures."""
     if judged(pair):
-        return side.events
+        return side.findings
     return [block for block in side.run.blocks if block.label != "ok"]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 
 from inspector import colors
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.pair.changes import CAME, Change
 from inspector.pair.colors import KINDS
 from inspector.pair.pair import Pair
@@ -53,7 +53,7 @@ def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> i
     return len(lanes) + 1
 
 
-def _found(side: Inspection) -> list[tuple[float, float, str]]:
+def _found(side: Analysis) -> list[tuple[float, float, str]]:
     """Give each frame the time up to halfway to its neighbours, half a hop at most."""
     labels = side.labels
     if labels is None:
@@ -67,7 +67,7 @@ def _found(side: Inspection) -> list[tuple[float, float, str]]:
     return list(zip(begins.tolist(), ends.tolist(), map(str, labels.debounced), strict=True))
 
 
-def _annotated(side: Inspection) -> list[tuple[float, float, str]]:
+def _annotated(side: Analysis) -> list[tuple[float, float, str]]:
     return [(block.start, block.stop, block.label) for block in side.run.blocks]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.pair.pair import Pair
 from inspector.pair.spectra import spectra
 from noisemodel.noise import REFERENCE_POWER, decibel
@@ -166,7 +166,7 @@ def shared_links(pair: Pair) -> tuple[str, ...]:
     return tuple(name for name in pair.links[0].links if name in pair.links[1].links)
 
 
-def _heard(pair: Pair, side: Inspection, fast: Array, name: str) -> tuple[float, float]:
+def _heard(pair: Pair, side: Analysis, fast: Array, name: str) -> tuple[float, float]:
     """Say how long a class was heard in a run, and how loud that was."""
     labels = side.labels
     assert labels is not None

@@ -5,15 +5,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import models
 import noisemodel as nm
-from inspector.analysis.inspection import Inspection, robot_known
-from inspector.errors import InspectorError
-from inspector.library import CannotTellError, Library, label_run
+from inspector.analysis.analyse import Analysis, analyse, robot_known, with_links
+from inspector.library import Library
 from inspector.pair.alignment import Align, Alignment, align
 from inspector.pair.common import alike, together
 from noisemodel import robot as robots
-from noisemodel.links import LinkNoise, link_noise, vibrating
+from noisemodel.links import LinkNoise, vibrating
 from noisemodel.types import Array, Mask
 
 SIDES = ("before", "after")
@@ -30,13 +28,13 @@ class Pair:
         remarks: What is not compared and why, a sentence each.
     """
 
-    before: Inspection
-    after: Inspection
+    before: Analysis
+    after: Analysis
     alignment: Alignment
     remarks: tuple[str, ...]
 
     @property
-    def sides(self) -> tuple[tuple[str, Inspection], tuple[str, Inspection]]:
+    def sides(self) -> tuple[tuple[str, Analysis], tuple[str, Analysis]]:
         """Both with what they are called."""
         return (SIDES[0], self.before), (SIDES[1], self.after)
 
@@ -125,33 +123,11 @@ def _who(before: bool, after: bool) -> str:
     return "Both" if before and after else "Before" if before else "After"
 
 
-def _look(path: Path, run: nm.Run, library: Library, *, kind: str) -> Inspection:
-    """Look at a part of a run; at its links too, if a kind of noise is named."""
-    found = Inspection(
-        name=path.stem,
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
-        run=run,
-        noise=nm.simplified(run.motion, run.velocity_desired),
-        labels=None,
-        model="",
-        events=(),
-        links=None,
-        remarks=(),
-    )
-    try:
-        labelled = label_run(run, library)
-    except (CannotTellError, models.SignalError, nm.RunError) as error:
-        found = replace(found, remarks=(f"no class lanes: {error}.",))
-    else:
-        labels = labelled.labels
-        found = replace(found, labels=labels, model=labelled.model, events=labels.events())
-    if not kind:
-        return found
-    try:
-        links = link_noise(run, kind)
-    except nm.GeometryError as error:
-        raise InspectorError(f"{error}; `--no-robot` shows the runs without the robot") from error
-    return replace(found, links=links, remarks=(*found.remarks, *links.remarks))
+def _look(path: Path, run: nm.Run, library: Library, *, kind: str) -> Analysis:
+    """Analyse a part of a run; its links too, if a kind of noise is named."""
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    found = with_links(analyse(run, library, name=path.stem, sha256=digest), kind)
+    return replace(found, missing=())
 
 
 def _no_links(before: nm.Run, after: nm.Run) -> str:

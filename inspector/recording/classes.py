@@ -6,21 +6,21 @@ import numpy as np
 import rerun as rr
 
 from inspector import colors
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.recording import series
 from inspector.report.markdown import sentence
 from models import Event, Labels
 from noisemodel import Block
 
 
-def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
+def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
     """Log what a model found, and what somebody annotated.
 
     Args:
         recording: Where to.
-        inspection: The run with its labels and blocks.
+        analysis: The run with its labels and blocks.
     """
-    run, labels = inspection.run, inspection.labels
+    run, labels = analysis.run, analysis.labels
     annotated = {block.label for block in run.blocks}
     known = () if labels is None else labels.classes
     colours = colors.of_classes((*known, *sorted(annotated - set(known))))
@@ -32,7 +32,7 @@ def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
     if run.blocks:
         lane = [(block.start, block.stop, block.label) for block in run.blocks]
         series.log_lane(recording, "/class/annotated", lane, colours)
-    _log_events(recording, inspection, colours)
+    _log_events(recording, analysis, colours)
 
 
 def _stretches(labels: Labels) -> Iterator[tuple[float, float, str]]:
@@ -63,22 +63,20 @@ def _log_scores(
 
 
 def _log_events(
-    recording: rr.RecordingStream, inspection: Inspection, colours: dict[str, colors.Color]
+    recording: rr.RecordingStream, analysis: Analysis, colours: dict[str, colors.Color]
 ) -> None:
     """List the failures that were found and annotated, by time: findings are warnings."""
     found: list[tuple[str, str, Event | Block]] = [
-        ("WARN", "found", event) for event in inspection.events
+        ("WARN", "found", event) for event in analysis.findings
     ]
-    found += [
-        ("INFO", "annotated", block) for block in inspection.run.blocks if block.label != "ok"
-    ]
+    found += [("INFO", "annotated", block) for block in analysis.run.blocks if block.label != "ok"]
     rows = sorted(found, key=lambda row: row[2].start)
     if rows:
         recording.send_columns(
             "/events",
             indexes=[series.at(np.array([event.start for _, _, event in rows]))],
             columns=rr.TextLog.columns(
-                text=[f"{how}: {sentence(inspection, event)}" for _, how, event in rows],
+                text=[f"{how}: {sentence(analysis, event)}" for _, how, event in rows],
                 level=[level for level, _, _ in rows],
                 color=np.array([(*colours[event.label], 255) for *_, event in rows], np.uint8),
             ),

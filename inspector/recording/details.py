@@ -7,7 +7,7 @@ import numpy as np
 import rerun as rr
 
 from inspector import colors
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import Moment
 from inspector.recording import series
 from inspector.thinning import extremes
@@ -36,19 +36,19 @@ class Detail:
 
 
 def log(
-    recording: rr.RecordingStream, inspection: Inspection, moments: Sequence[Moment]
+    recording: rr.RecordingStream, analysis: Analysis, moments: Sequence[Moment]
 ) -> list[Detail]:
     """Log noise, and the velocities of the joints that vibrate most, sample by sample.
 
     Args:
         recording: Where to.
-        inspection: The run.
+        analysis: The run.
         moments: When.
 
     Returns:
         What was logged, in the order of the moments.
     """
-    run, found = inspection.run, []
+    run, found = analysis.run, []
     for number, moment in enumerate(moments):
         edges = (moment.peak - SPAN / 2, moment.peak + SPAN / 2)
         first, last = np.searchsorted(run.time, edges)
@@ -60,7 +60,7 @@ def log(
         path = f"/detail/{number}"
         time = run.time[part][valid]
         names = {"noise": ["simplified"], "velocity": [run.joint_names[i] for i in joints]}
-        values = {"noise": inspection.noise[part, None], "velocity": velocity[:, joints]}
+        values = {"noise": analysis.noise[part, None], "velocity": velocity[:, joints]}
         for kind, lines in names.items():
             one = [colors.NOISE] if kind == "noise" else colors.of_series(len(lines))
             thin = extremes(time, values[kind][valid], points=POINTS)

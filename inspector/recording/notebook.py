@@ -67,7 +67,7 @@ def in_notebook() -> bool:
 
 def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
     from inspector import assets
-    from inspector.analysis.inspection import inspect
+    from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library
     from inspector.recording.recording import write
     from inspector.sound.clip import of_recording
@@ -77,6 +77,6 @@ def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: s
         path = run if not isinstance(run, nm.Run) else Path(folder) / "run.npz"
         if isinstance(run, nm.Run):
             run.save(path)
-        found = inspect(Path(path), library, robot=robot, kind=kind)
+        found = analyse_file(Path(path), library, links=robot, kind=kind)
         write(found, recording, overwrite=True, sound=of_recording(found))
     return recording

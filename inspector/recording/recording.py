@@ -10,7 +10,7 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 
 from inspector import colors
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
 from inspector.recording import classes, details, joints, robot, series, unstable
 from inspector.recording import links as link_lanes
@@ -26,15 +26,13 @@ APPLICATION = "inspector"
 NOISE_POINTS = 100_000
 
 
-def write(
-    inspection: Inspection, path: Path, *, overwrite: bool = False, sound: bytes = b""
-) -> None:
+def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: bytes = b"") -> None:
     """Write the recording of an inspected run, whole or not at all.
 
     The same input makes a recording of the same id: opened again, it replaces itself.
 
     Args:
-        inspection: A run with its noise and labels.
+        analysis: A run with its noise and labels.
         path: The file to write, by convention ``*.rrd``.
         overwrite: Whether a file that exists may be replaced.
         sound: The run made audible, a WAV file that starts with the run; none if empty.
@@ -45,18 +43,18 @@ def write(
         MeshError: If one of the robot's meshes cannot be read.
     """
     with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
-        tree = _tree(inspection, Path(folder))
-        recording = rr.RecordingStream(APPLICATION, recording_id=inspection.sha256[:32])
+        tree = _tree(analysis, Path(folder))
+        recording = rr.RecordingStream(APPLICATION, recording_id=analysis.sha256[:32])
         recording.save(temporary)
-        contents = _log(recording, inspection, tree, sound)
+        contents = _log(recording, analysis, tree, sound)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
         recording.flush()
         recording.disconnect()
 
 
-def _tree(inspection: Inspection, folder: Path) -> UrdfTree | None:
-    run = inspection.run
-    if not inspection.has_robot:
+def _tree(analysis: Analysis, folder: Path) -> UrdfTree | None:
+    run = analysis.run
+    if analysis.links is None:
         return None
     assert run.robot is not None
     tree = robot.load(run.robot, folder)
@@ -65,19 +63,19 @@ def _tree(inspection: Inspection, folder: Path) -> UrdfTree | None:
 
 
 def _log(
-    recording: rr.RecordingStream, inspection: Inspection, tree: UrdfTree | None, sound: bytes
+    recording: rr.RecordingStream, analysis: Analysis, tree: UrdfTree | None, sound: bytes
 ) -> Contents:
-    run, links, moments = inspection.run, inspection.links, worst(inspection)
+    run, links, moments = analysis.run, analysis.links, worst(analysis)
     if tree is not None and links is not None:
         robot.log(recording, tree, run, coloured=True)
         link_lanes.log(recording, tree, links)
-    classes.log(recording, inspection)
-    _log_noise(recording, inspection)
+    classes.log(recording, analysis)
+    _log_noise(recording, analysis)
     if sound:
         unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
     limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
-    closeups = details.log(recording, inspection, moments)
-    _log_text(recording, inspection, {} if tree is None else robot.entities(tree))
+    closeups = details.log(recording, analysis, moments)
+    _log_text(recording, analysis, {} if tree is None else robot.entities(tree))
     failures = [moment for moment in moments if moment.failure]
     return Contents(
         joints=limb_plots,
@@ -85,17 +83,17 @@ def _log(
         root=None if tree is None else robot.root(tree, run),
         links=links is not None,
         terms=links is not None and bool(links.terms),
-        lanes=(inspection.labels is not None) + bool(run.blocks),
+        lanes=(analysis.labels is not None) + bool(run.blocks),
         events=any(moment.failure for moment in moments),
-        scores=inspection.labels is not None,
+        scores=analysis.labels is not None,
         sound=bool(sound),
         rate=run.rate,
         loop=(failures[0].start, failures[0].stop) if failures else None,
     )
 
 
-def _log_noise(recording: rr.RecordingStream, inspection: Inspection) -> None:
-    run, noise = inspection.run, inspection.noise
+def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> None:
+    run, noise = analysis.run, analysis.noise
     time, values = extremes(run.time[run.mask], noise[run.mask, None], points=NOISE_POINTS)
     series.log_lines(
         recording,
@@ -114,24 +112,24 @@ def _log_noise(recording: rr.RecordingStream, inspection: Inspection) -> None:
 
 
 def _log_text(
-    recording: rr.RecordingStream, inspection: Inspection, entities: Mapping[str, str]
+    recording: rr.RecordingStream, analysis: Analysis, entities: Mapping[str, str]
 ) -> None:
-    run, links = inspection.run, inspection.links
-    text = linked(report(inspection), entities)
+    run, links = analysis.run, analysis.links
+    text = linked(report(analysis), entities)
     recording.log("/report", rr.TextDocument(text, media_type="text/markdown"), static=True)
-    recording.send_recording_name(inspection.name)
+    recording.send_recording_name(analysis.name)
     recording.send_property(
         "inspector",
         rr.AnyValues(
-            input_sha256=inspection.sha256,
+            input_sha256=analysis.sha256,
             robot=run.robot or "",
             rate_hz=run.rate,
             duration_s=run.duration,
             joints=len(run.joint_names),
             samples_in_gaps=int((~run.mask).sum()),
-            model=inspection.model,
+            model=analysis.model,
             link_noise="" if links is None else links.kind,
-            findings=len(inspection.events),
+            findings=len(analysis.findings),
         ),
     )
 

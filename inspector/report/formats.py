@@ -5,9 +5,10 @@ import re
 from collections.abc import Callable, Sequence
 from xml.etree import ElementTree as ET
 
-from inspector.analysis.tracing import Origins
-from inspector.analysis.verdict import Status, Verdict
+from inspector.analysis.analyse import IGNORED, Status, Unknown
+from inspector.analysis.verdict import Verdict
 from inspector.localisation.localise import Origin
+from inspector.report.markdown import novelty
 from models import Event
 
 ANNOTATIONS = 10
@@ -30,33 +31,35 @@ def text(verdicts: Sequence[Verdict]) -> str:
     return "\n".join(lines)
 
 
-def as_json(verdicts: Sequence[Verdict], origins: Sequence[Origins] = ()) -> str:
-    """Write verdicts as ``noise-verdict/1``.
+def as_json(verdicts: Sequence[Verdict]) -> str:
+    """Write verdicts as ``noise-verdict/2``.
 
     Args:
-        verdicts: What was found in runs.
-        origins: Where it comes from, for each run; not written unless given.
+        verdicts: What was found in runs; findings that were localised have a ``localisation``.
     """
     runs = [
         {
             "run": str(verdict.path),
             "model": verdict.model,
+            "model_sha256": verdict.model_sha256,
             "status": verdict.status.value,
+            "unknown": verdict.unknown.value,
             "events": [
                 {
                     "label": event.label,
                     "start": round(event.start, 6),
                     "stop": round(event.stop, 6),
                     "score": round(event.score, 6),
-                    **({"origin": _origin(known[event])} if event in known else {}),
+                    "novel": event.novel,
+                    **_localised(verdict, event),
                 }
                 for event in verdict.events
             ],
             "message": verdict.message,
         }
-        for verdict, known in zip(verdicts, origins or [{}] * len(verdicts), strict=True)
+        for verdict in verdicts
     ]
-    return json.dumps({"format": "noise-verdict/1", "runs": runs}, indent=2)
+    return json.dumps({"format": "noise-verdict/2", "runs": runs}, indent=2)
 
 
 def junit(verdicts: Sequence[Verdict]) -> str:
@@ -81,6 +84,8 @@ def junit(verdicts: Sequence[Verdict]) -> str:
             sentences = [_sentence(event) for event in verdict.events] or [verdict.message]
             outcome = ET.SubElement(case, tags[verdict.status], message=_plain(sentences[0]))
             outcome.text = _plain("\n".join(sentences))
+        if verdict.message and verdict.status in (Status.OK, Status.FINDINGS):
+            ET.SubElement(case, "system-out").text = _plain(verdict.message)
     root = ET.Element("testsuites")
     root.append(suite)
     ET.indent(root)
@@ -99,7 +104,9 @@ def github(verdicts: Sequence[Verdict]) -> str:
         for verdict in verdicts
         if verdict.status is Status.CANNOT_TELL
     ]
-    return "\n".join(_capped(errors, "error") + _capped(warnings, "warning"))
+    ignored = any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
+    notices = [f"::notice::{IGNORED}"] if ignored else []
+    return "\n".join(_capped(errors, "error") + _capped(warnings, "warning") + notices)
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
@@ -108,6 +115,11 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "junit": junit,
     "github": github,
 }
+
+
+def _localised(verdict: Verdict, event: Event) -> dict[str, object]:
+    known = verdict.localisations.get(event)
+    return {} if known is None else {"localisation": _origin(known)}
 
 
 def _origin(origin: Origin) -> dict[str, object]:
@@ -123,7 +135,7 @@ def _origin(origin: Origin) -> dict[str, object]:
 
 
 def _sentence(event: Event) -> str:
-    return f"{event.label} from {event.start:.2f} s to {event.stop:.2f} s"
+    return f"{event.label} from {event.start:.2f} s to {event.stop:.2f} s{novelty(event)}"
 
 
 def _plain(value: object) -> str:

@@ -10,9 +10,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
-from inspector.report.markdown import ORIGIN, note, origin, verdict
+from inspector.report.markdown import ORIGIN, note, origin
 from inspector.sound.clip import clip, first_look
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
@@ -51,11 +51,11 @@ def require() -> None:
         raise InspectorError('a report needs matplotlib; `pip install "noise-inspector[report]"`')
 
 
-def write(inspection: Inspection, path: Path, *, audit: str = "", overwrite: bool = False) -> None:
+def write(analysis: Analysis, path: Path, *, audit: str = "", overwrite: bool = False) -> None:
     """Write the page of an inspected run, whole or not at all.
 
     Args:
-        inspection: A run with what was found in it.
+        analysis: A run with what was found in it.
         path: The file to write, by convention ``*.html``.
         audit: What the log can show, in lines.
         overwrite: Whether a file that exists may be replaced.
@@ -65,16 +65,16 @@ def write(inspection: Inspection, path: Path, *, audit: str = "", overwrite: boo
         OutputError: If the file exists or cannot be written.
     """
     require()
-    text = page(inspection, audit=audit)
+    text = page(analysis, audit=audit)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def page(inspection: Inspection, *, audit: str = "") -> str:
+def page(analysis: Analysis, *, audit: str = "") -> str:
     """Write the page of an inspected run.
 
     Args:
-        inspection: A run with what was found in it.
+        analysis: A run with what was found in it.
         audit: What the log can show, in lines.
 
     Returns:
@@ -87,34 +87,34 @@ def page(inspection: Inspection, *, audit: str = "") -> str:
     ET.SubElement(head, "meta", charset="utf-8")
     ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": POLICY})
     ET.SubElement(head, "meta", name="viewport", content="width=device-width")
-    _text(head, "title", f"{inspection.name}: {verdict(inspection)}")
+    _text(head, "title", f"{analysis.name}: {analysis.headline}")
     _text(head, "style", STYLE)
     body = ET.SubElement(html, "body")
-    _text(body, "h1", inspection.name)
-    _text(body, "p", verdict(inspection), "verdict")
-    _add_table(body, facts(inspection))
-    for table in found(inspection):
+    _text(body, "h1", analysis.name)
+    _text(body, "p", analysis.headline, "verdict")
+    _add_table(body, facts(analysis))
+    for table in found(analysis):
         _add_table(body, table)
     _text(body, "h2", "Over time")
-    image = f"data:image/png;base64,{_encoded(picture(inspection))}"
-    ET.SubElement(body, "img", src=image, alt=_described(inspection))
-    _add_sound(body, inspection)
-    for table in parts(inspection):
+    image = f"data:image/png;base64,{_encoded(picture(analysis))}"
+    ET.SubElement(body, "img", src=image, alt=_described(analysis))
+    _add_sound(body, analysis)
+    for table in parts(analysis):
         _add_table(body, table)
     _add_list(body, "What the log can show", audit.splitlines())
-    _add_list(body, "Remarks", inspection.remarks)
+    _add_list(body, "Remarks", analysis.remarks)
     _text(
         body,
         "p",
-        f"Made by noise-inspector of an input with SHA-256 {inspection.sha256}. The noise is an"
+        f"Made by noise-inspector of an input with SHA-256 {analysis.sha256}. The noise is an"
         " estimate from the velocities of rigid links: compare it, do not quote it.",
         "note",
     )
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_sound(body: ET.Element, inspection: Inspection) -> None:
-    heard = clip(inspection.run, around=first_look(inspection))
+def _add_sound(body: ET.Element, analysis: Analysis) -> None:
+    heard = clip(analysis.run, around=first_look(analysis))
     _text(body, "h2", "To be heard")
     if heard is None:
         _text(body, "p", "The log is too slow for ears.", "note")
@@ -175,11 +175,11 @@ def _text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
     element.text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]", "\ufffd", text)
 
 
-def _described(inspection: Inspection) -> str:
+def _described(analysis: Analysis) -> str:
     """Say in words what the picture shows."""
     rows = ["classes", "noise", "spectrogram of the noise"]
-    rows += ["loudest links"] if inspection.links is not None else []
-    return f"Over {inspection.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
+    rows += ["loudest links"] if analysis.links is not None else []
+    return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
 
 
 def _encoded(data: bytes) -> str:
@@ -190,14 +190,14 @@ MOST = 20
 """Links and joints that are listed, the loudest first."""
 
 
-def facts(inspection: Inspection) -> Table:
+def facts(analysis: Analysis) -> Table:
     """List what the run is."""
-    run = inspection.run
+    run = analysis.run
     rows = [
         ("robot", run.robot or "not named"),
         ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
         ("joints", str(len(run.joint_names))),
-        ("model", inspection.model or "none"),
+        ("model", analysis.model or "none"),
         *((key, _told(run.meta[key])) for key in ("scenario", "seed", "source") if key in run.meta),
     ]
     return Table("", ("", ""), rows)
@@ -207,33 +207,33 @@ def _told(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
-def found(inspection: Inspection) -> Iterator[Table]:
+def found(analysis: Analysis) -> Iterator[Table]:
     """List findings and annotated blocks, those that there are."""
-    said = note(inspection)
-    if inspection.events:
+    said = note(analysis)
+    if analysis.findings:
         rows = [
             (
                 event.label,
                 f"{event.start:.2f}",
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
-                *_plain(origin(inspection, event)),
+                *_plain(origin(analysis, event)),
             )
-            for event in inspection.events
+            for event in analysis.findings
         ]
         head = ("class", "from [s]", "to [s]", "score", *ORIGIN)
         yield Table("Findings", head, rows, (1, 2, 3), said)
-    if inspection.run.blocks:
+    if analysis.run.blocks:
         annotated = [
             (
                 block.label,
                 f"{block.start:.2f}",
                 f"{block.stop:.2f}",
-                *_plain(origin(inspection, block)),
+                *_plain(origin(analysis, block)),
             )
-            for block in inspection.run.blocks
+            for block in analysis.run.blocks
         ]
-        said = "" if inspection.events else said
+        said = "" if analysis.findings else said
         yield Table("Annotated", ("class", "from [s]", "to [s]", *ORIGIN), annotated, (1, 2), said)
 
 
@@ -242,9 +242,9 @@ def _plain(cells: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(cell.replace("`", "") for cell in cells)
 
 
-def parts(inspection: Inspection) -> Iterator[Table]:
+def parts(analysis: Analysis) -> Iterator[Table]:
     """List links and joints by what vibrates in them."""
-    links = inspection.links
+    links = analysis.links
     if links is not None:
         peaks = links.vibration.max(axis=0, initial=0.0)
         levels = decibel(np.maximum(peaks, REFERENCE_POWER) / REFERENCE_POWER)
@@ -257,7 +257,7 @@ def parts(inspection: Inspection) -> Iterator[Table]:
             [(f"{level:.1f}", f"{time:.2f}") for level, time in zip(levels, when, strict=True)],
             "Sound power of the measured motion above 10 Hz, normal to the surface.",
         )
-    run = inspection.run
+    run = analysis.run
     fast = vibrating(run.velocity.astype(np.float64), run.mask, run.rate)
     power = np.square(fast)
     peaks, when = np.abs(fast).max(axis=0), run.time[power.argmax(axis=0)]

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.localisation.links import culprits
 from inspector.localisation.localise import flows
 from models import Event
@@ -13,87 +13,82 @@ ORIGIN = ("shows first in", "by joints", "band", "links, shares of the excess")
 HEAD = ("class", "from [s]", "to [s]", *ORIGIN)
 
 
-def report(inspection: Inspection) -> str:
-    """Write the report of an inspected run.
+def report(analysis: Analysis) -> str:
+    """Write the report of an analysed run.
 
     Args:
-        inspection: The run with what was found in it.
+        analysis: The run with what was found in it.
 
     Returns:
-        Markdown: the verdict, the events, the run, and what is missing.
+        Markdown: the status, the events, the run, and what is missing.
     """
-    run = inspection.run
+    run = analysis.run
     facts = [
         ("robot", run.robot or "not named"),
         ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
         ("joints", str(len(run.joint_names))),
-        ("model", inspection.model or "none"),
+        ("model", analysis.model or "none"),
         *((key, str(run.meta[key])) for key in ("scenario", "seed") if key in run.meta),
     ]
     parts = [
-        f"# {inspection.name}",
-        f"**{verdict(inspection)}**",
+        f"# {analysis.name}",
+        f"**{analysis.headline}**",
         _table(("", ""), facts),
     ]
-    if inspection.events:
+    if analysis.findings:
         found = [
-            (e.label, f"{e.start:.2f}", f"{e.stop:.2f}", *origin(inspection, e))
-            for e in inspection.events
+            (f"{e.label}{novelty(e)}", f"{e.start:.2f}", f"{e.stop:.2f}", *origin(analysis, e))
+            for e in analysis.findings
         ]
         parts += ["## Events", _table(HEAD, found)]
     if run.blocks:
         rows = [
-            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *origin(inspection, b)) for b in run.blocks
+            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *origin(analysis, b)) for b in run.blocks
         ]
         parts += ["## Annotated", _table(HEAD, rows)]
-    if note(inspection):
-        parts += [note(inspection)]
-    if inspection.remarks:
-        parts += ["## Remarks", "\n".join(f"- {remark}" for remark in inspection.remarks)]
+    if note(analysis):
+        parts += [note(analysis)]
+    if analysis.remarks:
+        parts += ["## Remarks", "\n".join(f"- {remark}" for remark in analysis.remarks)]
     return "\n\n".join(parts) + "\n"
 
 
-def sentence(inspection: Inspection, event: Event | Block) -> str:
+def sentence(analysis: Analysis, event: Event | Block) -> str:
     """Say what an event is, when, and where it comes from."""
-    stage, joints, *others = origin(inspection, event)
+    stage, joints, *others = origin(analysis, event)
     by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
     where = "; ".join(part for part in (by, *others) if part)
-    return f"{event.label}, {event.start:.2f} s to {event.stop:.2f} s{where and f': {where}'}"
+    when = f"{event.start:.2f} s to {event.stop:.2f} s{novelty(event)}"
+    return f"{event.label}, {when}{where and f': {where}'}"
 
 
-def origin(inspection: Inspection, failure: Event | Block) -> tuple[str, str, str, str]:
+def novelty(event: Event | Block) -> str:
+    """Say that an event is out of distribution; nothing if it is not."""
+    return ", out of distribution" if isinstance(event, Event) and event.novel else ""
+
+
+def origin(analysis: Analysis, failure: Event | Block) -> tuple[str, str, str, str]:
     """Say where a failure comes from: stage of the control flow, joints, band, links."""
     if failure.label == "ok":
         return "", "", "", ""
-    known = inspection.origins[failure]
-    return known.stage, known.joints, known.frequencies, _links(inspection, failure)
+    known = analysis.localisations[failure]
+    return known.stage, known.joints, known.frequencies, _links(analysis, failure)
 
 
-def note(inspection: Inspection) -> str:
+def note(analysis: Analysis) -> str:
     """Say why no failure has a stage; nothing if that is not so."""
-    if not inspection.origins or flows(inspection.run):
+    if not analysis.localisations or flows(analysis.run):
         return ""
     return "No stages: the run has neither desired velocities nor named stages of the control flow."
 
 
-def verdict(inspection: Inspection) -> str:
-    """Say in a few words what was found."""
-    if inspection.labels is None:
-        return "Cannot tell"
-    if not inspection.events:
-        return "Quiet"
-    kinds = sorted({event.label for event in inspection.events})
-    count = len(inspection.events)
-    return f"{count} {'finding' if count == 1 else 'findings'}: {', '.join(kinds)}"
-
-
-def _links(inspection: Inspection, failure: Event | Block) -> str:
-    if inspection.links is None:
+def _links(analysis: Analysis, failure: Event | Block) -> str:
+    if analysis.links is None:
         return ""
-    annotated = [block for block in inspection.run.blocks if block.label != "ok"]
-    failures: list[Event | Block] = [*inspection.events, *annotated]
-    first = inspection.origins[failure].first
-    named = culprits(inspection.links, failure, failures, first=first)
+    annotated = [block for block in analysis.run.blocks if block.label != "ok"]
+    failures: list[Event | Block] = [*analysis.findings, *annotated]
+    first = analysis.localisations[failure].first
+    named = culprits(analysis.links, failure, failures, first=first)
     return ", ".join(f"{link} {share:.0%}" for link, share in named)
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from inspector import colors
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.spectrogram import spectrogram
 from inspector.thinning import extremes
 from noisemodel.links import LinkNoise
@@ -26,19 +26,19 @@ ROW = 0.24
 """Height of a class or a link, in [inch]."""
 
 
-def picture(inspection: Inspection) -> bytes:
+def picture(analysis: Analysis) -> bytes:
     """Draw an inspected run.
 
     Args:
-        inspection: A run with what was found in it.
+        analysis: A run with what was found in it.
 
     Returns:
         A PNG file.
     """
     from matplotlib.figure import Figure
 
-    links = inspection.links
-    rows = [_class_names(inspection), [], [], links.links[:LINKS] if links else []]
+    links = analysis.links
+    rows = [_class_names(analysis), [], [], links.links[:LINKS] if links else []]
     heights = [ROW * len(rows[0]) + 0.3, 1.5, 2.4, ROW * len(rows[3]) + 0.3]
     shown = [0, 1, 2, 3] if links else [0, 1, 2]
     shown = shown if rows[0] else shown[1:]
@@ -50,12 +50,12 @@ def picture(inspection: Inspection) -> bytes:
     )[:, 0]
     axes = dict(zip(shown, panels, strict=True))
     if 0 in axes:
-        _classes(axes[0], inspection)
-    _noise(axes[1], inspection)
-    _spectrogram(figure, axes[2], inspection)
+        _classes(axes[0], analysis)
+    _noise(axes[1], analysis)
+    _spectrogram(figure, axes[2], analysis)
     if links:
         _links(figure, axes[3], links)
-    run = inspection.run
+    run = analysis.run
     panels[-1].set_xlim(run.time[0], run.time[-1])
     panels[-1].set_xlabel("time [s]")
     file = io.BytesIO()
@@ -63,35 +63,35 @@ def picture(inspection: Inspection) -> bytes:
     return file.getvalue()
 
 
-def _class_names(inspection: Inspection) -> list[str]:
-    labels = inspection.labels
+def _class_names(analysis: Analysis) -> list[str]:
+    labels = analysis.labels
     known = [] if labels is None else list(labels.classes)
-    return [*known, *sorted({block.label for block in inspection.run.blocks} - set(known))]
+    return [*known, *sorted({block.label for block in analysis.run.blocks} - set(known))]
 
 
-def _classes(axes: "Axes", inspection: Inspection) -> None:
+def _classes(axes: "Axes", analysis: Analysis) -> None:
     """Draw a row for each class: filled what was found, hatched what somebody annotated."""
-    names = _class_names(inspection)
+    names = _class_names(analysis)
     shades = colors.of_classes(tuple(names))
     for row, name in enumerate(names):
         shade = tuple(channel / 255 for channel in shades[name])
-        found = [(e.start, e.stop - e.start) for e in inspection.events if e.label == name]
+        found = [(e.start, e.stop - e.start) for e in analysis.findings if e.label == name]
         axes.broken_barh(found, (row - 0.4, 0.4), facecolor=shade, edgecolor=INK, linewidth=0.6)
-        blocks = [(b.start, b.stop - b.start) for b in inspection.run.blocks if b.label == name]
+        blocks = [(b.start, b.stop - b.start) for b in analysis.run.blocks if b.label == name]
         axes.broken_barh(
             blocks, (row + 0.0, 0.4), facecolor="white", edgecolor=INK, linewidth=0.6, hatch="////"
         )
     axes.set_yticks(range(len(names)), names, parse_math=False)
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
-    hatched = "; hatched: annotated" if inspection.run.blocks else ""
+    hatched = "; hatched: annotated" if analysis.run.blocks else ""
     axes.set_title(f"filled: found{hatched}", fontsize=9, loc="left")
 
 
-def _noise(axes: "Axes", inspection: Inspection) -> None:
-    run = inspection.run
+def _noise(axes: "Axes", analysis: Analysis) -> None:
+    run = analysis.run
     time, noise = extremes(
-        run.time, np.where(run.mask, inspection.noise, np.nan)[:, None], points=POINTS
+        run.time, np.where(run.mask, analysis.noise, np.nan)[:, None], points=POINTS
     )
     axes.plot(time, noise[:, 0], color="#0072b2", linewidth=0.7)
     axes.set_ylim(bottom=0.0)
@@ -99,9 +99,9 @@ def _noise(axes: "Axes", inspection: Inspection) -> None:
     axes.grid(alpha=0.3)
 
 
-def _spectrogram(figure: "Figure", axes: "Axes", inspection: Inspection) -> None:
-    run = inspection.run
-    shown = spectrogram(inspection.noise, run.rate, start=float(run.time[0]), valid=run.mask)
+def _spectrogram(figure: "Figure", axes: "Axes", analysis: Analysis) -> None:
+    run = analysis.run
+    shown = spectrogram(analysis.noise, run.rate, start=float(run.time[0]), valid=run.mask)
     kept = shown.frequency <= TOP_HZ
     image = axes.pcolormesh(
         shown.time, shown.frequency[kept], shown.level[kept], cmap="inferno", shading="nearest"

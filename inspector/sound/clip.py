@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from inspector.analysis.inspection import Inspection
+from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
 from inspector.errors import InspectorError
 from inspector.sound.listening import Settings, common_gain, said, sound_of
@@ -32,22 +32,22 @@ class Clip:
     said: str
 
 
-def of_recording(inspection: Inspection) -> bytes:
+def of_recording(analysis: Analysis) -> bytes:
     """Make the sound that lies in a recording: it starts with the run, and has its worst moment.
 
     Args:
-        inspection: A run with what was found in it.
+        analysis: A run with what was found in it.
 
     Returns:
         A WAV file; nothing where nothing can be heard.
     """
-    found = clip(inspection.run, around=first_look(inspection), lead=True)
+    found = clip(analysis.run, around=first_look(analysis), lead=True)
     return b"" if found is None else found.data
 
 
-def first_look(inspection: Inspection) -> float:
+def first_look(analysis: Analysis) -> float:
     """Say when the worst moment of a run is, in [s]; 0 in a run that is all gap."""
-    moments = worst(inspection)
+    moments = worst(analysis)
     return moments[0].peak if moments else 0.0
 
 

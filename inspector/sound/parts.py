@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import noisemodel as nm
-from inspector.analysis.inspection import robot_known
+from inspector.analysis.analyse import robot_known
 from inspector.errors import InspectorError
 from noisemodel.noise import DENSITY, SOUND_SPEED
 from noisemodel.types import Array

@@ -1,0 +1,320 @@
+"""The analysis of a run: labels, findings, audit, status and remarks, decided here for all outputs.
+
+`classify`, `view`, `report`, comparisons of two runs, `export`, `inspector.show` and the summary of
+`live` print what an `Analysis` says; none of them decides again.
+"""
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+import models
+import noisemodel as nm
+from inspector.analysis.desired import without_placeholder
+from inspector.audit import Audit, audit, shortcomings, summary
+from inspector.errors import InspectorError
+from inspector.library import CannotTellError, Library, label_noise, label_run
+from inspector.localisation.extent import extent
+from inspector.localisation.localise import Origin, origins
+from models import Event
+from noisemodel.links import LinkNoise, link_noise
+from noisemodel.types import Array
+
+
+class Status(StrEnum):
+    """The outcome for a run."""
+
+    OK = "ok"
+    FINDINGS = "findings"
+    CANNOT_TELL = "cannot-tell"
+    BAD_INPUT = "bad-input"
+
+
+class Unknown(StrEnum):
+    """What becomes of frames that are out of distribution and below the alarm threshold."""
+
+    FINDING = "finding"
+    IGNORE = "ignore"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Analysis:
+    """A run, or a scalar noise, with what was found in it.
+
+    Attributes:
+        name: Name of the run.
+        status: `ok`, `findings` or `cannot-tell`.
+        run: The run as it was analysed; a scalar noise is a run of one joint.
+        reason: Why nothing can be told, in a sentence or two; empty otherwise.
+        labels: One label per frame; None where no model fits.
+        model: Name of the model that labelled, empty without.
+        model_sha256: SHA-256 of its file, empty without.
+        spans: The events of the labels, from the start of the first frame of each to the end of
+            its last.
+        findings: The same events, from their estimated onset to their end.
+        audit: What the run can show; None of a scalar noise.
+        notes: What was done to the run before it was labelled, a sentence each.
+        unknown: What becomes of `unknown` frames.
+        sha256: SHA-256 of the file that the run came from, empty without.
+        links: Noise link by link; None unless it was asked for and the run has a robot.
+        missing: What the run lacks to show the robot, and why, a sentence each.
+    """
+
+    name: str
+    status: Status
+    run: nm.Run
+    reason: str = ""
+    labels: models.Labels | None = None
+    model: str = ""
+    model_sha256: str = ""
+    spans: tuple[Event, ...] = ()
+    findings: tuple[Event, ...] = ()
+    audit: Audit | None = None
+    notes: tuple[str, ...] = ()
+    unknown: Unknown = Unknown.FINDING
+    sha256: str = ""
+    links: LinkNoise | None = None
+    missing: tuple[str, ...] = ()
+
+    @cached_property
+    def noise(self) -> Array:
+        """Simplified noise of the run, shape (samples,), in [rad/s]."""
+        return nm.simplified(self.run.motion, self.run.velocity_desired)
+
+    @cached_property
+    def localisations(self) -> dict[Event | nm.Block, Origin]:
+        """The localisation of each finding, and of each annotated failure."""
+        frame = 0.0 if self.labels is None else float(self.labels.stop[0] - self.labels.start[0])
+        found = origins(self.run, self.spans, frame=frame)
+        events = zip(self.spans, self.findings, strict=True)
+        named: dict[Event | nm.Block, Event] = dict(events)
+        return {named.get(failure, failure): each for failure, each in found.items()}
+
+    @property
+    def headline(self) -> str:
+        """The status and what it consists of, in a line."""
+        if self.status is Status.CANNOT_TELL:
+            return f"{self.status}: {self.reason}"
+        counts = Counter(event.label for event in self.findings)
+        kinds = ", ".join(f"{count} {label}" for label, count in sorted(counts.items()))
+        novel = sum(event.novel for event in self.findings)
+        parts = [f"{self.status}{f': {kinds}' if kinds else ''}"]
+        parts += [f"{novel} out of distribution"] if novel else []
+        parts += [IGNORED] if self.unknown is Unknown.IGNORE else []
+        return "; ".join(parts)
+
+    @property
+    def message(self) -> str:
+        """What `classify` says beside the findings, in a line; may be empty."""
+        flaws = () if self.audit is None else shortcomings(self.audit)
+        ignored = (f"{IGNORED[0].upper()}{IGNORED[1:]}.",) * (self.unknown is Unknown.IGNORE)
+        seen = (self.reason,) if self.status is Status.CANNOT_TELL else flaws
+        return " ".join((*ignored, *self.notes, *seen))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is missing or uncertain and why, a sentence each."""
+        seen = () if self.audit is None else summary(self.audit)
+        reason = (f"No labels: {self.reason}.",) if self.labels is None else ()
+        links = () if self.links is None else self.links.remarks
+        return (*self.missing, *self.notes, *reason, *seen, *links)
+
+
+IGNORED = "unknown frames are ignored"
+
+
+def analyse(
+    run: nm.Run,
+    library: Library,
+    *,
+    name: str = "run",
+    sha256: str = "",
+    unknown: Unknown = Unknown.FINDING,
+) -> Analysis:
+    """Label a run, and audit it.
+
+    The arrays of a run are read when they are needed, and only those that the models and the audit
+    need: an object that reads them from its file on demand can stand in for a `noisemodel.Run`.
+
+    Args:
+        run: The run.
+        library: Models to choose from.
+        name: Name of the run.
+        sha256: SHA-256 of the file that it came from.
+        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
+
+    Returns:
+        The analysis. A run that no model can label is no error: its status is `cannot-tell`.
+    """
+    run, left_out = without_placeholder(run)
+    seen = audit(run, library)
+    notes = (left_out,) if left_out else ()
+    empty = Analysis(
+        name=name,
+        status=Status.CANNOT_TELL,
+        run=run,
+        audit=seen,
+        notes=notes,
+        unknown=unknown,
+        sha256=sha256,
+    )
+    try:
+        labelled = label_run(run, library)
+    except (CannotTellError, models.SignalError, nm.RunError) as error:
+        return replace(empty, reason=str(error))
+    labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
+    spans = labels.events()
+    blind = seen.blind and not spans
+    return replace(
+        empty,
+        status=Status.CANNOT_TELL if blind else Status.FINDINGS if spans else Status.OK,
+        reason=" ".join(summary(seen)) if blind else "",
+        labels=labels,
+        model=labelled.model,
+        model_sha256=library[labelled.model].sha256,
+        spans=spans,
+        findings=_extents(run, labels, spans),
+        notes=(*notes, *([labelled.remark] if labelled.remark else [])),
+    )
+
+
+def analyse_noise(
+    time: Array,
+    noise: Array,
+    library: Library,
+    *,
+    name: str = "noise",
+    unknown: Unknown = Unknown.FINDING,
+) -> Analysis:
+    """Label a scalar noise, as NoisyTest's logs hold it.
+
+    Args:
+        time: Uniform, shape (samples,), in [s].
+        noise: Shape (samples,), in [rad/s].
+        library: Models to choose from.
+        name: Name of the log.
+        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
+
+    Returns:
+        The analysis, without an audit, of a run of one joint.
+    """
+    uniform = float(time[0]) + np.arange(len(time)) / models.nominal_rate(time)
+    run = nm.Run(time=uniform, velocity=noise[:, None], joint_names=("noise",))
+    empty = Analysis(name=name, status=Status.CANNOT_TELL, run=run, unknown=unknown)
+    try:
+        labelled = label_noise(time, noise, library)
+    except (CannotTellError, models.SignalError) as error:
+        return replace(empty, reason=str(error))
+    labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
+    spans = labels.events()
+    return replace(
+        empty,
+        status=Status.FINDINGS if spans else Status.OK,
+        labels=labels,
+        model=labelled.model,
+        model_sha256=library[labelled.model].sha256,
+        spans=spans,
+        findings=_extents(run, labels, spans),
+        notes=(labelled.remark,) if labelled.remark else (),
+    )
+
+
+def analyse_file(
+    path: Path,
+    library: Library,
+    *,
+    links: bool = True,
+    kind: str = "normal",
+    terms: bool = False,
+    unknown: Unknown = Unknown.FINDING,
+) -> Analysis:
+    """Read a run file and analyse it for people: with its hash, and its links.
+
+    Args:
+        path: A run file.
+        library: Models to choose from.
+        links: Whether to compute the noise link by link, if the run names a robot that is known.
+        kind: Kind of the extended noise, see ``noisemodel.extended``.
+        terms: Whether to compute the paper's terms A, B and C one by one.
+        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
+
+    Returns:
+        The analysis.
+
+    Raises:
+        RunFileError: If the file is no run file.
+        RobotError: If its robot cannot be read, or lacks one of the run's joints.
+        InspectorError: If the robot's shape cannot be had.
+    """
+    run = nm.Run.load(path)
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    found = analyse(run, library, name=path.stem, sha256=digest, unknown=unknown)
+    return with_links(found, kind if links else "", terms=terms)
+
+
+def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysis:
+    """Add the noise link by link, if the run names a robot that is known and holds positions.
+
+    Args:
+        analysis: Of a run.
+        kind: Kind of the extended noise, see ``noisemodel.extended``; empty for none.
+        terms: Whether to compute the paper's terms A, B and C one by one.
+
+    Returns:
+        The analysis with the links' noise, and with what the run lacks.
+
+    Raises:
+        RobotError: If the robot cannot be read, or lacks one of the run's joints.
+        InspectorError: If the robot's shape cannot be had.
+    """
+    run = analysis.run
+    found = replace(analysis, missing=tuple(_missing(run)))
+    if not kind or not robot_known(run) or run.position is None:
+        return found
+    try:
+        return replace(found, links=link_noise(run, kind, terms=terms))
+    except nm.GeometryError as error:
+        raise InspectorError(f"{error}; `--no-robot` shows the run without the robot") from error
+
+
+def robot_known(run: nm.Run) -> bool:
+    """Whether a run names a listed robot, or a URDF."""
+    return run.robot is not None and (run.robot in nm.ROBOTS or run.robot.endswith(".urdf"))
+
+
+def _extents(run: nm.Run, labels: models.Labels, spans: Sequence[Event]) -> tuple[Event, ...]:
+    """Let each event start at its onset, and end when what it is of does."""
+    frame = float(labels.stop[0] - labels.start[0])
+    hop = float(np.diff(labels.start).min(initial=frame))
+
+    def real(span: Event) -> Event:
+        start, stop = extent(run, span.start, span.stop, frame=frame, hop=hop)
+        return replace(span, start=start, stop=stop)
+
+    return tuple(map(real, spans))
+
+
+def _missing(run: nm.Run) -> Iterator[str]:
+    """Say what a run does not hold."""
+    if run.robot is None:
+        yield "No 3D robot: the run names none."
+    elif not robot_known(run):
+        yield f"No 3D robot: {run.robot!r} is neither a listed robot nor a URDF file."
+    elif run.position is None:
+        yield "No 3D robot: the run has no positions."
+    elif run.base_pose is None and run.robot in nm.ROBOTS and nm.ROBOTS[run.robot].floating_base:
+        yield "The run has no base pose: the robot is drawn with its base at the origin."
+    if run.velocity_desired is None:
+        yield "The run has no desired velocities: the noise counts the measured motion alone."
+    for signal, method in run.meta.get("differentiated", {}).items():
+        yield f"The run had no {signal}: it was differentiated ({method})."
+    lost = int((~run.mask).sum())
+    if lost:
+        yield f"{lost} samples lie in gaps; frames that touch one are not labelled."

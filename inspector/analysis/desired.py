@@ -1,0 +1,63 @@
+"""A desired velocity that is none: zeros that position-target controllers write."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from noisemodel import Run
+
+MOVES = 0.1
+"""Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below."""
+WINDOW = 2.0
+"""Stretch of time in which it has to move, in [s]."""
+SHARE = 0.75
+"""Share of that time: a motion reverses now and then, a push is over sooner."""
+STEP = 1e-6
+"""Change of a desired position from which it changes, in [rad] or [m]."""
+
+
+def without_placeholder(run: Run) -> tuple[Run, str]:
+    """Leave a desired velocity out that is zero throughout although the robot is told to move.
+
+    Controllers that take position targets write zeros in its place. It is left out if the desired
+    position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters of any
+    two seconds. The zeros of a robot that is told to stand stay, also when it is pushed.
+
+    Args:
+        run: The run.
+
+    Returns:
+        The run, without its desired velocity if that is a placeholder, and a sentence that says
+        so; the run itself and an empty text otherwise.
+    """
+    desired = run.velocity_desired
+    if desired is None or not desired.size or np.any(desired):
+        return run, ""
+    if _changes(run):
+        reason = "the desired position changes"
+    elif _moves(run):
+        reason = f"joints move at more than {MOVES:g} rad/s for seconds"
+    else:
+        return run, ""
+    return (
+        replace(run, velocity_desired=None),
+        f"The desired velocity is zero throughout while {reason}: it was left out.",
+    )
+
+
+def _changes(run: Run) -> bool:
+    """Whether the desired position changes."""
+    if run.position_desired is None:
+        return False
+    positions = run.position_desired[run.mask]
+    return len(positions) > 0 and bool(np.ptp(positions, axis=0).max() > STEP)
+
+
+def _moves(run: Run) -> bool:
+    """Whether some joint is faster than ``MOVES`` for most of some ``WINDOW``."""
+    size = round(WINDOW * run.rate)
+    if len(run.time) < size or not run.joint_names:
+        return False
+    fast = (np.abs(run.velocity).max(axis=1) > MOVES) & run.mask
+    count = np.append(0, np.cumsum(fast))
+    return bool((count[size:] - count[:-size]).max() >= SHARE * size)
