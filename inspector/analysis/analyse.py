@@ -6,7 +6,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -96,6 +96,39 @@ class Analysis:
         named: dict[Event | nm.Block, Event] = dict(events)
         return {named.get(failure, failure): each for failure, each in found.items()}
 
+    @cached_property
+    def lane(self) -> tuple[tuple[float, float, str], ...]:
+        """The class over time: start and stop in [s] and class, in order, not overlapping.
+
+        Findings last from onset to end, and the later one counts where two overlap. `unknown`
+        frames that are no finding take the time around their middle; the rest of what is covered
+        by frames is `ok`.
+        """
+        labels = self.labels
+        if labels is None:
+            return ()
+        apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1]) + 1
+        groups = np.split(np.arange(len(labels)), apart)
+        layers = [(float(labels.start[g[0]]), float(labels.stop[g[-1]]), "ok") for g in groups]
+        alone = np.flatnonzero((labels.label == models.UNKNOWN) & ~labels.flagged)
+        middle = (labels.start[alone] + labels.stop[alone]) / 2
+        layers += [
+            (t - hop(labels) / 2, t + hop(labels) / 2, models.UNKNOWN) for t in middle.tolist()
+        ]
+        layers += [(event.start, event.stop, event.label) for event in self.findings]
+        edges = np.unique([time for start, stop, _ in layers for time in (start, stop)])
+        names = np.full(len(edges) - 1, "", dtype=object)
+        for start, stop, name in layers:
+            names[np.searchsorted(edges, start) : np.searchsorted(edges, stop)] = name
+        changes = np.flatnonzero(np.append(True, names[1:] != names[:-1]))
+        stretches = zip(
+            edges[changes].tolist(),
+            edges[np.append(changes[1:], len(names))].tolist(),
+            names[changes].tolist(),
+            strict=True,
+        )
+        return tuple(stretch for stretch in stretches if stretch[2])
+
     @property
     def headline(self) -> str:
         """The status and what it consists of, in a line."""
@@ -169,7 +202,7 @@ def analyse(
     except (CannotTellError, models.SignalError, nm.RunError) as error:
         return replace(empty, reason=str(error))
     labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
-    spans = labels.events()
+    spans, findings = _extents(run, labels)
     blind = seen.blind and not spans
     return replace(
         empty,
@@ -179,7 +212,7 @@ def analyse(
         model=labelled.model,
         model_sha256=library[labelled.model].sha256,
         spans=spans,
-        findings=_extents(run, labels, spans),
+        findings=findings,
         notes=(*notes, *([labelled.remark] if labelled.remark else [])),
     )
 
@@ -212,7 +245,7 @@ def analyse_noise(
     except (CannotTellError, models.SignalError) as error:
         return replace(empty, reason=str(error))
     labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
-    spans = labels.events()
+    spans, findings = _extents(run, labels)
     return replace(
         empty,
         status=Status.FINDINGS if spans else Status.OK,
@@ -220,7 +253,7 @@ def analyse_noise(
         model=labelled.model,
         model_sha256=library[labelled.model].sha256,
         spans=spans,
-        findings=_extents(run, labels, spans),
+        findings=findings,
         notes=(labelled.remark,) if labelled.remark else (),
     )
 
@@ -289,16 +322,46 @@ def robot_known(run: nm.Run) -> bool:
     return run.robot is not None and (run.robot in nm.ROBOTS or run.robot.endswith(".urdf"))
 
 
-def _extents(run: nm.Run, labels: models.Labels, spans: Sequence[Event]) -> tuple[Event, ...]:
-    """Let each event start at its onset, and end when what it is of does."""
-    frame = float(labels.stop[0] - labels.start[0])
-    hop = float(np.diff(labels.start).min(initial=frame))
+def _extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
+    """List the events of labels, and the same from onset to end, in the order of the latter.
+
+    A stretch of flagged frames has an onset and an end. Where its class changes, each event has its
+    own within these; if that leaves less than a hop, it is as long as its frames allow.
+    """
+    frame, step = float(labels.stop[0] - labels.start[0]), hop(labels)
+    whole = [
+        (first, last, extent(run, first, last, frame=frame, hop=step))
+        for first, last in _stretches(labels)
+    ]
 
     def real(span: Event) -> Event:
-        start, stop = extent(run, span.start, span.stop, frame=frame, hop=hop)
+        (onset, end) = next(
+            found for first, last, found in whole if first <= span.start and span.stop <= last
+        )
+        start, stop = extent(run, span.start, span.stop, frame=frame, hop=step)
+        start, stop = max(start, onset), min(stop, end)
+        if stop - start < step:
+            start, stop = max(span.start, onset), min(span.stop, end)
+        if stop <= start:  # its frames end before the onset, or start after the end
+            start, stop = span.start, span.stop
         return replace(span, start=start, stop=stop)
 
-    return tuple(map(real, spans))
+    pairs = [(span, real(span)) for span in labels.events()]
+    pairs.sort(key=lambda pair: (pair[1].start, pair[1].stop))
+    return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)
+
+
+def _stretches(labels: models.Labels) -> list[tuple[float, float]]:
+    """List the stretches of flagged frames, by the start of the first and the stop of the last."""
+    own = np.flatnonzero(labels.flagged)
+    apart = np.flatnonzero(labels.start[own[1:]] > labels.stop[own[:-1]]) + 1
+    groups = [group for group in np.split(own, apart) if len(group)]
+    return [(float(labels.start[g[0]]), float(labels.stop[g[-1]])) for g in groups]
+
+
+def hop(labels: models.Labels) -> float:
+    """Time from one frame to the next, in [s]; a frame's duration if there is no next one."""
+    return float(np.diff(labels.start).min(initial=float(labels.stop[0] - labels.start[0])))
 
 
 def _missing(run: nm.Run) -> Iterator[str]:

@@ -66,7 +66,9 @@ def picture(analysis: Analysis) -> bytes:
 def _class_names(analysis: Analysis) -> list[str]:
     labels = analysis.labels
     known = [] if labels is None else list(labels.classes)
-    return [*known, *sorted({block.label for block in analysis.run.blocks} - set(known))]
+    others = {event.label for event in analysis.findings}
+    others |= {block.label for block in analysis.run.blocks}
+    return [*known, *sorted(others - set(known))]
 
 
 def _classes(axes: "Axes", analysis: Analysis) -> None:

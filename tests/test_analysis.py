@@ -1,0 +1,240 @@
+"""One analysis decides: its status, findings and remarks are those of every output."""
+
+import hashlib
+import json
+from dataclasses import replace
+from itertools import pairwise
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inspector.analysis.analyse import Analysis, Status, Unknown, analyse, analyse_noise
+from inspector.analysis.desired import without_placeholder
+from inspector.analysis.verdict import Verdict, exit_status
+from inspector.assets import demo_run, model_files
+from inspector.library import load_library
+from inspector.report import html, markdown
+from inspector.report.formats import FORMATS
+from models import Event, Labels
+from noisemodel import Run
+
+LIBRARY = load_library(model_files())
+RATE = 1000.0
+CLASSES = ("ok", "impact", "oscillations")
+
+
+def moving(*, desired=True, seconds=5.0, rate=RATE, tone=0.0, **changes):
+    """Two joints that travel, and measured noise."""
+    time = np.arange(round(seconds * rate)) / rate
+    generator = np.random.default_rng(0)
+    wanted = np.stack([0.5 * np.sin(2 * np.pi * f * time) for f in (0.3, 0.4)], axis=1)
+    velocity = wanted + 1e-4 * generator.normal(size=wanted.shape)
+    velocity[:, 0] += tone * np.sin(2 * np.pi * 60 * time) * ((time >= 2.0) & (time < 3.0))
+    fields = {"time": time, "velocity": velocity, "joint_names": ("a", "b")}
+    return Run(**(fields | ({"velocity_desired": wanted} if desired else {}) | changes))
+
+
+def analysed(text, **changes):
+    """An analysis with labels by their first letters, upper case above the threshold."""
+    names = {".": "ok", "i": "impact", "o": "oscillations", "u": "unknown"}
+    start = 0.1 * np.arange(len(text))
+    labels = Labels(
+        start,
+        start + 0.4,
+        np.array([names[letter.lower()] for letter in text], dtype=str),
+        np.zeros((len(text), 3)),
+        CLASSES,
+        np.array([letter.isupper() for letter in text], dtype=bool),
+    )
+    spans = labels.events()
+    status = Status.FINDINGS if spans else Status.OK
+    fields = {"labels": labels, "spans": spans, "findings": spans, "status": status}
+    return Analysis(**({"name": "run", "run": moving()} | fields | changes))
+
+
+def test_the_status_is_the_same_in_every_output(tmp_path):
+    slow = moving(rate=50.0)
+    held = replace(moving(), velocity=np.repeat(moving().velocity[::100], 100, axis=0))
+    for run in (moving(), moving(tone=1.0), slow, held, Run.load(demo_run())):
+        found = analyse(run, LIBRARY)
+        status = found.status.value
+        verdict = Verdict.of(tmp_path / "run.npz", found)
+        assert json.loads(FORMATS["json"]([verdict]))["runs"][0]["status"] == status
+        assert f"run.npz: {status}" in FORMATS["text"]([verdict])
+        outcome = {"ok": None, "findings": "failure", "cannot-tell": "skipped"}[status]
+        case = ET.fromstring(FORMATS["junit"]([verdict])).find(".//testcase")
+        tags = {child.tag for child in case} - {"system-out"}
+        assert tags == ({outcome} if outcome else set())
+        github = FORMATS["github"]([verdict])
+        assert (f"{status}: " in github) if outcome else not github
+        assert markdown.report(found).splitlines()[2].startswith(f"**{status}")
+        assert f"<title>run: {status}" in html.page(found)
+        assert exit_status([verdict]) == {"ok": 0, "findings": 1, "cannot-tell": 4}[status]
+
+
+def test_a_log_held_at_ten_hertz_cannot_be_told_in_any_output():
+    steps = 1e-3 * np.random.default_rng(1).normal(size=(50, 2))
+    velocity = np.repeat(steps, 100, axis=0)
+    held = Run(time=np.arange(5000) / RATE, velocity=velocity, joint_names=("a", "b"))
+    found = analyse(held, LIBRARY)
+    assert found.status is Status.CANNOT_TELL
+    assert "values are held for 100 samples" in found.headline
+    assert found.reason == found.message
+
+
+def test_a_run_without_a_fitting_model_cannot_be_told_and_has_a_reason():
+    found = analyse(moving(rate=50.0), LIBRARY)
+    assert (found.status, found.labels, found.findings) == (Status.CANNOT_TELL, None, ())
+    assert "rate of 50 Hz" in found.reason
+    assert any(remark.startswith("No labels: rate of 50 Hz") for remark in found.remarks)
+
+
+def test_an_analysis_names_its_model_and_the_hash_of_its_file():
+    found = analyse(moving(), LIBRARY)
+    (path,) = [path for path in model_files() if path.stem == found.model]
+    assert found.model_sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def test_a_finding_starts_at_its_onset_and_ends_when_the_event_does():
+    found = analyse(moving(tone=1.0), LIBRARY)
+    first, last = found.findings[0], max(found.findings, key=lambda event: event.stop)
+    assert first.start == pytest.approx(2.0, abs=0.05)
+    assert last.stop == pytest.approx(3.0, abs=0.05)
+    for span, finding in zip(found.spans, found.findings, strict=True):
+        assert span.start <= finding.start < finding.stop <= span.stop
+    assert [*found.findings] == sorted(found.findings, key=lambda each: (each.start, each.stop))
+
+
+def test_the_lane_shows_findings_from_onset_to_end():
+    found = analyse(moving(tone=1.0), LIBRARY)
+    shown = [stretch for stretch in found.lane if stretch[2] != "ok"]
+    assert shown[0][0] == found.findings[0].start
+    assert shown[-1][1] == max(event.stop for event in found.findings)
+
+
+@given(st.text(alphabet=".iIoOu", min_size=1, max_size=30))
+@settings(deadline=None)
+def test_a_lane_covers_all_frames_once_and_shows_each_finding(text):
+    found = analysed(text)
+    lane = found.lane
+    assert (lane[0][0], lane[-1][1]) == (0.0, pytest.approx(0.1 * len(text) + 0.3))
+    assert all(one[1] == other[0] for one, other in pairwise(lane))
+    assert all(one[2] != other[2] for one, other in pairwise(lane))
+    assert {name for *_, name in lane} <= {"ok", "unknown", *(e.label for e in found.findings)}
+    if found.findings:
+        assert found.findings[-1].label in {name for *_, name in lane}
+
+
+def test_unknown_frames_that_are_ignored_raise_nothing_and_it_is_said():
+    generator = np.random.default_rng(3)
+    loud = 1e4 * generator.normal(size=(5000, 1))
+    noise = np.abs(loud[:, 0])
+    time = np.arange(5000) / RATE
+    library = {name: each for name, each in LIBRARY.items() if name == "scalar-1khz"}
+    found = analyse_noise(time, noise, library)
+    assert found.status is Status.FINDINGS
+    assert all(event.novel for event in found.findings)
+    ignoring = analyse_noise(time, noise, library, unknown=Unknown.IGNORE)
+    assert "unknown" not in {event.label for event in ignoring.findings}
+    assert "unknown frames are ignored" in ignoring.headline
+    assert ignoring.message.startswith("Unknown frames are ignored.")
+
+
+def test_the_headline_counts_findings_by_class_and_says_how_many_are_novel():
+    events = (Event("impact", 1.0, 1.2, 0.9), Event("impact", 2.0, 2.2, 0.9, novel=True))
+    found = analysed("....", findings=events, spans=events, status=Status.FINDINGS)
+    assert found.headline == "findings: 2 impact; 1 out of distribution"
+    assert analysed("....").headline == "ok"
+
+
+# A desired velocity that is zero throughout.
+
+
+def zeros(run, **changes):
+    return replace(run, velocity_desired=np.zeros_like(run.velocity), **changes)
+
+
+def test_zeros_in_place_of_a_desired_velocity_are_left_out_of_a_run_that_moves():
+    run, said = without_placeholder(zeros(moving()))
+    assert run.velocity_desired is None
+    assert said == (
+        "The desired velocity is zero throughout while joints move at more than 0.1 rad/s for"
+        " seconds: it was left out."
+    )
+    assert said in analyse(zeros(moving()), LIBRARY).message
+
+
+def test_zeros_are_left_out_where_the_desired_position_changes():
+    still = 1e-4 * np.random.default_rng(0).normal(size=(5000, 2))
+    target = np.linspace(0.0, 0.5, 5000)[:, None] * np.ones(2)
+    run, said = without_placeholder(zeros(moving(), velocity=still, position_desired=target))
+    assert run.velocity_desired is None
+    assert run.position_desired is not None
+    assert "while the desired position changes" in said
+
+
+@pytest.mark.parametrize("push", [0.036, 0.5])
+def test_a_standing_arm_that_is_pushed_keeps_its_zeros(push):
+    time = np.arange(10_000) / RATE
+    pushes = push * np.exp(-(((time[:, None] - np.array([2.0, 6.0])) / 0.2) ** 2))
+    standing = zeros(
+        moving(seconds=10.0), velocity=pushes, position_desired=np.full((10_000, 2), 0.3)
+    )
+    run, said = without_placeholder(standing)
+    assert run is standing
+    assert said == ""
+
+
+def test_a_desired_velocity_that_is_not_all_zero_stays():
+    run = moving()
+    assert without_placeholder(run) == (run, "")
+    assert without_placeholder(moving(desired=False))[1] == ""
+
+
+def test_an_object_that_reads_arrays_on_demand_stands_in_for_a_run(tmp_path):
+    """What a model and the audit need is read, and nothing else."""
+    path = tmp_path / "run.npz"
+    run = moving(
+        tone=1.0, effort=np.ones((5000, 2)), base_pose=np.tile([0, 0, 0, 0, 0, 0, 1.0], (5000, 1))
+    )
+    run.save(path)
+    read = []
+
+    class Lazy:
+        def __getattr__(self, name):
+            value = getattr(Run.load(path), name)
+            read.append(name)
+            object.__setattr__(self, name, value)
+            return value
+
+    found, whole = analyse(Lazy(), LIBRARY), analyse(run, LIBRARY)
+    assert found.findings == whole.findings
+    assert found.status is whole.status
+    assert not {"effort", "base_pose"} & set(read)
+    assert "velocity" in read
+
+
+def test_a_run_is_labelled_and_audited_once(monkeypatch):
+    from inspector.analysis import analyse as module
+
+    counts = {"audit": 0, "label_run": 0}
+
+    def counted(name):
+        function = getattr(module, name)
+
+        def count(*arguments, **options):
+            counts[name] += 1
+            return function(*arguments, **options)
+
+        return count
+
+    for name in counts:
+        monkeypatch.setattr(module, name, counted(name))
+    found = module.analyse_file(demo_run(), LIBRARY)
+    markdown.report(found)
+    html.page(found)
+    assert found.localisations
+    assert counts == {"audit": 1, "label_run": 1}
