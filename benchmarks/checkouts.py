@@ -1,0 +1,335 @@
+"""Compare noises, features and scores of two checkouts bit for bit.
+
+    python benchmarks/checkouts.py --before OLD_CHECKOUT [--after .] [--runs demo my_run.npz …]
+        [--python-before PYTHON] [--python-after PYTHON] [--output build/checkouts]
+
+The same probe runs in each checkout, by that checkout's Python: its `.venv`, or this one if it has
+none. Inputs are the demo run, simulated runs of four robots (simulated once, in the checkout
+AFTER), and the stand-in for NoisyTest's data set, where `../shared/tools/standin_lola.py` is at
+hand. Compared are the simplified noise, the extended noise of each link, and, for each model that
+BEFORE ships, features, decisions and scores of all frames; of two runs also the simulated run file.
+Where model files differ, AFTER also reads those of BEFORE. Labels and findings are not compared:
+the rule that makes them of scores changes from 0.1 to 0.2.
+
+`docs/renamed.csv` says what a checkout that is older than this file calls by another name. Exit
+status 1 if anything differs, or if nothing was compared. Noises of all links take about 1 GB in
+the output folder; inputs stay there for the next time, results are removed at the end.
+"""
+
+import argparse
+import csv
+import filecmp
+import json
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parents[1]
+PROBE = ROOT / "benchmarks" / "checkoutsprobe.py"
+RENAMED = ROOT / "docs" / "renamed.csv"
+STANDIN = ROOT.parent / "shared" / "tools" / "standin_lola.py"
+
+SIMULATED: dict[str, tuple[str, str, int, float]] = {
+    "talos-straight": ("talos", "straight", 0, 3.0),
+    "talos-obstacle-toe": ("talos", "obstacle-toe", 1, 4.0),
+    "talos-multisine": ("talos", "multisine-60-100", 2, 3.0),
+    "go2-straight": ("go2", "straight", 3, 3.0),
+    "go2-force-jump": ("go2", "force-jump", 1, 4.0),
+    "go2-reference-jump": ("go2", "reference-jump", 1, 4.0),
+    "panda-straight": ("panda", "straight", 0, 3.0),
+    "panda-early-height": ("panda", "early-height", 1, 4.0),
+    "panda-limit-cycle": ("panda", "limit-cycle", 1, 4.0),
+    "solo12-straight": ("solo12", "straight", 1, 3.0),
+    "solo12-decalibrated": ("solo12", "decalibrated", 1, 4.0),
+    "solo12-multisine": ("solo12", "multisine-30-40", 2, 3.0),
+}
+"""Robot, scenario, seed and duration in [s] of each simulated run."""
+TASKS = ("simulate", "runs", "logs", "train", "models")
+"""What a probe is given, each by name."""
+AGAIN = ("panda-early-height", "go2-force-jump")
+"""Runs that both checkouts simulate."""
+
+
+@dataclass(frozen=True)
+class Checkout:
+    """A checkout and the Python that runs it.
+
+    Attributes:
+        folder: Its root.
+        python: A Python with what it depends on.
+        scratch: Folder for caches of its own, so that nothing is written into the checkout and
+            neither reads what the other has computed.
+    """
+
+    folder: Path
+    python: Path
+    scratch: Path
+
+    @classmethod
+    def of(cls, folder: Path, python: Path | None, scratch: Path) -> "Checkout":
+        """Describe a checkout; its Python is that of its `.venv` unless given, or this one.
+
+        What an earlier call has left in its cache is removed: other code may have computed it.
+        """
+        own = folder.resolve() / ".venv" / "bin" / "python"
+        python = python or (own if own.exists() else Path(sys.executable))
+        shutil.rmtree(scratch / "cache", ignore_errors=True)
+        return cls(folder.resolve(), python.absolute(), scratch)
+
+    @property
+    def models(self) -> dict[str, Path]:
+        """The model files that it ships, by name."""
+        return {path.stem: path for path in sorted(self.folder.glob("assets/models/*.npz"))}
+
+    @property
+    def renamed(self) -> dict[str, str]:
+        """Its names by those of this version; nothing where it knows them: it has the list."""
+        known = (self.folder / RENAMED.relative_to(ROOT)).exists()
+        return {} if known else {new: old for old, new in reversed(names()) if new}
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """Variables of its processes: its own code and caches, one thread."""
+        return os.environ | {
+            "PYTHONPATH": str(self.folder),
+            "PYTHONPYCACHEPREFIX": str(self.scratch / "bytecode"),
+            "PYTHONDONTWRITEBYTECODE": "",
+            "XDG_CACHE_HOME": str(self.scratch / "cache"),
+            "OMP_NUM_THREADS": "1",
+            "OPENBLAS_NUM_THREADS": "1",
+        }
+
+    def probe(self, output: Path, **job: Mapping[str, object]) -> None:
+        """Compute results in this checkout.
+
+        Args:
+            output: Folder of the results; must not exist.
+            job: What to compute, see `TASKS`; nothing of what is not given.
+        """
+        output.mkdir(parents=True)
+        tasks = {task: job.get(task, {}) for task in TASKS}
+        place = {"checkout": self.folder, "output": output, "renamed": self.renamed}
+        file = output.with_suffix(".json")
+        file.write_text(json.dumps({**place, **tasks}, default=str))
+        done = subprocess.run(
+            [self.python, "-P", PROBE, file], cwd=self.folder, env=self.environment, check=False
+        )
+        if done.returncode:
+            raise SystemExit(f"the probe failed in {self.folder} (exit {done.returncode})")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One result of both checkouts.
+
+    Attributes:
+        item: The run, and what was computed.
+        contents: The arrays that were compared.
+        differences: What differs, a phrase each; empty if all bytes are the same.
+    """
+
+    item: str
+    contents: str
+    differences: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        word = "different" if self.differences else "same"
+        return f"{word:9}  {self.item}: {'; '.join(self.differences) or self.contents}"
+
+
+def names() -> list[tuple[str, str]]:
+    """Old and new dotted name of each row of the list of renamed names."""
+    with RENAMED.open(newline="") as file:
+        return [(row["old"], row["new"]) for row in csv.DictReader(file)]
+
+
+def compare(before: Path, after: Path) -> list[Comparison]:
+    """Compare two folders of results, file by file.
+
+    Args:
+        before: Results of the older checkout.
+        after: Results of the newer one.
+
+    Returns:
+        A comparison for each file that one of them has.
+    """
+    found = {path.relative_to(side) for side in (before, after) for path in side.rglob("*.npz")}
+    return [_compare_files(path, before / path, after / path) for path in sorted(found)]
+
+
+def _compare_files(path: Path, before: Path, after: Path) -> Comparison:
+    item = f"{path.parent}, {path.stem}"
+    for side, there in (("before", before), ("after", after)):
+        if not there.exists():
+            return Comparison(item, "", (f"not computed by the checkout {side}",))
+    with np.load(before, allow_pickle=False) as old, np.load(after, allow_pickle=False) as new:
+        one, other = dict(old), dict(new)
+    contents = ", ".join(f"{name} {array.shape}" for name, array in other.items())
+    differences = [
+        f"array {name} is in one of them only" for name in sorted(one.keys() ^ other.keys())
+    ]
+    both = {name: difference(array, other[name]) for name, array in one.items() if name in other}
+    differences += [f"{name}: {text}" for name, text in both.items() if text]
+    if not differences and not filecmp.cmp(before, after, shallow=False):
+        differences.append("all arrays are the same, the files are not")
+    return Comparison(item, contents, tuple(differences))
+
+
+def difference(before: NDArray[np.generic], after: NDArray[np.generic]) -> str:
+    """Phrase that says how two arrays differ, bit for bit; empty if they do not."""
+    if (before.dtype, before.shape) != (after.dtype, after.shape):
+        return f"{before.dtype} {before.shape} before, {after.dtype} {after.shape} after"
+    if before.tobytes() == after.tobytes():
+        return ""
+    if before.dtype.kind != "f":
+        return f"{np.sum(before != after)} of {before.size} values differ"
+    bits = f"u{before.dtype.itemsize}"
+    one, other = (np.ascontiguousarray(each) for each in (before, after))
+    count = np.sum(one.view(bits) != other.view(bits))
+    largest = np.nanmax(np.append(np.abs(one - other).ravel(), 0.0))
+    return f"{count} of {before.size} values differ, by at most {largest:.3g}"
+
+
+def closing(found: Sequence[Comparison]) -> tuple[str, int]:
+    """Closing line and exit status: 0 only if something was compared and nothing differs."""
+    different = sum(bool(each.differences) for each in found)
+    if not found:
+        return "nothing was compared", 1
+    same = len(found) - different
+    return f"{len(found)} compared: {same} the same, {different} different", int(different > 0)
+
+
+def standin(folder: Path) -> Path | None:
+    """Folder of the stand-in for NoisyTest's data set, made if need be; None without its maker."""
+    if not folder.exists() and STANDIN.exists():
+        fresh = folder.with_suffix(".part")
+        shutil.rmtree(fresh, ignore_errors=True)
+        subprocess.run([sys.executable, STANDIN, fresh], check=True, stdout=subprocess.DEVNULL)
+        fresh.rename(folder)
+    return folder if folder.exists() else None
+
+
+def inputs(after: Checkout, folder: Path, wanted: Iterable[str]) -> dict[str, Path]:
+    """Files of the runs that are compared, by name; what is missing is simulated.
+
+    Args:
+        after: The checkout that simulates.
+        folder: Where simulated run files are kept.
+        wanted: Names of runs, and paths of run files.
+    """
+    files = {name: folder / name / "simulated run.npz" for name in wanted if name in SIMULATED}
+    for name in [name for name, file in files.items() if not file.exists()]:
+        fresh = folder.with_suffix(".part")
+        shutil.rmtree(fresh, ignore_errors=True)
+        after.probe(fresh, simulate={name: SIMULATED[name]})
+        folder.mkdir(parents=True, exist_ok=True)
+        (fresh / name).rename(folder / name)
+    if "demo" in wanted:
+        files["demo"] = ROOT / "assets" / "runs" / "demo.npz"
+    given = [Path(name).resolve() for name in wanted if name not in {"demo", "lola", *SIMULATED}]
+    return files | {path.stem: path for path in given}
+
+
+def compare_checkouts(
+    before: Checkout, after: Checkout, folder: Path, wanted: Sequence[str]
+) -> list[Comparison]:
+    """Compute everything in both checkouts, and compare it.
+
+    Args:
+        before: The older checkout.
+        after: The newer one.
+        folder: Where inputs are kept and results are written.
+        wanted: Names of runs, "lola" for the stand-in, and paths of run files.
+    """
+    runs = inputs(after, folder / "runs", wanted)
+    logs: dict[str, Path] = {}
+    train: dict[str, Path] = {}
+    if "lola" in wanted:
+        if lola := standin(folder / "lola"):
+            paths = sorted(lola.glob("*/*.log"))
+            logs = {f"lola/{path.parent.name}/{path.stem}": path for path in paths}
+            train = {"lola": lola}
+        else:
+            print(f"skipped    lola: its maker is not there ({STANDIN})")
+    simulate = {name: SIMULATED[name] for name in AGAIN if name in wanted}
+    models = {name: path for name, path in after.models.items() if name in before.models}
+    for name in sorted(after.models.keys() - models):
+        print(f"skipped    model {name}: the checkout before has none of this name")
+    for side, checkout, own in (("before", before, before.models), ("after", after, models)):
+        shutil.rmtree(folder / side, ignore_errors=True)
+        job = {"simulate": simulate, "runs": runs, "logs": logs, "train": train, "models": own}
+        checkout.probe(folder / side, **job)
+    versions = [(folder / side / "versions.json").read_text() for side in ("before", "after")]
+    if versions[0] != versions[1]:
+        print(f"caution    not the same packages: {versions[0]} before, {versions[1]} after")
+    found = compare(folder / "before", folder / "after")
+    changed = [
+        name for name, path in models.items() if not filecmp.cmp(before.models[name], path, False)
+    ]
+    if changed and runs:
+        found += _old_files(before, after, folder, changed, runs)
+    for side in ("before", "after"):
+        shutil.rmtree(folder / side)
+    return found
+
+
+def _old_files(
+    before: Checkout,
+    after: Checkout,
+    folder: Path,
+    changed: Iterable[str],
+    runs: Mapping[str, Path],
+) -> list[Comparison]:
+    """Compare what both checkouts decide by the older one's model files, on one run."""
+    run = next(iter(runs))
+    files = {f"{name}": before.models[name] for name in changed}
+    results = folder / "old files"
+    shutil.rmtree(results, ignore_errors=True)
+    after.probe(results, runs={run: runs[run]}, models=files)
+    found = [
+        _compare_files(
+            Path(run, f"model file of before, {name}.npz"),
+            folder / "before" / run / f"{name}.npz",
+            results / run / f"{name}.npz",
+        )
+        for name in files
+    ]
+    shutil.rmtree(results)
+    return found
+
+
+def main() -> int:
+    """Compare, print a line for each item, and return the exit status."""
+    arguments = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    shipped = ["demo", "lola", *SIMULATED]
+    arguments.add_argument("--before", type=Path, required=True, metavar="FOLDER")
+    arguments.add_argument("--after", type=Path, default=ROOT, metavar="FOLDER")
+    arguments.add_argument("--python-before", type=Path, metavar="PYTHON")
+    arguments.add_argument("--python-after", type=Path, metavar="PYTHON")
+    arguments.add_argument(
+        "--runs", nargs="+", default=shipped, help=f"of {', '.join(shipped)}, or run files"
+    )
+    arguments.add_argument("--output", type=Path, default=ROOT / "build" / "checkouts")
+    given = arguments.parse_args()
+    if unknown := [name for name in given.runs if name not in shipped and not Path(name).is_file()]:
+        arguments.error(f"no run file {', '.join(unknown)}; known by name: {', '.join(shipped)}")
+    folder = given.output.resolve()
+    before = Checkout.of(given.before, given.python_before, folder / "scratch" / "before")
+    after = Checkout.of(given.after, given.python_after, folder / "scratch" / "after")
+    found = compare_checkouts(before, after, folder, given.runs)
+    line, status = closing(found)
+    print(*found, line, sep="\n")
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

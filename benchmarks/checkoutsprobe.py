@@ -1,0 +1,239 @@
+"""Results of one checkout: what `checkouts.py` compares. Run by it, in the checkout's own Python.
+
+    python -P checkoutsprobe.py JOB.json
+
+The job names the checkout, what to compute and where results go. Names are those of the newer
+version; a job for an older one says what they are called there. Every result is a file
+`<output>/<run>/<what>.npz` of plain arrays.
+"""
+
+import importlib
+import json
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+KINDS = ("paper", "normal")
+"""Kinds of the extended noise that are computed."""
+PACKAGES = ("numpy", "scipy", "scikit-learn", "pin", "mujoco")
+"""Libraries whose versions may change results."""
+CHUNK = 64
+"""Frames whose features are computed at once."""
+
+
+def older(name: str, renamed: Mapping[str, str]) -> str:
+    """Old name of what a newer version calls by a dotted name.
+
+    Args:
+        name: The new name.
+        renamed: Old names by new ones; the longest that `name` begins with counts.
+    """
+    parts = name.split(".")
+    for stop in range(len(parts), 0, -1):
+        if (head := ".".join(parts[:stop])) in renamed:
+            return ".".join((renamed[head], *parts[stop:]))
+    return name
+
+
+def resolve(name: str) -> Any:
+    """Module, class, function, attribute or dataclass field of a dotted name.
+
+    Raises:
+        ImportError: If its first part is no module.
+        AttributeError: If a module or a class has no such attribute or field.
+    """
+    first, *rest = name.split(".")
+    found, path = importlib.import_module(first), first
+    for part in rest:
+        path = f"{path}.{part}"
+        fields = getattr(found, "__dataclass_fields__", {})
+        if part in fields:
+            found = fields[part]
+        elif hasattr(found, part) or not hasattr(found, "__path__"):
+            found = getattr(found, part)
+        else:
+            try:
+                found = importlib.import_module(path)
+            except ModuleNotFoundError as error:
+                if error.name != path:
+                    raise
+                raise AttributeError(f"nothing is called {path}") from error
+    return found
+
+
+@dataclass(frozen=True)
+class Names:
+    """Names of a newer version, translated for an older checkout.
+
+    Attributes:
+        renamed: Old names by new ones; empty for a checkout that knows the new ones.
+    """
+
+    renamed: Mapping[str, str]
+
+    def __call__(self, name: str) -> Any:
+        """Return what the checkout has under a new name."""
+        return resolve(older(name, self.renamed))
+
+    def field(self, name: str, of: Any) -> Any:
+        """Value of an attribute of an object, by the new dotted name of class and attribute."""
+        return getattr(of, older(name, self.renamed).rpartition(".")[2])
+
+
+class Probe:
+    """One checkout at work.
+
+    Attributes:
+        names: Finds what the newer version calls by a name.
+        output: Folder of the results.
+    """
+
+    def __init__(self, names: Names, output: Path, models: Mapping[str, str]) -> None:
+        """Load the models, by the names of their files."""
+        self.names, self.output = names, output
+        load = names("models.Classifier.load")
+        self._models = {name: load(path) for name, path in models.items()}
+
+    def keep(self, run: str, what: str, **arrays: Any) -> None:
+        """Write one result."""
+        folder = self.output / run
+        folder.mkdir(parents=True, exist_ok=True)
+        np.savez(folder / f"{what}.npz", **arrays)
+
+    def simulate(self, name: str, case: list[Any]) -> None:
+        """Simulate robot, scenario and seed for a duration in [s], and write the run file."""
+        robot, scenario, seed, duration = case
+        run = self.names("scenarios.simulate")(robot, scenario, seed, duration=duration)
+        path = self.output / name / "simulated run.npz"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self.names("noisemodel.Run.save")(run, path)
+
+    def look_at_run(self, name: str, path: str) -> None:
+        """Compute the noises of a run, and what each model decides on it."""
+        run = self.names("noisemodel.Run.load")(path)
+        read = self.names.field
+        velocity = read("noisemodel.Run.velocity", run)
+        desired = read("noisemodel.Run.velocity_desired", run)
+        motion = read("noisemodel.Run.motion", run)
+        noise = self.names("noisemodel.simplified")(motion, desired)
+        self.keep(name, "simplified noise", velocity=velocity, noise=noise)
+        self._link_noise(name, run)
+        for model in self._models:
+            self._classify_run(name, run, model)
+
+    def look_at_log(self, name: str, path: str) -> None:
+        """Read one of NoisyTest's logs, and classify it by all models of the noise alone."""
+        time, noise = self.names("models.read_log")(path)
+        rate = self.names("models.nominal_rate")(time)
+        self.keep(name, "log", time=time, noise=noise, rate=rate)
+        for model, classifier in self._models.items():
+            profile = self.names.field("models.Classifier.profile", classifier)
+            signals = self.names.field("models.Profile.signals", profile)
+            same_rate = abs(rate / self.names.field("models.Profile.rate", profile) - 1) < 1e-3
+            if same_rate and tuple(signals) == (self.names("models.NOISE"),):
+                self._classify(name, model, {"noise": noise}, valid=None)
+
+    def train(self, name: str, folder: str) -> None:
+        """Train NoisyTest's profile on its data set, and decide on the validation part."""
+        profile = self.names("models.Profile.noisytest")("rbf")
+        read = self.names("models.Dataset.read")
+        classifier = self.names("models.Classifier.train")(
+            read(Path(folder, "training"), profile), profile
+        )
+        validation = read(Path(folder, "validation"), profile, training=False)
+        frames = self.names.field("models.Dataset.frames", validation)
+        decisions = self.names("models.Classifier.decision")(classifier, frames)
+        scores = self.names("models.Classifier.scores")(classifier, frames)
+        self.keep(name, "noisytest-rbf, trained", decisions=decisions, scores=scores)
+
+    def _link_noise(self, name: str, run: Any) -> None:
+        """Compute the extended noise of a run that has a robot and positions."""
+        read = self.names.field
+        listed, robot_name = self.names("noisemodel.ROBOTS"), read("noisemodel.Run.robot", run)
+        if robot_name not in listed or read("noisemodel.Run.position", run) is None:
+            return
+        floating = True if read("noisemodel.Run.base_pose", run) is not None else None
+        robot = self.names("noisemodel.Robot.load")(robot_name, floating_base=floating)
+        surface = self.names("noisemodel.Surface.of")(robot)
+        q, v = self.names("noisemodel.Robot.configuration")(robot, run)
+        desired = self.names("noisemodel.Robot.desired")(robot, run)
+        q_desired, v_desired = desired or (None, None)
+        for kind in KINDS:
+            noise = self.names("noisemodel.extended")(
+                robot, surface, q, v, kind, q_desired=q_desired, v_desired=v_desired
+            )
+            power = read("noisemodel.Noise.power", noise)
+            self.keep(name, f"extended noise, {kind}", power=power)
+
+    def _classify_run(self, name: str, run: Any, model: str) -> None:
+        """Classify a run, at the lower rate of the model if it has one."""
+        profile = self.names.field("models.Classifier.profile", self._models[model])
+        rate = self.names.field("models.Profile.rate", profile)
+        own = self.names.field("noisemodel.Run.rate", run)
+        if own < rate * (1 - 1e-3):
+            return
+        if own > rate * (1 + 1e-3):
+            run = self.names("noisemodel.decimated")(run, rate)
+        norms, joints = self.names("noisemodel.norms")(run), self.names("noisemodel.by_joint")(run)
+        signals = {**norms, **joints}
+        if set(self.names.field("models.Profile.signals", profile)) <= set(signals):
+            valid = self.names.field("noisemodel.Run.valid", run)
+            self._classify(name, model, signals, valid=valid)
+
+    def _classify(self, name: str, model: str, signals: Mapping[str, Any], *, valid: Any) -> None:
+        """Keep features and decisions of all frames, and scores as `classify` gives them."""
+        classifier = self._models[model]
+        profile = self.names.field("models.Classifier.profile", classifier)
+        rate = self.names.field("models.Profile.rate", profile)
+        wanted = self.names.field("models.Profile.signals", profile)
+        rows = np.vstack([signals[one] for one in wanted])
+        frames = self.names("models.frame")(
+            rows if len(rows) > 1 else rows[0],
+            length=self.names.field("models.Profile.length", profile),
+            hop=self.names.field("models.Profile.hop", profile),
+        )
+        parts = np.split(frames, range(CHUNK, len(frames), CHUNK))
+        features = np.concatenate([self.names("models.features")(one, profile) for one in parts])
+        decisions = self.names("models.Classifier.decide")(classifier, features)
+        given = {one: signals[one] for one in wanted}
+        labels = self.names("models.Classifier.classify")(classifier, given, rate, valid=valid)
+        self.keep(
+            name,
+            model,
+            signals=rows,
+            features=features,
+            decisions=decisions,
+            **{
+                field: self.names.field(f"models.Labels.{field}", labels)
+                for field in ("start", "stop", "scores")
+            },
+        )
+
+
+def main() -> None:
+    """Do the job that the only argument names."""
+    job = json.loads(Path(sys.argv[1]).read_text())
+    for package in ("noisemodel", "models", "scenarios"):
+        found = Path(str(importlib.import_module(package).__file__)).resolve()
+        if not found.is_relative_to(Path(job["checkout"]).resolve()):
+            raise SystemExit(f"{package} is imported from {found}, not from {job['checkout']}")
+    probe = Probe(Names(job["renamed"]), Path(job["output"]), job["models"])
+    versions = {package: metadata.version(package) for package in PACKAGES}
+    (probe.output / "versions.json").write_text(json.dumps(versions))
+    for name, case in job["simulate"].items():
+        probe.simulate(name, case)
+    for name, path in job["runs"].items():
+        probe.look_at_run(name, path)
+    for name, path in job["logs"].items():
+        probe.look_at_log(name, path)
+    for name, folder in job["train"].items():
+        probe.train(name, folder)
+
+
+if __name__ == "__main__":
+    main()
