@@ -27,6 +27,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,12 @@ PROBE = ROOT / "benchmarks" / "checkoutsprobe.py"
 RENAMED = ROOT / "docs" / "renamed.csv"
 STANDIN = ROOT.parent / "shared" / "tools" / "standin_lola.py"
 
-SIMULATED: dict[str, tuple[str, str, int, float]] = {
+DEMO = ROOT / "assets" / "runs" / "demo.npz"
+
+Case: TypeAlias = tuple[str, str, int, float]
+"""Robot, scenario, seed and duration in [s] of a simulated run."""
+
+SIMULATED: dict[str, Case] = {
     "talos-straight": ("talos", "straight", 0, 3.0),
     "talos-obstacle-toe": ("talos", "obstacle-toe", 1, 4.0),
     "talos-multisine": ("talos", "multisine-60-100", 2, 3.0),
@@ -50,7 +56,9 @@ SIMULATED: dict[str, tuple[str, str, int, float]] = {
     "solo12-decalibrated": ("solo12", "decalibrated", 1, 4.0),
     "solo12-multisine": ("solo12", "multisine-30-40", 2, 3.0),
 }
-"""Robot, scenario, seed and duration in [s] of each simulated run."""
+"""The simulated runs, by name."""
+SHIPPED = ("demo", "lola", *SIMULATED)
+"""What is compared unless runs are named."""
 TASKS = ("simulate", "runs", "logs", "train", "models")
 """What a probe is given, each by name."""
 AGAIN = ("panda-early-height", "go2-force-jump")
@@ -216,25 +224,22 @@ def standin(folder: Path) -> Path | None:
     return folder if folder.exists() else None
 
 
-def inputs(after: Checkout, folder: Path, wanted: Iterable[str]) -> dict[str, Path]:
-    """Files of the runs that are compared, by name; what is missing is simulated.
+def simulated(checkout: Checkout, folder: Path, cases: Mapping[str, Case]) -> dict[str, Path]:
+    """Run files of simulated runs, by name; those that the folder lacks are simulated.
 
     Args:
-        after: The checkout that simulates.
-        folder: Where simulated run files are kept.
-        wanted: Names of runs, and paths of run files.
+        checkout: The checkout that simulates.
+        folder: Where run files are kept.
+        cases: What each run is.
     """
-    files = {name: folder / name / "simulated run.npz" for name in wanted if name in SIMULATED}
+    files = {name: folder / name / "simulated run.npz" for name in cases}
     for name in [name for name, file in files.items() if not file.exists()]:
         fresh = folder.with_suffix(".part")
         shutil.rmtree(fresh, ignore_errors=True)
-        after.probe(fresh, simulate={name: SIMULATED[name]})
+        checkout.probe(fresh, simulate={name: cases[name]})
         folder.mkdir(parents=True, exist_ok=True)
         (fresh / name).rename(folder / name)
-    if "demo" in wanted:
-        files["demo"] = ROOT / "assets" / "runs" / "demo.npz"
-    given = [Path(name).resolve() for name in wanted if name not in {"demo", "lola", *SIMULATED}]
-    return files | {path.stem: path for path in given}
+    return files
 
 
 def compare_checkouts(
@@ -248,7 +253,11 @@ def compare_checkouts(
         folder: Where inputs are kept and results are written.
         wanted: Names of runs, "lola" for the stand-in, and paths of run files.
     """
-    runs = inputs(after, folder / "runs", wanted)
+    chosen = {name: case for name, case in SIMULATED.items() if name in wanted}
+    runs = simulated(after, folder / "runs", chosen)
+    runs |= {"demo": DEMO} if "demo" in wanted else {}
+    given = [Path(name).resolve() for name in wanted if name not in SHIPPED]
+    runs |= {path.stem: path for path in given}
     logs: dict[str, Path] = {}
     train: dict[str, Path] = {}
     if "lola" in wanted:
@@ -310,18 +319,17 @@ def main() -> int:
     arguments = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    shipped = ["demo", "lola", *SIMULATED]
     arguments.add_argument("--before", type=Path, required=True, metavar="FOLDER")
     arguments.add_argument("--after", type=Path, default=ROOT, metavar="FOLDER")
     arguments.add_argument("--python-before", type=Path, metavar="PYTHON")
     arguments.add_argument("--python-after", type=Path, metavar="PYTHON")
     arguments.add_argument(
-        "--runs", nargs="+", default=shipped, help=f"of {', '.join(shipped)}, or run files"
+        "--runs", nargs="+", default=SHIPPED, help=f"of {', '.join(SHIPPED)}, or run files"
     )
     arguments.add_argument("--output", type=Path, default=ROOT / "build" / "checkouts")
     given = arguments.parse_args()
-    if unknown := [name for name in given.runs if name not in shipped and not Path(name).is_file()]:
-        arguments.error(f"no run file {', '.join(unknown)}; known by name: {', '.join(shipped)}")
+    if unknown := [name for name in given.runs if name not in SHIPPED and not Path(name).is_file()]:
+        arguments.error(f"no run file {', '.join(unknown)}; known by name: {', '.join(SHIPPED)}")
     folder = given.output.resolve()
     before = Checkout.of(given.before, given.python_before, folder / "scratch" / "before")
     after = Checkout.of(given.after, given.python_after, folder / "scratch" / "after")

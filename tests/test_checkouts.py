@@ -1,4 +1,4 @@
-"""What compares two checkouts notices a difference, and knows how names have changed."""
+"""Two checkouts compared: differences are noticed, renamed names are found, commands are timed."""
 
 import importlib
 import io
@@ -59,6 +59,11 @@ def checkouts(benchmarks):
 @pytest.fixture(scope="module")
 def probe(benchmarks):
     return importlib.import_module("benchmarks.checkoutsprobe")
+
+
+@pytest.fixture(scope="module")
+def commands(benchmarks):
+    return importlib.import_module("benchmarks.commands")
 
 
 @pytest.fixture(scope="module")
@@ -228,3 +233,42 @@ def test_each_public_name_of_the_first_version_exists_or_is_listed(checkouts, pr
             except AttributeError:
                 lost.append(name)
     assert lost == []
+
+
+def checkout_of(checkouts, folder, script):
+    """A checkout whose `inspector` is a script."""
+    (folder / "inspector").mkdir(parents=True)
+    (folder / "inspector" / "__init__.py").touch()
+    (folder / "inspector" / "__main__.py").write_text(script)
+    return checkouts.Checkout.of(folder, Path(sys.executable), folder / "scratch")
+
+
+def test_checkouts_are_timed_in_turns_after_a_warm_up(checkouts, commands, tmp_path):
+    record = tmp_path / "calls.txt"
+    script = f"import sys; open({str(record)!r}, 'a').write(' '.join(sys.argv[1:]) + '\\n')"
+    sides = {side: checkout_of(checkouts, tmp_path / side, script) for side in ("a", "b")}
+    found = commands.in_turns(sides, {"a": ["old", "run"], "b": ["new", "run"]}, 2)
+    assert record.read_text().splitlines() == ["old run", "new run"] * 3
+    assert {side: len(times) for side, times in found.items()} == {"a": 2, "b": 2}
+    assert all(cpu > 0.0 and wall > 0.0 for times in found.values() for cpu, wall in times)
+
+
+def test_findings_are_no_failure_of_a_command(checkouts, commands, tmp_path):
+    found = checkout_of(checkouts, tmp_path, "print('impact'); raise SystemExit(1)")
+    assert len(commands.measure(found, ["classify"])) == 2
+
+
+@pytest.mark.parametrize(
+    ("script", "text"), [("import nothing_there", "No module named"), ("exit(3)", "exit 3")]
+)
+def test_a_command_that_fails_is_not_timed(checkouts, commands, tmp_path, script, text):
+    broken = checkout_of(checkouts, tmp_path, script)
+    with pytest.raises(SystemExit, match=text):
+        commands.measure(broken, ["classify", "run.npz"])
+
+
+def test_a_row_has_medians_and_their_ratios(commands):
+    before, after = [(1.0, 2.0), (9.0, 9.0), (1.0, 2.0)], [(0.5, 4.0), (0.5, 4.0), (0.1, 0.1)]
+    assert commands.row("view", before, after) == (
+        "| view | 1.00 | 2.00 | 0.50 | 4.00 | 0.50 | 2.00 |"
+    )
