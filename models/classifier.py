@@ -30,7 +30,7 @@ class Classifier:
     Attributes:
         profile: How a signal becomes features.
         classes: What frames can be called, in the profile's order: those it was trained with.
-        machines: What decides: support vector machines, networks, or trees.
+        estimator: What decides: support vector machines, networks, trees, or a baseline.
         mean: What is subtracted from the features, shape (features,).
         scale: What they are divided by then, shape (features,).
         runs: SHA-256 of each training recording, by name.

@@ -185,7 +185,7 @@ def test_a_stream_hears_what_the_whole_signal_says(learnt):
     assert models.ANOMALY in labels
 
 
-def test_a_failure_of_any_name_is_found_by_a_anomaly(learnt):
+def test_a_failure_of_any_name_is_found_by_an_anomaly(learnt):
     blocks = ((0.0, 3.5, "ok"), (4.0, 6.0, "oscillations"), (6.5, 8.0, "ok"))
     tests = [recording(f"bad{seed}", seed, 0.3, blocks) for seed in (21, 22)]
     measured = models.assess(learnt.classifier, tests)
