@@ -1,18 +1,36 @@
-"""Commands, recordings and reports for people; ``read_log`` and ``show`` for programs."""
+"""Commands, recordings and reports for people; `analyse`, `read_log`, `show` for programs."""
 
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from inspector.analysis.analyse import Analysis, Status, Unknown, analyse
+    from inspector.library import load_library
     from inspector.live import LiveSession
     from inspector.logs.importing import Imported
     from inspector.logs.library import read_log, read_logs
     from inspector.recording.notebook import show
 
-__all__ = ["Imported", "LiveSession", "read_log", "read_logs", "show"]
+__all__ = [
+    "Analysis",
+    "Imported",
+    "LiveSession",
+    "Status",
+    "Unknown",
+    "analyse",
+    "load_library",
+    "read_log",
+    "read_logs",
+    "show",
+]
 
-_HOMES = {
+_MODULES = {
+    "Analysis": "inspector.analysis.analyse",
     "Imported": "inspector.logs.importing",
     "LiveSession": "inspector.live",
+    "Status": "inspector.analysis.analyse",
+    "Unknown": "inspector.analysis.analyse",
+    "analyse": "inspector.analysis.analyse",
+    "load_library": "inspector.library",
     "read_log": "inspector.logs.library",
     "read_logs": "inspector.logs.library",
     "show": "inspector.recording.notebook",
@@ -21,8 +39,13 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     """Import what is asked for: `inspector --help` needs none of it, and it takes long."""
-    if name not in _HOMES:
+    if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(_MODULES[name]), name)
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__

@@ -1,5 +1,6 @@
 """The demo run and the models that ship."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from inspector.errors import InspectorError
@@ -29,6 +30,22 @@ def demo_run() -> Path:
     return folder("runs") / "demo.npz"
 
 
-def model_files() -> tuple[Path, ...]:
-    """Name the model files that ship."""
-    return tuple(sorted(folder("models").glob("*.npz")))
+def model_files(chosen: Sequence[Path] | None = None) -> tuple[Path, ...]:
+    """Name model files: those that were chosen, or all that ship.
+
+    Args:
+        chosen: Model files, or names of models that ship; None or empty for all of these.
+
+    Raises:
+        InspectorError: If a chosen one is neither a file nor a model that ships.
+    """
+    shipped = {path.stem: path for path in sorted(folder("models").glob("*.npz"))}
+    found = []
+    for path in chosen or shipped.values():
+        known = shipped.get(str(path))
+        if known is None and not path.exists():
+            raise InspectorError(
+                f"{path}: no such model; name a file, or one that ships: {', '.join(shipped)}"
+            )
+        found.append(path if path.exists() else shipped[str(path)])
+    return tuple(found)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import models
 import noisemodel as nm
+from inspector import assets
 from inspector.errors import InspectorError
 from noisemodel.types import Array, Real
 
@@ -32,13 +33,16 @@ class Labelled:
     remark: str = ""
 
 
-def load_library(paths: Sequence[Path]) -> Library:
+def load_library(paths: Sequence[Path] = ()) -> Library:
     """Read models, by the stems of their files.
+
+    Args:
+        paths: Model files; those that ship unless given.
 
     Raises:
         ModelFileError: If a file is no model.
     """
-    return {path.stem: models.Classifier.load(path) for path in paths}
+    return {path.stem: models.Classifier.load(path) for path in paths or assets.model_files()}
 
 
 def for_robot(library: Library, robot: str | None) -> Library:

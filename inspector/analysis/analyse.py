@@ -19,7 +19,7 @@ import noisemodel as nm
 from inspector.analysis.desired import without_placeholder
 from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.errors import InspectorError
-from inspector.library import CannotTellError, Library, label_noise, label_run
+from inspector.library import CannotTellError, Library, label_noise, label_run, load_library
 from inspector.localisation.extent import extent
 from inspector.localisation.localise import Origin, origins
 from models import Event
@@ -164,7 +164,7 @@ IGNORED = "unknown frames are ignored"
 
 def analyse(
     run: nm.Run,
-    library: Library,
+    library: Library | None = None,
     *,
     name: str = "run",
     sha256: str = "",
@@ -177,7 +177,7 @@ def analyse(
 
     Args:
         run: The run.
-        library: Models to choose from.
+        library: Models to choose from, see `inspector.load_library`; those that ship unless given.
         name: Name of the run.
         sha256: SHA-256 of the file that it came from.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
@@ -185,6 +185,7 @@ def analyse(
     Returns:
         The analysis. A run that no model can label is no error: its status is `cannot-tell`.
     """
+    library = load_library() if library is None else library
     run, left_out = without_placeholder(run)
     seen = audit(run, library)
     notes = (left_out,) if left_out else ()

@@ -30,7 +30,7 @@ def audit(
     from inspector.audit.logs import audit_all
     from inspector.library import load_library
 
-    found, failed = audit_all(logs, load_library(model or assets.model_files()))
+    found, failed = audit_all(logs, load_library(assets.model_files(model)))
     if format is Format.JSON:
         typer.echo(as_json(found, failed))
     elif found:

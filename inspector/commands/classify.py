@@ -58,7 +58,7 @@ def classify(
 
     if localise and format is not Format.JSON:
         raise typer.BadParameter("--localise takes --format json")
-    library = load_library(model or assets.model_files())
+    library = load_library(assets.model_files(model))
     targets = {}
     if labels_to:
         targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)

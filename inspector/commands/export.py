@@ -25,7 +25,7 @@ def export(
     from inspector.library import load_library
     from noisemodel import Run
 
-    library = load_library(model or assets.model_files())
+    library = load_library(assets.model_files(model))
     found = write(Run.load(run), output, library, kind=kind, overwrite=overwrite)
     typer.echo(f"{run}: {found.analysis.headline}")
     for remark in found.remarks:

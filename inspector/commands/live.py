@@ -49,7 +49,7 @@ def live(
         LiveSession,
         rate,
         robot=robot,
-        library=load_library(model or assets.model_files()),
+        library=load_library(assets.model_files(model)),
         save=save,
         connect=connect,
         overwrite=overwrite,

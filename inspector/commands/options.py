@@ -12,7 +12,9 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
 ModelFiles = Annotated[
     list[Path] | None,
-    typer.Option("--model", help="A model to use instead of those that ship; may be repeated."),
+    typer.Option(
+        "--model", help="Use this model alone: a file, or the name of one that ships; repeatable."
+    ),
 ]
 
 

@@ -27,7 +27,7 @@ def report(
 
     html.require()
     refuse_existing(output, overwrite=overwrite)
-    library = load_library(model or assets.model_files())
+    library = load_library(assets.model_files(model))
     found = analyse_file(run, library, links=robot, kind=kind)
     assert found.audit is not None
     seen = text(found.name, found.audit)

@@ -38,7 +38,7 @@ def shot(
     with TemporaryDirectory() as folder:
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
-            found = analyse_file(run, load_library(model or assets.model_files()), kind=kind)
+            found = analyse_file(run, load_library(assets.model_files(model)), kind=kind)
             recording = Path(folder) / "run.rrd"
             seconds = first_look(found) if at is None else at
             write(found, recording)

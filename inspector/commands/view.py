@@ -71,7 +71,7 @@ def view(
     target = save or viewer.scratch_path(both)
     overwrite = overwrite or save is None
     refuse_existing(target, overwrite=overwrite)
-    library = load_library(model or assets.model_files())
+    library = load_library(assets.model_files(model))
     if after is None:
         _one(path, target, library, robot=robot, kind=kind, terms=terms, overwrite=overwrite)
     else:

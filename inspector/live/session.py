@@ -9,7 +9,6 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inspector import assets
 from inspector.library import Library, for_robot, load_library
 from inspector.live.block import Block, rows_of, widths_of
 from inspector.live.errors import LiveError
@@ -63,7 +62,7 @@ class LiveSession:
         if not 1.0 <= rate < np.inf:
             raise LiveError(f"a rate of {rate:g} Hz; expected 1 or more")
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
-        self._library = load_library(assets.model_files()) if library is None else library
+        self._library = load_library() if library is None else library
         self._tell, self._troubles = tell, Troubles(self._say)
         self._latest = -1.0 / rate
         self._block: Block | None = None

@@ -66,13 +66,12 @@ def in_notebook() -> bool:
 
 
 def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
-    from inspector import assets
     from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library
     from inspector.recording.recording import write
     from inspector.sound.clip import of_recording
 
-    library = load_library(assets.model_files())
+    library = load_library()
     with tempfile.TemporaryDirectory() as folder:
         path = run if not isinstance(run, nm.Run) else Path(folder) / "run.npz"
         if isinstance(run, nm.Run):
