@@ -138,8 +138,10 @@ def test_an_output_is_asked_for(importing, bag):
     assert "say where the run goes" in err
 
 
-def test_a_reader_that_is_not_installed_is_named(importing, bag, tmp_path, monkeypatch):
-    monkeypatch.setattr("inspector.logs.formats.find_spec", lambda name: None)
+@pytest.mark.parametrize("missing", ["rosbags", "mcap"])
+def test_a_library_that_is_not_installed_is_named(importing, bag, tmp_path, monkeypatch, missing):
+    monkeypatch.setattr("inspector.logs.formats.find_spec", lambda name: name != missing or None)
     status, _, err = importing(bag, "-o", tmp_path / "run.npz")
     assert status == 3
-    assert "rosbags reads such logs and is not installed; pip install 'noise-inspector[ros]'" in err
+    expected = f"{missing} reads such logs and is not installed; pip install 'noise-inspector[ros]'"
+    assert expected in err

@@ -4,10 +4,12 @@ import sqlite3
 
 import numpy as np
 import pytest
+from mcap.writer import Writer
 from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
+from inspector.logs.ros import mcaprecords
 
 TALK, OLD = Talk(), Talk(ros1=True)
 LONG = TIMES[0] + 10_000_000 * np.arange(4000)
@@ -67,6 +69,24 @@ def test_a_damaged_chunk_is_a_gap(whole, tmp_path):
     kept = run.mask.nonzero()[0]
     assert np.allclose(run.position[kept, :3], POSITION[kept], rtol=1e-12, atol=1e-12)
     assert any("damaged and left out" in remark for remark in imported.remarks)
+
+
+@pytest.mark.parametrize("damaged", [False, True])
+def test_a_checksum_of_the_whole_file_is_checked(tmp_path, damaged):
+    path = tmp_path / "log.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, use_chunking=False, enable_data_crcs=True)
+        writer.start()
+        schema = writer.register_schema(name="std_msgs/msg/Empty", encoding="ros2msg", data=b"")
+        channel = writer.register_channel(topic="/a", message_encoding="cdr", schema_id=schema)
+        for stamp in range(10):
+            writer.add_message(channel, log_time=stamp, data=b"0123456789", publish_time=stamp)
+        writer.finish()
+    if damaged:
+        path.write_bytes(path.read_bytes().replace(b"0123456789", b"0123x56789", 1))
+    lost = []
+    assert len(list(mcaprecords.messages(path, lost))) == 10
+    assert [each[:37] for each in lost] == ["some of what was read is damaged (crc"] * damaged
 
 
 def test_a_bag_whose_recorder_died_before_it_wrote_the_metadata_is_read(whole, tmp_path):

@@ -23,8 +23,8 @@ MAGIC = {
 }
 """The first bytes of a file, and the module here that reads it; what has none of them is CSV."""
 
-NEEDS = {"ros.reader": ("rosbags", "ros"), "hdf5": ("h5py", "hdf5")}
-"""The library that a reader needs, and the extra that installs it."""
+NEEDS = {"ros.reader": (("rosbags", "mcap"), "ros"), "hdf5": (("h5py",), "hdf5")}
+"""The libraries that a reader needs, and the extra that installs them."""
 
 
 class MissingReaderError(InspectorError):
@@ -56,9 +56,10 @@ def open_log(path: Path, reading: Reading) -> Opened:
         MissingReaderError: If the library that reads such logs is not installed.
     """
     module = _of_folder(path) if path.is_dir() else _of_file(path)
-    library, extra = NEEDS.get(module, ("", ""))
-    if library and find_spec(library) is None:
-        raise MissingReaderError(path, library, extra)
+    libraries, extra = NEEDS.get(module, ((), ""))
+    for library in libraries:
+        if find_spec(library) is None:
+            raise MissingReaderError(path, library, extra)
     reader: OpenLog = import_module(f"inspector.logs.{module}").open_log
     return reader(path, reading)
 
