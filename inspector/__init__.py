@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from inspector.library import load_library
     from inspector.live import LiveSession
     from inspector.logs.importing import Imported
-    from inspector.logs.library import read_log, read_logs
+    from inspector.logs.reading import read_log, read_logs
     from inspector.recording.notebook import show
 
 __all__ = [
@@ -27,12 +27,8 @@ _MODULES = {
     "Analysis": "inspector.analysis.analyse",
     "Imported": "inspector.logs.importing",
     "LiveSession": "inspector.live",
-    "Status": "inspector.analysis.analyse",
-    "Unknown": "inspector.analysis.analyse",
-    "analyse": "inspector.analysis.analyse",
-    "load_library": "inspector.library",
-    "read_log": "inspector.logs.library",
-    "read_logs": "inspector.logs.library",
+    "read_log": "inspector.logs.reading",
+    "read_logs": "inspector.logs.reading",
     "show": "inspector.recording.notebook",
 }
 

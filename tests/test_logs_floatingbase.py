@@ -1,4 +1,4 @@
-"""Poses and velocities of a base, turned into the run's convention."""
+"""Poses and velocities of a base, converted to the run's convention."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -11,7 +11,7 @@ TURNS = Rotation.random(50, rng=0)
 POSES = np.hstack((np.zeros((50, 3)), TURNS.as_quat()))
 
 
-def test_the_order_of_a_quaternion_is_turned():
+def test_the_order_of_a_quaternion_is_converted():
     pose = np.hstack((POSES[:, :3], POSES[:, [6, 3, 4, 5]]))
     assert np.array_equal(pose_of(pose, "wxyz"), POSES)
     assert np.array_equal(pose_of(POSES, "xyzw"), POSES)
@@ -19,7 +19,7 @@ def test_the_order_of_a_quaternion_is_turned():
 
 @given(st.integers(0, 1000))
 @settings(max_examples=20, deadline=None)
-def test_velocities_in_the_worlds_axes_are_seen_from_the_body(seed):
+def test_velocities_in_world_axes_are_converted_to_body_axes(seed):
     twist = np.random.default_rng(seed).standard_normal((50, 6))
     linear, angular = (TURNS.inv().apply(part) for part in (twist[:, :3], twist[:, 3:]))
     assert np.allclose(velocity_of(twist, "world", POSES), np.hstack((linear, angular)))
@@ -29,14 +29,14 @@ def test_velocities_in_the_worlds_axes_are_seen_from_the_body(seed):
 
 def test_poses_are_interpolated_the_short_way():
     time, between = np.arange(50) / 50, np.arange(480) / 490
-    turns = Rotation.from_rotvec(np.stack((time, 2 * time, 0 * time), axis=1))
+    is_angular = Rotation.from_rotvec(np.stack((time, 2 * time, 0 * time), axis=1))
     signs = np.where(np.arange(50) % 3, 1.0, -1.0)[:, None]  # q and -q are one rotation
-    poses = np.hstack((np.zeros((50, 3)), signs * turns.as_quat()))
+    poses = np.hstack((np.zeros((50, 3)), signs * is_angular.as_quat()))
 
     def linearly(columns):
         return np.stack([np.interp(between, time, column) for column in columns.T], axis=1)
 
     found = Rotation.from_quat(interpolated(poses, linearly)[:, 3:])
-    error = found * Slerp(time, turns)(between).inv()
+    error = found * Slerp(time, is_angular)(between).inv()
     assert error.magnitude().max() < 1e-4
     assert np.allclose(np.linalg.norm(interpolated(poses, linearly)[:, 3:], axis=1), 1)

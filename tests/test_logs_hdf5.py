@@ -49,7 +49,7 @@ def test_robomimics_demonstrations_are_runs_in_their_order(tmp_path):
     assert run.position_desired is None  # actions are no joint positions
 
 
-def test_isaac_labs_states_go_before_its_observations_and_bring_the_base(tmp_path):
+def test_isaac_labs_states_take_precedence_over_observations_and_hold_the_base(tmp_path):
     pose = np.column_stack((numbers(3), np.tile(TURN, (400, 1))))
     twist = np.tile([1.0, 0.0, 0.0, 0.0, 2.0, 3.0], (400, 1))
     home = "states/articulation/robot"
@@ -81,20 +81,20 @@ def test_any_file_is_read_by_mapping(tmp_path):
     assert np.array_equal(run.velocity[:, run.joint_names.index("tool")], POSITION[:, 6])
 
 
-def test_what_is_missing_is_one_line(tmp_path):
+def test_what_is_missing_is_an_error_of_one_line(tmp_path):
     path = write(tmp_path / "log.hdf5", {"demo_0": {"obs/joint_pos": POSITION}})
-    with pytest.raises(LogError, match="there are no stamps; say the log's rate"):
+    with pytest.raises(LogError, match="there are no stamps; specify the log's rate"):
         read_log(path)
     said = "log.hdf5: obs/joint_pos may be relative to a default pose (Isaac Lab)"
     assert said in read_log(path, rate=50).remarks
     path = write(tmp_path / "other.hdf5", {"demo_0": {"obs/eef": POSITION}})
-    message = "demo_0 holds no known joint positions or velocities; say which do, .* obs/eef"
+    message = "demo_0 holds no known joint positions or velocities; name them, .* obs/eef"
     with pytest.raises(LogError, match=message):
         read_log(path, rate=50)
 
 
 @pytest.mark.parametrize("share", [0.001, 0.5, 0.95])
-def test_a_file_that_was_cut_off_is_one_line(tmp_path, share):
+def test_a_file_that_was_cut_off_is_an_error_of_one_line(tmp_path, share):
     path = cut(robomimic(tmp_path), share)
     with pytest.raises(LogError) as caught:
         list(read_logs(path))

@@ -1,4 +1,4 @@
-"""The layout of a JointState, held against rosbags' own reading of it."""
+"""The layout of a JointState, compared with what rosbags reads."""
 
 import numpy as np
 from hypothesis import given, settings
@@ -19,7 +19,7 @@ FLOATS = st.lists(st.floats(width=64), max_size=5)
     st.text(st.characters(codec="ascii", exclude_characters="\0"), max_size=9),
 )
 @settings(max_examples=100, deadline=None)
-def test_a_layout_finds_what_rosbags_finds(names, position, velocity, effort, frame):
+def test_a_layout_gives_the_numbers_of_rosbags(names, position, velocity, effort, frame):
     message = TALK.joint_state(1_700_000_000_123_456_789, names, position, velocity, effort)
     message.header.frame_id = frame
     data = bytes(TALK.raw(message))

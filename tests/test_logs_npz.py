@@ -1,4 +1,4 @@
-"""NumPy archives: the run file itself, MuJoCo's state, Isaac's, one's own."""
+"""NumPy archives: run files, MuJoCo's state, Isaac's arrays, and others by mapping."""
 
 import mujoco
 import numpy as np
@@ -18,14 +18,14 @@ def save(tmp_path, **arrays):
     return tmp_path / "log.npz"
 
 
-def test_a_run_file_is_taken_as_it_is(tmp_path):
+def test_a_run_file_is_loaded_unchanged(tmp_path):
     blocks = (Block(0.0, 1.0, "ok"),)
     run = Run(time=TIME, velocity=VELOCITY, joint_names=JOINTS, blocks=blocks, meta={"seed": 3})
     run.save(tmp_path / "run.npz")
     imported = read_log(tmp_path / "run.npz")
     assert imported.run.blocks == blocks
     assert imported.run.meta == {"seed": 3}
-    assert imported.remarks == ("a run file, taken as it is",)
+    assert imported.remarks == ("a run file, unchanged",)
 
 
 def test_a_run_file_whose_time_is_not_uniform_is_resampled(tmp_path):
@@ -43,7 +43,7 @@ FREE = """<mujoco><worldbody><body><freejoint/><geom size="0.1"/>
 </body></worldbody></mujoco>"""
 
 
-def test_mujocos_state_becomes_a_base_in_its_own_axes_and_joints(tmp_path):
+def test_mujocos_state_becomes_a_base_in_body_axes_and_joints(tmp_path):
     model = mujoco.MjModel.from_xml_string(FREE)
     data = mujoco.MjData(model)
     data.qvel[:] = [0.3, -0.2, 1.0, 0.5, 1.0, -2.0, 4.0]
@@ -83,10 +83,10 @@ def test_isaacs_arrays_are_known_and_its_root_is_mapped(tmp_path):
     assert np.array_equal(run.velocity, VELOCITY)
     up = [0.0, np.sin(0.6), np.cos(0.6)]  # the world's z, seen from a body tilted about x
     assert np.allclose(run.base_velocity, np.concatenate((up, np.multiply(2, up))))
-    with pytest.raises(LogError, match="is turned into the body's by a base_pose of the same"):
+    with pytest.raises(LogError, match="a velocity in world axes needs a base_pose of the same"):
         read_log(path, mapping=mapping[1:], rate=200)
     wrong = ["base_pose=root_state[1:8]"]
-    with pytest.raises(LogError, match="a quaternion has another length than 1"):
+    with pytest.raises(LogError, match="a quaternion whose norm is not 1"):
         read_log(path, mapping=wrong, rate=200)
 
 
@@ -106,7 +106,7 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
         (
             {"dof_vel": VELOCITY},
             [],
-            r"there are no stamps; say the log's rate \(--rate\), or",
+            r"there are no stamps; specify the log's rate \(--rate\), or",
         ),
         (
             {"speed": VELOCITY, "t": TIME},
@@ -142,14 +142,14 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
         ),
     ],
 )
-def test_arrays_that_do_not_fit_are_one_line(tmp_path, arrays, mapping, message):
+def test_arrays_that_do_not_fit_are_errors_of_one_line(tmp_path, arrays, mapping, message):
     path = save(tmp_path, **arrays)
     with pytest.raises(LogError, match=message) as caught:
         read_log(path, mapping=mapping)
     assert "\n" not in str(caught.value)
 
 
-def test_a_damaged_archive_is_one_line(tmp_path):
+def test_a_damaged_archive_is_an_error_of_one_line(tmp_path):
     path = save(tmp_path, t=TIME, dof_vel=VELOCITY)
     data = path.read_bytes()
     path.write_bytes(data[:-100])

@@ -29,7 +29,7 @@ def wide(tmp_path, **columns):
         pa.array(TIMES, pa.timestamp("ns")),
     ],
 )
-def test_wide_columns_come_back_bit_for_bit(tmp_path, stamps):
+def test_columns_are_read_bit_for_bit(tmp_path, stamps):
     columns = {f"{joint}.velocity": VELOCITY[:, n] for n, joint in enumerate(JOINTS)}
     imported = read_log(wide(tmp_path, time=stamps, note=["fine"] * 400, **columns))
     assert imported.run.joint_names == JOINTS
@@ -46,12 +46,12 @@ def test_columns_of_lists_are_arrays_of_joints(tmp_path):
     assert np.array_equal(run.velocity, VELOCITY)
 
 
-def test_what_does_not_fit_is_one_line(tmp_path):
+def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
     ragged = [row[: 2 + n % 2] for n, row in enumerate(POSITION)]
     with pytest.raises(LogError, match="column 'joint_pos' has lists of different lengths"):
         read_log(wide(tmp_path, time=TIMES, joint_pos=ragged))
     path = wide(tmp_path, joint_pos=list(POSITION))
-    with pytest.raises(LogError, match=r"there are no stamps; say the log's rate \(--rate\)"):
+    with pytest.raises(LogError, match=r"there are no stamps; specify the log's rate \(--rate\)"):
         read_log(path)
     assert read_log(path, rate=100).run.rate == 100.0
     message = r"'joint_pos' has 3 columns, --joints names 2; take a part of it .*\[0:2\]"
@@ -85,7 +85,7 @@ def test_one_episode_is_chosen_by_its_number(tmp_path):
         read_log(folder, episode="7")
 
 
-def test_a_lone_file_of_a_data_set_knows_its_info(tmp_path):
+def test_a_single_file_of_a_data_set_finds_its_info(tmp_path):
     folder = write_lerobot(tmp_path / "set", [STATE], names={"motors": list(JOINTS)}, v3=False)
     file = folder / "data" / "chunk-000" / "episode_000000.parquet"
     assert read_log(file).run.joint_names == JOINTS
@@ -97,10 +97,12 @@ def test_stamps_of_float32_do_not_make_a_long_episode_jitter(tmp_path):
     assert np.array_equal(run.position, state.astype(np.float32))
 
 
-def test_units_that_nobody_said_are_not_taken_for_radians(tmp_path):
+def test_unspecified_units_are_not_assumed_to_be_radians(tmp_path):
     names = [f"{joint}.pos" for joint in JOINTS]
     folder = write_lerobot(tmp_path / "set", [STATE * 30], names=names)
-    message = "LeRobot does not log the unit of its '.pos' features: say --units degrees, normal"
+    message = (
+        "LeRobot does not log the unit of its '.pos' features: specify --units degrees, normal"
+    )
     with pytest.raises(LogError, match=message):
         read_log(folder)
     run = read_log(folder, units="degrees").run
@@ -123,12 +125,12 @@ def test_normalised_units_are_shares_of_the_robots_ranges(tmp_path):
     assert np.allclose(position[[0, -1], 1], [0.0, 0.04], atol=1e-6)
 
 
-def test_a_gripper_of_a_data_set_in_degrees_is_no_angle(tmp_path):
+def test_a_gripper_of_a_data_set_in_degrees_is_normalised(tmp_path):
     names = ["shoulder.pos", "gripper.pos"]
     folder = write_lerobot(tmp_path / "set", [STATE[:, :2] * 30], names=names)
     imported = read_log(folder, units="degrees")
     assert imported.run.joint_names == ("shoulder",)
-    said = "set: in 0 to 100 of its range, no angle, left out without a robot: gripper"
+    said = "set: normalised to 0 to 100 of its range, left out since no robot is specified: gripper"
     assert said in imported.remarks
 
 
@@ -141,10 +143,10 @@ def test_the_pose_of_an_end_effector_is_no_joint(tmp_path):
     assert run.position_desired is None
 
 
-def test_a_data_set_without_names_says_what_it_was_taken_for(tmp_path):
+def test_a_data_set_without_names_is_read_as_positions_with_a_remark(tmp_path):
     imported = read_log(write_lerobot(tmp_path / "set", [STATE], names=None))
     assert imported.run.joint_names == ("joint_0", "joint_1", "joint_2")
-    said = "set: observation.state has no names; it is taken for joint positions"
+    said = "set: observation.state has no names; it is read as joint positions"
     assert said in imported.remarks
 
 
@@ -152,18 +154,18 @@ def test_a_data_set_without_names_says_what_it_was_taken_for(tmp_path):
     ("info", "message"),
     [
         ("{", "cannot be read"),
-        ("[]", "names no features"),
-        ('{"features": 3}', "names no features"),
+        ("[]", "has no features"),
+        ('{"features": 3}', "has no features"),
     ],
 )
-def test_a_broken_info_file_is_one_line(tmp_path, info, message):
+def test_a_broken_info_file_is_an_error_of_one_line(tmp_path, info, message):
     folder = write_lerobot(tmp_path / "set", [STATE], names=None)
     (folder / "meta" / "info.json").write_text(info)
     with pytest.raises(LogError, match=message):
         read_log(folder)
 
 
-def test_damaged_data_is_one_line(tmp_path):
+def test_damaged_data_is_an_error_of_one_line(tmp_path):
     folder = write_lerobot(tmp_path / "set", [STATE], names=None)
     cut(folder / "data" / "chunk-000" / "file-000.parquet", 0.7)
     with pytest.raises(LogError, match="damaged or cut off"):

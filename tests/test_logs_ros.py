@@ -35,7 +35,7 @@ def states(talk=TALK, **how):
         (OLD, {"compression": "bz2"}),
     ],
 )
-def test_every_value_of_a_bag_comes_back_bit_for_bit(tmp_path, talk, how):
+def test_every_value_of_a_bag_is_read_bit_for_bit(tmp_path, talk, how):
     run = read_log(bag(tmp_path, {"/joint_states": states(talk)}, talk=talk, **how)).run
     assert run.joint_names == JOINTS
     assert np.array_equal(run.position, POSITION)
@@ -47,7 +47,7 @@ def test_every_value_of_a_bag_comes_back_bit_for_bit(tmp_path, talk, how):
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
-def test_a_lone_file_of_a_bag_is_enough(tmp_path, storage):
+def test_a_single_file_of_a_bag_is_enough(tmp_path, storage):
     folder = bag(tmp_path, {"/joint_states": states()}, storage=storage)
     (file,) = [each for each in folder.iterdir() if each.name != "metadata.yaml"]
     assert np.array_equal(read_log(file).run.position, POSITION)
@@ -63,10 +63,10 @@ def test_messages_without_stamps_have_those_of_the_recorder(tmp_path):
     messages = states(times=np.zeros(len(TIMES), dtype=int), received=TIMES)
     imported = read_log(bag(tmp_path, {"/joint_states": messages}))
     assert np.array_equal(imported.run.position, POSITION)
-    assert "bag: the messages have no stamps, those of the recorder are taken" in imported.remarks
+    assert "bag: the messages have no stamps, those of the recorder are used" in imported.remarks
 
 
-def test_velocities_that_were_not_logged_are_differentiated_and_it_is_said(tmp_path):
+def test_velocities_that_were_not_logged_are_differentiated_with_a_remark(tmp_path):
     position, velocity = motion((TIMES - EPOCH) * 1e-9)
     path = bag(tmp_path, {"/joint_states": joint_states(TALK, position=position)})
     run = read_log(path).run
@@ -130,7 +130,7 @@ def test_joint_states_that_are_commands_are_desired_motion(tmp_path):
     assert np.array_equal(run.position_desired, VELOCITY)
 
 
-def test_what_a_topic_holds_can_be_said(tmp_path):
+def test_the_signal_of_a_topic_can_be_mapped(tmp_path):
     path = bag(
         tmp_path,
         {
@@ -159,7 +159,7 @@ def controller_states(talk, kind, stages):
 
 
 @pytest.mark.parametrize("talk", [TALK, OLD])
-def test_a_controllers_state_holds_both_sides_under_its_old_names(tmp_path, talk):
+def test_a_controllers_state_holds_measured_and_desired_motion_under_its_old_names(tmp_path, talk):
     stages = ("desired", "actual", "error")
     messages = controller_states(talk, "JointTrajectoryControllerState", stages)
     run = read_log(bag(tmp_path, {"/arm/state": messages}, talk=talk)).run
@@ -170,7 +170,7 @@ def test_a_controllers_state_holds_both_sides_under_its_old_names(tmp_path, talk
     assert np.array_equal(run.velocity_desired, POSITION)
 
 
-def test_joint_states_go_before_a_controllers_feedback(tmp_path):
+def test_joint_states_take_precedence_over_a_controllers_feedback(tmp_path):
     stages = ("desired", "actual", "error")
     state = controller_states(TALK, "JointTrajectoryControllerState", stages)
     own = joint_states(TALK, position=EFFORT, velocity=EFFORT)
@@ -180,7 +180,7 @@ def test_joint_states_go_before_a_controllers_feedback(tmp_path):
     assert any("not read: /arm/state/actual/positions" in each for each in imported.remarks)
 
 
-def test_trajectories_are_desired_motion_and_hold_between_their_points(tmp_path):
+def test_trajectories_are_desired_motion_and_apply_between_their_points(tmp_path):
     def trajectory(at, start, stop):
         points = [
             TALK.point([start + (stop - start) * n / 10] * 3, [stop - start] * 3, after=n / 10)
@@ -203,7 +203,7 @@ def test_trajectories_are_desired_motion_and_hold_between_their_points(tmp_path)
     assert np.allclose(run.position_desired[moving, 0], run.time[moving], atol=1e-9)
 
 
-def test_odometry_is_the_base_in_its_own_axes(tmp_path):
+def test_odometry_is_the_base_in_body_axes(tmp_path):
     robot = Talk()
     messages = []
     for n, at in enumerate(TIMES):
@@ -266,7 +266,7 @@ def described(kinds):
     return URDF.format("\n".join(JOINT.format(name, kind) for name, kind in kinds.items()))
 
 
-def test_the_robot_comes_with_the_bag(tmp_path):
+def test_the_robot_is_read_from_the_bag(tmp_path):
     kinds = {"shoulder": "revolute", "elbow": "continuous", "wrist": "prismatic"}
     text = TALK.make("std_msgs/String", data=described(kinds))
     position = POSITION.copy()
@@ -291,7 +291,7 @@ def test_a_joint_that_the_robot_lacks_is_left_out_and_named(tmp_path):
     assert "bag: left out, not joints of 'robot_description': wrist" in imported.remarks
 
 
-def test_a_description_that_is_no_robot_does_no_harm(tmp_path):
+def test_an_invalid_robot_description_is_a_remark(tmp_path):
     text = TALK.make("std_msgs/String", data="<robot name='x'><joint/></robot>")
     topics = {"/joint_states": states(), "/robot_description": [(EPOCH, text)]}
     imported = read_log(bag(tmp_path, topics))
@@ -327,7 +327,7 @@ def test_topics_that_are_not_read_are_listed(tmp_path):
         ({"/joint_states": joint_states(TALK, effort=EFFORT)}, "no message holds joints"),
     ],
 )
-def test_a_bag_without_motion_is_one_line(tmp_path, topics, message):
+def test_a_bag_without_motion_is_an_error_of_one_line(tmp_path, topics, message):
     path = bag(tmp_path, topics)
     with pytest.raises(LogError, match=message) as caught:
         read_log(path)
@@ -335,14 +335,14 @@ def test_a_bag_without_motion_is_one_line(tmp_path, topics, message):
     assert "\n" not in str(caught.value)
 
 
-def test_one_nan_is_named_but_what_was_never_logged_is_left_out(tmp_path):
+def test_one_nan_is_named_but_columns_of_nan_are_left_out(tmp_path):
     never = np.full_like(EFFORT, np.nan)
     topics = {
         "/joint_states": joint_states(TALK, position=POSITION, velocity=VELOCITY, effort=never)
     }
     imported = read_log(bag(tmp_path, topics))
     assert imported.run.effort is None
-    assert any("nothing but nan, left out: /joint_states/effort of" in r for r in imported.remarks)
+    assert any("all nan, left out: /joint_states/effort of" in r for r in imported.remarks)
     broken = VELOCITY.copy()
     broken[123, 1] = np.nan
     topics = {"/joint_states": joint_states(TALK, position=POSITION, velocity=broken)}
@@ -359,7 +359,7 @@ def test_an_imported_bag_is_saved_and_loaded(tmp_path):
     assert Run.load(tmp_path / "run.npz").meta == run.meta
 
 
-def test_a_long_bag_is_held_little_more_than_once(tmp_path):
+def test_a_long_bag_takes_little_more_memory_than_its_values(tmp_path):
     times = EPOCH + 1_000_000 * np.arange(8000)
     times += np.random.default_rng(0).integers(-100_000, 100_000, len(times))
     names = [f"joint_{n}" for n in range(60)]
@@ -378,7 +378,7 @@ def test_a_long_bag_is_held_little_more_than_once(tmp_path):
     assert peak < 1.8 * numbers_of + 40e6
 
 
-def test_a_part_of_a_robots_joints_is_enough_mimic_joints_among_them(tmp_path):
+def test_some_of_a_robots_joints_are_enough_including_mimic_joints(tmp_path):
     names = ["panda_finger_joint2", "panda_joint7", "panda_finger_joint1", "panda_joint2"]
     position = np.abs(numbers(4)) / 100
     path = bag(tmp_path, {"/joint_states": joint_states(TALK, TIMES, names, position=position)})

@@ -1,4 +1,4 @@
-"""Commands on logs of robots."""
+"""`inspector import`: logs to run files."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -55,9 +55,9 @@ def import_(
 ) -> None:
     """Turn logs into run files; exit 3 if one of them cannot be read."""
     from inspector.logs.batch import import_logs
-    from inspector.logs.library import listing, reading_of
+    from inspector.logs.reading import listing, read_options
 
-    reading = reading_of(
+    options = read_options(
         map_ or (),
         saved=mapping,
         robot=robot,
@@ -68,35 +68,35 @@ def import_(
         offset=offset,
     )
     if list_:
-        for line in (line for log in logs for line in listing(log, reading)):
+        for line in (line for log in logs for line in listing(log, options)):
             typer.echo(line)
         return
     if output is None:
         raise typer.BadParameter("say where the run goes", param_hint="'--output' / '-o'")
     failed = False
-    for done in import_logs(
+    for result in import_logs(
         logs,
         output,
-        reading,
+        options,
         desired=desired,
         episodes=episode or (),
         overwrite=overwrite,
-        watch=_watched,
+        progress=_progress,
     ):
-        failed |= bool(done.problem)
-        if done.problem:
-            typer.echo(f"inspector: {done.problem}", err=True)
+        failed |= bool(result.problem)
+        if result.problem:
+            typer.echo(f"inspector: {result.problem}", err=True)
             continue
-        for remark in done.remarks:
+        for remark in result.remarks:
             typer.echo(f"  {remark}")
-        typer.echo(f"{done.path}: {done.duration:.2f} s at {done.rate:g} Hz")
+        typer.echo(f"{result.path}: {result.duration:.2f} s at {result.rate:g} Hz")
     if save_mapping:
-        reading.save(save_mapping, overwrite=overwrite)
+        options.save(save_mapping, overwrite=overwrite)
     if failed:
         raise typer.Exit(3)
 
 
-def _watched(items: Iterable[Any], total: int) -> Iterator[Any]:
+def _progress(items: Iterable[Any], total: int) -> Iterator[Any]:
     from inspector.progress import progress
 
     return progress(items, "import", total=total)

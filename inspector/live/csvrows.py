@@ -9,7 +9,7 @@ import numpy as np
 from inspector.live.block import SIGNALS
 from inspector.live.errors import LiveError
 from inspector.live.rows import Note, Rows
-from inspector.logs.columns import TIMES, listed, named
+from inspector.logs.signals import TIMES, column_signal, listed
 from noisemodel.types import Array
 
 UNKNOWN = ["", "nan", "NaN", "NAN", "null"]
@@ -33,7 +33,7 @@ class CsvReader:
         self._header = [cell.strip() for cell in text.split(self._delimiter)]
         found: dict[str, dict[str, int]] = {}
         for place, column in enumerate(self._header):
-            if (meaning := named(column)) is not None and meaning[0] in SIGNALS:
+            if (meaning := column_signal(column)) is not None and meaning[0] in SIGNALS:
                 joint = meaning[1]
                 known = joint if isinstance(joint, str) else _numbered(joint, names)
                 found.setdefault(meaning[0], {})[known] = place

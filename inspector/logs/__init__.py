@@ -1,1 +1,1 @@
-"""Logs of robots, from where people have them: a reader per format, then one way to a run."""
+"""Robot logs read as runs: one reader per format, then the same steps for all of them."""

@@ -1,8 +1,8 @@
-"""Offset and drift between two clocks, from motion that both of them saw.
+"""Offset and drift between two clocks, estimated by cross-correlation.
 
-The desired and the measured velocities of the same joints are laid over each other where they
-correlate best; the same again in short pieces shows how the clocks drift apart. What stays below
-``LAG`` is a controller's, not a clock's.
+The cross-correlation of the desired and the measured velocities of the same joints gives the
+offset; the residual offsets of short segments give the drift. An offset below ``LAG`` is
+attributed to the controller, not to the clocks.
 """
 
 from collections.abc import Mapping
@@ -12,63 +12,63 @@ from itertools import pairwise
 import numpy as np
 from scipy import fft
 
-from inspector.logs.resample import Clocked
+from inspector.logs.resample import TimedTrack
 from noisemodel.types import Array
 
 CORRELATION = 0.6
-"""Normalised correlation that two clocks must reach."""
+"""Least normalised correlation of an accepted offset."""
 
-RIVAL = 0.95
-"""Share of it that the next best offset may reach."""
+NEXT_BEST = 0.95
+"""Largest correlation of the next best offset, as a share of the best."""
 
 SHARE = 0.5
-"""Share of the shorter log that must lie within the longer one."""
+"""Least share of the shorter log that overlaps the longer one."""
 
 LAG = 0.1
-"""Measured motion that trails its desired one by up to this is a controller's work, in [s]."""
+"""Largest delay of measured behind desired motion that is attributed to a controller, in [s]."""
 
-FINEST = 1000.0
-"""Rate at which motions are compared at most, in [Hz]."""
+HIGHEST_RATE = 1000.0
+"""Highest rate at which motions are compared, in [Hz]."""
 
-COARSE = 50.0
-"""Rate at which they are compared first, in [Hz]."""
+COARSE_RATE = 50.0
+"""Rate of the first search, in [Hz]."""
 
-PIECES, SHORTEST = 12, 2.0
-"""How many pieces show a drift, and how long each must be, in [s]."""
+SEGMENTS, SHORTEST = 12, 2.0
+"""Largest number of segments that the drift is fitted to, and their least length, in [s]."""
 
-CERTAIN = 5.0
-"""Standard errors above which a drift is one."""
+SIGNIFICANT = 5.0
+"""Least ratio of a drift to its standard error."""
 
 LEAST_DRIFT = 20e-6
-"""Drift below which quartz clocks cannot be told apart, in [s/s]."""
+"""Least drift that is distinguished from none, as of quartz clocks, in [s/s]."""
 
 
 @dataclass(frozen=True)
 class Offset:
-    """How the desired clock stands to the measured one: t_measured = t + seconds + drift t.
+    """Offset of the desired clock to the measured one: t_measured = t + seconds + drift t.
 
     Attributes:
-        seconds: What to add to desired stamps at the first of them, in [s].
-        drift: By how much more with each second, in [s/s].
-        correlation: How well the motions agree then, at most 1.
-        rival: How well they agree at the next best offset.
+        seconds: Offset at the first desired stamp, in [s].
+        drift: Change of the offset per second, in [s/s].
+        correlation: Normalised correlation at this offset, at most 1.
+        next_best: Normalised correlation at the next best offset.
         span: Duration of the desired log, in [s].
     """
 
     seconds: float
     drift: float
     correlation: float
-    rival: float
+    next_best: float
     span: float
 
     @property
-    def is_sure(self) -> bool:
-        """Whether the motions agree, and nowhere else nearly as well."""
-        return self.correlation >= CORRELATION and self.rival <= RIVAL * self.correlation
+    def is_unambiguous(self) -> bool:
+        """Whether the correlation is high, and at no other offset nearly as high."""
+        return self.correlation >= CORRELATION and self.next_best <= NEXT_BEST * self.correlation
 
     @property
-    def is_of_clocks(self) -> bool:
-        """Whether it is more than a controller's lag."""
+    def exceeds_lag(self) -> bool:
+        """Whether it is larger than a controller's lag."""
         ends = (self.seconds, self.seconds + self.drift * self.span)
         return bool(self.drift) or max(map(abs, ends)) > LAG
 
@@ -76,48 +76,50 @@ class Offset:
         drift = f", drift {self.drift * 1e6:+.0f} ppm" if self.drift else ""
         return (
             f"offset {self.seconds:+.4f} s{drift} (correlation {self.correlation:.2f}, next best"
-            f" {self.rival:.2f})"
+            f" {self.next_best:.2f})"
         )
 
 
-def estimate(measured: Mapping[str, Clocked], desired: Mapping[str, Clocked]) -> Offset | None:
-    """Estimate how the desired clock stands to the measured one.
+def estimate(
+    measured: Mapping[str, TimedTrack], desired: Mapping[str, TimedTrack]
+) -> Offset | None:
+    """Offset of the desired clock to the measured one.
 
     Args:
-        measured: By signal, "position" or "velocity", what was measured.
-        desired: The same of what was desired.
+        measured: The measured tracks by signal, "position" or "velocity".
+        desired: The desired tracks by signal.
 
     Returns:
-        The offset; None where no joint moves in both.
+        The offset; None if no joint moves in both.
     """
-    pair = _shared(measured, desired)
+    pair = _common_tracks(measured, desired)
     if pair is None:
         return None
-    rate = min(FINEST, *(track.clock.nominal for track in pair))
+    rate = min(HIGHEST_RATE, *(track.clock.nominal for track in pair))
     joints = [joint for joint in pair[0].track.joints if joint in pair[1].track.joints]
-    there, here = (_Motion.of(track, joints) for track in pair)
-    coarse = min(rate, COARSE)
-    seconds, correlation, rival = _search(there, here, coarse)
+    measured_motion, desired_motion = (_Motion.of(track, joints) for track in pair)
+    coarse = min(rate, COARSE_RATE)
+    seconds, correlation, next_best = _search(measured_motion, desired_motion, coarse)
     drift = 0.0
-    span = float(here.time[-1] - here.time[0])
+    span = float(desired_motion.time[-1] - desired_motion.time[0])
     for _ in range(3):
-        pieces = _pieces(there, here, seconds, drift, rate)
-        if not len(pieces):
+        residuals = _residuals(measured_motion, desired_motion, seconds, drift, rate)
+        if not len(residuals):
             break
-        seconds, drift = _line(pieces, seconds, drift)
-    return Offset(seconds, drift, correlation, rival, span)
+        seconds, drift = _fitted(residuals, seconds, drift)
+    return Offset(seconds, drift, correlation, next_best, span)
 
 
 @dataclass(frozen=True, eq=False)
 class _Motion:
-    """Velocities of some joints, scaled to one size, and 0 in gaps."""
+    """Velocities of some joints over time."""
 
     time: Array
     velocity: Array
     clock_stretches: tuple[slice, ...]
 
     @classmethod
-    def of(cls, track: Clocked, joints: list[str]) -> "_Motion":
+    def of(cls, track: TimedTrack, joints: list[str]) -> "_Motion":
         columns = [track.track.joints.index(joint) for joint in joints]
         values = np.asarray(track.track.values[:, columns], dtype=np.float64)
         if track.track.signal.startswith("position"):
@@ -125,7 +127,7 @@ class _Motion:
         return cls(track.time, values, track.clock.stretches)
 
     def at(self, instants: Array) -> Array:
-        """Interpolate linearly, 0 in gaps and beyond, shape (instants, joints)."""
+        """Linearly interpolated velocities, 0 in gaps and outside, shape (instants, joints)."""
         found = np.zeros((len(instants), self.velocity.shape[1]))
         for stretch in self.clock_stretches:
             known = self.time[stretch]
@@ -135,10 +137,10 @@ class _Motion:
         return found
 
 
-def _shared(
-    measured: Mapping[str, Clocked], desired: Mapping[str, Clocked]
-) -> tuple[Clocked, Clocked] | None:
-    """Find a measured and a desired track of the same joints, of velocities if there are any."""
+def _common_tracks(
+    measured: Mapping[str, TimedTrack], desired: Mapping[str, TimedTrack]
+) -> tuple[TimedTrack, TimedTrack] | None:
+    """A measured and a desired track with a joint that moves in both, preferably velocities."""
     for one in ("velocity", "position"):
         for other in (one, "velocity", "position"):
             pair = measured.get(one), desired.get(other)
@@ -153,10 +155,13 @@ def _shared(
     return None
 
 
-def _search(there: _Motion, here: _Motion, rate: float) -> tuple[float, float, float]:
-    """Find the best offset of all, its correlation, and that of the next best."""
+def _search(
+    measured_motion: _Motion, desired_motion: _Motion, rate: float
+) -> tuple[float, float, float]:
+    """Best offset in [s], its correlation, and that of the next best."""
     one, other = (
-        motion.at(np.arange(motion.time[0], motion.time[-1], 1 / rate)) for motion in (there, here)
+        motion.at(np.arange(motion.time[0], motion.time[-1], 1 / rate))
+        for motion in (measured_motion, desired_motion)
     )
     scale = np.sqrt((one**2).mean(axis=0) * (other**2).mean(axis=0))
     moving = scale > 0
@@ -177,77 +182,79 @@ def _search(there: _Motion, here: _Motion, rate: float) -> tuple[float, float, f
     correlation = np.where(overlap >= least - 0.5, correlation, -1.0)
     best = int(np.argmax(correlation))
     lags = np.arange(length)
-    away = np.minimum((lags - best) % length, (best - lags) % length)
+    distance = np.minimum((lags - best) % length, (best - lags) % length)
     edge = _edge(correlation, best, length)
-    rival = float(correlation[away > edge].max(initial=-1.0))
+    next_best = float(correlation[distance > edge].max(initial=-1.0))
     lag = best if best < len(one) else best - length
-    seconds = lag / rate + float(there.time[0] - here.time[0])
-    return seconds, float(correlation[best]), rival
+    seconds = lag / rate + float(measured_motion.time[0] - desired_motion.time[0])
+    return seconds, float(correlation[best]), next_best
 
 
 def _edge(correlation: Array, best: int, length: int) -> int:
-    """Find how far the peak reaches: to where the correlation has fallen below a half of it."""
+    """Half-width of the peak in samples: where the correlation falls below half of it."""
     around = np.roll(correlation, length // 2 - best)
     below = np.flatnonzero(around < 0.5 * around[length // 2])
     below = np.abs(below - length // 2)
     return int(below.min(initial=length)) if len(below) else length
 
 
-def _pieces(there: _Motion, here: _Motion, seconds: float, drift: float, rate: float) -> Array:
-    """Measure what is left of the offset in pieces: when, how much, how much weight."""
-    since = here.time - here.time[0]
-    shifted = here.time + seconds + drift * since
-    start = max(there.time[0], shifted[0]) + 2 * LAG
-    stop = min(there.time[-1], shifted[-1]) - 2 * LAG
-    count = min(PIECES, int((stop - start) / SHORTEST))
+def _residuals(
+    measured_motion: _Motion, desired_motion: _Motion, seconds: float, drift: float, rate: float
+) -> Array:
+    """Residual offset of each segment: time, offset and weight, shape (segments, 3)."""
+    since = desired_motion.time - desired_motion.time[0]
+    shifted = desired_motion.time + seconds + drift * since
+    start = max(measured_motion.time[0], shifted[0]) + 2 * LAG
+    stop = min(measured_motion.time[-1], shifted[-1]) - 2 * LAG
+    count = min(SEGMENTS, int((stop - start) / SHORTEST))
     if count < 1:
         return np.empty((0, 3))
-    moved = _Motion(shifted, here.velocity, here.clock_stretches)
+    moved = _Motion(shifted, desired_motion.velocity, desired_motion.clock_stretches)
     reach = int(np.ceil(2 * LAG * rate))
     found = []
     edges = np.linspace(start, stop, count + 1)
     for first, last in pairwise(edges):
         instants = np.arange(first, last, 1 / rate)
-        wider = first + np.arange(-reach, len(instants) + reach) / rate
-        left, correlation = _match(there.at(instants), moved.at(wider), rate)
+        longer = first + np.arange(-reach, len(instants) + reach) / rate
+        residual, correlation = _match(measured_motion.at(instants), moved.at(longer), rate)
         if correlation >= CORRELATION:
-            found.append(((first + last) / 2 - shifted[0], left, correlation))
+            found.append(((first + last) / 2 - shifted[0], residual, correlation))
     return np.array(found).reshape(-1, 3)
 
 
-def _match(piece: Array, wider: Array, rate: float) -> tuple[float, float]:
-    """Find where a piece lies in a wider one: time ahead of its middle, and the correlation."""
-    scale = np.sqrt((piece**2).sum(axis=0) * (wider**2).sum(axis=0))
+def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
+    """Offset in [s] of a segment within a longer one, and the correlation there."""
+    scale = np.sqrt((segment**2).sum(axis=0) * (longer**2).sum(axis=0))
     moving = scale > 0
     if not moving.any():
         return 0.0, 0.0
-    weight = np.sqrt(1 / scale[moving])  # joints count alike, fast or slow
-    piece, wider = piece[:, moving] * weight, wider[:, moving] * weight
-    reach = (len(wider) - len(piece)) // 2
-    length = fft.next_fast_len(len(wider), real=True)
-    product = fft.rfft(wider, length, axis=0) * np.conj(fft.rfft(piece, length, axis=0))
+    weight = np.sqrt(1 / scale[moving])  # joints have equal weight, fast or slow
+    segment, longer = segment[:, moving] * weight, longer[:, moving] * weight
+    reach = (len(longer) - len(segment)) // 2
+    length = fft.next_fast_len(len(longer), real=True)
+    product = fft.rfft(longer, length, axis=0) * np.conj(fft.rfft(segment, length, axis=0))
     crossed = fft.irfft(product.sum(axis=1), length)[: 2 * reach + 1]
-    energy = np.concatenate(([0.0], np.cumsum((wider**2).sum(axis=1))))
-    energy = (energy[len(piece) :] - energy[: -len(piece)])[: 2 * reach + 1]
-    near = crossed / np.sqrt(np.maximum((piece**2).sum() * energy, np.finfo(np.float64).tiny))
+    energy = np.concatenate(([0.0], np.cumsum((longer**2).sum(axis=1))))
+    energy = (energy[len(segment) :] - energy[: -len(segment)])[: 2 * reach + 1]
+    near = crossed / np.sqrt(np.maximum((segment**2).sum() * energy, np.finfo(np.float64).tiny))
     peak = int(np.argmax(near))
-    found = wider[peak : peak + len(piece)]
-    gain = (piece * found).sum(axis=0) / np.maximum((found**2).sum(axis=0), 1e-300)
+    found = longer[peak : peak + len(segment)]
+    gain = (segment * found).sum(axis=0) / np.maximum((found**2).sum(axis=0), 1e-300)
     slope = np.gradient(found * gain, 1 / rate, axis=0)
     # piece(t) = found(t - rest), to first order
-    rest = ((found * gain - piece) * slope).sum() / (slope**2).sum()
+    rest = ((found * gain - segment) * slope).sum() / (slope**2).sum()
     return (reach - peak) / rate + float(rest), float(near[peak])
 
 
-def _line(pieces: Array, seconds: float, drift: float) -> tuple[float, float]:
-    """Fit offset and drift to the pieces; a drift that is not certain is none."""
-    when, left, weight = pieces.T
-    total = left + drift * when
-    if len(pieces) >= 4:
+def _fitted(residuals: Array, seconds: float, drift: float) -> tuple[float, float]:
+    """Offset and drift fitted to the segments; a drift that is not significant is 0."""
+    when, residual, weight = residuals.T
+    total = residual + drift * when
+    if len(residuals) >= 4:
         matrix = np.stack((np.ones(len(when)), when), axis=1) * weight[:, None]
         (constant, slope), *_ = np.linalg.lstsq(matrix, total * weight, rcond=None)
         spread = np.sqrt(np.sum((total - constant - slope * when) ** 2) / (len(when) - 2))
         error = spread / (np.std(when) * np.sqrt(len(when)))
-        if abs(slope) > max(CERTAIN * error, LEAST_DRIFT):
+        if abs(slope) > max(SIGNIFICANT * error, LEAST_DRIFT):
             return seconds + float(constant), float(slope)
     return seconds + float(np.average(total, weights=weight)), 0.0

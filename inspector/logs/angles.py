@@ -1,4 +1,4 @@
-"""Degrees and normalised units, told from radians and turned into them."""
+"""Joint positions and velocities converted to radians from degrees or normalised units."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -11,42 +11,47 @@ from inspector.logs.log import Track
 from noisemodel import Robot
 
 LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
-"""What a joint that turns hardly exceeds, in [rad] and [rad/s]."""
+"""Values above which an angle is taken for degrees, in [rad] and [rad/s]."""
 
 TURNING = ("revolute", "continuous")
 
 HINT = (
     "if it is in degrees, say --degrees, if in -100 to 100 of each joint's range, --units"
-    " normalised; if the joint slides or turns without end, say which robot it is (--robot)"
+    " normalised; if the joint is prismatic or continuous, say which robot it is (--robot)"
 )
 
 
 def in_radians(
-    path: Path, tracks: Sequence[Track], robot: Robot | None, units: str, *, grips: bool = False
+    path: Path,
+    tracks: Sequence[Track],
+    robot: Robot | None,
+    units: str,
+    *,
+    normalised_grippers: bool = False,
 ) -> tuple[Track, ...]:
-    """Bring the motion of joints into radians.
+    """Tracks with angles in radians.
 
     Args:
         path: The log, for errors.
         tracks: Its tracks.
-        robot: The robot, if it is known: it tells joints that slide, and their ranges.
-        units: "radians", "degrees", "normalised", or empty if nobody said.
-        grips: Whether grippers are normalised even where the rest is in degrees. They are left
-            out if there is no robot that has their range.
+        robot: The robot, if known: it has the types and the ranges of the joints.
+        units: "radians", "degrees", "normalised", or empty if not specified.
+        normalised_grippers: Whether grippers are normalised even if the other joints are in
+            degrees. They are left out if no robot gives their range.
 
     Raises:
-        LogError: If nobody said a unit and a joint that turns goes further than any does in
-            radians, or if it is normalised and the joint's range is not known.
+        LogError: If no unit is specified and a value is too large for radians, or if the unit is
+            normalised and the range of a joint is not known.
     """
     if units == "degrees":
         return tuple(
-            _to_radians(each, robot) if is_angle else _from_shares(path, each, robot)
+            _to_radians(each, robot) if is_angle else _from_normalised(path, each, robot)
             for track in tracks
-            for each, is_angle in _apart(track, grips=grips)
+            for each, is_angle in _by_kind(track, normalised_grippers=normalised_grippers)
             if is_angle or robot
         )
     if units == "normalised":
-        return tuple(_from_shares(path, track, robot) for track in tracks)
+        return tuple(_from_normalised(path, track, robot) for track in tracks)
     if not units:
         for track in tracks:
             _refuse_degrees(path, track, robot)
@@ -54,26 +59,26 @@ def in_radians(
 
 
 def grippers(track: Track) -> tuple[str, ...]:
-    """Name the joints that are grippers, going by their names."""
+    """Joints whose names are those of grippers."""
     return tuple(joint for joint in track.joints if _is_gripper(joint))
 
 
-def turns(track: Track, robot: Robot | None) -> list[bool]:
-    """Say of each column whether it is an angle or a rate of one, as far as is known."""
+def is_angular(track: Track, robot: Robot | None) -> list[bool]:
+    """Whether each column is an angle or an angular rate; True for joints of unknown type."""
     kinds = _kinds(robot)
     moves = track.signal.startswith(("position", "velocity"))
     return [moves and kinds.get(joint, "revolute") in TURNING for joint in track.joints]
 
 
 def _to_radians(track: Track, robot: Robot | None) -> Track:
-    angular = turns(track, robot)
+    angular = is_angular(track, robot)
     if not any(angular):
         return track
     return replace(track, values=np.where(angular, np.deg2rad(track.values), track.values))
 
 
-def _from_shares(path: Path, track: Track, robot: Robot | None) -> Track:
-    """Take -100 to 100 for a joint's whole range; of grippers, 0 to 100."""
+def _from_normalised(path: Path, track: Track, robot: Robot | None) -> Track:
+    """Track with -100 to 100 scaled to the range of each joint; of grippers, 0 to 100."""
     if not track.signal.startswith(("position", "velocity")):
         return track
     if robot is None:
@@ -98,19 +103,19 @@ def _is_gripper(joint: str) -> bool:
     return "gripper" in joint or "finger" in joint
 
 
-def _apart(track: Track, *, grips: bool) -> Iterator[tuple[Track, bool]]:
-    """Take grippers from the other joints, if that is asked for."""
+def _by_kind(track: Track, *, normalised_grippers: bool) -> Iterator[tuple[Track, bool]]:
+    """Split a track into angles and, if these are normalised, grippers; whether it is angles."""
     for is_angle in (True, False):
         kept = [
             place
             for place, joint in enumerate(track.joints)
-            if (grips and _is_gripper(joint)) is not is_angle
+            if (normalised_grippers and _is_gripper(joint)) is not is_angle
         ]
         if kept or (is_angle and not track.joints):
-            yield _only(track, kept) if 0 < len(kept) < len(track.joints) else track, is_angle
+            yield _columns(track, kept) if 0 < len(kept) < len(track.joints) else track, is_angle
 
 
-def _only(track: Track, kept: Sequence[int]) -> Track:
+def _columns(track: Track, kept: Sequence[int]) -> Track:
     return replace(
         track,
         joints=tuple(track.joints[place] for place in kept),
@@ -124,7 +129,7 @@ def _refuse_degrees(path: Path, track: Track, robot: Robot | None) -> None:
     if quantity not in LARGEST:
         return
     kinds = _kinds(robot)
-    for place, angular in enumerate(turns(track, robot)):
+    for place, angular in enumerate(is_angular(track, robot)):
         endless = kinds.get(track.joints[place]) == "continuous" and quantity == "position"
         if not angular or endless:
             continue

@@ -1,4 +1,4 @@
-"""Logs become run files: one, or a folder of them."""
+"""Logs imported as run files: one file, or a folder of them."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -6,23 +6,23 @@ from pathlib import Path
 
 from inspector.errors import InspectorError
 from inspector.logs.importing import Imported
-from inspector.logs.library import Job, jobs_of
-from inspector.logs.opened import Watch, unwatched
-from inspector.logs.reading import Reading
+from inspector.logs.log import Progress, without_progress
+from inspector.logs.options import ReadOptions
+from inspector.logs.reading import Job, jobs_of
 from noisemodel import NoiseModelError
 from noisemodel.atomic import refuse_existing, replacing
 
 
 @dataclass(frozen=True)
 class Written:
-    """What became of one log, or of one of its episodes.
+    """Result of importing one log, or one of its episodes.
 
     Attributes:
-        path: The run file; of a log that could not be read, the log.
+        path: The run file; if the log could not be read, the log.
         duration: Of the run, in [s].
         rate: Of the run, in [Hz].
-        remarks: What was decided on the way.
-        problem: Why there is no run; empty if there is.
+        remarks: What was decided during the import, a sentence each.
+        problem: Why there is no run file; empty if there is one.
     """
 
     path: Path
@@ -35,26 +35,26 @@ class Written:
 def import_logs(
     logs: Sequence[Path],
     output: Path,
-    reading: Reading,
+    options: ReadOptions,
     *,
     desired: Path | None = None,
     episodes: Sequence[str] = (),
     overwrite: bool = False,
-    watch: Watch,
+    progress: Progress,
 ) -> Iterator[Written]:
-    """Read logs and write a run file for each run.
+    """Write a run file for each run of some logs.
 
     Args:
         logs: The logs.
-        output: A run file; a folder, which is made, for several logs or episodes.
-        reading: What a person said of the logs.
+        output: A run file; for several logs or episodes a folder, which is created.
+        options: How to read the logs.
         desired: A log with the desired motion, for a single log.
         episodes: Which episodes to read, all unless given.
         overwrite: Whether files that exist may be replaced.
-        watch: Is told how reading goes on.
+        progress: Wraps what is read, to show how much is done.
 
     Yields:
-        What became of each; a log that cannot be read does not stop the others.
+        The result of each; a log that cannot be read does not stop the others.
 
     Raises:
         InspectorError: If the output does not fit the logs, or a single log cannot be read.
@@ -62,31 +62,35 @@ def import_logs(
     """
     if desired and len(logs) > 1:
         raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
-    many = len(logs) > 1
+    several = len(logs) > 1
     jobs: list[Job] = []
     failed: list[Written] = []
     for log in logs:
         try:
-            inner = unwatched if many else watch  # there is one bar at a time
-            jobs += jobs_of(log, reading, desired=desired, episodes=episodes or None, watch=inner)
+            inner = without_progress if several else progress  # there is one bar at a time
+            jobs += jobs_of(
+                log, options, desired=desired, episodes=episodes or None, progress=inner
+            )
         except (InspectorError, NoiseModelError) as error:
-            if not many:
+            if not several:
                 raise
             failed.append(Written(log, problem=str(error)))
-    targets = _targets(jobs, output, many=many, overwrite=overwrite)
+    targets = _targets(jobs, output, several=several, overwrite=overwrite)
     yield from failed
-    for job, target in watch(zip(jobs, targets, strict=True), len(jobs)):
+    for job, target in progress(zip(jobs, targets, strict=True), len(jobs)):
         try:
             yield _written(job.read(), target, overwrite=overwrite)
         except (InspectorError, NoiseModelError) as error:
-            if len(targets) == 1 and not many:
+            if len(targets) == 1 and not several:
                 raise
             yield Written(target, problem=str(error))
 
 
-def _targets(jobs: Sequence[Job], output: Path, *, many: bool, overwrite: bool) -> tuple[Path, ...]:
-    """Name the run files, before any work is done for them."""
-    if len(jobs) == 1 and not many and not output.is_dir():
+def _targets(
+    jobs: Sequence[Job], output: Path, *, several: bool, overwrite: bool
+) -> tuple[Path, ...]:
+    """Paths of the run files, checked before the logs are read."""
+    if len(jobs) == 1 and not several and not output.is_dir():
         refuse_existing(output, overwrite=overwrite)
         return (output,)
     if output.suffix == ".npz" or output.is_file():
@@ -95,13 +99,15 @@ def _targets(jobs: Sequence[Job], output: Path, *, many: bool, overwrite: bool) 
             " (--episode)"
         )
     targets = tuple(output / f"{job.name}.npz" for job in jobs)
-    twice = [path for place, path in enumerate(targets) if path in targets[:place]]
-    if twice:
-        raise InspectorError(f"{twice[0]}: two logs would be written there; import them one by one")
+    duplicates = [path for place, path in enumerate(targets) if path in targets[:place]]
+    if duplicates:
+        raise InspectorError(
+            f"{duplicates[0]}: two logs would be written there; import them one by one"
+        )
     try:
         output.mkdir(exist_ok=True)
     except OSError as error:
-        raise InspectorError(f"{output}: cannot be made ({error.strerror})") from error
+        raise InspectorError(f"{output}: cannot be created ({error.strerror})") from error
     for target in targets:
         refuse_existing(target, overwrite=overwrite)
     return targets

@@ -1,4 +1,4 @@
-"""A wide CSV log, checked cell by cell."""
+"""CSV logs with a header and a row per sample."""
 
 import csv
 from array import array
@@ -11,39 +11,40 @@ from typing import TextIO
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.columns import TIMES, listed, named
-from inspector.logs.log import Field, Log, Stamps
-from inspector.logs.opened import Opened, Watch
-from inspector.logs.reading import Reading
-from inspector.logs.stamping import UNITS, unit_of
+from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
+from inspector.logs.options import ReadOptions
+from inspector.logs.signals import TIMES, column_signal, listed
+from inspector.logs.timestamps import UNITS, unit_of
 
 
-def open_log(path: Path, reading: Reading) -> Opened:
-    """Offer a CSV log: a header, then a row per sample.
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of a CSV log, a header and then a row per sample.
 
-    Cells are separated by commas, semicolons, tabs or spaces, numbers have a decimal point.
+    The delimiter is a comma, semicolon, tab or space; the decimal separator is a point.
 
     Args:
         path: The file.
-        reading: What a person said of it; the rate tells the unit of the stamps.
+        options: How to read it; the rate determines the unit of the stamps.
     """
-    return Opened("CSV", ("",), lambda _, watch: read(path, reading, watch), lambda: _listing(path))
+    return LogReader(
+        "CSV", ("",), lambda _, progress: read(path, options, progress), lambda: _listing(path)
+    )
 
 
-def read(path: Path, reading: Reading, watch: Watch) -> Log:
-    """Read the columns that are known to hold something.
+def read(path: Path, options: ReadOptions, progress: Progress) -> Log:
+    """Log with the columns whose signal is known.
 
     Raises:
         LogError: If the file cannot be read, a row has more or fewer cells than the header, a
-            cell that is needed holds no number, or no stamps are found.
+            cell of a column that is read holds no number, or no stamps are found.
     """
     try:
         with path.open(newline="", encoding="utf-8-sig") as stream:
-            return _read(path, stream, reading, watch)
+            return _read(path, stream, options, progress)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
     except UnicodeDecodeError as error:
-        raise LogError(path, "not a CSV log: it is no text in UTF-8") from error
+        raise LogError(path, "not a CSV log: not text in UTF-8") from error
 
 
 def _listing(path: Path) -> tuple[str, ...]:
@@ -51,32 +52,32 @@ def _listing(path: Path) -> tuple[str, ...]:
         header = next(_cells(path, stream), (1, [""]))[1]
         rows = sum(1 for _ in stream)
     names = [name.strip().lstrip("# ") for name in header]
-    return (f"{rows} rows", *(f"{name}  {_meant(name)}" for name in names))
+    return (f"{rows} rows", *(f"{name}  {_meaning(name)}" for name in names))
 
 
-def _meant(name: str) -> str:
-    known = named(name)
+def _meaning(name: str) -> str:
+    known = column_signal(name)
     return "not known" if known is None else f"{known[0]} of {known[1]}"
 
 
-def _read(path: Path, stream: TextIO, reading: Reading, watch: Watch) -> Log:
+def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) -> Log:
     lines = _cells(path, stream)
     first = next(lines, None)
     if first is None:
         raise LogError(path, "the log is empty; expected a header, then a row per sample")
-    header = tuple(name.strip().lstrip("# ") for name in first[1])  # "# time" is NumPy's habit
+    header = tuple(name.strip().lstrip("# ") for name in first[1])  # NumPy writes "# time"
     _check_header(path, header)
-    time = _time_column(path, header, reading)
-    said = {entry.source for entry in reading.entries}
+    time = _time_column(path, header, options)
+    mapped = {entry.source for entry in options.entries}
     wanted = [time] + [
         place
         for place, name in enumerate(header)
-        if place != time and (name in said or named(name) is not None)
+        if place != time and (name in mapped or column_signal(name) is not None)
     ]
-    left = tuple(name for place, name in enumerate(header) if name and place not in wanted)
+    not_read = tuple(name for place, name in enumerate(header) if name and place not in wanted)
     pick, names = itemgetter(*wanted, time), [header[place] for place in wanted]
     rows, stamps, numbers = array("q"), list[str](), array("d")
-    for row, cells in watch(lines, 0):
+    for row, cells in progress(lines, 0):
         if len(cells) != len(header):
             raise LogError(
                 path, f"{len(cells)} cells where the header names {len(header)} columns", row
@@ -94,30 +95,32 @@ def _read(path: Path, stream: TextIO, reading: Reading, watch: Watch) -> Log:
     if not np.isfinite(table[:, 0]).all():
         sample = int(np.argmin(np.isfinite(table[:, 0])))
         raise LogError(path, f"column {names[0]!r} holds {table[sample, 0]}", rows[sample])
-    taken = _stamps(path, stamps, rows, reading.rate)
+    taken = _stamps(path, stamps, rows, options.rate)
     fields = (
         Field(name, table[:, place : place + 1], taken, source=path.name)
         for place, name in enumerate(names)
         if place
     )
-    return Log(path, tuple(fields), left=left)
+    return Log(path, tuple(fields), not_read=not_read)
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:
     for place, name in enumerate(header):
         if not name.isprintable():
             raise LogError(
-                path, f"the name {name[:40]!r} cannot be printed; is a quote open?", row=1
+                path,
+                f"the name {name[:40]!r} cannot be printed; is a quotation mark not closed?",
+                row=1,
             )
         if name and name in header[:place]:
             raise LogError(path, f"two columns are named {name!r}", row=1)
 
 
-def _time_column(path: Path, header: Sequence[str], reading: Reading) -> int:
-    if reading.time in header:
-        return header.index(reading.time)
-    said = {entry.source for entry in reading.entries}
-    known = {name.lower(): name for name in reversed(header) if name not in said}
+def _time_column(path: Path, header: Sequence[str], options: ReadOptions) -> int:
+    if options.time in header:
+        return header.index(options.time)
+    mapped = {entry.source for entry in options.entries}
+    known = {name.lower(): name for name in reversed(header) if name not in mapped}
     candidates = [known[name] for name in TIMES if name in known]
     if not candidates:
         raise LogError(
@@ -129,7 +132,7 @@ def _time_column(path: Path, header: Sequence[str], reading: Reading) -> int:
 
 
 def _stamps(path: Path, cells: Sequence[str], rows: Sequence[int], rate: float | None) -> Stamps:
-    exact = [Decimal(cell) for cell in cells]  # absolute stamps need more digits than a float
+    exact = [Decimal(cell) for cell in cells]  # absolute stamps exceed the precision of a float
     since = np.array([float(stamp - exact[0]) for stamp in exact])
     unit = unit_of(path, np.diff(since), rate)
     return Stamps(
@@ -141,7 +144,7 @@ def _stamps(path: Path, cells: Sequence[str], rows: Sequence[int], rate: float |
 
 
 def _cells(path: Path, stream: TextIO) -> Iterator[tuple[int, list[str]]]:
-    """Go through line number and cells of all lines that are not blank."""
+    """Line number and cells of each line that is not blank."""
     head = stream.readline()
     stream.seek(0)
     delimiter = next((mark for mark in ",;\t" if mark in head), " ")
@@ -159,12 +162,12 @@ def _bad_cell(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) 
         if not cell.strip():
             return LogError(
                 path,
-                f"column {name!r} is empty; columns of another clock belong into a log of their"
-                " own (--desired)",
+                f"column {name!r} is empty; columns with another clock must be in a separate"
+                " log (--desired)",
                 row,
             )
         if not _is_number(cell):
-            return LogError(path, f"column {name!r} holds {cell!r}, which is no number", row)
+            return LogError(path, f"column {name!r} holds {cell!r}, which is not a number", row)
     raise AssertionError("every cell is a number")
 
 

@@ -1,4 +1,4 @@
-"""A floating base as simulators write it, turned into the run's convention.
+"""Pose and velocity of a floating base, converted to the run's convention.
 
 The run has x, y, z and the quaternion x, y, z, w; its velocity is the body's own, linear, then
 angular, in the body's axes, as Pinocchio has it.
@@ -14,7 +14,7 @@ WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
 
 
 def pose_of(values: Real, convention: str) -> Array:
-    """Order a pose as the run has it.
+    """Pose in the run's order.
 
     Args:
         values: x, y, z and a quaternion, shape (samples, 7).
@@ -28,12 +28,12 @@ def pose_of(values: Real, convention: str) -> Array:
 
 
 def velocity_of(values: Real, convention: str, pose: Array) -> Array:
-    """Turn a base's velocity into the body's own axes.
+    """Velocity of the base in body axes.
 
     Args:
         values: Linear, then angular velocity, shape (samples, 6).
-        convention: "world" for the world's axes, "mujoco" for the world's axes of the linear and
-            the body's of the angular velocity, as a free joint's ``qvel`` is, "body" for ours.
+        convention: "world" for world axes, "mujoco" for a linear velocity in world axes and an
+            angular one in body axes (``qvel`` of a free joint), "body" for body axes.
         pose: The base's pose at the same samples, as the run has it, shape (samples, 7).
 
     Returns:
@@ -47,33 +47,33 @@ def velocity_of(values: Real, convention: str, pose: Array) -> Array:
     return np.hstack((linear, angular))
 
 
-def interpolated(pose: Array, between: Callable[[Array], Array]) -> Array:
-    """Interpolate poses so that quaternions take the short way and keep their length.
+def interpolated(pose: Array, interpolate: Callable[[Array], Array]) -> Array:
+    """Interpolated poses, whose quaternions take the shorter way and have norm 1.
 
     Args:
         pose: x, y, z and quaternion x, y, z, w, shape (samples, 7).
-        between: Interpolates columns.
+        interpolate: Interpolates columns.
 
     Returns:
-        Poses at the instants that ``between`` gives, shape (instants, 7).
+        Poses at the instants that ``interpolate`` gives, shape (instants, 7).
     """
     quaternion = pose[:, 3:]
-    # q and -q are one rotation: keep the sign that lies nearer to the sample before.
+    # q and -q are one rotation: take the sign nearer to the previous sample.
     flips = np.einsum("si,si->s", quaternion[1:], quaternion[:-1]) < 0
     signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
-    found = between(np.hstack((pose[:, :3], quaternion * signs[:, None])))
+    found = interpolate(np.hstack((pose[:, :3], quaternion * signs[:, None])))
     length: Array = np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
     return np.hstack((found[:, :3], found[:, 3:] / np.where(length > 0, length, 1.0)))
 
 
-def unturned(pose: Array) -> Mask:
-    """Find the samples whose quaternion has no length near 1, shape (samples,)."""
+def not_normalised(pose: Array) -> Mask:
+    """Whether the norm of each sample's quaternion is not near 1, shape (samples,)."""
     return np.asarray(np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1) > 0.01)
 
 
 def _into_body(vectors: Array, pose: Array) -> Array:
-    """Rotate vectors by the inverse of the pose's rotation: v' = R(q)^T v."""
+    """Vectors rotated from world to body axes: v' = R(q)^T v."""
     axis, scalar = -pose[:, 3:6], pose[:, 6:]
-    across = 2 * np.cross(axis, vectors)
-    turned: Array = vectors + scalar * across + np.cross(axis, across)
-    return turned
+    cross = 2 * np.cross(axis, vectors)
+    rotated: Array = vectors + scalar * cross + np.cross(axis, cross)
+    return rotated

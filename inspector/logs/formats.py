@@ -1,4 +1,4 @@
-"""Which format a log has, by its content."""
+"""Format of a log, detected from its content."""
 
 from collections.abc import Callable
 from importlib import import_module
@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TypeAlias
 
 from inspector.errors import InspectorError, LogError
-from inspector.logs.opened import Opened
-from inspector.logs.reading import Reading
+from inspector.logs.log import LogReader
+from inspector.logs.options import ReadOptions
 
-OpenLog: TypeAlias = Callable[[Path, Reading], Opened]
+OpenLog: TypeAlias = Callable[[Path, ReadOptions], LogReader]
 
 MAGIC = {
     b"\x89MCAP0\r\n": "ros.reader",
@@ -21,7 +21,7 @@ MAGIC = {
     b"PK\x03\x04": "npz",
     b"PK\x05\x06": "npz",
 }
-"""The first bytes of a file, and the module here that reads it; what has none of them is CSV."""
+"""The first bytes of a file, and the module here that reads it; other files are CSV."""
 
 NEEDS = {"ros.reader": (("rosbags", "mcap"), "ros"), "hdf5": (("h5py",), "hdf5")}
 """The libraries that a reader needs, and the extra that installs them."""
@@ -32,8 +32,8 @@ class MissingReaderError(InspectorError):
 
     Args:
         path: The log.
-        library: What reads it.
-        extra: The extra of this package that installs that.
+        library: The missing library.
+        extra: The extra of this package that installs it.
     """
 
     def __init__(self, path: Path, library: str, extra: str) -> None:
@@ -44,16 +44,16 @@ class MissingReaderError(InspectorError):
         )
 
 
-def open_log(path: Path, reading: Reading) -> Opened:
-    """Recognise a log by its first bytes, or by what a folder holds.
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of a log, chosen by its first bytes, or by the files in a folder.
 
     Args:
         path: A file, or the folder of a bag or a data set.
-        reading: What a person said of it.
+        options: How to read it.
 
     Raises:
         LogError: If there is no such file, or it cannot be read.
-        MissingReaderError: If the library that reads such logs is not installed.
+        MissingReaderError: If a library that reads such logs is not installed.
     """
     module = _of_folder(path) if path.is_dir() else _of_file(path)
     libraries, extra = NEEDS.get(module, ((), ""))
@@ -61,7 +61,7 @@ def open_log(path: Path, reading: Reading) -> Opened:
         if find_spec(library) is None:
             raise MissingReaderError(path, library, extra)
     reader: OpenLog = import_module(f"inspector.logs.{module}").open_log
-    return reader(path, reading)
+    return reader(path, options)
 
 
 def _of_file(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""HDF5 as robomimic and Isaac Lab write it, a group per episode; or any with a row per sample."""
+"""HDF5 logs, with a group per episode (robomimic, Isaac Lab) or a row per sample."""
 
 import json
 import re
@@ -10,77 +10,76 @@ import h5py
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.columns import array_signal, listed
-from inspector.logs.log import Field, Log, Stamps
-from inspector.logs.opened import Opened
-from inspector.logs.reading import Entry, Reading
-from inspector.logs.stamping import stamps_of, time_name, without_stamps
+from inspector.logs.log import Field, Log, LogReader, Stamps
+from inspector.logs.options import Entry, ReadOptions
+from inspector.logs.signals import array_signal, listed
+from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
 
-HOME = "data"
+EPISODES = "data"
 """The group that holds the episodes."""
 
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
-"""What h5py raises on files that are broken."""
+"""Errors that h5py raises for damaged files."""
 
 RELATIVE = "obs/joint_pos may be relative to a default pose (Isaac Lab)"
 
 STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>root_pose|root_velocity)")
-"""What Isaac Lab writes of a base: w, x, y, z and velocities in the world's axes."""
+"""Isaac Lab's base pose, with the quaternion w, x, y, z, and base velocity in world axes."""
 
 
-def open_log(path: Path, reading: Reading) -> Opened:
-    """Offer an HDF5 file.
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of an HDF5 file.
 
     Args:
         path: The file.
-        reading: What a person said of it.
+        options: How to read it.
 
     Raises:
         LogError: If it cannot be read.
     """
     try:
         with h5py.File(path) as file:
-            home = file.get(HOME)
-            episodes = _episodes(home) if isinstance(home, h5py.Group) else ("",)
+            group = file.get(EPISODES)
+            episodes = _episodes(group) if isinstance(group, h5py.Group) else ("",)
     except DAMAGE as error:
         raise LogError(path, f"damaged or cut off ({_one_line(error)})") from error
-    return Opened(
+    return LogReader(
         "HDF5",
         episodes,
-        lambda episode, watch: _read(path, reading, episode),
+        lambda episode, progress: _read(path, options, episode),
         lambda: _listing(path, episodes),
     )
 
 
-def _episodes(home: Any) -> tuple[str, ...]:
-    groups = [name for name, each in home.items() if isinstance(each, h5py.Group)]
+def _episodes(group: Any) -> tuple[str, ...]:
+    groups = [name for name, each in group.items() if isinstance(each, h5py.Group)]
     numbered = sorted(groups, key=lambda name: [int(n) for n in re.findall(r"\d+", name)])
     return tuple(numbered) or ("",)
 
 
-def _read(path: Path, reading: Reading, episode: str) -> Log:
+def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     try:
         with h5py.File(path) as file:
-            home = file[f"{HOME}/{episode}"] if episode else file
-            arrays = dict(_arrays(home))
-            rate = reading.rate or _rate(file.get(HOME, file).attrs.get("env_args"))
+            group = file[f"{EPISODES}/{episode}"] if episode else file
+            arrays = dict(_arrays(group))
+            rate = options.rate or _rate(file.get(EPISODES, file).attrs.get("env_args"))
     except DAMAGE as error:
         raise LogError(path, f"{episode or 'it'} is damaged ({_one_line(error)})") from error
-    time = time_name((name for name, each in arrays.items() if each.ndim == 1), reading)
-    moving = [each for name, each in arrays.items() if _is_motion(name, reading)]
-    if not moving:
+    time = time_name((name for name, each in arrays.items() if each.ndim == 1), options)
+    motion = [each for name, each in arrays.items() if _is_motion(name, options)]
+    if not motion:
         raise LogError(
             path,
-            f"{episode or 'the file'} holds no known joint positions or velocities; say which do,"
+            f"{episode or 'the file'} holds no known joint positions or velocities; name them,"
             f" such as --map position=obs/q; it has {listed(sorted(arrays))}",
         )
-    samples = len(moving[0])
+    samples = len(motion[0])
     if time:
-        stamps = stamps_of(path, time, arrays[time], reading.rate)
+        stamps = stamps_of(path, time, arrays[time], options.rate)
     elif rate:
         stamps = Stamps.every(1 / rate, samples)
     else:
-        stamps = without_stamps(path, samples, reading, arrays)
+        stamps = stamps_at_rate(path, samples, options, arrays)
     fields = [
         Field(
             name,
@@ -102,23 +101,23 @@ def _read(path: Path, reading: Reading, episode: str) -> Log:
     )
 
 
-def _arrays(home: Any) -> Iterator[tuple[str, Any]]:
-    """Go through all arrays of numbers that are no pictures, with their names within the group."""
+def _arrays(group: Any) -> Iterator[tuple[str, Any]]:
+    """Numeric arrays of one or two dimensions, with their names within the group."""
     found: list[tuple[str, Any]] = []
 
     def visit(name: str, each: Any) -> None:
         if isinstance(each, h5py.Dataset) and each.dtype.kind in "iuf" and 1 <= each.ndim <= 2:
             found.append((name, each))
 
-    home.visititems(visit)
+    group.visititems(visit)
     for name, dataset in found:
         values = dataset[()]
         yield name, values if values.dtype.kind == "f" else values.astype(np.float64)
 
 
-def _is_motion(name: str, reading: Reading) -> bool:
-    said = {entry.part()[0] for entry in reading.entries if entry.signal != "time"}
-    return name in said or array_signal(name) is not None
+def _is_motion(name: str, options: ReadOptions) -> bool:
+    mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
+    return name in mapped or array_signal(name) is not None
 
 
 def _suggested(arrays: dict[str, Any]) -> Iterator[Entry]:
@@ -134,7 +133,7 @@ def _suggested(arrays: dict[str, Any]) -> Iterator[Entry]:
 
 
 def _rate(env_args: Any) -> float | None:
-    """Find the rate of control in what robomimic or Isaac Lab says of its environment."""
+    """Control rate in [Hz] from the environment's arguments of robomimic or Isaac Lab."""
     try:
         args = json.loads(env_args)
         if frequency := args.get("env_kwargs", {}).get("control_freq"):
@@ -147,9 +146,9 @@ def _rate(env_args: Any) -> float | None:
 
 def _listing(path: Path, episodes: tuple[str, ...]) -> tuple[str, ...]:
     with h5py.File(path) as file:
-        home = file[f"{HOME}/{episodes[0]}"] if episodes[0] else file
+        group = file[f"{EPISODES}/{episodes[0]}"] if episodes[0] else file
         rows = [f"{len(episodes)} episodes: {listed(episodes)}"] if episodes[0] else []
-        home.visititems(
+        group.visititems(
             lambda name, each: (
                 rows.append(f"{name}  {each.dtype} {each.shape}")
                 if isinstance(each, h5py.Dataset)

@@ -1,4 +1,4 @@
-"""What logs hold becomes a run: on one clock, resampled, differentiated where need be."""
+"""A run made of prepared logs: synchronised, resampled, differentiated where necessary."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,21 +8,21 @@ from typing import Any
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.columns import listed
 from inspector.logs.log import Stamps
-from inspector.logs.motion import Piece, motion_of
-from inspector.logs.reading import Reading
-from inspector.logs.resample import UNIFORM, Clock, Clocked, clock_of, common_time, onto
-from inspector.logs.side import Side, check_mapped, paired
-from inspector.logs.twoclocks import OneClock, apart, on_one_clock
+from inspector.logs.motion import ResampledTrack, motion_of
+from inspector.logs.options import ReadOptions
+from inspector.logs.preparation import PreparedLog, check_mapping, with_desired
+from inspector.logs.resample import UNIFORM, Clock, TimedTrack, clock_of, common_time, resampled
+from inspector.logs.signals import listed
+from inspector.logs.synchronisation import Synchronised, no_overlap, synchronise
 from noisemodel import Robot, Run
 from noisemodel.types import Array, Mask
 
 FARTHEST = 1.5
-"""Factor by which a declared rate may miss that of the stamps."""
+"""Largest ratio of the specified rate to that of the stamps, or the inverse."""
 
 EMPTIEST = 20
-"""Instants that a run may have for each sample of its log; most of it would be gaps."""
+"""Largest number of the run's samples per logged sample; above it most of the run is gaps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,9 +31,9 @@ class Imported:
 
     Attributes:
         run: The run.
-        remarks: What was decided on the way, for the person who imports, a sentence each.
-        name: What to call it: the log's name, and the episode's.
-        urdf: Text of the URDF that came with the log, where no robot was named.
+        remarks: What was decided during the import, a sentence each.
+        name: Name of the log and of the episode.
+        urdf: Text of the URDF in the log, if no robot was specified.
     """
 
     run: Run
@@ -42,141 +42,149 @@ class Imported:
     urdf: str = ""
 
 
-def run_of(sides: list[Side], reading: Reading, robot: Robot | None, name: str) -> Imported:
-    """Make a run of one log, or of one of the measured and one of the desired motion.
+def run_of(
+    logs: list[PreparedLog], options: ReadOptions, robot: Robot | None, name: str
+) -> Imported:
+    """Run of one log, or of one with the measured and one with the desired motion.
 
-    The run's time starts at 0; its ``meta`` keeps the first stamp. Stamps that are not uniform are
-    resampled to the reading's rate, or to the round rate that they are near to; gaps become
-    ``valid`` False. The run is cut to the time that all signals cover. Velocities that are missing
-    are differentiated from positions.
+    The run's time starts at 0; its ``meta`` has the first stamp. Samples whose stamps are not
+    uniform are resampled to the specified rate, or to the nearest round one; ``valid`` is False
+    in gaps. The run is cut to the time that all signals cover. Missing velocities are
+    differentiated from positions.
 
     Args:
-        sides: The logs; the list is emptied, so that a long log need not be held twice.
-        reading: What a person said of them.
-        robot: The robot, if it is known.
-        name: What to call the run.
+        logs: The logs; the list is emptied, so that a long log is not held twice.
+        options: How to read them.
+        robot: The robot, if known.
+        name: Name of the run.
 
     Raises:
-        LogError: If the logs do not make a run.
+        LogError: If no run can be made of the logs.
     """
-    check_mapped(sides, reading)
-    if len(sides) > 1:
-        sides[:] = paired(*sides)
-    main = _main(sides[0], reading.rate)
-    one = on_one_clock(
-        sides[-1].path,
-        [track for side in sides for track in side.tracks],
+    check_mapping(logs, options)
+    if len(logs) > 1:
+        logs[:] = with_desired(*logs)
+    main = _main(logs[0], options.rate)
+    synchronised = synchronise(
+        logs[-1].path,
+        [track for log in logs for track in log.tracks],
         main,
-        rate=reading.rate,
+        rate=options.rate,
         robot=robot,
-        offset=reading.offset,
+        offset=options.offset,
     )
-    leading = next(each for each in one.tracks if each.track.stamps is main)
-    time, valid = common_time(one.tracks, leading)
+    leading = next(each for each in synchronised.tracks if each.track.stamps is main)
+    time, valid = common_time(synchronised.tracks, leading)
     if len(time) < 2 or not valid.any():
-        others = [each for each in one.tracks if each.track.stamps is not main]
-        raise LogError(sides[-1].path, apart(others[-1] if others else leading, leading))
+        others = [each for each in synchronised.tracks if each.track.stamps is not main]
+        raise LogError(logs[-1].path, no_overlap(others[-1] if others else leading, leading))
     clock, covered = leading.clock, float(leading.time[-1])
-    said = [*_remarks(sides, one)]
-    meta = _meta(sides, one, main.start + Decimal(str(time[0])), clock)
-    urdf = sides[0].urdf if robot and not reading.robot else ""
-    tracks = list(one.tracks)
-    sides.clear()
-    del one, leading  # from here on each signal goes when it has been resampled
-    motion = motion_of([*_pieces(tracks, time, valid, clock)], time - time[0], valid)
+    remarks = [*_remarks(logs, synchronised)]
+    meta = _meta(logs, synchronised, main.start + Decimal(str(time[0])), clock)
+    urdf = logs[0].urdf if robot and not options.robot else ""
+    tracks = list(synchronised.tracks)
+    logs.clear()
+    del synchronised, leading  # each signal is freed when it has been resampled
+    motion = motion_of([*_resampled(tracks, time, valid, clock)], time - time[0], valid)
     if motion.differentiated:
         meta["differentiated"] = dict(motion.differentiated)
     run = Run(
         time=time - time[0],
         valid=valid,
-        robot=reading.robot or None,
-        meta=meta
-        | ({"differentiated": dict(motion.differentiated)} if motion.differentiated else {}),
+        robot=options.robot or None,
+        meta=meta,
         **motion.signals,
     )
     if run.duration < covered:
-        said.append(f"cut to the {run.duration:.6g} s that {_both(meta)} cover")
+        remarks.append(f"cut to the {run.duration:.6g} s that {_extent(meta)} cover")
     if Decimal(meta["start"]):
-        said.append(f"time starts at 0; the first stamp, {meta['start']} s, is kept in meta")
-    return Imported(run, (*said, *motion.remarks), name, urdf)
+        remarks.append(f"time starts at 0; the first stamp, {meta['start']} s, is in meta")
+    return Imported(run, (*remarks, *motion.remarks), name, urdf)
 
 
-def _main(side: Side, rate: float | None) -> Stamps:
-    """Choose the stamps that the run's time is made of: those of the most joints."""
+def _main(log: PreparedLog, rate: float | None) -> Stamps:
+    """Stamps that the run's time is made of: those of the most joints."""
     widths: dict[int, int] = {}
-    for track in side.tracks:
+    for track in log.tracks:
         if track.signal in ("position", "velocity"):
             key = id(track.stamps)
             widths[key] = max(widths.get(key, 0), len(track.joints))
     if not widths:
-        raise LogError(side.path, "holds no measured motion, only desired")
+        raise LogError(log.path, "holds no measured motion, only desired")
     chosen = max(widths, key=lambda key: widths[key])
-    track = next(track for track in side.tracks if id(track.stamps) == chosen)
+    track = next(track for track in log.tracks if id(track.stamps) == chosen)
     time = track.stamps.time
     nominal = clock_of(time).nominal
     if rate is not None and not 1 / FARTHEST <= rate / nominal <= FARTHEST:
         raise LogError(
-            side.path,
-            f"the stamps come at {nominal:g} Hz; a run of {rate:g} Hz cannot be had of it",
+            log.path,
+            f"the rate of the stamps is {nominal:g} Hz; a run of {rate:g} Hz cannot be made of it",
         )
     if time[-1] * nominal > EMPTIEST * len(time):
         steps = np.diff(time)
         jump = int(np.argmax(steps))
         raise track.fault(
-            side.path, f"time jumps by {steps[jump]:.6g} s; most of the log is gaps", jump + 1
+            log.path, f"time jumps by {steps[jump]:.6g} s; most of the log is gaps", jump + 1
         )
     return track.stamps
 
 
-def _pieces(tracks: list[Clocked], time: Array, valid: Mask, clock: Clock) -> Iterator[Piece]:
-    """Resample one track after the other, and let each go."""
+def _resampled(
+    tracks: list[TimedTrack], time: Array, valid: Mask, clock: Clock
+) -> Iterator[ResampledTrack]:
+    """Resample one track after the other, and free each."""
     while tracks:
         track = tracks.pop(0)
-        values = onto(time, valid, track, slack=UNIFORM / clock.rate)
-        yield Piece(track.track.signal, track.track.joints, values)
+        values = resampled(time, valid, track, slack=UNIFORM / clock.rate)
+        yield ResampledTrack(track.track.signal, track.track.joints, values)
 
 
-def _meta(sides: Sequence[Side], one: OneClock, start: Decimal, clock: Clock) -> dict[str, Any]:
-    disorders = [disorder for side in sides for disorder in side.disorders]
+def _meta(
+    logs: Sequence[PreparedLog], synchronised: Synchronised, start: Decimal, clock: Clock
+) -> dict[str, Any]:
+    unordered = [unordered for log in logs for unordered in log.unordered]
     meta: dict[str, Any] = {
-        **{key: value for side in sides for key, value in side.meta.items()},
-        "source": [side.path.name for side in sides],
+        **{key: value for log in logs for key, value in log.meta.items()},
+        "source": [log.path.name for log in logs],
         "start": f"{start.normalize():f}",
         "jitter": {"rms": clock.jitter_rms, "max": clock.jitter_max},
     }
-    if disorders:
+    if unordered:
         meta["stamps"] = {
-            "duplicates": sum(each.duplicates for each in disorders),
-            "backward": sum(each.backward for each in disorders),
+            "duplicates": sum(each.duplicates for each in unordered),
+            "backward": sum(each.backward for each in unordered),
         }
-    if one.offset:
-        meta["offset"] = {"seconds": one.offset.seconds, "drift": one.offset.drift}
+    if synchronised.offset:
+        meta["offset"] = {
+            "seconds": synchronised.offset.seconds,
+            "drift": synchronised.offset.drift,
+        }
     return meta
 
 
-def _remarks(sides: Sequence[Side], one: OneClock) -> Iterator[str]:
-    for side in sides:
-        name = side.path.name
-        clocks = _by_stamps(side, one.tracks)
+def _remarks(logs: Sequence[PreparedLog], synchronised: Synchronised) -> Iterator[str]:
+    for log in logs:
+        name = log.path.name
+        clocks = _by_stamps(log, synchronised.tracks)
         for track in clocks:
             whose = f"{name}, {track.track.signal}" if len(clocks) > 1 else name
             yield from (f"{whose}: {remark}" for remark in _of_clock(track))
-        for disorder in side.disorders:
-            yield f"{name}: {disorder}"
-        yield from (f"{name}: {remark}" for remark in side.remarks)
-        if side.left:
-            yield f"{name}: {_counted(side.left, 'column')} not read: {listed(side.left)}"
-    if one.remark:
-        yield f"{sides[-1].path.name}: {one.remark}"
+        for unordered in log.unordered:
+            yield f"{name}: {unordered}"
+        yield from (f"{name}: {remark}" for remark in log.remarks)
+        if log.not_read:
+            yield f"{name}: {_counted(log.not_read, 'column')} not read: {listed(log.not_read)}"
+    if synchronised.remark:
+        yield f"{logs[-1].path.name}: {synchronised.remark}"
 
 
-def _by_stamps(side: Side, tracks: Sequence[Clocked]) -> list[Clocked]:
-    ours = {id(track.stamps) for track in side.tracks}
+def _by_stamps(log: PreparedLog, tracks: Sequence[TimedTrack]) -> list[TimedTrack]:
+    ours = {id(track.stamps) for track in log.tracks}
     found = {id(each.track.stamps): each for each in reversed(tracks)}
     return [each for key, each in reversed(found.items()) if key in ours]
 
 
-def _of_clock(track: Clocked) -> Iterator[str]:
+def _of_clock(track: TimedTrack) -> Iterator[str]:
     stamps, clock = track.track.stamps, track.clock
     if stamps.unit != "seconds":
         yield f"stamps are in {stamps.unit}"
@@ -185,7 +193,7 @@ def _of_clock(track: Clocked) -> Iterator[str]:
     if not clock.uniform:
         yield (
             f"resampled to {clock.rate:g} Hz (the stamps' nominal rate is"
-            f" {clock.nominal:g} Hz; their steps are off by {clock.jitter_rms * 1e3:.3g} ms rms,"
+            f" {clock.nominal:g} Hz; their jitter is {clock.jitter_rms * 1e3:.3g} ms rms,"
             f" {clock.jitter_max * 1e3:.3g} ms at most)"
         )
     if clock.gaps:
@@ -196,7 +204,7 @@ def _of_clock(track: Clocked) -> Iterator[str]:
         )
 
 
-def _both(meta: dict[str, Any]) -> str:
+def _extent(meta: dict[str, Any]) -> str:
     return "both logs" if len(meta["source"]) > 1 else "all its signals"
 
 

@@ -1,31 +1,32 @@
-"""What every reader of logs gives: named fields, each with its own stamps, and a log of them."""
+"""What readers of logs return: fields with stamps, in a log; and tracks, with known signals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.reading import Entry
+from inspector.logs.options import Entry
+from noisemodel import Run
 from noisemodel.types import Array, Real
 
 
 @dataclass(frozen=True, eq=False)
 class Stamps:
-    """When samples were taken; fields that were taken together share one of these.
+    """Timestamps of samples; fields that were sampled together share them.
 
     Attributes:
         start: The first stamp, in [s], exact.
         time: Time since the first stamp, as logged, shape (samples,), in [s].
-        rows: The line of the file in which each sample stands, where the file has lines.
-        unit: The unit that the stamps had.
-        origin: Where they come from, if not from where one would think.
-        held: Whether values hold between stamps however far these lie apart, as those of a
-            planned trajectory do.
+        rows: Line number of each sample, if the file has lines.
+        unit: Unit of the stamps in the log.
+        origin: Remark on where they come from, if it is not the expected source.
+        held: Whether values apply between stamps however far apart, as those of a planned
+            trajectory do.
     """
 
     start: Decimal
@@ -39,7 +40,7 @@ class Stamps:
     def of_nanoseconds(
         cls, stamps: NDArray[np.int64], *, origin: str = "", held: bool = False
     ) -> "Stamps":
-        """Make stamps of whole nanoseconds, shape (samples,)."""
+        """Stamps from whole nanoseconds, shape (samples,)."""
         first = int(stamps[0])
         return cls(
             Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), origin=origin, held=held
@@ -47,21 +48,21 @@ class Stamps:
 
     @classmethod
     def every(cls, step: float, samples: int) -> "Stamps":
-        """Make the stamps of a log that has none, but a known step in [s]."""
+        """Stamps of a log that has none, with a known step in [s]."""
         return cls(Decimal(0), np.arange(samples, dtype=np.float64) * step)
 
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """One array of a log, as it was logged.
+    """One array of a log, as logged.
 
     Attributes:
-        name: What the log calls it.
+        name: Its name in the log.
         values: Shape (samples, columns).
-        stamps: When its samples were taken.
-        joints: What the log says the columns belong to; empty if it does not say.
-        signal: What the format itself says the array holds; empty if it does not say.
-        source: The topic or file that it comes from; choices are made among these.
+        stamps: Its timestamps.
+        joints: Joints of the columns, if the log names them; else empty.
+        signal: The signal, if the format defines it; else empty.
+        source: The topic or file that it comes from.
         rank: Of several sources of one signal those with the lowest rank are taken.
     """
 
@@ -76,24 +77,24 @@ class Field:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """One recording, read but not yet understood.
+    """One recording as logged, before signals are assigned to its fields.
 
     Attributes:
         path: The file or folder.
         fields: Its arrays.
         episode: Name of the episode, where the file holds several.
-        left: What was not read, by name.
-        remarks: What was lost or decided in reading, a sentence each.
-        units: Why the unit of angles is not known, where the format leaves it open.
-        urdf: Text of the URDF that came with the log, may be empty.
-        suggested: What the format says of its arrays; what a person says goes before it.
-        meta: What else the log says of itself.
+        not_read: Names of what was not read.
+        remarks: What was lost or decided during reading, a sentence each.
+        units: Why the unit of angles is not known, if the format does not define it.
+        urdf: Text of the URDF in the log, may be empty.
+        suggested: Mapping that the format defines; that of the options takes precedence.
+        meta: Further metadata of the log.
     """
 
     path: Path
     fields: tuple[Field, ...]
     episode: str = ""
-    left: tuple[str, ...] = ()
+    not_read: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     units: str = ""
     urdf: str = ""
@@ -106,10 +107,10 @@ class Track:
     """One signal of some joints, or of the base.
 
     Attributes:
-        signal: One of ``inspector.logs.columns.SIGNALS``.
-        joints: Whom the columns belong to; empty for the base.
-        labels: What the log calls each column.
-        stamps: When its samples were taken.
+        signal: One of ``inspector.logs.signals.SIGNALS``.
+        joints: Joints of the columns; empty for the base.
+        labels: Names of the columns in the log.
+        stamps: Its timestamps.
         values: Shape (samples, columns).
     """
 
@@ -125,8 +126,40 @@ class Track:
         return self.signal.endswith("_desired")
 
     def fault(self, path: Path, problem: str, sample: int) -> LogError:
-        """Make an error that says where in the log a problem is."""
+        """Error that names the place of a problem in the log."""
         if self.stamps.rows is not None:
             return LogError(path, problem, self.stamps.rows[sample])
         at = self.stamps.time[sample] - self.stamps.time[0]
         return LogError(path, f"{problem} (sample {sample + 1}, {at:.6g} s into the log)")
+
+
+class Progress(Protocol):
+    """Wraps what is read, to show how much is done."""
+
+    def __call__(self, items: Iterable[Any], total: int) -> Iterable[Any]:
+        """Pass items on; ``total`` of them are expected, 0 if unknown."""
+
+
+def without_progress(items: Iterable[Any], total: int) -> Iterable[Any]:
+    """Pass items on without showing progress."""
+    return items
+
+
+@dataclass(frozen=True)
+class LogReader:
+    """A log of a known format: its episodes, and functions that read it.
+
+    Attributes:
+        kind: Name of the format.
+        episodes: Names of the episodes, each of which becomes a run; a single "" for a log
+            without episodes.
+        read: Reads one episode by its name.
+        listing: Lists the contents without reading all of them, a line each.
+        run: Reads the run, if the log is a run file.
+    """
+
+    kind: str
+    episodes: tuple[str, ...]
+    read: Callable[[str, Progress], Log]
+    listing: Callable[[], tuple[str, ...]]
+    run: Callable[[], Run] | None = None

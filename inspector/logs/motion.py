@@ -1,4 +1,4 @@
-"""Signals of joints on one time base become those of a run."""
+"""Signals of a run, assembled from resampled tracks and differentiated where missing."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,11 +11,11 @@ from noisemodel.types import Array, Mask, Real
 
 
 @dataclass(frozen=True, eq=False)
-class Piece:
-    """A signal of some joints, or of the base, on the run's time base.
+class ResampledTrack:
+    """One signal of some joints, or of the base, on the run's time base.
 
     Attributes:
-        signal: One of ``inspector.logs.columns.SIGNALS``.
+        signal: One of ``inspector.logs.signals.SIGNALS``.
         joints: The joints of its columns; empty for the base.
         values: Shape (samples, columns).
     """
@@ -30,8 +30,8 @@ class Motion:
     """Signals of a run.
 
     Attributes:
-        signals: What ``noisemodel.Run`` takes, by its names.
-        differentiated: By the name of each velocity that was missing, how it was had.
+        signals: Arguments of ``noisemodel.Run`` by name.
+        differentiated: The method by the name of each differentiated velocity.
         remarks: What was differentiated or left out, a sentence each.
     """
 
@@ -40,48 +40,56 @@ class Motion:
     remarks: tuple[str, ...]
 
 
-def motion_of(pieces: Sequence[Piece], time: Array, valid: Mask) -> Motion:
-    """Sort pieces by signal and joint; differentiate what velocities are missing.
+def motion_of(tracks: Sequence[ResampledTrack], time: Array, valid: Mask) -> Motion:
+    """Signals by joint, with missing velocities differentiated.
 
-    A signal that some of the joints lack, and that cannot be had otherwise, is left out.
+    A signal that some of the joints lack, and that cannot be computed, is left out.
 
     Args:
-        pieces: The signals.
+        tracks: The signals.
         time: Uniform, shape (samples,), in [s].
         valid: False in gaps, shape (samples,).
     """
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}
     remarks: list[str] = []
-    held = {
-        signal: _together([piece for piece in pieces if piece.signal == signal])
-        for signal in dict.fromkeys(piece.signal for piece in pieces)
+    logged_tracks = {
+        signal: _joined([track for track in tracks if track.signal == signal])
+        for signal in dict.fromkeys(track.signal for track in tracks)
     }
     for suffix, names in (("", "joint_names"), ("_desired", "desired_joint_names")):
         velocity, position = f"velocity{suffix}", f"position{suffix}"
-        known = [held[signal] for signal in (velocity, position) if signal in held]
-        joints = tuple(dict.fromkeys(joint for piece in known for joint in piece.joints))
+        known = [
+            logged_tracks[signal] for signal in (velocity, position) if signal in logged_tracks
+        ]
+        joints = tuple(dict.fromkeys(joint for track in known for joint in track.joints))
         if not joints:
             continue
-        logged = held[velocity].joints if velocity in held else ()
+        logged = logged_tracks[velocity].joints if velocity in logged_tracks else ()
         missing = tuple(joint for joint in joints if joint not in logged)
         if missing:
-            slopes = joint_velocity(time, _ordered(held[position], missing), valid)
-            added = Piece(velocity, missing, slopes)
-            held[velocity] = _together([held[velocity], added] if velocity in held else [added])
-            of_whom = f" of {', '.join(missing)}" if logged else ""
-            differentiated[velocity] = METHOD + of_whom
-            remarks.append(f"{velocity}{of_whom}: differentiated from positions ({METHOD})")
+            slopes = joint_velocity(time, _ordered(logged_tracks[position], missing), valid)
+            added = ResampledTrack(velocity, missing, slopes)
+            logged_tracks[velocity] = _joined(
+                [logged_tracks[velocity], added] if velocity in logged_tracks else [added]
+            )
+            of_joints = f" of {', '.join(missing)}" if logged else ""
+            differentiated[velocity] = METHOD + of_joints
+            remarks.append(f"{velocity}{of_joints}: differentiated from positions ({METHOD})")
         signals[names] = joints
         for signal in (velocity, position) if suffix else (velocity, position, "effort"):
-            if signal not in held:
+            if signal not in logged_tracks:
                 continue
-            lacking = [joint for joint in joints if joint not in held[signal].joints]
+            lacking = [joint for joint in joints if joint not in logged_tracks[signal].joints]
             if not lacking:
-                signals[signal] = _ordered(held[signal], joints)
+                signals[signal] = _ordered(logged_tracks[signal], joints)
             else:
-                remarks.append(f"{signal}: left out, there is none of {', '.join(lacking)}")
-    signals |= {name: held[name].values for name in ("base_pose", "base_velocity") if name in held}
+                remarks.append(f"{signal}: left out, missing for {', '.join(lacking)}")
+    signals |= {
+        name: logged_tracks[name].values
+        for name in ("base_pose", "base_velocity")
+        if name in logged_tracks
+    }
     if "base_pose" in signals and "base_velocity" not in signals:
         signals["base_velocity"] = base_velocity(time, signals["base_pose"], valid)
         differentiated["base_velocity"] = METHOD
@@ -89,15 +97,15 @@ def motion_of(pieces: Sequence[Piece], time: Array, valid: Mask) -> Motion:
     return Motion(signals, differentiated, tuple(remarks))
 
 
-def _together(pieces: Sequence[Piece]) -> Piece:
-    if len(pieces) == 1:
-        return pieces[0]
-    joints = tuple(joint for piece in pieces for joint in piece.joints)
-    return Piece(pieces[0].signal, joints, np.hstack([piece.values for piece in pieces]))
+def _joined(tracks: Sequence[ResampledTrack]) -> ResampledTrack:
+    if len(tracks) == 1:
+        return tracks[0]
+    joints = tuple(joint for track in tracks for joint in track.joints)
+    return ResampledTrack(tracks[0].signal, joints, np.hstack([track.values for track in tracks]))
 
 
-def _ordered(piece: Piece, joints: Sequence[str]) -> Real:
-    """Take the columns of some joints; all of them in their own order as they are."""
-    if tuple(joints) == piece.joints:
-        return piece.values
-    return piece.values[:, [piece.joints.index(joint) for joint in joints]]
+def _ordered(track: ResampledTrack, joints: Sequence[str]) -> Real:
+    """Columns of some joints; no copy if these are all, in order."""
+    if tuple(joints) == track.joints:
+        return track.values
+    return track.values[:, [track.joints.index(joint) for joint in joints]]

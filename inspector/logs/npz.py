@@ -1,4 +1,4 @@
-"""NumPy archives: the run file itself, MuJoCo's and Isaac's arrays, one's own by mapping."""
+"""NumPy archives: run files, arrays of MuJoCo and Isaac, and others by mapping."""
 
 import zipfile
 from collections.abc import Iterator
@@ -9,33 +9,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.columns import array_signal, listed
-from inspector.logs.log import Field, Log
-from inspector.logs.opened import Opened
-from inspector.logs.reading import Entry, Reading
-from inspector.logs.stamping import stamps_of, time_name, without_stamps
+from inspector.logs.log import Field, Log, LogReader
+from inspector.logs.options import Entry, ReadOptions
+from inspector.logs.signals import array_signal, listed
+from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
 from noisemodel import Run, RunError, checks
 from noisemodel.runfile import ARRAYS, DAMAGE, MAX_BYTES, STAGE
 
 
-def open_log(path: Path, reading: Reading) -> Opened:
-    """Offer an archive.
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of an archive.
 
     Args:
         path: The file.
-        reading: What a person said of it.
+        options: How to read it.
 
     Raises:
-        LogError: If it is no archive of plain arrays.
+        LogError: If it is not an archive of plain arrays.
     """
     arrays = _arrays(path)
     run = None
-    if _is_run(arrays) and not reading.entries:
+    if _is_run(arrays) and not options.entries:
         run = lambda: Run.load(path)  # noqa: E731
-    return Opened(
+    return LogReader(
         "npz",
         ("",),
-        lambda _, watch: _read(path, _arrays(path), reading),
+        lambda _, progress: _read(path, _arrays(path), options),
         lambda: tuple(f"{name}  {each.dtype} {each.shape}" for name, each in _arrays(path).items()),
         run,
     )
@@ -57,7 +56,7 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
 
 
 def _is_run(arrays: dict[str, NDArray[Any]]) -> bool:
-    """Say whether it is a run file whose time is uniform; if it is not, it is resampled."""
+    """Whether it is a run file with uniform time; one without is resampled."""
     known = all(name in ARRAYS or name.startswith(STAGE) for name in arrays)
     if not known or "time" not in arrays:
         return False
@@ -68,32 +67,32 @@ def _is_run(arrays: dict[str, NDArray[Any]]) -> bool:
     return True
 
 
-def _read(path: Path, arrays: dict[str, NDArray[Any]], reading: Reading) -> Log:
+def _read(path: Path, arrays: dict[str, NDArray[Any]], options: ReadOptions) -> Log:
     numbers = {
         name: each if each.dtype.kind == "f" else each.astype(np.float64)
         for name, each in arrays.items()
         if each.dtype.kind in "iuf" and each.ndim in (1, 2)
     }
     suggested = tuple(_suggested(numbers))
-    said = {entry.part()[0] for entry in (*reading.entries, *suggested) if entry.signal != "time"}
-    moving = [each for name, each in numbers.items() if name in said or array_signal(name)]
-    time = time_name((name for name, each in arrays.items() if each.ndim == 1), reading)
-    if not moving:
+    mapped = {entry.part()[0] for entry in (*options.entries, *suggested) if entry.signal != "time"}
+    motion = [each for name, each in numbers.items() if name in mapped or array_signal(name)]
+    time = time_name((name for name, each in arrays.items() if each.ndim == 1), options)
+    if not motion:
         raise LogError(
             path,
-            "holds no known joint positions or velocities; say which do, such as --map"
+            "holds no known joint positions or velocities; name them, such as --map"
             f" position=qpos[7:]; it has {listed(sorted(arrays))}",
         )
-    samples = len(moving[0])
+    samples = len(motion[0])
     if time:
-        stamps = stamps_of(path, time, arrays[time], reading.rate)
+        stamps = stamps_of(path, time, arrays[time], options.rate)
     else:
-        stamps = without_stamps(path, samples, reading, arrays)
+        stamps = stamps_at_rate(path, samples, options, arrays)
     samples = len(stamps.time)
     for name, each in numbers.items():
-        if (name in said or array_signal(name)) and len(each) != samples:
-            turned = each.ndim == 2 and each.shape[1] == samples
-            hint = "; samples come first, is it transposed?" if turned else ""
+        if (name in mapped or array_signal(name)) and len(each) != samples:
+            transposed = each.ndim == 2 and each.shape[1] == samples
+            hint = "; samples come first, is it transposed?" if transposed else ""
             problem = f"{name!r} has shape {each.shape}, there are {samples} stamps{hint}"
             raise LogError(path, problem)
     names = {
@@ -111,16 +110,16 @@ def _read(path: Path, arrays: dict[str, NDArray[Any]], reading: Reading) -> Log:
             matching = joints if len(joints) == values.shape[1] else ()
             fields.append(Field(name, values, stamps, joints=matching, source=path.name))
     read = {field.name for field in fields} | {time, "joint_names", "desired_joint_names"}
-    left = tuple(name for name in arrays if name not in read)
-    return Log(path, tuple(fields), left=left, suggested=suggested)
+    not_read = tuple(name for name in arrays if name not in read)
+    return Log(path, tuple(fields), not_read=not_read, suggested=suggested)
 
 
 def _suggested(arrays: dict[str, NDArray[Any]]) -> Iterator[Entry]:
-    """Say what MuJoCo's state holds: behind a free base, if there is one, the joints."""
+    """Mapping of MuJoCo's state: a floating base, if there is one, then the joints."""
     qpos, qvel = (arrays.get(name) for name in ("qpos", "qvel"))
     if qpos is None or qpos.ndim != 2:
         return
-    free = qpos.shape[1] >= 7 and _is_turned(qpos[:, 3:7])
+    free = qpos.shape[1] >= 7 and _are_quaternions(qpos[:, 3:7])
     free = free and (qvel is None or (qvel.ndim == 2 and qvel.shape[1] == qpos.shape[1] - 1))
     if free:
         yield Entry("base_pose", "wxyz", "qpos[0:7]")
@@ -133,6 +132,6 @@ def _suggested(arrays: dict[str, NDArray[Any]]) -> Iterator[Entry]:
             yield Entry("velocity", "", f"qvel[{6 * free}:]")
 
 
-def _is_turned(quaternions: NDArray[Any]) -> bool:
+def _are_quaternions(quaternions: NDArray[Any]) -> bool:
     length = np.linalg.norm(quaternions, axis=1)
     return bool((np.abs(length - 1) < 0.01).all())

@@ -1,4 +1,4 @@
-"""Stamps that stand still or run backwards, left out and counted."""
+"""Tracks with increasing stamps: duplicate and backward ones are left out and counted."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -10,18 +10,18 @@ import numpy as np
 from inspector.logs.log import Stamps, Track
 from noisemodel.types import Mask
 
-DISORDER = 0.1
-"""Share of samples above which a log is refused: it is several logs, or no time at all."""
+MOST_UNORDERED = 0.1
+"""Share of such samples above which a log is refused: it is several logs, or has no stamps."""
 
 
 @dataclass(frozen=True)
-class Disorder:
-    """What was wrong with the stamps of a track.
+class UnorderedStamps:
+    """Stamps of a track that were left out.
 
     Attributes:
-        duplicates: Samples with the stamp of one before.
-        backward: Samples with a stamp before that of one before.
-        first: When the first of them comes, in [s] since the first stamp.
+        duplicates: Number of samples with the latest stamp before them.
+        backward: Number of samples with an earlier stamp.
+        first: Time of the first of them, in [s] since the first stamp.
     """
 
     duplicates: int
@@ -35,42 +35,44 @@ class Disorder:
         )
 
 
-def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tuple[Disorder, ...]]:
-    """Leave out the samples whose stamps do not rise above all before.
+def ordered(
+    path: Path, tracks: Sequence[Track]
+) -> tuple[tuple[Track, ...], tuple[UnorderedStamps, ...]]:
+    """Tracks without the samples whose stamps are not later than all before.
 
     Args:
         path: The log, for errors.
-        tracks: Its tracks; what shares stamps goes on sharing them.
+        tracks: Its tracks; those that share stamps still do afterwards.
 
     Returns:
-        The tracks, and what was wrong with each set of stamps that had something wrong.
+        The tracks, and what was left out of each set of stamps that was not in order.
 
     Raises:
         LogError: If a tenth of the samples or more is out of order.
     """
-    rising = {id(track.stamps): _rising(track.stamps) for track in tracks}
-    disorders, kept = [], {}
+    increasing = {id(track.stamps): _is_increasing(track.stamps) for track in tracks}
+    unordered, kept = [], {}
     for track in {id(track.stamps): track for track in tracks}.values():
-        keep = rising[id(track.stamps)]
+        keep = increasing[id(track.stamps)]
         kept[id(track.stamps)] = track.stamps
         if not keep.all():
-            disorders.append(_disorder(path, track, keep))
+            unordered.append(_unordered(path, track, keep))
             kept[id(track.stamps)] = _only(track.stamps, keep)
-    return tuple(_ordered(tracks, rising, kept)), tuple(disorders)
+    return tuple(_ordered(tracks, increasing, kept)), tuple(unordered)
 
 
 def _ordered(
-    tracks: Sequence[Track], rising: dict[int, Mask], kept: dict[int, Stamps]
+    tracks: Sequence[Track], increasing: dict[int, Mask], kept: dict[int, Stamps]
 ) -> Iterator[Track]:
     for track in tracks:
-        keep = rising[id(track.stamps)]
+        keep = increasing[id(track.stamps)]
         if keep.all():
             yield track
         else:
             yield replace(track, stamps=kept[id(track.stamps)], values=track.values[keep])
 
 
-def _rising(stamps: Stamps) -> Mask:
+def _is_increasing(stamps: Stamps) -> Mask:
     latest = np.maximum.accumulate(stamps.time)
     return np.concatenate(([True], stamps.time[1:] > latest[:-1]))
 
@@ -80,16 +82,16 @@ def _only(stamps: Stamps, keep: Mask) -> Stamps:
     return replace(stamps, time=stamps.time[keep], rows=rows)
 
 
-def _disorder(path: Path, track: Track, keep: Mask) -> Disorder:
+def _unordered(path: Path, track: Track, keep: Mask) -> UnorderedStamps:
     time = track.stamps.time
     wrong = np.flatnonzero(~keep)
     latest = np.maximum.accumulate(time)
     duplicates = int(np.sum(time[wrong] == latest[wrong - 1]))
-    if len(wrong) >= DISORDER * len(time):
+    if len(wrong) >= MOST_UNORDERED * len(time):
         after, before = (
             track.stamps.start + Decimal(str(since))
             for since in (time[wrong[0]], latest[wrong[0] - 1])
         )
         how = "stands still" if after == before else "runs backwards"
         raise track.fault(path, f"time {how}: {after} comes after {before}", int(wrong[0]))
-    return Disorder(duplicates, len(wrong) - duplicates, float(latest[wrong[0] - 1]))
+    return UnorderedStamps(duplicates, len(wrong) - duplicates, float(latest[wrong[0] - 1]))

@@ -1,4 +1,4 @@
-"""Parquet with a row per sample: columns of numbers, or of lists of them."""
+"""Parquet logs with a row per sample, and columns of numbers or of lists of numbers."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -11,43 +11,42 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.columns import array_signal, named
-from inspector.logs.log import Field, Log
-from inspector.logs.opened import Opened
-from inspector.logs.reading import Reading
-from inspector.logs.stamping import stamps_of, time_name, without_stamps
+from inspector.logs.log import Field, Log, LogReader
+from inspector.logs.options import ReadOptions
+from inspector.logs.signals import array_signal, column_signal
+from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError)
-"""What pyarrow raises on files that are broken."""
+"""Errors that pyarrow raises for damaged files."""
 
 EPISODE = "episode_index"
-"""The column that tells episodes apart, if there is one."""
+"""The column with the number of the episode, if there is one."""
 
 
-def open_log(path: Path, reading: Reading) -> Opened:
-    """Offer a Parquet file.
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of a Parquet file.
 
     Args:
         path: The file.
-        reading: What a person said of it.
+        options: How to read it.
 
     Raises:
         LogError: If it cannot be read.
     """
     schema = schema_of(path)
-    return Opened(
+    return LogReader(
         "Parquet",
         episodes_of(path) if EPISODE in schema.names else ("",),
-        lambda episode, watch: _read(path, reading, episode),
+        lambda episode, progress: _read(path, options, episode),
         lambda: listing(path),
     )
 
 
 def schema_of(path: Path) -> Any:
-    """Read the columns' names and types.
+    """Names and types of the columns.
 
     Raises:
-        LogError: If the file is damaged: its columns stand at its end, without which it is none.
+        LogError: If the file is damaged; the schema is at its end.
     """
     try:
         return pyarrow.parquet.read_schema(path)
@@ -56,7 +55,7 @@ def schema_of(path: Path) -> Any:
 
 
 def table_of(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any:
-    """Read some columns, of one episode where there are several.
+    """Table of some columns, of one episode if there are several.
 
     Raises:
         LogError: If a file is damaged.
@@ -73,13 +72,13 @@ def table_of(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any
 
 
 def episodes_of(path: Path) -> tuple[str, ...]:
-    """List the episodes in a file."""
+    """Episodes in a file."""
     column = table_of([path], [EPISODE], "").column(0).to_numpy()
     return tuple(str(each) for each in np.unique(column))
 
 
 def values_of(path: Path, name: str, column: Any) -> NDArray[Any] | None:
-    """Turn a column into an array, shape (samples, columns); None if it holds no numbers.
+    """Column as an array, shape (samples, columns); None if it holds no numbers.
 
     Raises:
         LogError: If its lists are of different lengths.
@@ -104,29 +103,30 @@ def values_of(path: Path, name: str, column: Any) -> NDArray[Any] | None:
 
 
 def listing(path: Path) -> tuple[str, ...]:
-    """List the columns of a file with their types."""
+    """Columns of a file with their types, a line each."""
     schema = schema_of(path)
     rows = pyarrow.parquet.read_metadata(path).num_rows
     return (f"{rows} rows", *(f"{each.name}  {each.type}" for each in schema))
 
 
-def _read(path: Path, reading: Reading, episode: str) -> Log:
+def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     names = schema_of(path).names
-    said = {name for entry in reading.entries for name in (entry.source, entry.part()[0])}
-    time = time_name(names, reading)
+    mapped = {name for entry in options.entries for name in (entry.source, entry.part()[0])}
+    time = time_name(names, options)
     wanted = [
         name
         for name in names
-        if name in said or (name not in (time, EPISODE) and (named(name) or array_signal(name)))
+        if name in mapped
+        or (name not in (time, EPISODE) and (column_signal(name) or array_signal(name)))
     ]
     table = table_of([path], [*wanted, *([time] if time and time not in wanted else [])], episode)
     if time:
         column = values_of(path, time, table.column(time))
         if column is None or column.shape[1] != 1:
             raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
-        stamps = stamps_of(path, time, column[:, 0], reading.rate)
+        stamps = stamps_of(path, time, column[:, 0], options.rate)
     else:
-        stamps = without_stamps(path, len(table), reading, names)
+        stamps = stamps_at_rate(path, len(table), options, names)
 
     def fields() -> Iterator[Field]:
         for name in wanted:
@@ -137,7 +137,7 @@ def _read(path: Path, reading: Reading, episode: str) -> Log:
 
     found = tuple(fields())
     read = {field.name for field in found} | {time, EPISODE}
-    return Log(path, found, episode, left=tuple(name for name in names if name not in read))
+    return Log(path, found, episode, not_read=tuple(name for name in names if name not in read))
 
 
 def _one_line(error: BaseException) -> str:

@@ -1,204 +1,223 @@
-"""How a person says that a log is to be read: options and mapping, kept as TOML."""
+"""Runs read from logs of any known format, by path."""
 
-import json
-import re
-import tomllib
-from collections.abc import Iterable
-from dataclasses import dataclass, fields
-from math import isfinite
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
-from inspector.errors import InspectorError
-from inspector.logs.columns import BASE_SIGNALS, JOINT_SIGNALS
-from noisemodel.atomic import replacing
-
-FORMAT = "noise-mapping/1"
-UNITS = ("radians", "degrees", "normalised")
-
-CONVENTIONS = {
-    "base_pose": ("xyzw", "wxyz"),
-    "base_velocity": ("body", "world", "mujoco"),
-}
-"""How a base may be written: the order of its quaternion; the axes of its velocity, where MuJoCo's
-are the world's for the linear part and the body's for the angular one. The first is ours."""
-
-PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
+from inspector.errors import LogError
+from inspector.logs.formats import open_log
+from inspector.logs.importing import Imported, run_of
+from inspector.logs.log import LogReader, Progress, without_progress
+from inspector.logs.options import ReadOptions, parse_mapping
+from inspector.logs.preparation import prepared
+from inspector.logs.signals import listed
+from noisemodel import Robot, RobotError
 
 
 @dataclass(frozen=True)
-class Entry:
-    """What a person said of one column or array.
+class Job:
+    """A run of a log that is not read yet.
 
     Attributes:
-        signal: One of ``inspector.logs.columns.SIGNALS``, or "time".
-        joint: The joint, for a single column; for a base the convention that it is written in;
-            empty for an array of all joints.
-        source: The column or array, perhaps with a part of it: ``qpos[7:]``, ``qvel[6]``.
+        name: Its name.
+        episode: The episode that it is, empty for a log without episodes.
+        read: Reads it.
     """
 
-    signal: str
-    joint: str
-    source: str
-
-    @property
-    def target(self) -> str:
-        """What is left of the equals sign."""
-        return f"{self.signal}.{self.joint}" if self.joint else self.signal
-
-    def part(self) -> tuple[str, slice]:
-        """Split the source into the name of an array and its columns."""
-        match = PART.fullmatch(self.source)
-        if match is None or not (match["first"] or match["colon"]):
-            return self.source, slice(None)
-        first = int(match["first"] or 0)
-        if not match["colon"]:
-            return match["name"], slice(first, first + 1)
-        return match["name"], slice(first, int(match["last"]) if match["last"] else None)
+    name: str
+    episode: str
+    read: Callable[[], Imported]
 
 
-@dataclass(frozen=True)
-class Reading:
-    """How a log is to be read, as far as it does not say so itself.
-
-    Attributes:
-        robot: Listed name or URDF of the robot; joints are checked against it, and columns that
-            are only numbered get its joints in order.
-        rate: The log's rate, if it is known, in [Hz].
-        units: "radians", "degrees" or "normalised" (-100 to 100 of each joint's range, 0 to 100
-            of a gripper's); empty for what the log says.
-        joints: Names of the columns of arrays, in order.
-        topics: The topics to read, all unless given.
-        offset: What to add to the desired motion's stamps, in [s]; estimated unless given.
-        entries: What a person said of columns and arrays.
-    """
-
-    robot: str = ""
-    rate: float | None = None
-    units: str = ""
-    joints: tuple[str, ...] = ()
-    topics: tuple[str, ...] = ()
-    offset: float | None = None
-    entries: tuple[Entry, ...] = ()
-
-    def __post_init__(self) -> None:
-        """Check what a person said."""
-        if self.rate is not None and not (isfinite(self.rate) and self.rate > 0):
-            raise InspectorError(f"the rate is {self.rate:g} Hz; expected a number above 0")
-        if self.offset is not None and not isfinite(self.offset):
-            raise InspectorError(f"the offset is {self.offset:g} s; expected a finite number")
-        if self.units and self.units not in UNITS:
-            raise InspectorError(f"no units {self.units!r}; there are {', '.join(UNITS)}")
-
-    @property
-    def time(self) -> str:
-        """The column that was said to hold the stamps, or empty."""
-        return next((entry.source for entry in self.entries if entry.signal == "time"), "")
-
-    @classmethod
-    def load(cls, path: Path) -> Self:
-        """Read a mapping that was saved.
-
-        Raises:
-            InspectorError: If it cannot be read, or says what is not known.
-        """
-        try:
-            saved = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InspectorError(f"{path}: not a mapping in TOML ({error})") from error
-        if saved.pop("format", None) != FORMAT:
-            raise InspectorError(f'{path}: not a mapping; expected format = "{FORMAT}"')
-        entries = saved.pop("map", {})
-        known = {field.name for field in fields(cls)} - {"entries"}
-        if unknown := sorted(set(saved) - known):
-            raise InspectorError(
-                f"{path}: unknown setting {unknown[0]!r}; there are {', '.join(sorted(known))}, map"
-            )
-        try:
-            for target, source in entries.items():
-                _setting(target, source)
-            said = parse_mapping(f"{target}={source}" for target, source in entries.items())
-            return cls(
-                **{name: _setting(name, value) for name, value in saved.items()}, entries=said
-            )
-        except (InspectorError, AttributeError, TypeError) as error:
-            raise InspectorError(f"{path}: {error}") from error
-
-    def save(self, path: Path, *, overwrite: bool = False) -> None:
-        """Write the mapping as TOML, to be used again.
-
-        Raises:
-            OutputError: If the file exists or cannot be written.
-        """
-        lines = [f'format = "{FORMAT}"']
-        for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name != "entries" and value not in (None, "", ()):
-                lines.append(f"{field.name} = {_toml(value)}")
-        if self.entries:
-            lines += ["", "[map]"]
-            lines += [f"{_toml(each.target)} = {_toml(each.source)}" for each in self.entries]
-        with replacing(path, overwrite=overwrite) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
-    """Read what a person says of columns and arrays that have names of their own.
+def read_log(
+    path: str | Path,
+    *,
+    desired: str | Path | None = None,
+    episode: str | None = None,
+    mapping: Sequence[str] = (),
+    **options: Any,
+) -> Imported:
+    """Run of a log of any known format.
 
     Args:
-        entries: ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN`` each. The column may
-            hold any character, the joint any but "="; of an array ``[3]``, ``[7:]`` or ``[:7]``
-            names a part. Signals of the base may say how they are written, as ``CONVENTIONS`` has
-            it: ``base_pose.wxyz=root_pose``.
+        path: A CSV, Parquet, HDF5 or npz file, a ROS bag, a LeRobot data set, or a run file.
+        desired: Another log with the desired motion, which may have a clock of its own.
+        episode: Which episode to read, where the log holds several.
+        mapping: Signals of columns and arrays that are not known by their names:
+            ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN``.
+        **options: ``robot``, ``rate``, ``units``, ``joints``, ``topics`` and ``offset``, as
+            ``inspector.logs.options.ReadOptions`` has them.
 
     Returns:
-        The entries.
+        The run, and what was decided during the import.
 
     Raises:
-        InspectorError: If an entry is not of that form, or a column or target is named twice.
+        InspectorError: If an option is not valid, or the log cannot be read as one robot's
+            motion.
+        RobotError: If the robot cannot be read, or lacks the joints that the log names.
+
+    Example:
+        >>> read_log("bag/", robot="panda").run.rate  # doctest: +SKIP
+        1000.0
     """
-    said: list[Entry] = []
-    for text in entries:
-        target, _, source = text.partition("=")
-        signal, dot, joint = target.partition(".")
-        known = signal in (*JOINT_SIGNALS, *BASE_SIGNALS) or target == "time"
-        if not source or not known or (dot and not joint):
-            raise InspectorError(
-                f"mapping {text!r}: expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2,"
-                " SIGNAL=ARRAY, such as position=qpos[7:], or time=COLUMN; signals are"
-                f" {', '.join((*JOINT_SIGNALS, *BASE_SIGNALS))}"
-            )
-        if joint and joint not in CONVENTIONS.get(signal, (joint,)):
-            raise InspectorError(
-                f"mapping {text!r}: a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
-            )
-        if any(entry.source == source for entry in said):
-            raise InspectorError(f"mapping {text!r}: column {source!r} is mapped twice")
-        if any(entry.target == target for entry in said):
-            raise InspectorError(f"mapping {text!r}: {target} is mapped twice")
-        said.append(Entry(signal, joint, source))
-    return tuple(said)
+    chosen = read_options(mapping, **options)
+    jobs = jobs_of(Path(path), chosen, desired=Path(desired) if desired else None)
+    if episode is None and len(jobs) > 1:
+        raise LogError(
+            Path(path),
+            f"holds {len(jobs)} episodes ({listed([job.episode for job in jobs])}); choose one"
+            " (episode), or read all (read_logs)",
+        )
+    return _chosen(Path(path), jobs, None if episode is None else [episode])[0].read()
 
 
-def _setting(name: str, value: Any) -> Any:
-    """Check the type of a saved setting."""
-    if name in ("joints", "topics"):
-        wanted = isinstance(value, list) and all(isinstance(each, str) for each in value)
-        value = tuple(value) if wanted else value
-    elif name in ("rate", "offset"):
-        wanted = isinstance(value, int | float) and not isinstance(value, bool)
-    else:
-        wanted = isinstance(value, str)
-    if not wanted:
-        raise InspectorError(f"{name} = {value!r} is of another kind than expected")
-    return value
+def read_logs(
+    path: str | Path,
+    options: ReadOptions | None = None,
+    *,
+    desired: str | Path | None = None,
+    episodes: Sequence[str] | None = None,
+    progress: Progress = without_progress,
+) -> Iterator[Imported]:
+    """Runs of a log, read one after the other.
+
+    Args:
+        path: The log.
+        options: How to read it.
+        desired: Another log with the desired motion.
+        episodes: Which episodes to read, all unless given.
+        progress: Wraps what is read, to show how much is done.
+
+    Yields:
+        A run per episode.
+
+    Raises:
+        InspectorError: As ``read_log``.
+        RobotError: As ``read_log``.
+    """
+    jobs = jobs_of(
+        Path(path),
+        options or ReadOptions(),
+        desired=Path(desired) if desired else None,
+        progress=progress,
+    )
+    for job in _chosen(Path(path), jobs, episodes):
+        yield job.read()
 
 
-def _toml(value: str | float | tuple[str, ...]) -> str:
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(_toml, value)) + "]"
-    if isinstance(value, str):  # JSON's strings are TOML's, but for one character
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    return repr(float(value))
+def jobs_of(
+    path: Path,
+    options: ReadOptions,
+    *,
+    desired: Path | None = None,
+    episodes: Sequence[str] | None = None,
+    progress: Progress = without_progress,
+) -> tuple[Job, ...]:
+    """Runs of a log, to be read one by one.
+
+    Args:
+        path: The log.
+        options: How to read it.
+        desired: Another log with the desired motion.
+        episodes: Which episodes, all unless given.
+        progress: Wraps what is read, to show how much is done.
+
+    Raises:
+        InspectorError: As ``read_log``.
+        RobotError: If the robot cannot be read.
+    """
+    robot = Robot.load(options.robot) if options.robot else None
+    opened = open_log(path, options)
+    opened_desired = open_log(desired, options) if desired else None
+    jobs = []
+    for episode in opened.episodes:
+        name = f"{path.stem}-{episode}" if episode else path.stem
+        read = partial(
+            _run_of_episode, path, name, opened, opened_desired, episode, options, robot, progress
+        )
+        jobs.append(Job(name, episode, read))
+    return _chosen(path, tuple(jobs), episodes)
+
+
+def read_options(
+    mapping: Sequence[str] = (), *, saved: str | Path | None = None, **options: Any
+) -> ReadOptions:
+    """Options of reading a log, combined with a saved mapping.
+
+    Args:
+        mapping: Signals of columns and arrays, as ``parse_mapping`` has it.
+        saved: A saved mapping; the other arguments take precedence.
+        **options: The other attributes of ``ReadOptions``; None for what is not specified.
+
+    Raises:
+        InspectorError: If one of them is not valid.
+    """
+    before = ReadOptions.load(Path(saved)) if saved else ReadOptions()
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in {"joints", "topics"} & set(given):
+        given[name] = tuple(given[name])
+    if "robot" in given:
+        given["robot"] = str(given["robot"])
+    entries = parse_mapping(mapping)
+    targets = {entry.target for entry in entries}
+    kept = tuple(entry for entry in before.entries if entry.target not in targets)
+    return replace(before, **given, entries=(*entries, *kept))
+
+
+def listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
+    """Contents of a log, a line each.
+
+    Raises:
+        LogError: If it cannot be read.
+    """
+    opened = open_log(path, options)
+    return (f"{path}: {opened.kind}", *(f"  {line}" for line in opened.listing()))
+
+
+def _chosen(path: Path, jobs: tuple[Job, ...], episodes: Sequence[str] | None) -> tuple[Job, ...]:
+    by_name = {job.episode: job for job in jobs}
+    for episode in episodes or ():
+        if episode not in by_name:
+            known = listed([each or "no episodes" for each in by_name])
+            raise LogError(path, f"there is no episode {episode!r}; it has {known}")
+    return tuple(by_name[episode] for episode in episodes) if episodes else jobs
+
+
+def _run_of_episode(
+    path: Path,
+    name: str,
+    opened: LogReader,
+    desired: LogReader | None,
+    episode: str,
+    options: ReadOptions,
+    robot: Robot | None,
+    progress: Progress,
+) -> Imported:
+    if opened.run and not desired:
+        return Imported(opened.run(), ("a run file, unchanged",), name)
+    log = opened.read(episode, progress)
+    remarks: tuple[str, ...] = ()
+    if robot is None and log.urdf:
+        robot, remarks = _robot_of(log.urdf)
+    logs = [prepared(log, options, robot)]
+    del log  # its tracks remain, and are freed one by one as they are resampled
+    if desired:
+        same_episode = episode if episode in desired.episodes else desired.episodes[0]
+        logs.append(prepared(desired.read(same_episode, progress), options, robot))
+    imported = run_of(logs, options, robot, name)
+    return replace(imported, remarks=(*imported.remarks, *remarks))
+
+
+def _robot_of(urdf: str) -> tuple[Robot | None, tuple[str, ...]]:
+    """Robot of the URDF in a log, or None and a remark if it cannot be read."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot_description.urdf"
+        path.write_text(urdf, encoding="utf-8")
+        try:
+            return Robot.load(path), ()
+        except RobotError as error:
+            problem = str(error).replace(str(path), "the log's robot description")
+            return None, (f"{problem}; joints are not checked",)

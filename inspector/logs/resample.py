@@ -1,4 +1,4 @@
-"""Signals with clocks of their own, brought onto one uniform time base."""
+"""Signals with separate clocks, resampled to one uniform time base."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -11,31 +11,31 @@ from inspector.logs.log import Track
 from noisemodel.types import Array, Indices, Mask, Real
 
 ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-"""Round rates are these times a power of ten, in [Hz]."""
+"""Round rates are these, times a power of ten, in [Hz]."""
 
 NEAR = 0.05
-"""Share by which the nominal rate may miss a round one that is taken for it."""
+"""Largest relative difference of a nominal rate to the round one that replaces it."""
 
 UNIFORM = 1e-3
-"""Share by which the steps of a uniform clock may differ from each other."""
+"""Largest relative deviation of a uniform clock's steps from their median."""
 
 GAP = 5.0
-"""Nominal steps above which a step is a gap."""
+"""Length of a step, in nominal ones, above which it is a gap."""
 
 BLOCK = 500_000
-"""Values that are interpolated at a time; it takes some ten times their memory."""
+"""Values that are interpolated at once, which takes about ten times their memory."""
 
 
 @dataclass(frozen=True)
 class Clock:
-    """How samples lie in time.
+    """Rate, jitter and gaps of timestamps.
 
     Attributes:
         nominal: Inverse of the median step, in [Hz].
-        rate: The rate that the samples are taken to have, in [Hz].
-        uniform: Whether the stamps are regular already.
-        jitter_rms: Deviation of the steps from that rate's, gaps left out, in [s].
-        jitter_max: The same at its largest, in [s].
+        rate: The rate that is used, in [Hz].
+        uniform: Whether the stamps are uniform.
+        jitter_rms: Root mean square deviation of the steps from that rate's, without gaps, in [s].
+        jitter_max: Largest deviation, in [s].
         gaps: Start and end of each gap, in [s].
         stretches: The samples between gaps.
     """
@@ -50,14 +50,14 @@ class Clock:
 
 
 @dataclass(frozen=True, eq=False)
-class Clocked:
-    """A track on the clock that all tracks share.
+class TimedTrack:
+    """A track with its times on the common clock.
 
     Attributes:
         track: The signal as it was logged.
-        time: Rising, shape (samples,), in [s].
-        clock: How ``time`` lies.
-        angles: Which columns are angles, that may wrap.
+        time: Increasing, shape (samples,), in [s].
+        clock: Clock of ``time``.
+        angles: Whether each column is an angle, which may wrap.
     """
 
     track: Track
@@ -67,16 +67,16 @@ class Clocked:
 
 
 def clock_of(time: Array, rate: float | None = None, *, held: bool = False) -> Clock:
-    """Look at the stamps of a log.
+    """Clock of the stamps of a log.
 
     Args:
-        time: Rising, shape (samples,), in [s].
-        rate: The rate, if it is known, in [Hz].
-        held: Whether values hold between stamps however far apart, so that there are no gaps.
+        time: Increasing, shape (samples,), in [s].
+        rate: The rate, if known, in [Hz].
+        held: Whether values apply between stamps however far apart, so that there are no gaps.
 
     Returns:
-        The clock. Unless given, its rate is the nominal one of uniform stamps, and of others the
-        round one that this is near to.
+        The clock. Unless given, its rate is the nominal one of uniform stamps, and otherwise the
+        nearest round one.
     """
     steps = np.diff(time)
     step = float(np.median(steps))
@@ -99,34 +99,34 @@ def clock_of(time: Array, rate: float | None = None, *, held: bool = False) -> C
     )
 
 
-def common_time(tracks: Sequence[Clocked], main: Clocked) -> tuple[Array, Mask]:
-    """Make the uniform time base of a run, where all tracks reach.
+def common_time(tracks: Sequence[TimedTrack], main: TimedTrack) -> tuple[Array, Mask]:
+    """Uniform time base of a run, over the time that all tracks cover.
 
     Args:
         tracks: All tracks.
-        main: The one whose rate the run has, its time from 0.
+        main: The track whose rate the run has; its time starts at 0.
 
     Returns:
-        Time, shape (instants,), in [s], and whether each instant lies outside of all gaps. Where
-        tracks do not overlap there are no instants.
+        Time, shape (instants,), in [s], and whether each instant is outside of all gaps; no
+        instants if the tracks do not overlap.
     """
-    slack = UNIFORM / main.clock.rate  # an instant may miss a last sample by rounding
+    slack = UNIFORM / main.clock.rate  # tolerance for rounding at the last sample
     time = grid(main.time, main.clock)
     starts = max(track.time[0] for track in tracks) - slack
     stops = min(track.time[-1] for track in tracks) + slack
     time = time[(time >= starts) & (time <= stops)]
     valid = np.ones(len(time), dtype=bool)
     for track in {id(track.track.stamps): track for track in tracks}.values():
-        valid &= _reached(time, track, slack)
+        valid &= _covered(time, track, slack)
     return time, valid
 
 
 def grid(time: Array, clock: Clock) -> Array:
-    """Make the uniform time base of a track: its own stamps where these are uniform already.
+    """Uniform time base of a track: its own stamps if these are uniform.
 
     Args:
         time: The track's stamps, from 0, shape (samples,), in [s].
-        clock: How they lie.
+        clock: Their clock.
 
     Returns:
         Time base, shape (instants,), in [s].
@@ -136,17 +136,17 @@ def grid(time: Array, clock: Clock) -> Array:
     return np.arange(int(time[-1] * clock.rate + UNIFORM) + 1) / clock.rate
 
 
-def onto(instants: Array, valid: Mask, track: Clocked, *, slack: float) -> Real:
-    """Bring a track onto a time base.
+def resampled(instants: Array, valid: Mask, track: TimedTrack, *, slack: float) -> Real:
+    """Values of a track on a time base.
 
-    Samples are taken as they are where all instants fall on one, within ``slack``; else they are
-    interpolated. Between samples values are monotonic, so that nothing overshoots.
+    If each instant coincides with a sample, within ``slack``, samples are not changed; else they
+    are interpolated monotonically (PCHIP), without overshoot.
 
     Args:
         instants: The time base, shape (instants,), in [s].
         valid: False in gaps, shape (instants,).
         track: The track.
-        slack: How far an instant may miss a sample that is taken for it, in [s].
+        slack: Largest difference of coinciding times, in [s].
 
     Returns:
         Values, 0 in gaps, shape (instants, columns).
@@ -158,7 +158,7 @@ def onto(instants: Array, valid: Mask, track: Clocked, *, slack: float) -> Real:
         return np.where(valid[:, None], track.track.values[places], 0.0)
     if track.track.signal == "base_pose":
         pose = np.asarray(track.track.values, dtype=np.float64)
-        found = interpolated(pose, lambda values: _between(instants, track, values, slack))
+        found = interpolated(pose, lambda values: _interpolated(instants, track, values, slack))
     else:
         found = np.empty((len(instants), track.track.values.shape[1]))
         block = max(1, BLOCK // len(track.time))
@@ -168,20 +168,20 @@ def onto(instants: Array, valid: Mask, track: Clocked, *, slack: float) -> Real:
             angles = track.angles[part]
             if any(angles):
                 values = np.where(angles, np.unwrap(values, axis=0), values)
-            found[:, part] = _between(instants, track, values, slack)
+            found[:, part] = _interpolated(instants, track, values, slack)
     found[~valid] = 0.0
     return found
 
 
-def _places(instants: Array, track: Clocked, slack: float) -> Indices | None:
-    """Find the sample on which each instant falls; None if one falls on none."""
+def _places(instants: Array, track: TimedTrack, slack: float) -> Indices | None:
+    """Index of the sample at each instant; None if an instant has none."""
     if not track.clock.uniform:
         return None
     places = np.searchsorted(track.time, instants - slack).clip(max=len(track.time) - 1)
     return places if (np.abs(track.time[places] - instants) <= slack).all() else None
 
 
-def _reached(instants: Array, track: Clocked, slack: float) -> Mask:
+def _covered(instants: Array, track: TimedTrack, slack: float) -> Mask:
     if _places(instants, track, slack) is not None:
         return np.ones(len(instants), dtype=bool)
     reached = np.zeros(len(instants), dtype=bool)
@@ -190,7 +190,7 @@ def _reached(instants: Array, track: Clocked, slack: float) -> Mask:
     return reached
 
 
-def _between(instants: Array, track: Clocked, values: Real, slack: float) -> Array:
+def _interpolated(instants: Array, track: TimedTrack, values: Real, slack: float) -> Array:
     from scipy.interpolate import PchipInterpolator
 
     found = np.zeros((len(instants), values.shape[1]))
@@ -201,8 +201,8 @@ def _between(instants: Array, track: Clocked, values: Real, slack: float) -> Arr
     return found
 
 
-def _parts(instants: Array, track: Clocked, slack: float) -> Iterator[tuple[slice, slice]]:
-    """Go through the instants that lie in each stretch between gaps, and the stretch's samples."""
+def _parts(instants: Array, track: TimedTrack, slack: float) -> Iterator[tuple[slice, slice]]:
+    """The instants within each stretch between gaps, and the stretch's samples."""
     for stretch in track.clock.stretches:
         known = track.time[stretch]
         if len(known) > 1:
@@ -211,7 +211,7 @@ def _parts(instants: Array, track: Clocked, slack: float) -> Iterator[tuple[slic
 
 
 def _round(rate: float) -> float:
-    """Find the round rate that a rate is near to, or leave it."""
+    """The nearest round rate, or the rate itself if none is near."""
     power = 10.0 ** np.floor(np.log10(rate))
     near = float(power * min(ROUND, key=lambda digit: abs(digit * power / rate - 1)))
     return near if abs(near / rate - 1) <= NEAR else rate

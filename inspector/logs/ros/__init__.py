@@ -1,1 +1,1 @@
-"""ROS bags, of both generations and all storages, without a ROS installation."""
+"""ROS 1 and ROS 2 bags of all storages, read without a ROS installation."""

@@ -1,4 +1,4 @@
-"""A bag as topics and raw messages, whoever reads them from the file."""
+"""Topics and serialised messages of a bag, independent of its storage."""
 
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
@@ -9,7 +9,7 @@ MAGIC = {b"\x89MCAP0\r\n": "MCAP", b"SQLite format 3\x00": "SQLite", b"#ROSBAG V
 """The first bytes of the files that bags are stored in."""
 
 Message: TypeAlias = tuple[str, int, bytes]
-"""Topic, when it was received in [ns], and the message as serialised."""
+"""Topic, time of reception in [ns], and the serialised message."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +20,7 @@ class Topic:
         name: Its name.
         type: Type of its messages, as ROS 2 writes it: ``sensor_msgs/msg/JointState``.
         definition: Text of the type's definition, empty if the bag has none.
-        count: How many messages there are, -1 if nobody counted.
+        count: Number of messages, -1 if unknown.
     """
 
     name: str
@@ -34,13 +34,13 @@ class Bag:
     """A bag that is open for reading.
 
     Attributes:
-        kind: What it is, for people.
-        ros1: Whether messages are serialised as ROS 1 does it.
+        kind: Name of its kind.
+        ros1: Whether messages are serialised in the format of ROS 1.
         topics: Its topics by name.
-        messages: Goes through the messages of some topics.
-        close: Lets go of the file.
-        seconds: Time from first to last message, in [s]; 0 if nobody knows.
-        lost: What could not be read, a sentence each; complete when all messages were read.
+        messages: Iterates over the messages of some topics.
+        close: Closes the file.
+        seconds: Time from first to last message, in [s]; 0 if unknown.
+        lost: What could not be read, a sentence each; complete after all messages are read.
     """
 
     kind: str
@@ -53,7 +53,7 @@ class Bag:
 
 
 def storage_of(path: Path) -> str:
-    """Say how a file stores messages, by its first bytes; empty if it is no bag."""
+    """Storage of a file, by its first bytes; empty if it is not a bag."""
     try:
         with path.open("rb") as stream:
             head = stream.read(16)

@@ -1,4 +1,4 @@
-"""Bags that are whole, read by rosbags."""
+"""Undamaged bags, read by rosbags."""
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
@@ -8,11 +8,11 @@ from inspector.logs.ros.bag import Bag, Message, Topic, storage_of
 
 
 class DamagedError(Exception):
-    """A bag that rosbags does not read; something may still be had of it."""
+    """A bag that rosbags cannot read; parts of it may be readable."""
 
 
 def open_bag(path: Path) -> Bag:
-    """Open a bag.
+    """Bag that is open for reading.
 
     Args:
         path: The folder of a ROS 2 bag, one of its files, or a ROS 1 bag.
@@ -44,7 +44,7 @@ def open_bag(path: Path) -> Bag:
 
 
 def _messages(reader: Any, bag: Bag, names: Collection[str]) -> Iterator[Message]:
-    """Go through messages until the end, or to where the bag is damaged."""
+    """Messages to the end, or to where the bag is damaged."""
     wanted = [each for each in reader.connections if each.topic in names]
     expected, count = sum(each.msgcount for each in wanted), 0
     try:

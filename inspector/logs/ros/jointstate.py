@@ -1,7 +1,8 @@
-"""The layout of a serialised JointState, so that its numbers are copied and not parsed.
+"""Byte layout of a serialised JointState, by which its numbers are copied without parsing.
 
-CDR pads a number to a multiple of its size, counted from the end of the four bytes that say which
-CDR it is. Messages of one publisher have one layout: what stands between their numbers is equal.
+CDR aligns a number to a multiple of its size, counted from the end of the four bytes of the
+encapsulation header. Messages of one publisher have one layout: the bytes between their numbers
+are equal.
 """
 
 import struct
@@ -9,23 +10,23 @@ from dataclasses import dataclass
 from typing import Self
 
 LITTLE = b"\x00\x01"
-"""CDR, little-endian; anything else is left to the general reader."""
+"""CDR, little-endian; other encodings are deserialised by rosbags."""
 
 STAMP = struct.Struct("<iI")
 COUNT = struct.Struct("<I")
 BODY = 12
-"""Where what follows the stamp begins."""
+"""Offset of the bytes after the stamp."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the numbers of a JointState stand.
+    """Byte offsets of the numbers of a JointState.
 
     Attributes:
         names: The joints.
         size: Length of the message in bytes.
         arrays: Start and stop of the positions, velocities and efforts.
-        between: Bytes that all messages of this layout share, by where they stand.
+        between: Bytes that all messages of this layout share, with start and stop.
     """
 
     names: tuple[str, ...]
@@ -35,7 +36,7 @@ class Layout:
 
     @classmethod
     def of(cls, data: bytes) -> Self | None:
-        """Find the layout of a message; None if it is of another kind than expected.
+        """Layout of a message; None if it is not a JointState in little-endian CDR.
 
         Args:
             data: The message, serialised as ``sensor_msgs/msg/JointState`` in CDR.
@@ -67,7 +68,7 @@ class Layout:
         return cls(tuple(names), len(data), tuple(arrays), tuple(between))
 
     def fits(self, data: bytes) -> bool:
-        """Say whether a message has this layout."""
+        """Whether a message has this layout."""
         return (
             len(data) == self.size
             and data[:2] == LITTLE
@@ -76,7 +77,7 @@ class Layout:
 
 
 def stamp(data: bytes) -> int:
-    """Read the stamp of a message that has a layout, in [ns]."""
+    """Stamp of a message that has a layout, in [ns]."""
     seconds, nanoseconds = STAMP.unpack_from(data, 4)
     return int(seconds) * 10**9 + int(nanoseconds)
 

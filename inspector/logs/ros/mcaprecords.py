@@ -14,7 +14,7 @@ from inspector.logs.ros.bag import Message, Topic
 
 
 def topics(path: Path) -> Iterator[Topic]:
-    """Go through the topics that intact records name."""
+    """Topics of intact records."""
     schemas: dict[int, Schema] = {}
     for record in _records(path, []):
         if isinstance(record, Schema):
@@ -26,7 +26,7 @@ def topics(path: Path) -> Iterator[Topic]:
 
 
 def messages(path: Path, lost: list[str]) -> Iterator[Message]:
-    """Go through the messages of intact records.
+    """Messages of intact records.
 
     Args:
         path: The file.
@@ -41,7 +41,7 @@ def messages(path: Path, lost: list[str]) -> Iterator[Message]:
 
 
 def _records(path: Path, lost: list[str]) -> Iterator[McapRecord]:
-    """Go through records, including those in chunks, to where the file ends or is damaged."""
+    """Records, including those in chunks, to where the file ends or is damaged."""
     size, place = path.stat().st_size, 0  # no record is longer than its file
     with path.open("rb") as stream:
         reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)

@@ -1,5 +1,6 @@
-"""What the messages of each type hold of the motion of a robot's joints."""
+"""Fields with the motion of joints and base, from the messages of each type."""
 
+from array import array
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Protocol
@@ -8,10 +9,9 @@ import numpy as np
 
 from inspector.logs.log import Field, Stamps
 from inspector.logs.ros.bag import Topic
-from inspector.logs.ros.basemotion import Odometries, Transforms
-from inspector.logs.ros.grouping import Gathered
+from inspector.logs.ros.buffers import JointBuffer, stamps_of
+from inspector.logs.ros.decoding import STATE, Decoder, nanoseconds, stamp_of
 from inspector.logs.ros.jointstate import Layout, stamp
-from inspector.logs.ros.types import STATE, Decoder, nanoseconds, stamp_of
 
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
 """A JointState topic with one of these in its name holds desired motion."""
@@ -20,22 +20,29 @@ ARRAYS = {"position": "position", "velocity": "velocity", "effort": "effort"}
 POINT = {"positions": "position", "velocities": "velocity", "effort": "effort"}
 
 
-class Gatherer(Protocol):
-    """Takes the messages of a topic, then tells what they hold."""
+FIXED_FRAMES = ("odom", "world", "map", "earth")
+"""Frames that do not move with the robot, the smoothest first."""
+
+BASE_FRAMES = ("base_link", "base_footprint", "base", "pelvis", "torso", "trunk", "root")
+"""Frames of a robot's base."""
+
+
+class TopicReader(Protocol):
+    """Collects the messages of a topic, and makes fields of them."""
 
     def add(self, received: int, data: bytes) -> None:
-        """Take a message that was received at a time in [ns]."""
+        """Add a message that was received at a time in [ns]."""
 
     def fields(self) -> Iterator[Field]:
-        """Go through what the messages hold."""
+        """Fields of the messages."""
 
 
 class JointStates:
-    """``sensor_msgs/JointState``: what was measured, or commanded if the topic's name says so."""
+    """``sensor_msgs/JointState``: measured motion, or desired if the topic's name says so."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
-        self.gathered = Gathered(topic.name)
+        self.buffer = JointBuffer(topic.name)
         self.layout: Layout | None = None
         self.ros1 = ros1
         commanded = any(word in topic.name.lower() for word in COMMANDED)
@@ -48,25 +55,25 @@ class JointStates:
             }
 
     def add(self, received: int, data: bytes) -> None:
-        """Take a message."""
+        """Add a message."""
         if self.layout is None or not self.layout.fits(data):
             self.layout = None if self.ros1 else Layout.of(data)
         if self.layout is not None:
             parts = (data[start:stop] for start, stop in self.layout.arrays)
-            named = dict(zip(ARRAYS, parts, strict=True))
-            self.gathered.add(self.layout.names, stamp(data), received, named)
+            column_signal = dict(zip(ARRAYS, parts, strict=True))
+            self.buffer.add(self.layout.names, stamp(data), received, column_signal)
             return
         message = self.decode(data)
-        named = {name: getattr(message, name) for name in ARRAYS}
-        self.gathered.add(tuple(message.name), stamp_of(message), received, named)
+        column_signal = {name: getattr(message, name) for name in ARRAYS}
+        self.buffer.add(tuple(message.name), stamp_of(message), received, column_signal)
 
     def fields(self) -> Iterator[Field]:
-        """Go through positions, velocities and efforts."""
-        return self.gathered.fields(self.signals)
+        """Positions, velocities and efforts."""
+        return self.buffer.fields(self.signals)
 
 
 class ControllerStates:
-    """``control_msgs/JointTrajectoryControllerState``: both sides, with one stamp."""
+    """``control_msgs/JointTrajectoryControllerState``: measured and desired, with one stamp."""
 
     STAGES: Mapping[str, bool] = {
         "reference": True,
@@ -74,11 +81,11 @@ class ControllerStates:
         "feedback": False,
         "actual": False,
     }
-    """The names of a stage, and whether it is the desired one."""
+    """Names of the stages, and whether each is desired motion."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
-        self.gathered = Gathered(topic.name)
+        self.buffer = JointBuffer(topic.name)
         self.signals = {
             f"{stage}/{name}": (f"{signal}_desired" if desired else signal, 0 if desired else 1)
             for stage, desired in self.STAGES.items()
@@ -87,26 +94,26 @@ class ControllerStates:
         }
 
     def add(self, received: int, data: bytes) -> None:
-        """Take a message; of a stage that has two names the one that holds something."""
+        """Add a message; of the two names of a stage the one that is not empty is used."""
         message = self.decode(data)
         parts = {}
         for stages in (("reference", "desired"), ("feedback", "actual")):
-            there = [name for name in stages if _is_filled(getattr(message, name, None))]
-            for stage in there[:1]:
+            present = [name for name in stages if _has_values(getattr(message, name, None))]
+            for stage in present[:1]:
                 point = getattr(message, stage)
                 for name in POINT:
                     if f"{stage}/{name}" in self.signals:
                         parts[f"{stage}/{name}"] = getattr(point, name, ())
         joints = tuple(message.joint_names)
-        self.gathered.add(joints, stamp_of(message), received, parts)
+        self.buffer.add(joints, stamp_of(message), received, parts)
 
     def fields(self) -> Iterator[Field]:
-        """Go through positions, velocities and efforts of both sides."""
-        return self.gathered.fields(self.signals)
+        """Measured and desired positions and velocities, and measured efforts."""
+        return self.buffer.fields(self.signals)
 
 
 class Trajectories:
-    """``trajectory_msgs/JointTrajectory``: desired motion, planned ahead."""
+    """``trajectory_msgs/JointTrajectory``: planned desired motion."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
@@ -114,7 +121,7 @@ class Trajectories:
         self.joints: dict[frozenset[str], list[tuple[int, tuple[str, ...], Any]]] = {}
 
     def add(self, received: int, data: bytes) -> None:
-        """Take a trajectory."""
+        """Add a trajectory."""
         message = self.decode(data)
         joints = tuple(message.joint_names)
         if joints and message.points:
@@ -123,11 +130,11 @@ class Trajectories:
             plans.append((start, joints, message.points))
 
     def fields(self) -> Iterator[Field]:
-        """Go through the points; a new trajectory takes the place of what is left of the last."""
+        """Fields of the points; a new trajectory replaces the rest of the previous one."""
         for plans in self.joints.values():
             joints, rows = plans[0][1], []
-            begins = [start for start, _, _ in plans[1:]]
-            for (start, names, points), stop in zip(plans, [*begins, 2**63], strict=True):
+            starts = [start for start, _, _ in plans[1:]]
+            for (start, names, points), stop in zip(plans, [*starts, 2**63], strict=True):
                 order = [names.index(joint) for joint in joints]
                 for point in points:
                     at = start + nanoseconds(point.time_from_start)
@@ -148,6 +155,72 @@ class Trajectories:
                     )
 
 
+class Odometries:
+    """``nav_msgs/Odometry``: pose of the base in the world, velocity in body axes."""
+
+    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
+        self.decode = Decoder(path, topic, ros1=ros1)
+        self.topic = topic.name
+        self.logged, self.received = array("q"), array("q")
+        self.poses, self.twists = array("d"), array("d")
+
+    def add(self, received: int, data: bytes) -> None:
+        """Add a message."""
+        message = self.decode(data)
+        self.logged.append(stamp_of(message))
+        self.received.append(received)
+        self.poses.extend(_pose(message.pose.pose.position, message.pose.pose.orientation))
+        twist = message.twist.twist
+        self.twists.extend(getattr(twist.linear, axis) for axis in "xyz")
+        self.twists.extend(getattr(twist.angular, axis) for axis in "xyz")
+
+    def fields(self) -> Iterator[Field]:
+        """Pose and velocity."""
+        stamps = stamps_of(self.logged, self.received)
+        for name, numbers, signal, width in (
+            ("pose", self.poses, "base_pose", 7),
+            ("twist", self.twists, "base_velocity", 6),
+        ):
+            values = np.frombuffer(numbers).reshape(-1, width)
+            yield Field(f"{self.topic}/{name}", values, stamps, signal=signal, source=self.topic)
+
+
+class Transforms:
+    """``tf2_msgs/TFMessage``: the pose of the base."""
+
+    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
+        self.decode = Decoder(path, topic, ros1=ros1)
+        self.topic = topic.name
+        self.pairs: dict[tuple[str, str], tuple[array[int], array[int], array[float]]] = {}
+
+    def add(self, received: int, data: bytes) -> None:
+        """Add a message."""
+        for each in self.decode(data).transforms:
+            pair = each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/")
+            if pair[0] in FIXED_FRAMES and pair[1] in BASE_FRAMES:
+                logged, at, poses = self.pairs.setdefault(
+                    pair, (array("q"), array("q"), array("d"))
+                )
+                logged.append(stamp_of(each))
+                at.append(received)
+                poses.extend(_pose(each.transform.translation, each.transform.rotation))
+
+    def fields(self) -> Iterator[Field]:
+        """Pose of the base in the smoothest of the fixed frames."""
+        for world, base in sorted(
+            self.pairs, key=lambda pair: (FIXED_FRAMES.index(pair[0]), BASE_FRAMES.index(pair[1]))
+        )[:1]:
+            logged, at, poses = self.pairs[world, base]
+            yield Field(
+                f"{self.topic}/{world}/{base}",
+                np.frombuffer(poses).reshape(-1, 7),
+                stamps_of(logged, at),
+                signal="base_pose",
+                source=self.topic,
+                rank=1,
+            )
+
+
 class Descriptions:
     """``std_msgs/String``: the robot's URDF."""
 
@@ -156,17 +229,17 @@ class Descriptions:
         self.urdf = ""
 
     def add(self, received: int, data: bytes) -> None:
-        """Take a message; the last one that holds a URDF is it."""
+        """Add a message; the last one that holds a URDF is used."""
         text = str(self.decode(data).data)
         if "<robot" in text:
             self.urdf = text
 
     def fields(self) -> Iterator[Field]:
-        """Give nothing: a URDF does not move."""
+        """No fields: a URDF has no motion."""
         return iter(())
 
 
-GATHERERS: Mapping[str, Callable[..., Gatherer]] = {
+TOPIC_READERS: Mapping[str, Callable[..., TopicReader]] = {
     "sensor_msgs/msg/JointState": JointStates,
     STATE: ControllerStates,
     "trajectory_msgs/msg/JointTrajectory": Trajectories,
@@ -174,19 +247,23 @@ GATHERERS: Mapping[str, Callable[..., Gatherer]] = {
     "tf2_msgs/msg/TFMessage": Transforms,
     "tf/msg/tfMessage": Transforms,
 }
-"""The types of messages that are read, and what reads them."""
+"""Readers by the type of messages."""
 
 DESCRIPTION = "robot_description"
-"""The last part of the name of the topic that a robot's URDF comes on."""
+"""The last part of the name of the topic with a robot's URDF."""
 
 
-def gatherer_of(path: Path, topic: Topic, *, ros1: bool) -> Gatherer | None:
-    """Choose what reads a topic; None if nothing does."""
+def topic_reader(path: Path, topic: Topic, *, ros1: bool) -> TopicReader | None:
+    """Reader of a topic; None if its type is not read."""
     if topic.type == "std_msgs/msg/String" and topic.name.endswith(DESCRIPTION):
         return Descriptions(path, topic, ros1=ros1)
-    kind = GATHERERS.get(topic.type)
+    kind = TOPIC_READERS.get(topic.type)
     return kind(path, topic, ros1=ros1) if kind else None
 
 
-def _is_filled(point: Any) -> bool:
+def _has_values(point: Any) -> bool:
     return point is not None and bool(len(point.positions) or len(point.velocities))
+
+
+def _pose(position: Any, turn: Any) -> tuple[float, ...]:
+    return (position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w)

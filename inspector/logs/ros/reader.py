@@ -1,28 +1,33 @@
-"""A bag becomes a log: the topics that hold a robot's motion."""
+"""Log of a bag: the topics that hold a robot's motion."""
 
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
 from inspector.errors import LogError
-from inspector.logs.columns import listed
-from inspector.logs.log import Log
-from inspector.logs.opened import Opened, Watch
-from inspector.logs.reading import Reading
-from inspector.logs.ros import intact, salvage
+from inspector.logs.log import Log, LogReader, Progress
+from inspector.logs.options import ReadOptions
+from inspector.logs.ros import damaged, intact
 from inspector.logs.ros.bag import Bag, Topic
-from inspector.logs.ros.messages import DESCRIPTION, GATHERERS, Descriptions, Gatherer, gatherer_of
+from inspector.logs.ros.messages import (
+    DESCRIPTION,
+    TOPIC_READERS,
+    Descriptions,
+    TopicReader,
+    topic_reader,
+)
+from inspector.logs.signals import listed
 
 
-def open_log(path: Path, reading: Reading) -> Opened:
-    """Offer a bag.
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of a bag.
 
     Args:
         path: The folder of a ROS 2 bag, one of its files, or a ROS 1 bag.
-        reading: What a person said of it; topics are chosen by it.
+        options: How to read it, including which topics.
     """
-    return Opened(
-        "ROS bag", ("",), lambda _, watch: _read(path, reading, watch), lambda: _listing(path)
+    return LogReader(
+        "ROS bag", ("",), lambda _, progress: _read(path, options, progress), lambda: _listing(path)
     )
 
 
@@ -30,27 +35,27 @@ def _bag(path: Path) -> Bag:
     try:
         return intact.open_bag(path)
     except intact.DamagedError as error:
-        return salvage.open_bag(path, str(error))
+        return damaged.open_bag(path, str(error))
 
 
-def _read(path: Path, reading: Reading, watch: Watch) -> Log:
+def _read(path: Path, options: ReadOptions, progress: Progress) -> Log:
     try:
         with closing(_bag(path)) as bag:
-            return _gathered(path, bag, reading, watch)
-    except intact.DamagedError as error:  # it was whole to the eye
-        return _gathered(path, salvage.open_bag(path, str(error)), reading, watch)
+            return _log_of(path, bag, options, progress)
+    except intact.DamagedError as error:  # rosbags could open it
+        return _log_of(path, damaged.open_bag(path, str(error)), options, progress)
 
 
-def _gathered(path: Path, bag: Bag, reading: Reading, watch: Watch) -> Log:
-    chosen = dict(_chosen(path, bag, reading))
+def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> Log:
+    chosen = dict(_chosen(path, bag, options))
     total = sum(max(bag.topics[name].count, 0) for name in chosen)
-    for name, received, data in watch(bag.messages(chosen), total):
+    for name, received, data in progress(bag.messages(chosen), total):
         chosen[name].add(received, data)
-    fields = [field for gatherer in chosen.values() for field in gatherer.fields()]
+    fields = [field for reader in chosen.values() for field in reader.fields()]
     if not any(field.signal.startswith(("position", "velocity")) for field in fields):
         raise LogError(path, f"no message holds joints; {_contents(bag)}")
     urdfs = [each.urdf for each in chosen.values() if isinstance(each, Descriptions) and each.urdf]
-    left = (
+    not_read = (
         f"{topic.name} ({topic.type if topic.count else 'no messages'})"
         for topic in bag.topics.values()
         if topic.name not in chosen or topic.count == 0
@@ -58,31 +63,31 @@ def _gathered(path: Path, bag: Bag, reading: Reading, watch: Watch) -> Log:
     return Log(
         path,
         tuple(field for field in fields if field.signal),
-        left=tuple(left),
+        not_read=tuple(not_read),
         remarks=tuple(bag.lost),
         urdf=urdfs[-1] if urdfs else "",
         meta={"topics": sorted({field.source for field in fields})},
     )
 
 
-def _chosen(path: Path, bag: Bag, reading: Reading) -> Iterator[tuple[str, Gatherer]]:
-    for name in reading.topics:
+def _chosen(path: Path, bag: Bag, options: ReadOptions) -> Iterator[tuple[str, TopicReader]]:
+    for name in options.topics:
         if name not in bag.topics:
             raise LogError(path, f"there is no topic {name!r}; {_contents(bag)}")
-        if bag.topics[name].type not in GATHERERS:
+        if bag.topics[name].type not in TOPIC_READERS:
             raise LogError(
                 path,
                 f"{name} is a {bag.topics[name].type}; types that are read are"
-                f" {', '.join(GATHERERS)}",
+                f" {', '.join(TOPIC_READERS)}",
             )
     found = False
     for topic in bag.topics.values():
         described = topic.name.endswith(DESCRIPTION)
-        if not reading.topics or topic.name in reading.topics or described:
-            gatherer = gatherer_of(path, topic, ros1=bag.ros1)
-            if gatherer and topic.count:
+        if not options.topics or topic.name in options.topics or described:
+            reader = topic_reader(path, topic, ros1=bag.ros1)
+            if reader and topic.count:
                 found = True
-                yield topic.name, gatherer
+                yield topic.name, reader
     if not found:
         raise LogError(path, f"no topic holds joints; {_contents(bag)}")
 
@@ -93,7 +98,7 @@ def _contents(bag: Bag) -> str:
 
 
 def _listing(path: Path) -> tuple[str, ...]:
-    """List topics with type, count and rate, and whether they are read."""
+    """Topics with type, count and rate, and whether they are read, a line each."""
     with closing(_bag(path)) as bag:
         return _rows(bag)
 
@@ -109,4 +114,4 @@ def _rows(bag: Bag) -> tuple[str, ...]:
 
 
 def _is_read(topic: Topic) -> bool:
-    return topic.type in GATHERERS or topic.name.endswith(DESCRIPTION)
+    return topic.type in TOPIC_READERS or topic.name.endswith(DESCRIPTION)

@@ -1,4 +1,4 @@
-"""A ROS 1 bag, record by record: what is left of a file that has lost its index.
+"""Topics and messages of a ROS 1 bag without its index, read record by record.
 
 A record is a header of ``name=value`` fields and data, each with its length before it. Chunks hold
 records in turn, perhaps compressed. http://wiki.ros.org/Bags/Format/2.0
@@ -18,7 +18,7 @@ MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"
 
 
 def topics(path: Path) -> Iterator[Topic]:
-    """Go through the topics that intact records name."""
+    """Topics of intact records."""
     with path.open("rb") as stream:
         for header, data in _records(stream, []):
             if header.get("op") == CONNECTION and "topic" in header:
@@ -30,11 +30,11 @@ def topics(path: Path) -> Iterator[Topic]:
 
 
 def messages(path: Path, lost: list[str]) -> Iterator[Message]:
-    """Go through the messages of intact records.
+    """Messages of intact records.
 
     Args:
         path: The file.
-        lost: Is told what was lost.
+        lost: What was lost is appended to it, a sentence each.
     """
     names: dict[bytes, str] = {}
     with path.open("rb") as stream:
@@ -53,7 +53,7 @@ def _topic(header: dict[str, bytes]) -> str:
 
 
 def _records(stream: BinaryIO, lost: list[str]) -> Iterator[tuple[dict[str, bytes], bytes]]:
-    """Go through records, those in chunks among them, to where the file ends."""
+    """Records, including those in chunks, to where the file ends or is damaged."""
     size = stream.seek(0, 2)
     stream.seek(0)
     stream.readline()

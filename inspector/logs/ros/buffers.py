@@ -1,4 +1,4 @@
-"""Numbers of many messages, gathered as they come, a group for each set of joints."""
+"""Numbers of many messages, buffered in arrays for each set of joints."""
 
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,10 +8,10 @@ import numpy as np
 
 from inspector.logs.log import Field, Stamps
 
-RECORDER = "the messages have no stamps, those of the recorder are taken"
+RECORDER = "the messages have no stamps, those of the recorder are used"
 
 Parts = Mapping[str, Sequence[float] | bytes | memoryview]
-"""By the name of an array of a message, its numbers, or the bytes of its float64s."""
+"""Numbers of a message by the name of the array, or the bytes of its float64 numbers."""
 
 
 @dataclass
@@ -21,7 +21,7 @@ class Group:
     Attributes:
         joints: The joints, in the order of the first message.
         logged: Stamps in the messages' headers, in [ns].
-        received: When the recorder had them, in [ns].
+        received: When the recorder received them, in [ns].
         arrays: Numbers by the name of the array, row after row.
     """
 
@@ -31,11 +31,11 @@ class Group:
     arrays: dict[str, "array[float]"] = field(default_factory=dict)
 
 
-class Gathered:
-    """The messages of one topic.
+class JointBuffer:
+    """Numbers of the messages of one topic.
 
-    Publishers that share a topic, an arm's and a gripper's, make a group each. Numbers are kept as
-    the eight bytes that they came as.
+    Publishers that share a topic, such as an arm's and a gripper's, have a group each. Numbers
+    are stored as float64.
     """
 
     def __init__(self, topic: str) -> None:
@@ -43,15 +43,17 @@ class Gathered:
         self.groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
 
     def add(self, joints: tuple[str, ...], logged: int, received: int, parts: Parts) -> None:
-        """Append a message; arrays that do not fit the joints in length are not there."""
-        there = tuple(name for name, numbers in parts.items() if _count(numbers) == len(joints) > 0)
-        group = self.groups.get((frozenset(joints), there))
+        """Append a message; arrays whose length is not that of the joints are ignored."""
+        present = tuple(
+            name for name, numbers in parts.items() if _count(numbers) == len(joints) > 0
+        )
+        group = self.groups.get((frozenset(joints), present))
         if group is None:
-            group = self.groups[frozenset(joints), there] = Group(joints)
-            group.arrays = {name: array("d") for name in there}
+            group = self.groups[frozenset(joints), present] = Group(joints)
+            group.arrays = {name: array("d") for name in present}
         group.logged.append(logged)
         group.received.append(received)
-        for name in there:
+        for name in present:
             numbers = parts[name]
             if joints != group.joints:
                 numbers = _reordered(numbers, joints, group.joints)
@@ -61,10 +63,10 @@ class Gathered:
                 group.arrays[name].extend(numbers)
 
     def fields(self, signals: Mapping[str, tuple[str, int]]) -> Iterator[Field]:
-        """Make fields of the arrays.
+        """Fields of the arrays.
 
         Args:
-            signals: By the name of an array, what it holds, and the rank of it.
+            signals: Signal and rank by the name of an array.
         """
         for group in self.groups.values():
             if not group.arrays:
@@ -85,15 +87,15 @@ class Gathered:
 
 
 def stamps_of(logged: "array[int]", received: "array[int]") -> Stamps:
-    """Take the stamps of the messages, or where they have none, of the recorder."""
+    """Stamps of the messages, or if they have none, of the recorder."""
     if any(logged):
         return Stamps.of_nanoseconds(np.frombuffer(logged, dtype=np.int64))
     return Stamps.of_nanoseconds(np.frombuffer(received, dtype=np.int64), origin=RECORDER)
 
 
 def _count(numbers: Sequence[float] | bytes | memoryview) -> int:
-    raw = isinstance(numbers, bytes | memoryview)
-    return len(numbers) // 8 if raw else len(numbers)
+    serialised = isinstance(numbers, bytes | memoryview)
+    return len(numbers) // 8 if serialised else len(numbers)
 
 
 def _reordered(

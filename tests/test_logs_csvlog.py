@@ -7,14 +7,14 @@ from inspector.errors import LogError
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t", " ", ", "])
-def test_cells_are_separated_as_usual(tmp_path, delimiter):
+def test_all_delimiters_are_recognised(tmp_path, delimiter):
     columns = {"timestamp": TIME, "actual_qd_0": TIME, "target_qd_0": -TIME}
     run = read_log(write(tmp_path / "log.csv", columns, delimiter)).run
     assert np.array_equal(run.velocity[:, 0], TIME)
     assert np.array_equal(run.velocity_desired[:, 0], -TIME)
 
 
-def test_blank_lines_quotes_and_a_byte_order_mark_do_no_harm(tmp_path):
+def test_blank_lines_quotes_and_a_byte_order_mark_are_accepted(tmp_path):
     body = '\ufefftime,"a.velocity"\r\n0,1\r\n\r\n0.01,"2"\r\n0.02,3\r\n\r\n'
     assert np.array_equal(read_log(text(tmp_path, body)).run.velocity.T, [[1, 2, 3]])
 
@@ -53,11 +53,11 @@ def test_the_first_stamp_is_kept_exactly(tmp_path):
     assert imported.run.meta["start"] == "1700000000.123400567"
     assert imported.remarks == (
         "log.csv: stamps are in nanoseconds",
-        "time starts at 0; the first stamp, 1700000000.123400567 s, is kept in meta",
+        "time starts at 0; the first stamp, 1700000000.123400567 s, is in meta",
     )
 
 
-def test_a_known_rate_tells_the_unit_of_the_stamps(tmp_path):
+def test_a_known_rate_determines_the_unit_of_the_stamps(tmp_path):
     path = write(tmp_path / "log.csv", {"t": np.arange(5), "a.velocity": np.ones(5)})
     run = read_log(path, rate=1000).run
     assert run.rate == 1000.0
@@ -81,7 +81,10 @@ HEAD = "time,a.velocity,b.velocity\n"
         (HEAD + "0,1,2\nnan,1,2\n", "row 3: column 'time' holds nan"),
         (HEAD + "0,1,2\n0.1,,2\n", r"row 3: column 'a.velocity' is empty; .* \(--desired\)"),
         (HEAD + "0,1,2\n,,\n", "row 3: column 'time' is empty"),
-        (HEAD + "0,1,2\n0.1,1,off\n", "row 3: column 'b.velocity' holds 'off', which is no number"),
+        (
+            HEAD + "0,1,2\n0.1,1,off\n",
+            "row 3: column 'b.velocity' holds 'off', which is not a number",
+        ),
         (HEAD.replace(",", ";") + "0;1;2\n0,1;1;2\n", "row 3: column 'time' holds '0,1', which is"),
         (HEAD + "0,1,2\n0.1,1\n", "row 3: 2 cells where the header names 3 columns"),
         (HEAD + "0,1,2\n0.1,1,2,3\n", "row 3: 4 cells where the header names 3 columns"),
@@ -111,7 +114,7 @@ def test_a_bad_log_is_one_line_that_names_the_row(tmp_path, body, message):
 
 def test_a_file_that_is_no_log_is_named(tmp_path):
     (tmp_path / "log.csv").write_bytes(b"\x89PNG\r\n\x1a\n\x00\xff\xfe")
-    with pytest.raises(LogError, match="not a CSV log: it is no text in UTF-8"):
+    with pytest.raises(LogError, match="not a CSV log: not text in UTF-8"):
         read_log(tmp_path / "log.csv")
     with pytest.raises(LogError, match=r"gone.csv: cannot be read \(No such file"):
         read_log(tmp_path / "gone.csv")

@@ -42,7 +42,7 @@ def test_a_bag_is_imported(importing, bag, tmp_path):
     assert np.array_equal(Run.load(tmp_path / "run.npz").position, POSITION)
 
 
-def test_what_is_inside_is_listed_and_nothing_written(importing, bag, tmp_path):
+def test_contents_are_listed_and_nothing_written(importing, bag, tmp_path):
     before = sorted(tmp_path.rglob("*"))
     status, out, _ = importing(bag, log(tmp_path), "--list")
     assert status == 0
@@ -132,7 +132,7 @@ def test_two_logs_of_one_name_are_not_written_over_each_other(importing, tmp_pat
     assert "log.csv: belongs to one log, 2 are given" in err
 
 
-def test_an_output_is_asked_for(importing, bag):
+def test_an_output_is_required(importing, bag):
     status, _, err = importing(bag)
     assert status == 2
     assert "say where the run goes" in err

@@ -1,4 +1,4 @@
-"""Which signal of which joint a column or an array holds, going by its name."""
+"""Signals of a log, and the column and array names that they are known by."""
 
 import re
 from collections.abc import Sequence
@@ -8,7 +8,7 @@ BASE_SIGNALS = ("base_pose", "base_velocity")
 SIGNALS = (*JOINT_SIGNALS, *BASE_SIGNALS)
 
 TIMES = ("time", "timestamp", "t", "__time", "stamp")
-"""Names of a time column, in any case; the first of these that a log has is taken."""
+"""Names of a time column, in any case; the first of these that a log has is used."""
 
 NAMED = re.compile(
     r"(?:.*/)?(?P<joint>[^/]+)[./]"
@@ -27,7 +27,7 @@ WORDS = {"q": "position", "positions": "position", "qd": "velocity", "velocities
 COMMANDED = ("desired", "reference", "target")
 
 ROBOSUITE = re.compile(r"robot\d+_(?=joint_(pos|vel)$)")
-"""What robosuite puts before the names of a robot's arrays."""
+"""Prefix of robosuite's arrays."""
 
 ARRAYS = {
     **{signal: signal for signal in SIGNALS},
@@ -37,17 +37,17 @@ ARRAYS = {
     **dict.fromkeys(("q_des", "joint_pos_target", "dof_pos_target"), "position_desired"),
     **dict.fromkeys(("qd_des", "dq_des", "joint_vel_target"), "velocity_desired"),
 }
-"""Names of whole arrays, in any case: the run file's own, and those of simulators."""
+"""Signals by the names of arrays, in any case: those of the run file, and of simulators."""
 
 
-def named(column: str) -> tuple[str, str | int] | None:
-    """Say which signal of which joint a column holds.
+def column_signal(column: str) -> tuple[str, str | int] | None:
+    """Signal and joint of a column, by its name.
 
     Args:
         column: Its name.
 
     Returns:
-        The signal, and the joint's name or number; None if the name says nothing.
+        The signal, and the joint's name or number; None for an unknown name.
     """
     if match := NAMED.fullmatch(column):
         return match["signal"], match["joint"]
@@ -64,11 +64,11 @@ def named(column: str) -> tuple[str, str | int] | None:
 
 
 def array_signal(name: str) -> str | None:
-    """Say which signal an array holds, the folders in its name left out."""
+    """Signal of an array by its name, without the folders in it; None for an unknown name."""
     return ARRAYS.get(ROBOSUITE.sub("", name.rpartition("/")[2].lower()))
 
 
 def listed(names: Sequence[str]) -> str:
-    """List names, not more than a line can take."""
+    """The first ten of some names, and how many more there are."""
     shown = ", ".join(names[:10])
     return shown + (f" and {len(names) - 10} more" if len(names) > 10 else "")

@@ -1,11 +1,11 @@
-"""What a person says of a log, kept as TOML."""
+"""Options of reading a log, saved as TOML."""
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspector.errors import InspectorError
-from inspector.logs.reading import UNITS, Entry, Reading, parse_mapping
+from inspector.logs.options import UNITS, Entry, ReadOptions, parse_mapping
 
 LETTERS = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc"), exclude_characters="=")
 NAMES = st.text(LETTERS, min_size=1)
@@ -21,17 +21,19 @@ NAMES = st.text(LETTERS, min_size=1)
     columns=st.lists(st.tuples(NAMES, NAMES), unique_by=(lambda p: p[0], lambda p: p[1])),
 )
 @settings(max_examples=100, deadline=None)
-def test_a_mapping_comes_back_as_it_was_saved(tmp_path_factory, columns, **settings):
+def test_a_saved_mapping_is_loaded_unchanged(tmp_path_factory, columns, **settings):
     entries = tuple(Entry("velocity", joint, column) for joint, column in columns)
-    reading = Reading(entries=entries, **settings)
+    options = ReadOptions(entries=entries, **settings)
     path = tmp_path_factory.mktemp("saved") / "mapping.toml"
-    reading.save(path)
-    assert Reading.load(path) == reading
+    options.save(path)
+    assert ReadOptions.load(path) == options
 
 
-def test_a_saved_mapping_is_read_by_people_too(tmp_path):
+def test_a_saved_mapping_is_readable(tmp_path):
     entries = parse_mapping(["time=clock", "position=qpos[7:]", "velocity.left.elbow=dq 2"])
-    Reading(robot="panda", rate=50.0, joints=("a", "b"), entries=entries).save(tmp_path / "m.toml")
+    ReadOptions(robot="panda", rate=50.0, joints=("a", "b"), entries=entries).save(
+        tmp_path / "m.toml"
+    )
     assert (tmp_path / "m.toml").read_text() == (
         'format = "noise-mapping/1"\nrobot = "panda"\nrate = 50.0\njoints = ["a", "b"]\n\n'
         '[map]\n"time" = "clock"\n"position" = "qpos[7:]"\n"velocity.left.elbow" = "dq 2"\n'
@@ -61,22 +63,22 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
         ("rate = 3", 'not a mapping; expected format = "noise-mapping/1"'),
         ("rate = ", "not a mapping in TOML"),
         ('format = "noise-mapping/1"\nspeed = 3', "unknown setting 'speed'; there are joints, off"),
-        ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another kind"),
+        ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another type"),
         ('format = "noise-mapping/1"\nrate = -1', "the rate is -1 Hz; expected a number above 0"),
-        ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another kind"),
+        ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another type"),
         ('format = "noise-mapping/1"\nunits = "miles"', "no units 'miles'; there are radians, deg"),
         ('format = "noise-mapping/1"\nmap = 3', "m.toml: "),
         ('format = "noise-mapping/1"\n[map]\nspeed = "x"', "mapping 'speed=x': expected SIGNAL"),
         ('format = "noise-mapping/1"\n[map]\nvelocity = 3', "velocity = 3 is of another"),
     ],
 )
-def test_a_mapping_that_makes_no_sense_is_one_line(tmp_path, text, message):
+def test_an_invalid_mapping_is_an_error_of_one_line(tmp_path, text, message):
     (tmp_path / "m.toml").write_text(text)
     with pytest.raises(InspectorError, match=message) as caught:
-        Reading.load(tmp_path / "m.toml")
+        ReadOptions.load(tmp_path / "m.toml")
     assert "\n" not in str(caught.value)
     with pytest.raises(InspectorError, match=r"cannot be read \(No such file"):
-        Reading.load(tmp_path / "gone.toml")
+        ReadOptions.load(tmp_path / "gone.toml")
 
 
 @pytest.mark.parametrize(
@@ -87,6 +89,6 @@ def test_a_mapping_that_makes_no_sense_is_one_line(tmp_path, text, message):
         (["position=a", "position=b"], "position is mapped twice"),
     ],
 )
-def test_an_entry_that_makes_no_sense_is_named(entries, message):
+def test_an_invalid_entry_is_named(entries, message):
     with pytest.raises(InspectorError, match=message):
         parse_mapping(entries)

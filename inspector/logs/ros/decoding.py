@@ -1,4 +1,4 @@
-"""Messages, deserialised by the bag's own definitions, or by those of ROS where it has none."""
+"""Messages, deserialised by the definitions in the bag, or by those of ROS if it has none."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -15,7 +15,7 @@ STATE = "control_msgs/msg/JointTrajectoryControllerState"
 
 
 def _state(joints: tuple[str, ...], others: tuple[str, ...] = (), last: str = "") -> str:
-    """Write the definition of a controller's state with these stages."""
+    """Definition of a controller's state with these stages."""
     point = "trajectory_msgs/JointTrajectoryPoint"
     multi = "trajectory_msgs/MultiDOFJointTrajectoryPoint"
     lines = ["std_msgs/Header header", "string[] joint_names"]
@@ -34,7 +34,7 @@ STATES = (
     _state(OLD, OLD),
     _state(OLD),
 )
-"""What a controller's state was over the years; bags of before 2023 do not say which it is."""
+"""Versions of a controller's state; bags from before 2023 do not contain the definition."""
 
 
 class Decoder:
@@ -96,16 +96,16 @@ class Decoder:
         except (SerdeError, KeyError, AssertionError) as error:
             raise LogError(
                 self.path,
-                f"{self.topic.name}: a message is no {self.topic.type}"
+                f"{self.topic.name}: a message is not a {self.topic.type}"
                 f" ({' '.join(str(error).split()) or type(error).__name__})",
             ) from error
 
 
 def stamp_of(message: Any) -> int:
-    """Read the stamp in a message's header, in [ns]."""
+    """Stamp in a message's header, in [ns]."""
     return nanoseconds(message.header.stamp)
 
 
 def nanoseconds(time: Any) -> int:
-    """Turn a time or duration of ROS into [ns]."""
+    """Time or duration of ROS, in [ns]."""
     return int(time.sec) * 10**9 + int(time.nanosec)

@@ -59,7 +59,7 @@ SAMPLES = {
 
 
 def complaint(path):
-    """Read the first run of a log; returns the error that was expected of it, or nothing."""
+    """Read the first run of a log; the text of an expected error, or nothing."""
     try:
         next(read_logs(path), None)
     except (InspectorError, NoiseModelError) as error:
@@ -68,7 +68,7 @@ def complaint(path):
 
 
 @pytest.mark.parametrize("kind", SAMPLES)
-def test_damage_is_an_error_of_one_line_or_does_no_harm(tmp_path, kind):
+def test_damage_gives_an_error_of_one_line_or_a_run(tmp_path, kind):
     path = SAMPLES[kind](tmp_path)
     whole = path.read_bytes()
     chance = random.Random(0)

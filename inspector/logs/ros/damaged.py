@@ -1,4 +1,4 @@
-"""What can be had of a bag that was cut off or is damaged, record by record."""
+"""Bags that were cut off or are damaged, read record by record."""
 
 import sqlite3
 from collections import deque
@@ -12,14 +12,14 @@ from inspector.logs.ros.bag import Bag, Message, Topic, storage_of
 
 
 def open_bag(path: Path, problem: str) -> Bag:
-    """Open a bag that is not whole.
+    """Bag with the intact records of a damaged one.
 
     Args:
         path: A file of a bag, or the folder of a ROS 2 bag.
-        problem: Why it cannot be read as it should be.
+        problem: Why it cannot be read by its index.
 
     Raises:
-        LogError: If nothing can be had of it.
+        LogError: If no topic can be read.
     """
     files = sorted(each for each in path.iterdir() if storage_of(each)) if path.is_dir() else [path]
     storages = {storage_of(file) for file in files}
@@ -27,12 +27,12 @@ def open_bag(path: Path, problem: str) -> Bag:
         raise LogError(path, f"not a bag that can be read: {problem}")
     storage = storages.pop()
     bag = Bag(f"damaged bag ({storage})", storage == "ROS 1", {}, lambda names: iter(()))
-    bag.lost.append(f"the bag is not whole ({problem})")
+    bag.lost.append(f"the bag is damaged or cut off ({problem})")
     for file in files:
         bag.topics |= {topic.name: topic for topic in _topics(file, storage, bag)}
     bag.messages = lambda names: _messages(files, storage, bag, names)
     if not bag.topics:
-        raise LogError(path, f"nothing can be had of the bag: {problem}")
+        raise LogError(path, f"no topic of the bag can be read: {problem}")
     return bag
 
 
@@ -58,7 +58,7 @@ def _messages(
             if message[0] in names:
                 yield message
                 count += 1
-    bag.lost.append(f"{count} messages were still there")
+    bag.lost.append(f"{count} messages were recovered")
 
 
 def _sqlite_topics(file: Path) -> Iterator[Topic]:
@@ -74,14 +74,14 @@ def _sqlite_topics(file: Path) -> Iterator[Topic]:
                     yield Topic(name, kind, definitions.get(kind) or "")
         except sqlite3.DatabaseError as error:
             problem = " ".join(str(error).split())[:100]
-            raise LogError(file, f"nothing can be had of the bag: {problem}") from error
+            raise LogError(file, f"no topic of the bag can be read: {problem}") from error
 
 
 def _sqlite_messages(file: Path, lost: list[str]) -> Iterator[Message]:
-    """Go through messages in the order of their rows, to where a page is missing.
+    """Messages in the order of their rows, to where a page is missing.
 
-    The last page that is there may have lost its end, which SQLite reads as zeros: messages are
-    held back until a page's worth has come after them.
+    The last page may be cut off, and SQLite reads zeros for the rest of it: messages are held
+    back until a page of data follows them.
     """
     with closing(_database(file)) as database:
         held: deque[Message] = deque()
@@ -105,7 +105,7 @@ def _sqlite_messages(file: Path, lost: list[str]) -> Iterator[Message]:
 
 
 def _database(file: Path) -> sqlite3.Connection:
-    """Open a database that may be shorter than it says of itself."""
+    """Database that may be shorter than its header says."""
     database = sqlite3.connect(f"{file.resolve().as_uri()}?immutable=1", uri=True)
-    database.execute("PRAGMA writable_schema = ON")  # else SQLite refuses it at the first look
+    database.execute("PRAGMA writable_schema = ON")  # otherwise SQLite refuses to open it
     return database

@@ -1,4 +1,4 @@
-"""The log of a real Franka Panda, the whole way."""
+"""The log of a real Franka Panda, from import to verdict."""
 
 import json
 import subprocess

@@ -12,7 +12,7 @@ from noisemodel import Robot, Run, UnknownJointError, UnknownRobotError
 PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 
 
-def test_a_uniform_log_is_taken_bit_for_bit(tmp_path):
+def test_a_uniform_log_is_imported_bit_for_bit(tmp_path):
     imported = read_log(log(tmp_path))
     position, velocity = swing(TIME)
     run = imported.run
@@ -33,7 +33,7 @@ def test_an_imported_run_is_saved_and_loaded(tmp_path):
     assert Run.load(tmp_path / "run.npz").meta == run.meta
 
 
-def test_velocities_that_are_missing_are_differentiated_and_it_is_said(tmp_path):
+def test_velocities_that_are_missing_are_differentiated_with_a_remark(tmp_path):
     position, velocity = swing(TIME)
     imported = read_log(write(tmp_path / "log.csv", {"time": TIME, "a.position": position}))
     assert np.abs(imported.run.velocity[:, 0] - velocity).max() < 5e-3 * np.abs(velocity).max()
@@ -48,8 +48,8 @@ def test_a_joint_without_positions_leaves_all_positions_out(tmp_path):
     assert imported.run.position is None
     assert imported.run.effort is None
     assert imported.remarks == (
-        "position: left out, there is none of wrist",
-        "effort: left out, there is none of wrist",
+        "position: left out, missing for wrist",
+        "effort: left out, missing for wrist",
     )
 
 
@@ -62,7 +62,7 @@ def test_joints_are_checked_against_the_robot(tmp_path):
         read_log(path, robot="pandda")
 
 
-def test_desired_motion_comes_onto_the_measured_clock(tmp_path):
+def test_desired_motion_is_synchronised_to_the_measured_clock(tmp_path):
     measured = log(tmp_path, jittered() + 50)
     late = np.arange(1000) / 250 + 50.5
     desired = write(tmp_path / "desired.csv", {"time": late, "elbow.velocity": swing(late - 50)[1]})
@@ -77,7 +77,7 @@ def test_desired_motion_comes_onto_the_measured_clock(tmp_path):
     assert "cut to the 3.49 s that both logs cover" in imported.remarks
 
 
-def test_uniform_logs_of_one_clock_are_taken_bit_for_bit(tmp_path):
+def test_uniform_logs_of_one_clock_are_imported_bit_for_bit(tmp_path):
     desired = log(tmp_path, TIME[100:], name="desired.csv")
     run = read_log(log(tmp_path), desired=desired).run
     assert np.array_equal(run.velocity_desired, run.velocity)
@@ -85,7 +85,7 @@ def test_uniform_logs_of_one_clock_are_taken_bit_for_bit(tmp_path):
     assert run.time[0] == 0.0
 
 
-def test_a_desired_log_goes_before_desired_columns(tmp_path):
+def test_a_desired_log_takes_precedence_over_desired_columns(tmp_path):
     measured = log(tmp_path, **{"elbow.velocity_desired": TIME})
     desired = log(tmp_path, name="desired.csv", **{"elbow.velocity_desired": -TIME})
     imported = read_log(measured, desired=desired)
@@ -104,9 +104,9 @@ def test_gaps_of_the_desired_motion_are_gaps(tmp_path):
     assert not run.velocity[~run.mask].any()
 
 
-def test_logs_that_share_no_time_are_refused(tmp_path):
+def test_logs_that_do_not_overlap_are_refused(tmp_path):
     desired = log(tmp_path, TIME + 1.7e9, name="desired.csv")
-    message = r"desired.csv: the stamps from 1700000000.0 s to .* share no time with .* to 3.99 s"
+    message = r"desired.csv: the stamps from 1700000000.0 s to .* do not overlap with .* to 3.99 s"
     with pytest.raises(LogError, match=message):
         read_log(log(tmp_path), desired=desired)
 
@@ -120,7 +120,7 @@ def test_desired_angles_that_wrap_are_interpolated_the_short_way(tmp_path):
 
 
 @pytest.mark.parametrize("others", [{}, {"elbow.effort": TIME}])
-def test_desired_motion_alone_is_no_run(tmp_path, others):
+def test_desired_motion_alone_is_refused(tmp_path, others):
     path = write(tmp_path / "log.csv", {"time": TIME, "target_qd_0": TIME} | others)
     with pytest.raises(LogError, match="holds no measured motion, only desired"):
         read_log(path)

@@ -6,7 +6,7 @@ from inspector import read_log
 from inspector.errors import LogError
 
 
-def test_degrees_are_converted_but_not_what_slides(tmp_path):
+def test_degrees_are_converted_but_not_of_prismatic_joints(tmp_path):
     columns = {
         "time": TIME,
         "panda_joint1.position": np.full(400, 90.0),
@@ -27,7 +27,7 @@ def test_degrees_are_converted_but_not_what_slides(tmp_path):
 @pytest.mark.parametrize(
     ("column", "value"), [("elbow.position", -90.0), ("elbow.velocity", 120.0)]
 )
-def test_degrees_passed_as_radians_are_named_with_their_row(tmp_path, column, value):
+def test_degrees_in_place_of_radians_are_refused_with_their_row(tmp_path, column, value):
     path = log(tmp_path, **{column: np.where(TIME < 0.05, 0.0, value)})
     message = f"row 7: column '{column}' holds {value:g}, too much for radians; if .* --degrees"
     with pytest.raises(LogError, match=message) as caught:
@@ -35,7 +35,7 @@ def test_degrees_passed_as_radians_are_named_with_their_row(tmp_path, column, va
     assert caught.value.row == 7
 
 
-def test_wheels_and_sliders_may_go_far(tmp_path):
+def test_continuous_and_prismatic_joints_may_exceed_the_limit(tmp_path):
     position = np.linspace(0, 50, 400)
     path = write(
         tmp_path / "log.csv",

@@ -1,4 +1,4 @@
-"""Stamps from numbers: in which unit they are, and which column of a log they are in."""
+"""Timestamps of a log: the column that holds them, and their unit."""
 
 from collections.abc import Iterable
 from decimal import Decimal
@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.columns import TIMES, listed
 from inspector.logs.log import Stamps
-from inspector.logs.reading import Reading
+from inspector.logs.options import ReadOptions
+from inspector.logs.signals import TIMES, listed
 
 UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanoseconds": "1e-9"}
 """The units that stamps may have, in [s]."""
 
 SLOWEST, FASTEST_NS = 0.5, 1e4
-"""A step of up to the first is taken for seconds, from the second on for nanoseconds."""
+"""A median step up to the first is in seconds, one from the second on in nanoseconds."""
 
 
 def unit_of(path: Path, steps: NDArray[Any], rate: float | None) -> str:
-    """Tell the unit of stamps from their median step, and from the log's rate if it is known.
+    """Unit of stamps by their median step, and by the log's rate if known.
 
     Raises:
-        LogError: If it may be any.
+        LogError: If it is ambiguous.
     """
     rising = steps[steps > 0]
     step = float(np.median(rising)) if len(rising) else 0.0
@@ -43,13 +43,13 @@ def unit_of(path: Path, steps: NDArray[Any], rate: float | None) -> str:
 
 
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:
-    """Make stamps of an array of numbers.
+    """Stamps from an array of numbers.
 
     Args:
         path: The log, for errors.
-        name: What the log calls them.
-        values: Seconds, whole nanoseconds or times of NumPy's own kind, shape (samples,).
-        rate: The log's rate, if it is known, in [Hz].
+        name: Their name in the log.
+        values: Seconds, whole nanoseconds or NumPy datetimes, shape (samples,).
+        rate: The log's rate, if known, in [Hz].
 
     Raises:
         LogError: If they are not finite, or in an unknown unit.
@@ -73,24 +73,24 @@ def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -
     )
 
 
-def time_name(names: Iterable[str], reading: Reading) -> str:
-    """Choose the array that holds the stamps; empty if there is none."""
+def time_name(names: Iterable[str], options: ReadOptions) -> str:
+    """Name of the array that holds the stamps; empty if there is none."""
     known = {name.rpartition("/")[2].lower(): name for name in reversed(list(names))}
-    if reading.time:
-        return reading.time if reading.time in known.values() else ""
+    if options.time:
+        return options.time if options.time in known.values() else ""
     return next((known[name] for name in TIMES if name in known), "")
 
 
-def without_stamps(path: Path, samples: int, reading: Reading, names: Iterable[str]) -> Stamps:
-    """Make the stamps of a log that has none, from the rate that a person said.
+def stamps_at_rate(path: Path, samples: int, options: ReadOptions, names: Iterable[str]) -> Stamps:
+    """Stamps of a log that has none, at the specified rate.
 
     Raises:
-        LogError: If nobody did.
+        LogError: If no rate is specified.
     """
-    if reading.rate is None:
+    if options.rate is None:
         raise LogError(
             path,
-            "there are no stamps; say the log's rate (--rate), or where they are (--map"
+            "there are no stamps; specify the log's rate (--rate), or their column (--map"
             f" time=COLUMN); it has {listed(list(names))}",
         )
-    return Stamps.every(1 / reading.rate, samples)
+    return Stamps.every(1 / options.rate, samples)

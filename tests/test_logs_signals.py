@@ -4,7 +4,7 @@ from csvlogs import TIME, log, write
 
 from inspector import read_log
 from inspector.errors import InspectorError, LogError
-from inspector.logs.reading import parse_mapping
+from inspector.logs.options import parse_mapping
 from noisemodel import Robot
 
 
@@ -52,13 +52,13 @@ def test_a_desired_column_is_known_by_its_name(tmp_path, column, signal):
     assert run.joint_names == ("elbow",)
 
 
-def test_columns_that_nobody_claims_are_listed(tmp_path):
+def test_columns_without_a_known_signal_are_listed(tmp_path):
     path = log(tmp_path, target_moment_0=TIME, actual_current_0=TIME, comment=["fine"] * len(TIME))
     said = "log.csv: 3 columns not read: target_moment_0, actual_current_0, comment"
     assert read_log(path).remarks == (said,)
 
 
-def test_a_mapping_names_columns_that_have_names_of_their_own(tmp_path):
+def test_a_mapping_gives_the_signal_of_other_columns(tmp_path):
     columns = {"clock": TIME, "dq2": TIME, "cmd = 2": -TIME}
     run = read_log(
         write(tmp_path / "log.csv", columns),
@@ -69,7 +69,7 @@ def test_a_mapping_names_columns_that_have_names_of_their_own(tmp_path):
     assert np.array_equal(run.velocity_desired[:, 0], -TIME)
 
 
-def test_a_mapping_goes_before_a_name(tmp_path):
+def test_a_mapping_takes_precedence_over_a_name(tmp_path):
     path = log(tmp_path, better=TIME)
     imported = read_log(path, mapping=["velocity.elbow=better"])
     assert np.array_equal(imported.run.velocity[:, 0], TIME)

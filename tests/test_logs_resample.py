@@ -16,8 +16,8 @@ def test_irregular_stamps_are_resampled_to_the_round_rate_nearby(tmp_path):
     assert np.abs(run.position[:, 0] - position).max() < 5e-3
     assert np.abs(run.velocity[:, 0] - velocity).max() < 5e-3 * 2 * np.pi
     assert re.fullmatch(
-        r"log.csv: resampled to 100 Hz \(the stamps' nominal rate is 9\d.\d+ Hz; their steps are"
-        r" off by 1.\d+ ms rms, [34].\d+ ms at most\)",
+        r"log.csv: resampled to 100 Hz \(the stamps' nominal rate is 9\d.\d+ Hz; their jitter"
+        r" is 1.\d+ ms rms, [34].\d+ ms at most\)",
         imported.remarks[0],
     )
     assert run.meta["jitter"]["rms"] == pytest.approx(1.6e-3, rel=0.2)
@@ -27,19 +27,21 @@ def test_irregular_stamps_are_resampled_to_the_round_rate_nearby(tmp_path):
     ("nominal", "rate"),
     [(98.0, 100.0), (104.0, 100.0), (122.0, 125.0), (29.1, 30.0), (511.0, 500.0), (70.0, 70.0)],
 )
-def test_a_rate_within_5_percent_of_a_round_one_is_taken_for_it(tmp_path, nominal, rate):
+def test_a_rate_within_5_percent_of_a_round_one_becomes_that(tmp_path, nominal, rate):
     steps = np.tile([0.9, 1.0, 1.0, 1.1], 100) / nominal
     time = np.concatenate(([0.0], np.cumsum(steps)))
     assert read_log(log(tmp_path, time)).run.rate == pytest.approx(rate, rel=1e-9)
 
 
-def test_a_uniform_rate_is_left_alone_round_or_not(tmp_path):
+def test_a_uniform_rate_is_kept_round_or_not(tmp_path):
     assert read_log(log(tmp_path, np.arange(400) / 98.0)).run.rate == pytest.approx(98.0, rel=1e-9)
 
 
 def test_a_declared_rate_is_the_rate(tmp_path):
     assert read_log(log(tmp_path), rate=125).run.rate == pytest.approx(125.0)
-    with pytest.raises(LogError, match="the stamps come at 100 Hz; a run of 1000 Hz cannot be had"):
+    with pytest.raises(
+        LogError, match="the rate of the stamps is 100 Hz; a run of 1000 Hz cannot be made"
+    ):
         read_log(log(tmp_path), rate=1000)
     with pytest.raises(InspectorError, match="the rate is 0 Hz; expected a number above 0"):
         read_log(log(tmp_path), rate=0)

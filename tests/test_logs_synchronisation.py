@@ -1,4 +1,4 @@
-"""Desired and measured motion with clocks of their own."""
+"""Desired and measured motion with separate clocks."""
 
 import numpy as np
 import pytest
@@ -7,7 +7,7 @@ from samplelogs import JOINTS, TIMES, Talk, joint_states, motion, numbers, write
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.twoclocks import ClockError
+from inspector.logs.synchronisation import ClockError
 
 
 def csv(path, time, velocity, suffix=""):
@@ -16,7 +16,7 @@ def csv(path, time, velocity, suffix=""):
 
 
 def pair(tmp_path, *, offset, drift=0.0, lag=0.0, seconds=60, rate=250, desired_rate=100):
-    """A measured log, and a desired one whose clock is off; what the two share begins at 5 s."""
+    """A measured log, and a desired one whose clock differs; they overlap from 5 s on."""
     time = np.arange(seconds * rate) / rate
     measured = motion(time - lag)[1]
     measured += 0.02 * np.random.default_rng(1).standard_normal(measured.shape)
@@ -32,7 +32,7 @@ def pair(tmp_path, *, offset, drift=0.0, lag=0.0, seconds=60, rate=250, desired_
     ("offset", "drift"),
     [(0.7, 0.0), (-0.4, 2e-4), (1234.5, 0.0), (12.0, -1e-4), (0.0, 1e-4)],
 )
-def test_offset_and_drift_are_found_and_taken_away(tmp_path, offset, drift):
+def test_offset_and_drift_are_estimated_and_removed(tmp_path, offset, drift):
     measured, desired = pair(tmp_path, offset=offset, drift=drift)
     imported = read_log(measured, desired=desired)
     found = imported.run.meta["offset"]
@@ -44,7 +44,7 @@ def test_offset_and_drift_are_found_and_taken_away(tmp_path, offset, drift):
     assert imported.run.duration == pytest.approx(50, abs=0.1)
 
 
-def test_a_controllers_lag_is_said_and_left(tmp_path):
+def test_a_controllers_lag_is_reported_and_not_corrected(tmp_path):
     measured, desired = pair(tmp_path, offset=0.0, lag=0.02)
     imported = read_log(measured, desired=desired)
     assert "offset" not in imported.run.meta
@@ -52,7 +52,7 @@ def test_a_controllers_lag_is_said_and_left(tmp_path):
     assert said.startswith("desired.csv: offset +0.0200 s (correlation 1.00")
 
 
-def test_positions_tell_the_offset_where_there_are_no_velocities(tmp_path):
+def test_positions_give_the_offset_where_there_are_no_velocities(tmp_path):
     time = np.arange(6000) / 100
     for name, since, shift in (("measured", time, 0.0), ("desired", time[500:5000], 77.7)):
         position = motion(since)[0]
@@ -62,45 +62,46 @@ def test_positions_tell_the_offset_where_there_are_no_velocities(tmp_path):
     assert imported.run.meta["offset"]["seconds"] == pytest.approx(77.7, abs=1e-3)
 
 
-def test_a_motion_that_repeats_tells_nothing(tmp_path):
+def test_a_periodic_motion_gives_no_offset(tmp_path):
     time = np.arange(6000) / 100
     swing = np.cos(2 * np.pi * time)[:, None] * np.ones(3)
     measured = csv(tmp_path / "measured.csv", time, swing)
     desired = csv(tmp_path / "desired.csv", time + 1e6, swing)
     message = (
-        r"desired.csv: the stamps from 1000000(\.0)? s to .* share no time with .*, and the motions"
-        r" do not tell \(offset .*\); say --offset SECONDS, to be added to the desired stamps"
+        r"desired.csv: the stamps from 1000000(\.0)? s to .* do not overlap with .*, and the"
+        r" offset cannot be estimated \(offset .*\); specify --offset SECONDS, which is added to the"
+        r" desired stamps"
     )
     with pytest.raises(ClockError, match=message) as caught:
         read_log(measured, desired=desired)
-    assert not caught.value.offset.is_sure
+    assert not caught.value.offset.is_unambiguous
     imported = read_log(measured, desired=desired, offset=-1e6)
     assert np.allclose(imported.run.velocity_desired, imported.run.velocity, atol=1e-3)
     assert "desired.csv: offset -1e+06 s, as given" in imported.remarks
 
 
-def test_strangers_do_not_agree(tmp_path):
+def test_unrelated_motions_give_no_offset(tmp_path):
     time = np.arange(6000) / 100
     measured = csv(tmp_path / "measured.csv", time, motion(time)[1])
     for shift in (0.005, 1e6):
         desired = csv(tmp_path / "desired.csv", time + shift, motion(time, seed=9)[1])
         if shift > 1:
-            with pytest.raises(ClockError, match="the motions do not tell"):
+            with pytest.raises(ClockError, match="the offset cannot be estimated"):
                 read_log(measured, desired=desired)
         else:
             remarks = read_log(measured, desired=desired).remarks
-            assert any("is taken for the measured one's, the motions do not" in r for r in remarks)
+            assert any("is assumed to be the measured one's, since the" in r for r in remarks)
 
 
-def test_standstill_tells_no_offset(tmp_path):
+def test_standstill_gives_no_offset(tmp_path):
     time = np.arange(1000) / 100
     measured = csv(tmp_path / "measured.csv", time, np.zeros((1000, 3)))
     desired = csv(tmp_path / "desired.csv", time + 100, np.zeros((1000, 3)))
-    with pytest.raises(ClockError, match="no joint moves in both; say --offset"):
+    with pytest.raises(ClockError, match="no joint moves in both; specify --offset"):
         read_log(measured, desired=desired)
 
 
-def test_topics_of_two_machines_come_together(tmp_path):
+def test_topics_of_two_computers_are_synchronised(tmp_path):
     talk = Talk()
     since = np.arange(4000) / 100
     times = TIMES[0] + 10_000_000 * np.arange(4000)
@@ -114,7 +115,7 @@ def test_topics_of_two_machines_come_together(tmp_path):
     assert np.abs(run.velocity - run.velocity_desired).max() < 0.01
 
 
-def test_gaps_of_either_side_are_gaps_after_the_clocks_are_one(tmp_path):
+def test_gaps_of_either_log_are_gaps_after_synchronisation(tmp_path):
     measured, desired = pair(tmp_path, offset=1234.5)
     lines = desired.read_text().splitlines()
     desired.write_text("\n".join(lines[:2000] + lines[2200:]) + "\n")

@@ -1,0 +1,146 @@
+"""A log prepared for a run: its tracks in SI units, finite, with increasing stamps."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inspector.errors import LogError
+from inspector.logs.angles import grippers, in_radians
+from inspector.logs.log import Log, Track
+from inspector.logs.options import ReadOptions
+from inspector.logs.ordering import UnorderedStamps, ordered
+from inspector.logs.signals import listed
+from inspector.logs.tracks import tracks_of
+from noisemodel import Robot
+
+NO_RANGE = "normalised to 0 to 100 of its range, left out since no robot is specified"
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedLog:
+    """A log with the measured or the desired motion.
+
+    Attributes:
+        path: The log.
+        tracks: Its signals, in SI units, with increasing stamps.
+        names: Names of its columns and arrays, which a mapping may refer to.
+        not_read: Names of what is not read.
+        unordered: Stamps that were not increasing.
+        remarks: What was decided, a sentence each.
+        urdf: Text of the URDF in the log, may be empty.
+        meta: Metadata of the log.
+    """
+
+    path: Path
+    tracks: tuple[Track, ...]
+    names: tuple[str, ...]
+    not_read: tuple[str, ...]
+    unordered: tuple[UnorderedStamps, ...]
+    remarks: tuple[str, ...]
+    urdf: str = ""
+    meta: Mapping[str, Any] = field(default_factory=dict)
+
+
+def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog:
+    """Tracks of a log, checked and converted.
+
+    Raises:
+        LogError: If it holds no motion, a value that is not finite, an angle in an unknown unit,
+            or stamps that do not increase.
+        RobotError: If the robot lacks the joints that the log names.
+    """
+    if log.units and not options.units:
+        raise LogError(log.path, log.units)
+    found = tracks_of(log, options, robot)
+    tracks, too_short = _with_two_samples(log.path, found.tracks)
+    tracks, all_nan = _finite_only(log.path, tracks)
+    if log.units and options.units == "degrees" and not robot:
+        left_out = dict.fromkeys(joint for track in tracks for joint in grippers(track))
+        all_nan += (f"{NO_RANGE}: {listed(list(left_out))}",) if left_out else ()
+    tracks = in_radians(log.path, tracks, robot, options.units, normalised_grippers=bool(log.units))
+    tracks, unordered = ordered(log.path, tracks)
+    return PreparedLog(
+        path=log.path,
+        tracks=tracks,
+        names=(*(each.name for each in log.fields), *log.not_read),
+        not_read=found.not_read,
+        unordered=unordered,
+        remarks=(*log.remarks, *found.remarks, *too_short, *all_nan),
+        urdf=log.urdf,
+        meta={**log.meta, **({"units": options.units} if options.units else {})},
+    )
+
+
+def check_mapping(logs: Sequence[PreparedLog], options: ReadOptions) -> None:
+    """Refuse a mapping of a column that none of the logs has."""
+    names = {name for log in logs for name in log.names}
+    for entry in options.entries:
+        known = entry.source in names or entry.part()[0] in names
+        if not known and entry.signal != "time":
+            raise LogError(
+                logs[0].path,
+                f"there is no column {entry.source!r} to map; it has {listed(logs[0].names)}",
+            )
+
+
+def with_desired(measured: PreparedLog, desired: PreparedLog) -> list[PreparedLog]:
+    """Both logs, with desired motion only from the second."""
+    own = [track for track in measured.tracks if not track.is_desired]
+    others = [track for track in desired.tracks if track.is_desired] or [
+        replace(track, signal=f"{track.signal}_desired")
+        for track in desired.tracks
+        if track.signal in ("position", "velocity")
+    ]
+    return [_with_tracks(measured, own), _with_tracks(desired, others)]
+
+
+def _with_tracks(log: PreparedLog, tracks: Sequence[Track]) -> PreparedLog:
+    kept = {id(track.values) for track in tracks}
+    dropped = [
+        label for track in log.tracks if id(track.values) not in kept for label in track.labels
+    ]
+    return replace(log, tracks=tuple(tracks), not_read=(*log.not_read, *dropped))
+
+
+def _with_two_samples(
+    path: Path, tracks: Sequence[Track]
+) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+    """Tracks of at least two samples, and a remark on the others."""
+    long_enough = tuple(track for track in tracks if len(track.values) > 1)
+    if not any(track.joints for track in long_enough):
+        raise LogError(path, "1 sample; a run needs at least 2")
+    once = [label for track in tracks if len(track.values) < 2 for label in track.labels]
+    return long_enough, (f"logged once only, left out: {listed(once)}",) if once else ()
+
+
+def _finite_only(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+    """Tracks without columns that are nan throughout; other values that are not finite raise."""
+    remarks: list[str] = []
+    return tuple(_finite(path, tracks, remarks)), tuple(remarks)
+
+
+def _finite(path: Path, tracks: Sequence[Track], remarks: list[str]) -> Iterator[Track]:
+    for track in tracks:
+        finite = np.isfinite(track.values)
+        if finite.all():
+            yield track
+            continue
+        empty = np.atleast_1d(np.isnan(track.values).all(axis=0))
+        wrong = np.argwhere(~finite & ~empty)
+        if len(wrong):
+            sample, column = map(int, wrong[0])
+            value = track.values[sample, column]
+            raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
+        names = [label for label, is_nan in zip(track.labels, empty, strict=True) if is_nan]
+        remarks.append(f"all nan, left out: {listed(names)}")
+        kept = np.flatnonzero(~empty)
+        if len(kept) and track.joints:
+            yield replace(
+                track,
+                joints=tuple(track.joints[place] for place in kept),
+                labels=tuple(track.labels[place] for place in kept),
+                values=track.values[:, kept],
+            )
