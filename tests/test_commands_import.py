@@ -16,7 +16,7 @@ POSITION, VELOCITY = numbers(), numbers(seed=1)
 
 @pytest.fixture
 def importing(monkeypatch, capsys):
-    """Call `inspector import`; returns exit status, what it printed, and what it complained."""
+    """Call `inspector import`; returns exit status, standard output and standard error."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["inspector", "import", *map(str, arguments)])

@@ -68,9 +68,9 @@ def test_a_periodic_motion_gives_no_offset(tmp_path):
     measured = csv(tmp_path / "measured.csv", time, swing)
     desired = csv(tmp_path / "desired.csv", time + 1e6, swing)
     message = (
-        r"desired.csv: the stamps from 1000000(\.0)? s to .* do not overlap with .*, and the"
-        r" offset cannot be estimated \(offset .*\); specify --offset SECONDS, which is added to the"
-        r" desired stamps"
+        r"desired.csv: the stamps from 1000000(\.0)? s to .* do not overlap with .*, and"
+        r" the offset cannot be estimated \(offset .*\); specify --offset SECONDS, which is added"
+        r" to the desired stamps"
     )
     with pytest.raises(ClockError, match=message) as caught:
         read_log(measured, desired=desired)

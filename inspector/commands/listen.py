@@ -1,4 +1,4 @@
-"""The command that lets people listen to runs."""
+"""`inspector listen`: the noise of runs as sound files."""
 
 from pathlib import Path
 from typing import Annotated
@@ -29,14 +29,14 @@ def listen(
     overwrite: Overwrite = False,
 ) -> None:
     """Make noise audible: a WAV per run, of what would be heard, at a gain that is said."""
-    from inspector.sound import listening
+    from inspector.sound import sonification
     from noisemodel import Run
 
-    settings = listening.Settings(kind, joint, link, speed)
-    paths = listening.outputs(output, len(runs), overwrite=overwrite)
-    sounds = [listening.listen(Run.load(run), settings) for run in runs]
-    level = listening.common_gain(sounds) if gain is None else gain
-    listening.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
+    settings = sonification.Settings(kind, joint, link, speed)
+    paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
+    sounds = [sonification.sonify(Run.load(run), settings) for run in runs]
+    level = sonification.common_gain(sounds) if gain is None else gain
+    sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
     for run, path, sound in zip(runs, paths, sounds, strict=True):
         typer.echo(f"{run}: {sound}")
-        typer.echo(f"{path}: {listening.said(sound, level)}")
+        typer.echo(f"{path}: {sonification.description(sound, level)}")

@@ -29,7 +29,7 @@ def shot(
     from inspector.library import load_library
     from inspector.recording import screenshot as shooting
     from inspector.recording.recording import write
-    from inspector.sound.clip import first_look
+    from inspector.sound.clip import worst_time
     from noisemodel.atomic import refuse_existing
 
     shooting.require()
@@ -40,7 +40,7 @@ def shot(
         if run.suffix != ".rrd":
             found = analyse_file(run, load_library(assets.model_files(model)), kind=kind)
             recording = Path(folder) / "run.rrd"
-            seconds = first_look(found) if at is None else at
+            seconds = worst_time(found) if at is None else at
             write(found, recording)
         complaints = shooting.shoot(recording, output, seconds, size=points, overwrite=overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")

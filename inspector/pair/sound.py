@@ -5,7 +5,7 @@ import numpy as np
 from inspector.errors import InspectorError
 from inspector.pair.common import part
 from inspector.pair.pair import Pair
-from inspector.sound.listening import Settings, common_gain, sound_of
+from inspector.sound.sonification import Settings, common_gain, sound_of
 from inspector.sound.sound import SMALL_RATE
 
 MOST = 8_000_000

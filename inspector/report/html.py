@@ -12,8 +12,8 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
-from inspector.report.markdown import ORIGIN, note, origin
-from inspector.sound.clip import clip, first_look
+from inspector.report.markdown import ORIGIN, note, origin, verdict
+from inspector.sound.clip import clip, worst_time
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
 from noisemodel.noise import REFERENCE_POWER, decibel
@@ -113,15 +113,15 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_sound(body: ET.Element, analysis: Analysis) -> None:
-    heard = clip(analysis.run, around=first_look(analysis))
+def _add_sound(body: ET.Element, inspection: Inspection) -> None:
+    heard = clip(inspection.run, around=worst_time(inspection))
     _text(body, "h2", "To be heard")
     if heard is None:
         _text(body, "p", "The log is too slow for ears.", "note")
         return
     source = f"data:audio/wav;base64,{_encoded(heard.data)}"
     ET.SubElement(body, "audio", controls="controls", src=source)
-    span = f"From {heard.start:.2f} s to {heard.stop:.2f} s: {heard.said}."
+    span = f"From {heard.start:.2f} s to {heard.stop:.2f} s: {heard.description}."
     _text(body, "p", f"{span} {HEARD}", "note")
 
 

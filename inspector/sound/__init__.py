@@ -1,1 +1,1 @@
-"""Noise that can be heard: signed signals, mixed by their powers, as sound files."""
+"""Sound files of the noise: signed signals, mixed so that their powers add."""

@@ -1,4 +1,4 @@
-"""The sound of a run, small and quick enough to lie within a recording or a page."""
+"""Short sound of a run at 16 kHz, to be embedded in a recording or a page."""
 
 from dataclasses import dataclass, replace
 
@@ -7,60 +7,60 @@ import numpy as np
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
 from inspector.errors import InspectorError
-from inspector.sound.listening import Settings, common_gain, said, sound_of
+from inspector.sound.sonification import Settings, common_gain, description, sound_of
 from inspector.sound.sound import SMALL_RATE
 from noisemodel import Run
 
-MOST = 4_000_000
-"""Velocities that are mixed: a quarter of a second of work; 6 s of 32 joints at 10 kHz."""
+MOST_VELOCITIES = 4_000_000
+"""Largest number of velocities that are mixed: 6 s of 32 joints at 10 kHz, within 0.25 s."""
 
 
 @dataclass(frozen=True)
 class Clip:
-    """A sound as it lies within something else.
+    """A sound to be embedded.
 
     Attributes:
-        data: A whole WAV file of 16 kHz.
-        start: When what is heard starts in the run, in [s].
-        stop: When it ends there, in [s].
-        said: What it is, at which gain.
+        data: WAV file of 16 kHz.
+        start: Start in the run, in [s].
+        stop: End in the run, in [s].
+        description: What it is, at which gain.
     """
 
     data: bytes
     start: float
     stop: float
-    said: str
+    description: str
 
 
-def of_recording(analysis: Analysis) -> bytes:
-    """Make the sound that lies in a recording: it starts with the run, and has its worst moment.
+def of_recording(inspection: Inspection) -> bytes:
+    """Sound for a recording, that starts with the run and contains its worst moment.
 
     Args:
-        analysis: A run with what was found in it.
+        inspection: A run with its findings.
 
     Returns:
-        A WAV file; nothing where nothing can be heard.
+        A WAV file; empty if nothing is audible.
     """
-    found = clip(analysis.run, around=first_look(analysis), lead=True)
+    found = clip(inspection.run, around=worst_time(inspection), lead=True)
     return b"" if found is None else found.data
 
 
-def first_look(analysis: Analysis) -> float:
-    """Say when the worst moment of a run is, in [s]; 0 in a run that is all gap."""
-    moments = worst(analysis)
+def worst_time(inspection: Inspection) -> float:
+    """Time of the worst moment of a run, in [s]; 0 if the run has no valid samples."""
+    moments = worst(inspection)
     return moments[0].peak if moments else 0.0
 
 
 def clip(run: Run, *, around: float = 0.0, lead: bool = False) -> Clip | None:
-    """Make the sound of a run's simplified noise.
+    """Sound of a run's simplified noise.
 
     Args:
         run: The run.
-        around: What is heard where the run is too long for all of it, in [s].
-        lead: Whether silence takes the place of what is left out before.
+        around: Middle of the part that is used if the run is too long, in [s].
+        lead: Whether silence replaces what is left out before.
 
     Returns:
-        The sound, or nothing where hearing begins above all that the run holds.
+        The sound; None if nothing in the run is audible.
     """
     first, last = _kept(run, around)
     try:
@@ -72,22 +72,22 @@ def clip(run: Run, *, around: float = 0.0, lead: bool = False) -> Clip | None:
         data=sound.file(gain, lead=first / run.rate if lead else 0.0),
         start=sound.start,
         stop=sound.start + len(sound.signal) / sound.rate,
-        said=f"{sound.what}, {said(sound, gain)}",
+        description=f"{sound.what}, {description(sound, gain)}",
     )
 
 
 def _kept(run: Run, around: float) -> tuple[int, int]:
-    """First and last sample that are heard."""
+    """First sample and end of the part that is used."""
     width = run.motion.shape[1]
     width += 0 if run.velocity_desired is None else run.velocity_desired.shape[1]
-    count = min(max(2, MOST // width), len(run.time))
+    count = min(max(2, MOST_VELOCITIES // width), len(run.time))
     middle = int(np.searchsorted(run.time, around))
     first = min(max(middle - count // 2, 0), len(run.time) - count)
     return first, first + count
 
 
 def _part(run: Run, first: int, last: int) -> Run:
-    """Cut a stretch of velocities out."""
+    """Run of a part of the velocities."""
     part = slice(first, last)
     return replace(
         run,

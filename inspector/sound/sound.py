@@ -1,36 +1,39 @@
-"""A noise that can be played: what it is, at which gain, and what is lost on the way."""
+"""A playable noise, written as a WAV file that states its gain."""
 
+import struct
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy import fft
 
-from inspector.sound.wavfile import wav
 from noisemodel.types import Array
 
 RATE = 48_000
-"""Samples per second of a sound file, in [Hz]."""
+"""Sampling rate of a sound file, in [Hz]."""
 SMALL_RATE = 16_000
-"""The same where a sound lies within something else: it holds what a log of 10 kHz does."""
+"""Sampling rate of an embedded sound, in [Hz]: enough for a log of 10 kHz."""
 SILENCE = 1e-6
-"""What stays below is silent, in [rad/s] or [√W]: encoders and rounding are louder."""
+"""Peak below which a sound is silent, in [rad/s] or [√W]: quantisation noise is larger."""
 SOFTWARE = "noise-inspector"
+FULL_SCALE = 32767
+"""Full scale of 16 bits."""
 
 
 @dataclass(frozen=True, eq=False)
 class Sound:
-    """A noise with signs, that can be played.
+    """A signed noise signal that can be played.
 
     Attributes:
-        what: What it is, in a few words.
+        what: Short description.
         signal: Shape (samples,), in [unit].
-        rate: Samples of it per second of the run, in [Hz].
+        rate: Sampling rate of the signal, in [Hz].
         start: Time of its first sample in the run, in [s].
-        speed: How much faster than it was it is played.
+        speed: Factor of the playing speed.
         unit: "rad/s" or "√W".
-        remarks: What cannot be heard and why, a sentence each.
-        playing: Samples per second of playing, in [Hz].
+        remarks: What is inaudible and why, a sentence each.
+        playing: Sampling rate of the file, in [Hz].
     """
 
     what: str
@@ -54,34 +57,34 @@ class Sound:
 
     @property
     def silent(self) -> bool:
-        """Whether there is nothing to hear."""
+        """Whether its peak is below ``SILENCE``."""
         return self.peak < SILENCE
 
     @cached_property
     def played(self) -> Array:
-        """The signal as it is played, in [unit]."""
+        """The signal at playing speed and rate, in [unit]."""
         return self.at(self.playing)
 
     def at(self, rate: int) -> Array:
-        """Resample the signal as it is played, in [unit]; it is band-limited and ends in silence.
+        """The signal at playing speed, band-limited and resampled, in [unit].
 
         Args:
-            rate: Samples per second of playing, in [Hz].
+            rate: Sampling rate, in [Hz].
         """
         size = max(1, round(len(self.signal) * rate / (self.rate * self.speed)))
-        shared = min(size, len(self.signal)) // 2 + 1  # bins of both, those that are not are empty
+        shared = min(size, len(self.signal)) // 2 + 1  # bins of both; the others are 0
         spectrum = np.zeros(size // 2 + 1, dtype=np.complex128)
         spectrum[:shared] = fft.rfft(self.signal)[:shared]
         resampled: Array = fft.irfft(spectrum, size) * (size / len(self.signal))
         return resampled
 
     def file(self, gain: float, *, rate: int | None = None, lead: float = 0.0) -> bytes:
-        """Write the sound as a WAV file that says its gain.
+        """WAV file whose metadata state the gain.
 
         Args:
             gain: At 0 dB, full scale is 1 of the unit, in [dB].
-            rate: Samples per second, in [Hz]; unless given, those of playing.
-            lead: Silence before it, in [s].
+            rate: Sampling rate, in [Hz]; ``playing`` unless given.
+            lead: Duration of silence before it, in [s].
         """
         comment = f"{self.what}, {scale(gain, self.unit)}"
         if self.speed != 1.0:
@@ -93,7 +96,7 @@ class Sound:
         return wav(np.concatenate((silence, played * _factor(gain))), rate, notes)
 
     def clipped(self, gain: float) -> float:
-        """Share of the sound that is beyond full scale at a gain in [dB]."""
+        """Share of the samples that exceed full scale at a gain in [dB]."""
         return float(np.mean(np.abs(self.played) * _factor(gain) > 1.0))
 
     def __str__(self) -> str:
@@ -106,7 +109,7 @@ class Sound:
 
 
 def scale(gain: float, unit: str) -> str:
-    """Say what a gain means.
+    """Gain as text, with the value of full scale.
 
     Args:
         gain: In [dB].
@@ -117,3 +120,27 @@ def scale(gain: float, unit: str) -> str:
 
 def _factor(gain: float) -> float:
     return float(10.0 ** (gain / 20.0))
+
+
+def wav(signal: Array, rate: int, notes: Mapping[str, str]) -> bytes:
+    """One channel of 16 bits as RIFF WAVE (IBM and Microsoft, 1991).
+
+    Args:
+        signal: Shape (samples,); 1 is full scale, above which it is clipped.
+        rate: Sampling rate, in [Hz].
+        notes: Texts by their RIFF names: INAM a title, ISFT the software, ICMT a comment.
+
+    Returns:
+        The file.
+    """
+    samples = np.round(np.clip(signal, -1.0, 1.0) * FULL_SCALE).astype("<i2").tobytes()
+    form = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)  # PCM, one channel, 2 bytes each
+    info = b"INFO" + b"".join(
+        _chunk(name.encode("ascii"), text.encode("utf-8") + b"\0") for name, text in notes.items()
+    )
+    body = b"WAVE" + _chunk(b"fmt ", form) + _chunk(b"LIST", info) + _chunk(b"data", samples)
+    return _chunk(b"RIFF", body)
+
+
+def _chunk(name: bytes, content: bytes) -> bytes:
+    return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)

@@ -1,4 +1,4 @@
-"""Listen to runs: their noise as sound files, all at one gain that is said."""
+"""Sonification of runs: their noise as sound files, all at one stated gain."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,25 +9,25 @@ import numpy as np
 
 import noisemodel as nm
 from inspector.errors import InspectorError
-from inspector.sound.mixing import LOWEST, mix
-from inspector.sound.parts import parts
+from inspector.sound.components import components
+from inspector.sound.mixing import LOWEST_AUDIBLE, mix
 from inspector.sound.sound import SILENCE, Sound, scale
 from noisemodel.atomic import refuse_existing, replacing
 
 HEADROOM_DB = 1.0
 OSCILLATIONS = 1000.0
-"""Up to which the paper's oscillations reach, in [Hz]."""
+"""Highest frequency of the paper's oscillations, in [Hz]."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What is listened to.
+    """What is made audible.
 
     Attributes:
         kind: "simplified", "normal" or "rms"; empty takes "normal" with a link, else "simplified".
-        joint: The only joint, of the simplified noise; all if empty.
-        link: The only link, of the extended noise; all if empty.
-        speed: How much faster than it was it is played; frequencies rise by as much.
+        joint: One joint, of the simplified noise; all if empty.
+        link: One link, of the extended noise; all if empty.
+        speed: Factor of the playing speed, and of all frequencies.
     """
 
     kind: str = ""
@@ -36,61 +36,66 @@ class Settings:
     speed: float = 1.0
 
 
-def listen(run: nm.Run, settings: Settings | None = None) -> Sound:
-    """Make the noise of a run audible.
+def sonify(run: nm.Run, settings: Settings | None = None) -> Sound:
+    """Noise of a run as a sound, with remarks on what is inaudible.
 
     Args:
         run: The run; its gaps are silent.
-        settings: What is listened to.
+        settings: What is made audible.
 
     Returns:
         The sound.
 
     Raises:
-        InspectorError: If there is no such thing to listen to, or nothing of it can be heard.
-        NoiseModelError: If the extended noise cannot be had.
+        InspectorError: If the settings do not fit the run, or nothing is audible.
+        NoiseModelError: If the extended noise cannot be computed.
     """
-    chosen = settings or Settings()
-    return replace(sound_of(run, chosen), remarks=tuple(_remarks(run, chosen.speed)))
+    settings = settings or Settings()
+    return replace(sound_of(run, settings), remarks=tuple(_remarks(run, settings.speed)))
 
 
-def sound_of(run: nm.Run, chosen: Settings) -> Sound:
-    """Make the noise of a run audible, without looking for what is missing in it.
+def sound_of(run: nm.Run, settings: Settings) -> Sound:
+    """Noise of a run as a sound, without remarks.
 
     Args:
         run: The run; its gaps are silent.
-        chosen: What is listened to.
+        settings: What is made audible.
 
     Returns:
-        The sound, without remarks.
+        The sound.
 
     Raises:
-        InspectorError: If there is no such thing to listen to, or nothing of it can be heard.
-        NoiseModelError: If the extended noise cannot be had.
+        InspectorError: If the settings do not fit the run, or nothing is audible.
+        NoiseModelError: If the extended noise cannot be computed.
     """
-    if not 0.01 <= chosen.speed <= 1000.0:
-        raise InspectorError(f"a speed of {chosen.speed:g}, expected 0.01 to 1000")
-    kind = chosen.kind or ("normal" if chosen.link else "simplified")
-    made_of = parts(run, kind=kind, joint=chosen.joint, link=chosen.link)
-    signal = mix(made_of.signals, valid=run.mask, rate=run.rate, lowest=LOWEST / chosen.speed)
+    if not 0.01 <= settings.speed <= 1000.0:
+        raise InspectorError(f"a speed of {settings.speed:g}, expected 0.01 to 1000")
+    kind = settings.kind or ("normal" if settings.link else "simplified")
+    parts = components(run, kind=kind, joint=settings.joint, link=settings.link)
+    signal = mix(
+        parts.signals,
+        valid=run.mask,
+        rate=run.rate,
+        lowest=LOWEST_AUDIBLE / settings.speed,
+    )
     return Sound(
-        what=made_of.what,
+        what=parts.what,
         signal=signal,
         rate=run.rate,
         start=float(run.time[0]),
-        speed=chosen.speed,
-        unit=made_of.unit,
+        speed=settings.speed,
+        unit=parts.unit,
     )
 
 
 def common_gain(sounds: Sequence[Sound]) -> float:
-    """Choose the gain at which the loudest of several sounds just fits.
+    """Gain at which the loudest of several sounds does not clip.
 
     Args:
-        sounds: All that will be heard side by side.
+        sounds: All that are to be compared.
 
     Returns:
-        A tenth of a decibel or less below 1 dB of headroom, in [dB]; 0 if all are silent.
+        In [dB], rounded down to tenths, with 1 dB of headroom; 0 if all are silent.
     """
     peak = max(sound.peak for sound in sounds)
     if peak < SILENCE:
@@ -98,12 +103,12 @@ def common_gain(sounds: Sequence[Sound]) -> float:
     return float(np.floor(10.0 * (-20.0 * np.log10(peak) - HEADROOM_DB)) / 10.0)
 
 
-def outputs(path: Path, count: int, *, overwrite: bool = False) -> tuple[Path, ...]:
-    """Name the files for one sound or several, and refuse what exists before long work is done.
+def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Path, ...]:
+    """Paths of the files of one or more sounds, checked before the sounds are computed.
 
     Args:
-        path: The file that was asked for.
-        count: How many sounds there will be; several are told apart by a letter.
+        path: The specified file.
+        count: Number of sounds; the names of several get a letter each.
         overwrite: Whether files that exist may be replaced.
 
     Raises:
@@ -139,8 +144,8 @@ def save(sounds: Mapping[Path, Sound], gain: float, *, overwrite: bool = False) 
             temporary.write_bytes(sound.file(gain))
 
 
-def said(sound: Sound, gain: float) -> str:
-    """Say how a sound came out at a gain, and whether anything was lost.
+def description(sound: Sound, gain: float) -> str:
+    """Duration and gain of a sound, and whether it is silent or clipped.
 
     Args:
         sound: The sound.
@@ -152,9 +157,7 @@ def said(sound: Sound, gain: float) -> str:
         return f"{text}; silent: nothing reaches {SILENCE:g} {sound.unit}"
     if clipped := sound.clipped(gain):
         over = 20.0 * np.log10(sound.peak) + gain
-        return (
-            f"{text}; clipped: {clipped:.2%} of it is beyond full scale, by {over:.1f} dB at most"
-        )
+        return f"{text}; clipped: {clipped:.2%} of it exceeds full scale, by {over:.1f} dB at most"
     return text
 
 
@@ -162,17 +165,19 @@ def _remarks(run: nm.Run, speed: float) -> list[str]:
     from inspector.audit.bandwidth import bandwidth
 
     reach = bandwidth(run)
-    span = f"{LOWEST / speed:.3g} Hz to {reach.usable:.4g} Hz"
-    remarks = [f"To be heard: {span} of the motion ({reach.limit})."]
+    span = f"{LOWEST_AUDIBLE / speed:.3g} Hz to {reach.usable:.4g} Hz"
+    remarks = [f"Audible: {span} of the motion ({reach.limit})."]
     if speed != 1.0:
         remarks.append(f"Played {speed:g} times as fast: frequencies are {speed:g} times as high.")
     if reach.usable < OSCILLATIONS / 2:
         remarks.append(
-            f"What is faster than {reach.usable:.4g} Hz is not in the log: that it is quiet there"
-            " says nothing."
+            f"The log has no content above {reach.usable:.4g} Hz: silence there does not mean that"
+            " there is no noise."
         )
     if run.velocity_desired is None:
-        remarks.append("The run has no desired velocities: the measured motion is heard alone.")
+        remarks.append(
+            "The run has no desired velocities: the sound is of the measured motion only."
+        )
     if not run.mask.all():
         remarks.append("Gaps are silent.")
     return remarks

@@ -12,10 +12,10 @@ import noisemodel as nm
 from inspector.analysis.level import estimate
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.sound import listening
+from inspector.sound import sonification
 from inspector.sound.clip import clip
-from inspector.sound.listening import Settings, common_gain, listen, said, save
 from inspector.sound.mixing import mix
+from inspector.sound.sonification import Settings, common_gain, description, save, sonify
 from noisemodel import OutputError, Run
 
 RATE = 10_000.0
@@ -25,8 +25,8 @@ def times(seconds=2.0, rate=RATE):
     return np.arange(round(seconds * rate)) / rate
 
 
-def swinging(*columns, rate=RATE, **fields):
-    """A run of joints that move as given, each a signal of its own."""
+def run_of(*columns, rate=RATE, **fields):
+    """A run whose joints have the given velocities."""
     velocity = np.column_stack(columns)
     names = tuple(f"joint{i}" for i in range(velocity.shape[1]))
     time = times(len(velocity) / rate, rate)
@@ -52,7 +52,7 @@ def read(data):
 
 
 def middle(signal):
-    """What a sound is like away from its ends, where it is faded."""
+    """A sound without its ends, which are faded."""
     return signal[len(signal) // 4 : -len(signal) // 4]
 
 
@@ -61,140 +61,140 @@ def rms(signal):
 
 
 def test_an_oscillation_of_440_hz_sounds_at_440_hz():
-    sound = listen(swinging(0.01 * tone(440)))
+    sound = sonify(run_of(0.01 * tone(440)))
     heard, rate = pitch(sound.file(common_gain([sound])))
     assert rate == 48_000
     assert heard == pytest.approx(440, abs=0.5)
 
 
 def test_an_oscillation_about_a_steady_motion_sounds_the_same():
-    still, moving = (listen(swinging(base + 0.01 * tone(440))) for base in (0.0, 2.0))
+    still, moving = (sonify(run_of(base + 0.01 * tone(440))) for base in (0.0, 2.0))
     np.testing.assert_allclose(middle(still.signal), middle(moving.signal), atol=1e-8)
 
 
-def test_a_joint_that_is_alone_sounds_as_it_swings():
+def test_a_single_joint_is_not_changed():
     velocity = 0.01 * tone(440)
-    sound = listen(swinging(velocity))
+    sound = sonify(run_of(velocity))
     np.testing.assert_allclose(middle(sound.signal), middle(velocity), atol=1e-7)
 
 
-def test_joints_that_swing_against_each_other_are_heard_by_the_sum_of_their_powers():
+def test_powers_of_joints_in_antiphase_add():
     velocity = 0.01 * tone(300)
-    alone = listen(swinging(velocity))
-    against = listen(swinging(velocity, -velocity))
+    alone = sonify(run_of(velocity))
+    against = sonify(run_of(velocity, -velocity))
     assert rms(against.signal) == pytest.approx(np.sqrt(2) * rms(alone.signal), rel=1e-6)
 
 
-def test_joints_at_different_pitches_add_their_powers():
-    both = listen(swinging(0.03 * tone(200), 0.04 * tone(1500)))
+def test_powers_of_joints_at_different_frequencies_add():
+    both = sonify(run_of(0.03 * tone(200), 0.04 * tone(1500)))
     assert rms(both.signal) == pytest.approx(0.05 / np.sqrt(2), rel=0.01)
 
 
-def test_the_power_that_is_heard_is_that_of_the_noise_estimate():
+def test_the_power_of_a_sound_is_that_of_the_noise_estimate():
     velocity = np.random.default_rng(0).normal(size=(20_000, 3))
-    run = swinging(*velocity.T, velocity_desired=0.5 * velocity)
+    run = run_of(*velocity.T, velocity_desired=0.5 * velocity)
     whole = np.sqrt(np.mean(nm.simplified(run.motion, run.velocity_desired) ** 2))
     # Windows that overlap do not quite agree where many joints rattle at random.
-    assert 20 * np.log10(rms(listen(run).signal) / whole) == pytest.approx(0, abs=1.0)
+    assert 20 * np.log10(rms(sonify(run).signal) / whole) == pytest.approx(0, abs=1.0)
 
 
 def test_twice_the_noise_is_6_db_more_at_equal_gain():
-    quiet, loud = listen(swinging(0.01 * tone(440))), listen(swinging(0.02 * tone(440)))
+    quiet, loud = sonify(run_of(0.01 * tone(440))), sonify(run_of(0.02 * tone(440)))
     gain = common_gain([quiet, loud])
     levels = [20 * np.log10(rms(read(sound.file(gain))[0])) for sound in (quiet, loud)]
     assert levels[1] - levels[0] == pytest.approx(20 * np.log10(2), abs=0.01)
 
 
-def test_a_gain_is_what_it_says():
-    sound = listen(swinging(0.01 * tone(440)))
+def test_a_gain_scales_the_samples():
+    sound = sonify(run_of(0.01 * tone(440)))
     assert rms(read(sound.file(20.0))[0]) == pytest.approx(0.1 / np.sqrt(2), rel=5e-3)
 
 
-def test_standstill_is_silent_and_says_so():
-    sound = listen(swinging(np.zeros(20_000), np.zeros(20_000)))
+def test_standstill_is_silent_and_reported_so():
+    sound = sonify(run_of(np.zeros(20_000), np.zeros(20_000)))
     assert sound.silent
     assert common_gain([sound]) == 0.0
     assert not read(sound.file(60.0))[0].any()
-    assert "silent: nothing reaches 1e-06 rad/s" in said(sound, 0.0)
+    assert "silent: nothing reaches 1e-06 rad/s" in description(sound, 0.0)
     assert str(sound).startswith("simplified noise: silent")
 
 
-def test_slow_motion_is_not_heard_even_where_the_log_breaks_off():
-    sound = listen(swinging(np.cos(2 * np.pi * 0.5 * times()), times()))
+def test_slow_motion_is_silent_also_at_the_ends_of_the_log():
+    sound = sonify(run_of(np.cos(2 * np.pi * 0.5 * times()), times()))
     assert sound.peak < 1e-4
 
 
-def test_the_gain_that_is_chosen_clips_nothing_and_wastes_little():
-    sound = listen(swinging(0.01 * tone(440)))
+def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
+    sound = sonify(run_of(0.01 * tone(440)))
     gain = common_gain([sound])
     assert sound.clipped(gain) == 0.0
-    assert "clipped" not in said(sound, gain)
+    assert "clipped" not in description(sound, gain)
     assert 0.85 < np.abs(read(sound.file(gain))[0]).max() < 0.9  # 1 dB of headroom
 
 
-def test_nothing_clips_without_being_said():
-    sound = listen(swinging(0.01 * tone(440)))
+def test_clipping_is_reported():
+    sound = sonify(run_of(0.01 * tone(440)))
     assert np.abs(read(sound.file(46.0))[0]).max() == 1.0
-    assert "% of it is beyond full scale, by 6.1 dB at most" in said(sound, 46.0)
+    assert "% of it exceeds full scale, by 6.1 dB at most" in description(sound, 46.0)
 
 
-def test_a_sound_file_says_what_it_holds_and_at_which_gain():
-    data = listen(swinging(0.01 * tone(440))).file(20.0)
+def test_a_sound_file_states_its_contents_and_gain():
+    data = sonify(run_of(0.01 * tone(440))).file(20.0)
     assert struct.unpack("<I", data[4:8])[0] == len(data) - 8
     assert b"simplified noise, gain +20.0 dB: full scale is 0.1 rad/s" in data
     assert b"ISFT" in data
 
 
-def test_gaps_are_silent_and_nothing_rings_into_them():
+def test_gaps_are_silent_without_ringing():
     valid = np.ones(20_000, dtype=bool)
     valid[8000:12_000] = False
-    sound = listen(swinging(tone(440) * valid, valid=valid))
+    sound = sonify(run_of(tone(440) * valid, valid=valid))
     assert not sound.signal[~valid].any()
     assert np.abs(np.diff(sound.signal)).max() < 0.3  # no click: the tone itself moves by 0.28
     assert "Gaps are silent." in sound.remarks
 
 
-def test_an_impact_is_heard_when_it_happens():
+def test_an_impact_sounds_at_its_time():
     still, hit = np.zeros(20_000), np.zeros(20_000)
     hit[10_000:10_020] = 1.0
-    sound = listen(swinging(still + 1e-4 * tone(300), hit))
+    sound = sonify(run_of(still + 1e-4 * tone(300), hit))
     assert np.abs(sound.signal).argmax() == pytest.approx(10_010, abs=25)
 
 
 @pytest.mark.parametrize("rate", [100.0, 333.0, 1000.0, 9999.0, 48_000.0, 100_000.0])
-def test_a_log_of_any_rate_lasts_as_long_as_it_did(rate):
+def test_a_sound_has_the_duration_of_its_log_at_any_rate(rate):
     hertz = min(rate / 4, 440.0)
-    sound = listen(swinging(tone(hertz, rate=rate), rate=rate))
+    sound = sonify(run_of(tone(hertz, rate=rate), rate=rate))
     data = sound.file(-6.0)
     assert len(read(data)[0]) / 48_000 == pytest.approx(2.0, abs=2 / rate)
     assert pitch(data)[0] == pytest.approx(hertz, abs=1.0)
 
 
-def test_playing_faster_raises_what_no_ear_would_hear():
-    sound = listen(swinging(tone(12, 4.0, 100.0), rate=100.0), Settings(speed=10.0))
+def test_playing_faster_makes_low_frequencies_audible():
+    sound = sonify(run_of(tone(12, 4.0, 100.0), rate=100.0), Settings(speed=10.0))
     data = sound.file(-6.0)
     assert len(read(data)[0]) / 48_000 == pytest.approx(0.4, abs=0.01)
     assert pitch(data)[0] == pytest.approx(120, abs=3)
     assert b"played 10 times as fast" in data
 
 
-def test_a_slow_log_says_what_cannot_be_heard():
-    sound = listen(swinging(tone(40, rate=250.0), rate=250.0))
-    assert "To be heard: 20 Hz to 125 Hz of the motion (half the rate of 250 Hz)." in sound.remarks
-    assert any("faster than 125 Hz is not in the log" in remark for remark in sound.remarks)
+def test_a_log_at_a_low_rate_has_a_remark_on_its_bandwidth():
+    sound = sonify(run_of(tone(40, rate=250.0), rate=250.0))
+    assert "Audible: 20 Hz to 125 Hz of the motion (half the rate of 250 Hz)." in sound.remarks
+    assert any("no content above 125 Hz" in remark for remark in sound.remarks)
 
 
-def test_a_log_too_slow_for_ears_is_refused_and_told_how():
-    run = swinging(tone(5, rate=30.0), rate=30.0)
-    with pytest.raises(InspectorError, match="30 Hz holds nothing above 15 Hz.*--speed 6"):
-        listen(run)
-    assert not listen(run, Settings(speed=6.0)).silent
+def test_a_log_without_audible_frequencies_is_refused_with_a_speed():
+    run = run_of(tone(5, rate=30.0), rate=30.0)
+    with pytest.raises(InspectorError, match="30 Hz has no content above 15 Hz.*--speed 6"):
+        sonify(run)
+    assert not sonify(run, Settings(speed=6.0)).silent
 
 
-def test_a_single_joint_can_be_heard():
-    run = swinging(tone(300), tone(700))
-    assert pitch(listen(run, Settings(joint="joint0")).file(-6.0))[0] == pytest.approx(300, abs=0.5)
-    assert pitch(listen(run, Settings(joint="joint1")).file(-6.0))[0] == pytest.approx(700, abs=0.5)
+def test_one_joint_of_several_can_be_chosen():
+    run = run_of(tone(300), tone(700))
+    assert pitch(sonify(run, Settings(joint="joint0")).file(-6.0))[0] == pytest.approx(300, abs=0.5)
+    assert pitch(sonify(run, Settings(joint="joint1")).file(-6.0))[0] == pytest.approx(700, abs=0.5)
 
 
 @pytest.fixture
@@ -212,54 +212,54 @@ def arm(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["normal", "rms"])
-def test_the_power_of_a_link_that_is_heard_is_that_of_the_extended_noise(arm, kind):
+def test_the_power_of_a_links_sound_is_that_of_the_extended_noise(arm, kind):
     expected = np.sqrt(estimate(arm, kind).power.mean(axis=0))
     for link, power in zip(("link1", "link2"), expected, strict=True):
-        sound = listen(arm, Settings(kind=kind, link=link))
+        sound = sonify(arm, Settings(kind=kind, link=link))
         assert sound.unit == "√W"
         assert rms(sound.signal) == pytest.approx(power, rel=0.01)
     whole = np.sqrt(np.sum(expected**2))
-    assert rms(listen(arm, Settings(kind=kind)).signal) == pytest.approx(whole, rel=0.01)
+    assert rms(sonify(arm, Settings(kind=kind)).signal) == pytest.approx(whole, rel=0.01)
 
 
-def test_a_link_is_heard_at_the_pitch_of_the_joints_that_move_it(arm):
-    gain = -20 * np.log10(listen(arm, Settings(link="link1")).peak) - 1
-    assert pitch(listen(arm, Settings(link="link1")).file(gain))[0] == pytest.approx(150, abs=0.5)
+def test_a_link_sounds_at_the_frequency_of_the_joints_that_move_it(arm):
+    gain = -20 * np.log10(sonify(arm, Settings(link="link1")).peak) - 1
+    assert pitch(sonify(arm, Settings(link="link1")).file(gain))[0] == pytest.approx(150, abs=0.5)
 
 
 @pytest.mark.parametrize(
     ("settings", "text"),
     [
-        (Settings(kind="paper"), "'paper' has no sign that could be heard; there are simplified"),
+        (Settings(kind="paper"), "'paper' has no signed signals to play; there are simplified"),
         (Settings(joint="knee"), "no joint 'knee' in the run; it has joint1, joint2"),
-        (Settings(link="knee"), "no link 'knee' that makes noise; there are link1, link2"),
-        (Settings(kind="normal", joint="joint1"), "heard by links, not by joints"),
+        (Settings(link="knee"), "no link 'knee' with a surface; there are link1, link2"),
+        (Settings(kind="normal", joint="joint1"), "of links, not of joints"),
         (Settings(link="link1", joint="joint1"), "name no joint with it"),
         (Settings(kind="simplified", link="link1"), "of the kinds normal and rms"),
         (Settings(speed=0.0), "a speed of 0, expected 0.01 to 1000"),
     ],
 )
-def test_what_cannot_be_listened_to_is_named(arm, settings, text):
+def test_settings_that_do_not_fit_the_run_are_named(arm, settings, text):
     with pytest.raises(InspectorError, match=text):
-        listen(arm, settings)
+        sonify(arm, settings)
 
 
-def test_a_run_without_robot_has_no_links_to_hear():
+def test_a_link_needs_a_robot():
     with pytest.raises(nm.RobotError, match="'normal' needs a robot, the run names None"):
-        listen(swinging(tone(300)), Settings(link="link1"))
+        sonify(run_of(tone(300)), Settings(link="link1"))
 
 
 def test_two_runs_become_two_files_at_one_gain(tmp_path):
-    paths = listening.outputs(tmp_path / "ab.wav", 2)
+    paths = sonification.output_paths(tmp_path / "ab.wav", 2)
     assert [path.name for path in paths] == ["ab.a.wav", "ab.b.wav"]
-    sounds = [listen(swinging(size * tone(440))) for size in (0.01, 0.05)]
+    sounds = [sonify(run_of(size * tone(440))) for size in (0.01, 0.05)]
     save(dict(zip(paths, sounds, strict=True)), common_gain(sounds))
     peaks = [np.abs(middle(read(path.read_bytes())[0])).max() for path in paths]
     assert peaks[1] / peaks[0] == pytest.approx(5, rel=1e-3)
 
 
 def test_sounds_of_different_units_have_no_gain_in_common(arm, tmp_path):
-    sounds = {tmp_path / "a.wav": listen(arm), tmp_path / "b.wav": listen(arm, Settings("rms"))}
+    sounds = {tmp_path / "a.wav": sonify(arm), tmp_path / "b.wav": sonify(arm, Settings("rms"))}
     with pytest.raises(InspectorError, match="rad/s and √W have no gain in common"):
         save(sounds, 0.0)
 
@@ -267,12 +267,12 @@ def test_sounds_of_different_units_have_no_gain_in_common(arm, tmp_path):
 def test_a_sound_file_that_exists_is_kept(tmp_path):
     (tmp_path / "run.b.wav").write_text("precious")
     with pytest.raises(OutputError, match=r"run.b.wav: exists already"):
-        listening.outputs(tmp_path / "run.wav", 2)
+        sonification.output_paths(tmp_path / "run.wav", 2)
 
 
 @pytest.fixture
 def inspector(monkeypatch, capsys):
-    """Call the command line; returns exit status, what it printed, and what it complained."""
+    """Call the command line; returns exit status, standard output and standard error."""
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["inspector", *map(str, arguments)])
@@ -284,9 +284,9 @@ def inspector(monkeypatch, capsys):
     return call
 
 
-def test_the_command_line_compares_runs_by_ear(inspector, tmp_path):
+def test_the_command_writes_runs_at_one_gain(inspector, tmp_path):
     for name, size in (("before", 0.01), ("after", 0.02)):
-        swinging(size * tone(440)).save(tmp_path / f"{name}.npz")
+        run_of(size * tone(440)).save(tmp_path / f"{name}.npz")
     runs = [tmp_path / "before.npz", tmp_path / "after.npz"]
     status, out, err = inspector("listen", *runs, "-o", tmp_path / "ab.wav")
     assert (status, err) == (0, "")
@@ -297,8 +297,8 @@ def test_the_command_line_compares_runs_by_ear(inspector, tmp_path):
     assert "ab.a.wav: exists already" in err
 
 
-def test_the_command_line_says_what_cannot_be_heard_in_one_line(inspector, tmp_path):
-    swinging(tone(440)).save(tmp_path / "run.npz")
+def test_the_command_refuses_wrong_settings_in_one_line(inspector, tmp_path):
+    run_of(tone(440)).save(tmp_path / "run.npz")
     for wrong in (["--joint", "knee"], ["--kind", "A"], ["--link", "hand"], ["--speed", "0"]):
         status, out, err = inspector(
             "listen", tmp_path / "run.npz", "-o", tmp_path / "o.wav", *wrong
@@ -307,11 +307,11 @@ def test_the_command_line_says_what_cannot_be_heard_in_one_line(inspector, tmp_p
     assert not (tmp_path / "o.wav").exists()
 
 
-def test_a_clip_has_the_whole_run_or_what_is_around_its_worst_moment(monkeypatch):
-    run = swinging(0.01 * tone(440), 0.01 * tone(300))
+def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatch):
+    run = run_of(0.01 * tone(440), 0.01 * tone(300))
     whole = clip(run)
     assert (whole.start, whole.stop) == (0.0, 2.0)
-    monkeypatch.setattr("inspector.sound.clip.MOST", 10_000)
+    monkeypatch.setattr("inspector.sound.clip.MOST_VELOCITIES", 10_000)
     part = clip(run, around=1.5)
     assert (part.start, part.stop) == (1.25, 1.75)
     samples, rate = read(part.data)
@@ -321,11 +321,11 @@ def test_a_clip_has_the_whole_run_or_what_is_around_its_worst_moment(monkeypatch
     np.testing.assert_array_equal(led[20_000:], samples)
 
 
-def test_a_run_too_slow_for_ears_has_no_clip():
-    assert clip(swinging(tone(5, rate=30.0), rate=30.0)) is None
+def test_a_run_without_audible_frequencies_has_no_clip():
+    assert clip(run_of(tone(5, rate=30.0), rate=30.0)) is None
 
 
-def test_listening_takes_no_library_that_is_slow_to_import():
+def test_sounds_need_no_library_that_is_slow_to_import():
     code = "import sys, inspector.sound.clip; print('scipy.signal' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"

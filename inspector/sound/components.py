@@ -1,14 +1,14 @@
 """The signed signals of a run whose squares add up to its noise.
 
-The estimate itself cannot be played. It is a norm, p_hat = sqrt(sum of v²): always positive, so a
-joint that swings about zero at 100 Hz would be heard at 200 Hz, and one that swings about a steady
-motion at 100 Hz. What is played are the signals under the root, with their signs:
+The estimate itself cannot be played. It is a norm, p_hat = sqrt(sum of v²), and always positive: a
+joint that oscillates about zero at 100 Hz would sound at 200 Hz, and one that oscillates about a
+steady motion at 100 Hz. The signals under the root are played instead, with their signs:
 
 - *simplified*: the velocities of the joints, measured and desired, and of a floating base;
 - *rms*, *normal*: a link's power is a quadratic form of its twist, P = rho c S nu' M nu. With
   M = W' W the six signals sqrt(rho c S) W nu have squares that add up to it.
 
-The other kinds of the extended noise are sums of norms, and there is nothing under them to play.
+The other kinds of the extended noise are sums of norms and have no such signals.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,19 +24,19 @@ from noisemodel.types import Array
 
 PLAYABLE = ("simplified", "normal", "rms")
 CHUNK = 65_536
-"""Samples whose twists are computed at once."""
-TOGETHER = 4
-"""Links whose signals are held at once: those of 60 links for minutes would fill the memory."""
+"""Number of samples whose twists are computed at once."""
+LINKS_AT_ONCE = 4
+"""Number of links whose signals are in memory at once: all of 60 links would not fit."""
 
 
 @dataclass(frozen=True, eq=False)
-class Parts:
-    """Signals that make a noise together.
+class Components:
+    """Signals whose squares add up to a noise.
 
     Attributes:
-        what: What they are, in a few words.
-        unit: Of each signal.
-        signals: Each of shape (samples,); they are made as they are asked for.
+        what: Short description.
+        unit: Unit of each signal.
+        signals: Each of shape (samples,), computed one by one.
     """
 
     what: str
@@ -44,33 +44,35 @@ class Parts:
     signals: Iterator[Array]
 
 
-def parts(run: nm.Run, *, kind: str = "simplified", joint: str = "", link: str = "") -> Parts:
-    """Take the signals under the root of a noise.
+def components(
+    run: nm.Run, *, kind: str = "simplified", joint: str = "", link: str = ""
+) -> Components:
+    """Signed signals under the root of a noise.
 
     Args:
         run: The run.
         kind: "simplified", "normal" or "rms".
-        joint: The only joint to take, of the simplified noise; all and the base if empty.
-        link: The only link to take, of the extended noise; all if empty.
+        joint: One joint, of the simplified noise; all and the base if empty.
+        link: One link, of the extended noise; all if empty.
 
     Returns:
         The signals.
 
     Raises:
         InspectorError: If the kind cannot be played, or the run has no such joint or link.
-        RobotError: If a kind takes a robot and the run names none that is known.
+        RobotError: If the kind needs a robot and the run has no known one.
     """
     if kind not in PLAYABLE:
         raise InspectorError(
-            f"kind {kind!r} has no sign that could be heard; there are {', '.join(PLAYABLE)}"
+            f"kind {kind!r} has no signed signals to play; there are {', '.join(PLAYABLE)}"
         )
     if link and (joint or kind == "simplified"):
         raise InspectorError(f"link {link!r} is of the kinds normal and rms; name no joint with it")
     if joint and kind != "simplified":
-        raise InspectorError(f"kind {kind!r} is heard by links, not by joints; name a link")
+        raise InspectorError(f"kind {kind!r} is of links, not of joints; name a link")
     if kind == "simplified":
         what = f"simplified noise of {joint}" if joint else "simplified noise"
-        return Parts(what, "rad/s", _velocities(run, joint))
+        return Components(what, "rad/s", _velocities(run, joint))
     return _of_links(run, kind, link)
 
 
@@ -94,33 +96,33 @@ def _velocities(run: nm.Run, joint: str) -> Iterator[Array]:
     return (np.asarray(signal, dtype=np.float64) for signal in (*chosen, *base))
 
 
-def _of_links(run: nm.Run, kind: str, link: str) -> Parts:
+def _of_links(run: nm.Run, kind: str, link: str) -> Components:
     if run.robot is None or not robot_known(run):
         raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
     robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
     surface = nm.Surface.of(robot, "auto")
-    heard = [name for name in surface.names if name not in surface.bare]
-    if link and link not in heard:
-        raise InspectorError(f"no link {link!r} that makes noise; there are {', '.join(heard)}")
-    chosen = [surface.names.index(name) for name in ([link] if link else heard)]
+    radiating = [name for name in surface.names if name not in surface.bare]
+    if link and link not in radiating:
+        raise InspectorError(f"no link {link!r} with a surface; there are {', '.join(radiating)}")
+    chosen = [surface.names.index(name) for name in ([link] if link else radiating)]
     motions = [robot.configuration(run)]
     if (desired := robot.desired(run)) is not None:
         motions.append(desired)
     what = f"{kind} noise of {link}" if link else f"{kind} noise of all links"
-    return Parts(what, "√W", _twisted(robot, surface, kind, chosen, motions))
+    return Components(what, "√W", _weighted_twists(robot, surface, kind, chosen, motions))
 
 
-def _twisted(
+def _weighted_twists(
     robot: nm.Robot,
     surface: nm.Surface,
     kind: str,
     links: Sequence[int],
     motions: Sequence[tuple[Array, Array]],
 ) -> Iterator[Array]:
-    """Weigh the twists of links so that their squares are powers."""
+    """Twists of links, weighted so that their squares are powers."""
     forms = surface.mean_square if kind == "rms" else surface.mean_square_normal
-    for first in range(0, len(links), TOGETHER):
-        group = links[first : first + TOGETHER]
+    for first in range(0, len(links), LINKS_AT_ONCE):
+        group = links[first : first + LINKS_AT_ONCE]
         joints = surface.joint[group]
         for q, v in motions:
             twists = np.concatenate(
@@ -137,7 +139,7 @@ def _twisted(
 
 
 def _root(form: Array) -> Array:
-    """Find W with W' W = M for a form that may be singular, shape (6, 6)."""
+    """Matrix W with W' W = M for a form M that may be singular, shape (6, 6)."""
     values, vectors = np.linalg.eigh(form)
     root: Array = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
     return root
