@@ -47,7 +47,7 @@ def messages(path, topic):
 # --- what is exported
 
 
-def test_the_noise_is_what_the_other_commands_say(demo):
+def test_the_noise_is_that_of_the_other_commands(demo):
     content = collect(demo, LIBRARY, kind="C")
     np.testing.assert_array_equal(
         content.simplified, simplified(demo.motion, demo.velocity_desired)
@@ -58,7 +58,7 @@ def test_the_noise_is_what_the_other_commands_say(demo):
     assert content.remarks == ()
 
 
-def test_what_is_missing_is_said():
+def test_what_is_missing_is_a_remark():
     content = collect(plain_run(rate=200.0), LIBRARY)
     assert content.analysis.labels is None
     assert content.extended is None
@@ -81,7 +81,7 @@ def test_parquet_holds_every_number_to_the_bit(exported, demo):
     assert table.schema.metadata[b"model"] == b"general-10khz"
 
 
-def test_the_frames_can_be_had_back_from_the_table(exported):
+def test_the_frames_can_be_read_from_the_table(exported):
     folder, content = exported
     table = pyarrow.parquet.read_table(folder / "demo.parquet").to_pylist()
     frames = {row["frame_start"]: row for row in table if row["frame_start"] is not None}
@@ -103,7 +103,7 @@ def test_a_sample_has_the_frame_whose_middle_is_nearest(exported):
             assert abs(row["time"] - middle) <= 0.05 + 1e-9
 
 
-def test_csv_says_the_same_as_parquet(exported):
+def test_csv_has_the_values_of_parquet(exported):
     folder, _ = exported
     table = pyarrow.parquet.read_table(folder / "demo.parquet")
     with (folder / "demo.csv").open(newline="") as file:
@@ -165,7 +165,7 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
         assert json.loads(schema.data)["type"] == "object"
 
 
-def test_mcap_says_the_noise_to_the_bit(exported, demo):
+def test_mcap_holds_the_noise_to_the_bit(exported, demo):
     folder, content = exported
     stamps, noise = zip(*messages(folder / "demo.mcap", "/noise"), strict=True)
     assert [each["time"] for each in noise] == demo.time.tolist()
@@ -174,7 +174,7 @@ def test_mcap_says_the_noise_to_the_bit(exported, demo):
     np.testing.assert_allclose(np.array(stamps) * 1e-9, demo.time, atol=1e-9)
 
 
-def test_mcap_says_labels_scores_findings_and_annotations(exported, demo):
+def test_mcap_holds_labels_scores_findings_and_annotations(exported, demo):
     folder, content = exported
     frames = [message for _, message in messages(folder / "demo.mcap", "/labels")]
     assert [frame["label"] for frame in frames] == content.analysis.labels.label.tolist()
@@ -195,7 +195,7 @@ def test_messages_keep_their_schema(exported):
             assert json.loads(message.data).keys() == json.loads(schema.data)["properties"].keys()
 
 
-def test_absolute_stamps_are_had_back(tmp_path):
+def test_absolute_stamps_are_restored(tmp_path):
     run = plain_run(meta={"start": "1700000000.123456789"})
     export(run, tmp_path / "run.mcap", LIBRARY)
     stamps = [stamp for stamp, _ in messages(tmp_path / "run.mcap", "/noise")]
@@ -203,12 +203,12 @@ def test_absolute_stamps_are_had_back(tmp_path):
 
 
 @pytest.mark.parametrize("start", ["soon", "-5", "nan", "1e400", None])
-def test_a_start_that_is_no_time_is_passed_over(tmp_path, start):
+def test_an_invalid_start_is_ignored(tmp_path, start):
     export(plain_run(meta={"start": start}), tmp_path / "run.mcap", LIBRARY)
     assert messages(tmp_path / "run.mcap", "/noise")[0][0] == 0
 
 
-def test_a_run_before_time_0_is_moved(tmp_path):
+def test_a_run_before_time_0_is_shifted(tmp_path):
     export(plain_run(start=-1.0), tmp_path / "run.mcap", LIBRARY)
     (first, noise), *_ = messages(tmp_path / "run.mcap", "/noise")
     assert (first, noise["time"]) == (0, -1.0)
@@ -217,7 +217,7 @@ def test_a_run_before_time_0_is_moved(tmp_path):
 # --- bad input
 
 
-def test_bad_input_is_one_line_and_exit_3(tmp_path):
+def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
     (tmp_path / "there.csv").write_text("mine")
     for arguments, said in [
         ([demo_run(), "-o", tmp_path / "run.bag"], "there are .mcap, .csv, .parquet"),
@@ -234,7 +234,7 @@ def test_bad_input_is_one_line_and_exit_3(tmp_path):
     assert (tmp_path / "there.csv").read_text() == "mine"
 
 
-def test_a_missing_extra_is_said_and_leaves_nothing(tmp_path, monkeypatch):
+def test_a_missing_extra_is_an_error_and_leaves_no_file(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mcap.writer", None)
     plain_run().save(tmp_path / "run.npz")
     status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap")
@@ -243,7 +243,7 @@ def test_a_missing_extra_is_said_and_leaves_nothing(tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["run.npz"]
 
 
-def test_the_command_says_what_it_wrote(tmp_path):
+def test_the_command_prints_what_it_wrote(tmp_path):
     plain_run().save(tmp_path / "run.npz")
     status, out, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.parquet")
     assert (status, err) == (0, "")

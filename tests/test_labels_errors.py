@@ -23,17 +23,17 @@ def reading(tmp_path, name, content):
     ("name", "content", "message"),
     [
         ("l.txt", "0\t1\tok\n1\tok\n", "line 2: expected start, stop and label between tabs"),
-        ("l.txt", "0\t1\tok\n\n2,5\t3\tok\n", r"line 3: '2,5' is no time in seconds"),
-        ("l.txt", "nan\t1\tok\n", "line 1: 'nan' is no time"),
-        ("l.txt", "0\tinf\tok\n", "line 1: 'inf' is no time"),
+        ("l.txt", "0\t1\tok\n\n2,5\t3\tok\n", r"line 3: '2,5' is not a time in seconds"),
+        ("l.txt", "nan\t1\tok\n", "line 1: 'nan' is not a time"),
+        ("l.txt", "0\tinf\tok\n", "line 1: 'inf' is not a time"),
         ("l.txt", "3\t2\tok\n", "line 1: 'ok' from 3 s to 2 s stops before it starts"),
-        ("l.txt", "3\t3\tclick\n", "line 1: 'click' from 3 s to 3 s .* lasts no time"),
-        ("l.txt", "3\t4\t\n", "line 1: '' is no label; it is empty"),
-        ("l.txt", "3\t4\ta\tb\n", r"line 1: 'a\\tb' is no label; .* cannot be printed"),
+        ("l.txt", "3\t3\tclick\n", "line 1: 'click' from 3 s to 3 s .* has no duration"),
+        ("l.txt", "3\t4\t\n", "line 1: '' is not a label; it is empty"),
+        ("l.txt", "3\t4\ta\tb\n", r"line 1: 'a\\tb' is not a label; .* cannot be printed"),
         ("l.txt", "3\t12\tok\n", "line 1: 'ok' from 3 s to 12 s lies outside of the run"),
         ("l.txt", "-1\t2\tok\n", "line 1: 'ok' from -1 s to 2 s lies outside of the run"),
         ("l.txt", "3\t5\tb\n1\t4\ta\n", "line 1: 'b' starts at 3 s, before 'a' stops at 4 s"),
-        ("l.txt", b"\xff\xfe\x00", "no text in UTF-8"),
+        ("l.txt", b"\xff\xfe\x00", "not text in UTF-8"),
         ("l.csv", "", "line 1: there is no column 'start'; expected start, stop, label"),
         ("l.csv", "start,end,label\n", "line 1: there is no column 'stop'"),
         ("l.csv", "start,stop,label\n1,2\n", "line 2: 2 cells where the header names 3 columns"),
@@ -78,26 +78,28 @@ def test_damaged_labels_are_refused_with_their_place(tmp_path, name, content, me
     assert str(caught.value).startswith(str(tmp_path / name))
 
 
-def test_a_file_that_is_not_there_is_said(tmp_path):
+def test_a_missing_file_is_reported(tmp_path):
     with pytest.raises(LabelFileError, match="cannot be read .No such file"):
         read_labels(tmp_path / "none.csv", RUN)
 
 
 def test_unknown_formats_are_refused_with_the_known_ones(tmp_path):
-    with pytest.raises(InspectorError, match=r"no format of labels ends so; there are \.toml"):
+    with pytest.raises(
+        InspectorError, match=r"no format of labels has this suffix; there are \.toml"
+    ):
         read_labels(tmp_path / "labels.xlsx", RUN)
     with pytest.raises(InspectorError, match="no format 'excel' of labels; there are noisytest"):
         write_labels((), tmp_path / "labels.csv", format_name="excel")
     assert list(tmp_path.iterdir()) == []
 
 
-def test_nothing_is_written_over_and_nothing_half(tmp_path):
+def test_nothing_is_overwritten_or_written_in_part(tmp_path):
     path = tmp_path / "labels.csv"
     path.write_text("mine")
     with pytest.raises(OutputError, match="exists already"):
         write_labels([Block(0.0, 1.0, "ok")], path)
     assert path.read_text() == "mine"
-    with pytest.raises(LabelFileError, match="the recording's end to NoisyTest"):
+    with pytest.raises(LabelFileError, match="the end of the recording in NoisyTest"):
         write_labels([Block(-2.0, -1.0, "ok")], tmp_path / "labels.toml")
     assert list(tmp_path.iterdir()) == [path]
     write_labels([Block(0.0, 1.0, "ok")], path, overwrite=True)
@@ -107,7 +109,7 @@ def test_nothing_is_written_over_and_nothing_half(tmp_path):
 # --- the commands
 
 
-def test_labels_travel_out_and_in_by_the_command_line(tmp_path):
+def test_labels_are_written_and_read_by_the_command(tmp_path):
     status, out, err = call("labels", demo_run(), "--to", tmp_path / "labels.txt")
     assert (status, err) == (0, "")
     assert "labels.txt: 4 labels" in out
@@ -125,7 +127,7 @@ def test_labels_travel_out_and_in_by_the_command_line(tmp_path):
     assert len(out.splitlines()) == 4
 
 
-def test_bad_input_is_one_line_and_exit_3(tmp_path):
+def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
     RUN.save(tmp_path / "run.npz")
     (tmp_path / "late.csv").write_text("start,stop,label\n9,11,ok\n")
     for arguments, said in [
@@ -168,7 +170,7 @@ def test_findings_are_written_beside_the_verdicts(tmp_path):
     assert status == 3
 
 
-def test_where_findings_go_is_checked_before_the_work(tmp_path):
+def test_paths_of_findings_are_checked_before_classification(tmp_path):
     twin = tmp_path / "a" / "demo.npz"
     twin.parent.mkdir()
     twin.write_bytes(Path(demo_run()).read_bytes())

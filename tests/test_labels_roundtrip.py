@@ -4,7 +4,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from inspector.labels import LabelFileError, read_labels, write_labels
-from inspector.labels.formats import FORMATS
+from inspector.labels.files import FORMATS
 from models import Event, noisytest
 from noisemodel import Block, Run, RunError
 
@@ -47,14 +47,14 @@ def run_with(*blocks, seconds=10.0):
 @settings(deadline=None, max_examples=60)
 @given(run=annotated_runs())
 @example(run=run_with(Block(0.1 + 0.2, 1 / 3, " a,\"b\"; 'c' "), Block(1e-300, 0.1, "\\")))
-def test_nothing_is_lost_on_the_way_round(folder, suffix, run):
+def test_labels_written_and_read_again_are_equal(folder, suffix, run):
     assert there_and_back(folder, run, suffix) == run.blocks
 
 
 @settings(deadline=None, max_examples=60)
 @given(run=annotated_runs())
 @example(run=run_with(Block(0.5, 1.0, 'say "\\u0041" \\')))
-def test_nothing_is_lost_on_the_way_through_noisytest(folder, run):
+def test_labels_written_and_read_by_noisytest_are_equal(folder, run):
     if any(block.stop == -1.0 for block in run.blocks):
         with pytest.raises(LabelFileError, match="stops at -1 s, which is the recording's end"):
             there_and_back(folder, run, ".toml")
@@ -63,7 +63,7 @@ def test_nothing_is_lost_on_the_way_through_noisytest(folder, run):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_no_labels_are_labels_too(folder, suffix):
+def test_an_empty_list_of_labels_is_written_and_read(folder, suffix):
     assert there_and_back(folder, run_with(), suffix) == ()
 
 
@@ -88,7 +88,7 @@ def test_noisytest_reads_what_is_written_for_it(tmp_path):
     assert [tuple(each) for each in read] == [(b.start, b.stop, b.label) for b in blocks]
 
 
-def test_noisytests_end_is_the_end_of_the_run(tmp_path):
+def test_noisytests_stop_of_minus_1_is_the_end_of_the_run(tmp_path):
     text = '[data]\nchunk_ranges = [[0, 1.5], [2, -1]]\nchunk_labels = ["ok", "impact"]\n'
     (tmp_path / "labels.toml").write_text(text)
     blocks = read_labels(tmp_path / "labels.toml", run_with())
@@ -109,13 +109,13 @@ def test_a_spreadsheets_csv_is_read(tmp_path):
     assert blocks == (Block(0.0, 0.5, "ok"), Block(1.0, 2.5, "impact"))
 
 
-def test_a_format_can_be_named_in_place_of_the_ending(tmp_path):
+def test_a_format_can_be_named_in_place_of_the_suffix(tmp_path):
     run = run_with(Block(0.0, 1.0, "ok"))
     write_labels(run.blocks, tmp_path / "labels", format_name="noisytest")
     assert read_labels(tmp_path / "labels", run, format_name="noisytest") == run.blocks
 
 
-def test_what_a_run_accepts_a_file_of_labels_may_hold(folder):
+def test_all_labels_that_a_run_accepts_can_be_written(folder):
     """A block may begin and end up to a sample outside of the run, and overlap by one."""
     blocks = (Block(-0.0099, 5.0, "ok"), Block(4.991, 10.0099, "impact"))
     assert there_and_back(folder, run_with(*blocks), ".csv") == blocks

@@ -1,4 +1,4 @@
-"""Out again: noise, labels and scores of a run for the tools that people have."""
+"""Export of a run's noise, labels and scores for other tools."""
 
 from inspector.export.content import Content, collect
 from inspector.export.writing import export

@@ -1,8 +1,8 @@
-"""MCAP with JSON messages, as Foxglove and PlotJuggler open it.
+"""Export as MCAP with JSON messages, for Foxglove and PlotJuggler.
 
-Topics: /noise for each sample, /labels for each frame, at its middle, /findings and /annotations,
-where they start. Times are those of the run, after the first stamp that its ``meta`` keeps; MCAP
-has none before 0, so that a run which starts there is moved.
+Topics: /noise for each sample, /labels at the middle of each frame, /findings and /annotations at
+their start. Times are those of the run, added to the first stamp in its ``meta``. MCAP has no
+negative times: a run that starts before 0 is shifted.
 """
 
 import heapq
@@ -19,7 +19,7 @@ NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 SPAN = {"label": TEXT, "start": NUMBER, "stop": NUMBER}
 NANOSECONDS = 10**9
 LATEST = 2**63
-"""Stamps from here on are no time, in [ns]."""
+"""Stamps from here on are not valid, in [ns]."""
 
 Message = tuple[int, str, dict[str, Any]]
 
@@ -28,7 +28,7 @@ def write_mcap(content: Content, path: Path) -> None:
     """Write noise, labels, findings and annotations.
 
     Args:
-        content: What is exported.
+        content: The exported data.
         path: The file to write.
 
     Raises:
@@ -38,7 +38,7 @@ def write_mcap(content: Content, path: Path) -> None:
         from mcap.writer import Writer
     except ImportError as error:
         raise InspectorError(
-            f"MCAP takes the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
+            f"MCAP needs the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
         ) from error
     with path.open("wb") as stream:
         writer: Any = Writer(stream)
@@ -66,10 +66,10 @@ def write_mcap(content: Content, path: Path) -> None:
 
 
 def origin(content: Content) -> int:
-    """Tell when the run's time 0 is, in [ns].
+    """Time in the MCAP file of the run's time 0, in [ns].
 
     Args:
-        content: What is exported.
+        content: The exported data.
     """
     try:
         start = int(Decimal(str(content.analysis.run.meta.get("start", 0))) * NANOSECONDS)
@@ -80,7 +80,7 @@ def origin(content: Content) -> int:
 
 
 def _topics(content: Content) -> dict[str, dict[str, Any]]:
-    """Describe the messages of each topic that there is."""
+    """JSON properties of the messages of each topic."""
     noise = {"time": NUMBER, "simplified": NUMBER}
     topics: dict[str, dict[str, Any]] = {
         "/noise": noise if content.extended is None else noise | {"extended": NUMBER}
@@ -96,7 +96,7 @@ def _topics(content: Content) -> dict[str, dict[str, Any]]:
 
 
 def _messages(content: Content) -> Iterator[Iterator[Message]]:
-    """Give the messages of each topic in order of time."""
+    """Messages of each topic in order of time."""
     zero = origin(content)
 
     def stamp(time: float) -> int:

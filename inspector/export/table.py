@@ -1,4 +1,4 @@
-"""One wide table: a row for each sample, with the frame and the block that it lies in."""
+"""Export as one wide table: a row for each sample, with its frame and its block."""
 
 import csv
 from collections.abc import Iterator
@@ -22,14 +22,14 @@ UNITS = {
 
 
 def arrow_table(content: Content) -> Any:
-    """Lay out what is exported as a table of Arrow.
+    """Exported data as an Arrow table.
 
     Columns are time, simplified, extended (with a robot), annotated (with blocks), and with labels
     frame_start, frame_stop, label and a score_<class> each: those of the frame whose middle is
-    nearest, nothing before the first frame's and after the last one's share.
+    nearest, and null before the first and after the last frame's share.
 
     Args:
-        content: What is exported.
+        content: The exported data.
 
     Returns:
         A ``pyarrow.Table``, whose fields have their unit as metadata.
@@ -51,7 +51,7 @@ def write_parquet(content: Content, path: Path) -> None:
     """Write the table as Parquet.
 
     Args:
-        content: What is exported.
+        content: The exported data.
         path: The file to write.
     """
     from pyarrow import parquet
@@ -60,17 +60,17 @@ def write_parquet(content: Content, path: Path) -> None:
 
 
 def write_csv(content: Content, path: Path) -> None:
-    """Write the table as CSV, numbers with all digits that they have.
+    """Write the table as CSV, numbers with all digits.
 
     Args:
-        content: What is exported.
+        content: The exported data.
         path: The file to write.
     """
     import pyarrow.csv
 
     table = arrow_table(content)
     with path.open("w", newline="", encoding="utf-8") as file:
-        # Arrow would put all names in quotes, and not every reader of CSV takes them off.
+        # Arrow would quote all names, which not every reader of CSV accepts.
         csv.writer(file, lineterminator="\n").writerow(table.column_names)
     with path.open("ab") as stream:
         pyarrow.csv.write_csv(table, stream, pyarrow.csv.WriteOptions(include_header=False))
@@ -100,7 +100,7 @@ def _annotated(content: Content) -> list[str | None]:
 
 
 def _framed(time: Array, labels: models.Labels) -> Iterator[tuple[str, Any]]:
-    """Give each sample the frame whose middle is nearest, if that is near."""
+    """Columns of the frame whose middle is nearest to each sample, null outside of all shares."""
     import pyarrow as pa
 
     middles = (labels.start + labels.stop) / 2

@@ -1,4 +1,4 @@
-"""The formats of an export, and the way from a run to a file."""
+"""Export of a run to a file, in a format chosen by suffix."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +16,7 @@ WRITERS: dict[str, Callable[[Content, Path], None]] = {
     ".csv": write_csv,
     ".parquet": write_parquet,
 }
-"""What writes a file, by its ending."""
+"""Writers by suffix."""
 
 
 def export(
@@ -35,14 +35,14 @@ def export(
         What was written.
 
     Raises:
-        InspectorError: If there is no such format, or it takes an extra that is not installed.
+        InspectorError: If there is no such format, or it needs an extra that is not installed.
         OutputError: If the file exists or cannot be written.
         NoiseModelError: If there is no such kind of noise, or the robot cannot be read.
     """
     write = WRITERS.get(path.suffix.lower())
     if write is None:
         raise InspectorError(
-            f"{path}: no format of exports ends so; there are {', '.join(WRITERS)}"
+            f"{path}: no format of exports has this suffix; there are {', '.join(WRITERS)}"
         )
     refuse_existing(path, overwrite=overwrite)
     content = collect(run, library, kind=kind)

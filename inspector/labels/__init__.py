@@ -1,10 +1,9 @@
-"""Labels that travel: annotated blocks and findings as files that other tools read and write.
+"""Label files of other tools: annotated blocks read and written, findings written.
 
-Times are those of the run, in [s]; numbers are written so that they come back bit for bit.
+Times are those of the run, in [s]; numbers are written with all digits.
 """
 
 from inspector.labels.entry import LabelFileError
-from inspector.labels.formats import write_labels
-from inspector.labels.reading import read_labels
+from inspector.labels.files import read_labels, write_labels
 
 __all__ = ["LabelFileError", "read_labels", "write_labels"]

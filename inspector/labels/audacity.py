@@ -1,4 +1,4 @@
-"""Audacity's label tracks: a line for each label, start, stop and text between tabs."""
+"""Label tracks of Audacity: a line for each label, with start, stop and text between tabs."""
 
 from collections.abc import Iterator, Sequence
 
@@ -6,7 +6,7 @@ from inspector.labels.entry import Entry, EntryError, Span, number
 
 
 def render(spans: Sequence[Span]) -> str:
-    """Write labels as a label track.
+    """Label track of some labels.
 
     Args:
         spans: The labels.
@@ -15,16 +15,16 @@ def render(spans: Sequence[Span]) -> str:
 
 
 def parse(text: str) -> Iterator[Entry]:
-    """Read a label track.
+    """Labels of a label track.
 
     Args:
-        text: The track; the lines with frequencies that follow spectral selections are passed over.
+        text: The track; lines with the frequencies of spectral selections are ignored.
 
     Yields:
         Its labels.
 
     Raises:
-        EntryError: If a line is none of a label track.
+        EntryError: If a line is not part of a label track.
     """
     for row, line in enumerate(text.split("\n"), start=1):
         where, cells = f"line {row}", line.removesuffix("\r").split("\t", maxsplit=2)

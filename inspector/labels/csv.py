@@ -1,4 +1,4 @@
-"""Labels as CSV: columns start, stop and label under a header; findings have a score too."""
+"""Labels as CSV, with columns start, stop and label; findings also have a score."""
 
 import csv
 import io
@@ -11,10 +11,10 @@ COLUMNS = ("start", "stop", "label")
 
 
 def render(spans: Sequence[Span]) -> str:
-    """Write labels as CSV.
+    """CSV text of some labels.
 
     Args:
-        spans: The labels; if they are findings, their scores are written too.
+        spans: The labels; scores are written if they are findings.
     """
     text = io.StringIO(newline="")
     scored = [span for span in spans if isinstance(span, Event)]
@@ -29,11 +29,11 @@ def render(spans: Sequence[Span]) -> str:
 
 
 def parse(text: str) -> Iterator[Entry]:
-    """Read labels from CSV.
+    """Labels of CSV text.
 
     Args:
         text: A header that names start, stop and label in any order, then a row per label; other
-            columns are passed over.
+            columns are ignored.
 
     Yields:
         The labels.

@@ -1,4 +1,4 @@
-"""One label of a file, before it is known whether it fits a run."""
+"""Labels as files contain them, before they are checked against a run."""
 
 from dataclasses import dataclass
 from math import isfinite
@@ -13,26 +13,26 @@ class Span(Protocol):
 
     @property
     def start(self) -> float:
-        """When it starts, in [s]."""
+        """Start, in [s]."""
 
     @property
     def stop(self) -> float:
-        """When it stops, in [s]."""
+        """Stop, in [s]."""
 
     @property
     def label(self) -> str:
-        """What it is called."""
+        """Name of the label."""
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A label as a file has it.
+    """One label of a file.
 
     Attributes:
-        start: When it starts, in [s].
-        stop: When it stops, in [s]; None if it lasts to the end of the run.
-        label: What it is called.
-        where: Its place in the file, say "line 3".
+        start: Start, in [s].
+        stop: Stop, in [s]; None for the end of the run.
+        label: Name of the label.
+        where: Its place in the file, such as "line 3".
     """
 
     start: float
@@ -42,21 +42,21 @@ class Entry:
 
 
 def number(text: str, where: str) -> float:
-    """Read a time.
+    """Time parsed from text, in [s].
 
     Args:
         text: A number with a decimal point.
         where: Its place in the file.
 
     Raises:
-        EntryError: If it is no finite number.
+        EntryError: If it is not a finite number.
     """
     try:
         value = float(text)
     except ValueError:
-        raise EntryError(f"{text!r} is no time in seconds", where) from None
+        raise EntryError(f"{text!r} is not a time in seconds", where) from None
     if not isfinite(value):
-        raise EntryError(f"{text!r} is no time in seconds", where)
+        raise EntryError(f"{text!r} is not a time in seconds", where)
     return value
 
 
@@ -66,7 +66,7 @@ class LabelFileError(InspectorError):
     Args:
         path: The file.
         problem: What is wrong with it, in one line.
-        where: The place in the file, say "line 3", if it is in one place.
+        where: The place in the file, such as "line 3", if there is one.
     """
 
     def __init__(self, path: Path, problem: str, where: str = "") -> None:
@@ -75,7 +75,7 @@ class LabelFileError(InspectorError):
 
 
 class EntryError(ValueError):
-    """A place in a text of labels that makes no sense, to become a ``LabelFileError``.
+    """Invalid text of labels, which is raised again as ``LabelFileError``.
 
     Args:
         problem: What is wrong, in one line.

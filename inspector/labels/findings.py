@@ -1,4 +1,4 @@
-"""What `classify` found, a file of labels for each run."""
+"""Label files of the findings of `classify`, one for each run."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
@@ -6,18 +6,18 @@ from pathlib import Path
 from inspector.analysis.analyse import Status
 from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError
-from inspector.labels.formats import format_of, write_labels
+from inspector.labels.files import format_of, write_labels
 from noisemodel.atomic import refuse_existing
 
 
 def label_paths(
     runs: Sequence[Path], folder: Path, *, format_name: str, overwrite: bool = False
 ) -> dict[Path, Path]:
-    """Name a file of labels for each run, before long work is done for them.
+    """Paths of the label files, checked before the runs are classified.
 
     Args:
         runs: The runs.
-        folder: Where the files will lie; it is made if it is not there.
+        folder: Folder of the files; it is created if it does not exist.
         format_name: "noisytest", "csv" or "audacity".
         overwrite: Whether files that exist may be replaced.
 
@@ -26,7 +26,7 @@ def label_paths(
 
     Raises:
         InspectorError: If there is no such format, two runs have one name, or the folder cannot be
-            made.
+            created.
         OutputError: If a file exists.
     """
     suffix = format_of(folder, format_name).suffix
@@ -52,16 +52,16 @@ def write_findings(
     format_name: str,
     overwrite: bool = False,
 ) -> None:
-    """Write the findings of each run that was judged; a quiet run has a file without labels.
+    """Write the findings of each run that was classified; one without has an empty file.
 
     Args:
-        verdicts: What was found.
+        verdicts: The verdicts.
         targets: The file of each run.
         format_name: "noisytest", "csv" or "audacity".
         overwrite: Whether files that exist may be replaced.
 
     Raises:
-        LabelFileError: If the format cannot say one of the findings.
+        LabelFileError: If the format cannot represent one of the findings.
         OutputError: If a file cannot be written.
     """
     for verdict in verdicts:

@@ -1,8 +1,7 @@
-"""NoisyTest's TOML: chunk_ranges and chunk_labels in a table [data].
+"""Labels as NoisyTest's TOML: chunk_ranges and chunk_labels in a table [data].
 
-Both numbers of a range are written with a decimal point, since the TOML reader that NoisyTest uses
-takes no mixed ones; and a stop of -1 is the end of the recording, so that no other label may stop
-there.
+Both numbers of a range are written with a decimal point, since NoisyTest's TOML reader refuses
+lists of mixed types. A stop of -1 is the end of the recording, so no label may stop at -1 s.
 """
 
 import json
@@ -13,26 +12,26 @@ from typing import Any
 from inspector.labels.entry import Entry, EntryError, Span
 
 END = -1.0
-"""A stop that stands for the end of the recording."""
+"""Stop of a label that ends with the recording."""
 
 LATEST = 1e12
-"""No time lies beyond, in [s]."""
+"""Largest accepted time, in [s]."""
 
 
 def render(spans: Sequence[Span]) -> str:
-    """Write labels as NoisyTest has them beside each of its logs.
+    """TOML text of some labels, as NoisyTest stores it beside each log.
 
     Args:
         spans: The labels.
 
     Raises:
-        EntryError: If one stops at -1 s, which means something else there.
+        EntryError: If one stops at -1 s, which is the end of the recording.
     """
     for span in spans:
         if span.stop == END:
             raise EntryError(
-                f"label {span.label!r} stops at -1 s, which is the recording's end to NoisyTest;"
-                " take another format"
+                f"label {span.label!r} stops at -1 s, the end of the recording in NoisyTest;"
+                " use another format"
             )
     ranges = "".join(f"    [{span.start!r}, {span.stop!r}],\n" for span in spans)
     labels = "".join(f"    {json.dumps(span.label, ensure_ascii=False)},\n" for span in spans)
@@ -40,7 +39,7 @@ def render(spans: Sequence[Span]) -> str:
 
 
 def parse(text: str) -> Iterator[Entry]:
-    """Read NoisyTest's annotations.
+    """Labels of NoisyTest's annotations.
 
     Args:
         text: TOML.
@@ -49,7 +48,7 @@ def parse(text: str) -> Iterator[Entry]:
         The labels.
 
     Raises:
-        EntryError: If it is no TOML, lacks the lists, or they hold other things.
+        EntryError: If it is not TOML, lacks the lists, or they have other contents.
     """
     try:
         data = tomllib.loads(text).get("data", {})
