@@ -94,10 +94,10 @@ def test_nothing_is_written_of_a_log_that_cannot_be_read(importing, tmp_path):
 
 def test_a_mapping_is_saved_and_used_again(importing, tmp_path):
     np.savez(tmp_path / "log.npz", clock=np.arange(400) / 100, dq=VELOCITY)
-    said = ["--map", "time=clock", "--map", "velocity=dq", "--joints", ",".join(JOINTS)]
+    options = ["--map", "time=clock", "--map", "velocity=dq", "--joints", ",".join(JOINTS)]
     kept = tmp_path / "mapping.toml"
     status, _, err = importing(
-        tmp_path / "log.npz", *said, "-o", tmp_path / "a.npz", "--save-mapping", kept
+        tmp_path / "log.npz", *options, "-o", tmp_path / "a.npz", "--save-mapping", kept
     )
     assert (status, err) == (0, "")
     status, _, _ = importing(tmp_path / "log.npz", "--mapping", kept, "-o", tmp_path / "b.npz")

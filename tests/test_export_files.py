@@ -219,7 +219,7 @@ def test_a_run_before_time_0_is_shifted(tmp_path):
 
 def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
     (tmp_path / "there.csv").write_text("mine")
-    for arguments, said in [
+    for arguments, expected in [
         ([demo_run(), "-o", tmp_path / "run.bag"], "there are .mcap, .csv, .parquet"),
         ([demo_run(), "-o", tmp_path / "there.csv"], "exists already"),
         ([demo_run(), "-o", tmp_path / "no" / "run.csv"], "cannot be written"),
@@ -228,7 +228,7 @@ def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
     ]:
         status, out, err = call("export", *arguments)
         assert (status, out) == (3, "")
-        assert said in err
+        assert expected in err
         assert len(err.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["there.csv"]
     assert (tmp_path / "there.csv").read_text() == "mine"

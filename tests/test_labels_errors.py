@@ -130,7 +130,7 @@ def test_labels_are_written_and_read_by_the_command(tmp_path):
 def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
     RUN.save(tmp_path / "run.npz")
     (tmp_path / "late.csv").write_text("start,stop,label\n9,11,ok\n")
-    for arguments, said in [
+    for arguments, text in [
         (["run.npz"], "has no labels"),
         (["run.npz", "--to", tmp_path / "x.csv"], "has no labels"),
         (["run.npz", "--from", tmp_path / "late.csv", "-o", tmp_path / "x.npz"], "outside of the"),
@@ -138,7 +138,7 @@ def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
     ]:
         status, out, err = call("labels", tmp_path / arguments[0], *arguments[1:])
         assert (status, out) == (3, "")
-        assert said in err
+        assert text in err
         assert len(err.splitlines()) == 1
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz", "late.csv"}
 

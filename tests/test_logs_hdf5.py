@@ -66,7 +66,7 @@ def test_isaac_labs_states_take_precedence_over_observations_and_hold_the_base(t
     assert np.array_equal(run.position, POSITION)
     assert run.rate == pytest.approx(50.0)
     assert np.allclose(run.base_pose[:, 3:], [0, 0, np.sqrt(0.5), np.sqrt(0.5)])
-    # The body looks along the world's y: what goes along x goes to its right.
+    # The body looks along the world's y: motion along x is to its right.
     assert np.allclose(run.base_velocity, [0.0, -1.0, 0.0, 2.0, 0.0, 3.0])
 
 
@@ -85,8 +85,8 @@ def test_what_is_missing_is_an_error_of_one_line(tmp_path):
     path = write(tmp_path / "log.hdf5", {"demo_0": {"obs/joint_pos": POSITION}})
     with pytest.raises(LogError, match="there are no stamps; specify the log's rate"):
         read_log(path)
-    said = "log.hdf5: obs/joint_pos may be relative to a default pose (Isaac Lab)"
-    assert said in read_log(path, rate=50).remarks
+    expected = "log.hdf5: obs/joint_pos may be relative to a default pose (Isaac Lab)"
+    assert expected in read_log(path, rate=50).remarks
     path = write(tmp_path / "other.hdf5", {"demo_0": {"obs/eef": POSITION}})
     message = "demo_0 holds no known joint positions or velocities; name them, .* obs/eef"
     with pytest.raises(LogError, match=message):

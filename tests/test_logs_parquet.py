@@ -108,7 +108,7 @@ def test_unspecified_units_are_not_assumed_to_be_radians(tmp_path):
     run = read_log(folder, units="degrees").run
     assert np.allclose(run.position, np.deg2rad(STATE * 30), rtol=1e-6)
     assert run.meta["units"] == "degrees"
-    with pytest.raises(LogError, match=r"say which robot \(--robot\)"):
+    with pytest.raises(LogError, match=r"name the robot \(--robot\)"):
         read_log(folder, units="normalised")
     older = write_lerobot(tmp_path / "older", [STATE * 30], names=list(JOINTS))
     with pytest.raises(LogError, match="too much for radians; if it is in degrees, say --degrees"):
@@ -130,8 +130,10 @@ def test_a_gripper_of_a_data_set_in_degrees_is_normalised(tmp_path):
     folder = write_lerobot(tmp_path / "set", [STATE[:, :2] * 30], names=names)
     imported = read_log(folder, units="degrees")
     assert imported.run.joint_names == ("shoulder",)
-    said = "set: normalised to 0 to 100 of its range, left out since no robot is specified: gripper"
-    assert said in imported.remarks
+    expected = (
+        "set: normalised to 0 to 100 of its range, left out since no robot is specified: gripper"
+    )
+    assert expected in imported.remarks
 
 
 def test_the_pose_of_an_end_effector_is_no_joint(tmp_path):
@@ -146,8 +148,8 @@ def test_the_pose_of_an_end_effector_is_no_joint(tmp_path):
 def test_a_data_set_without_names_is_read_as_positions_with_a_remark(tmp_path):
     imported = read_log(write_lerobot(tmp_path / "set", [STATE], names=None))
     assert imported.run.joint_names == ("joint_0", "joint_1", "joint_2")
-    said = "set: observation.state has no names; it is read as joint positions"
-    assert said in imported.remarks
+    expected = "set: observation.state has no names; it is read as joint positions"
+    assert expected in imported.remarks
 
 
 @pytest.mark.parametrize(

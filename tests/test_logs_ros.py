@@ -304,8 +304,8 @@ def test_topics_that_are_not_read_are_listed(tmp_path):
     flag = [(at, TALK.make("std_msgs/Bool", data=True)) for at in TIMES[:3]]
     topics = {"/joint_states": states(), "/stop": flag, "/odom": "nav_msgs/msg/Odometry"}
     imported = read_log(bag(tmp_path, topics))
-    said = "bag: 2 columns not read: /stop (std_msgs/msg/Bool), /odom (no messages)"
-    assert said in imported.remarks
+    expected = "bag: 2 columns not read: /stop (std_msgs/msg/Bool), /odom (no messages)"
+    assert expected in imported.remarks
 
 
 @pytest.mark.parametrize(

@@ -54,8 +54,8 @@ def test_a_desired_column_is_known_by_its_name(tmp_path, column, signal):
 
 def test_columns_without_a_known_signal_are_listed(tmp_path):
     path = log(tmp_path, target_moment_0=TIME, actual_current_0=TIME, comment=["fine"] * len(TIME))
-    said = "log.csv: 3 columns not read: target_moment_0, actual_current_0, comment"
-    assert read_log(path).remarks == (said,)
+    text = "log.csv: 3 columns not read: target_moment_0, actual_current_0, comment"
+    assert read_log(path).remarks == (text,)
 
 
 def test_a_mapping_gives_the_signal_of_other_columns(tmp_path):

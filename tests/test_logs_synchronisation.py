@@ -48,8 +48,8 @@ def test_a_controllers_lag_is_reported_and_not_corrected(tmp_path):
     measured, desired = pair(tmp_path, offset=0.0, lag=0.02)
     imported = read_log(measured, desired=desired)
     assert "offset" not in imported.run.meta
-    (said,) = [each for each in imported.remarks if "a controller's lag" in each]
-    assert said.startswith("desired.csv: offset +0.0200 s (correlation 1.00")
+    (expected,) = [each for each in imported.remarks if "a controller's lag" in each]
+    assert expected.startswith("desired.csv: offset +0.0200 s (correlation 1.00")
 
 
 def test_positions_give_the_offset_where_there_are_no_velocities(tmp_path):
@@ -131,8 +131,8 @@ def test_duplicate_and_backward_stamps_are_left_out_and_counted(tmp_path):
     time[[100, 101]] = time[99]  # twice the same
     time[500] = time[490]
     imported = read_log(csv(tmp_path / "log.csv", time, numbers(samples=1000) / 10))
-    said = "2 duplicate and 1 backward stamps left out, the first 0.99 s into the log"
-    assert f"log.csv: {said}" in imported.remarks
+    expected = "2 duplicate and 1 backward stamps left out, the first 0.99 s into the log"
+    assert f"log.csv: {expected}" in imported.remarks
     assert imported.run.meta["stamps"] == {"duplicates": 2, "backward": 1}
     assert np.all(np.diff(imported.run.time) > 0)
 

@@ -62,9 +62,9 @@ def rms(signal):
 
 def test_an_oscillation_of_440_hz_sounds_at_440_hz():
     sound = sonify(run_of(0.01 * tone(440)))
-    heard, rate = pitch(sound.file(common_gain([sound])))
+    frequency, rate = pitch(sound.file(common_gain([sound])))
     assert rate == 48_000
-    assert heard == pytest.approx(440, abs=0.5)
+    assert frequency == pytest.approx(440, abs=0.5)
 
 
 def test_an_oscillation_about_a_steady_motion_sounds_the_same():

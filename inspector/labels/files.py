@@ -127,13 +127,13 @@ def _block(entry: Entry, end: float) -> Block:
 
 def _check(path: Path, entry: Entry, block: Block, reach: tuple[float, float]) -> None:
     """Refuse a label that is not printable, reversed, or outside of the run."""
-    said = f"{block.label!r} from {block.start:g} s to {block.stop:g} s"
+    label = f"{block.label!r} from {block.start:g} s to {block.stop:g} s"
     if not block.label or not block.label.isprintable():
         problem = f"{block.label!r} is not a label; it is empty or cannot be printed"
     elif not block.start < block.stop:
-        problem = f"{said} stops before it starts, or has no duration"
+        problem = f"{label} stops before it starts, or has no duration"
     elif block.start < reach[0] or block.stop > reach[1]:
-        problem = f"{said} lies outside of the run, {reach[0]:g} s to {reach[1]:g} s"
+        problem = f"{label} lies outside of the run, {reach[0]:g} s to {reach[1]:g} s"
     else:
         return
     raise LabelFileError(path, problem, entry.where)

@@ -16,8 +16,8 @@ LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
 TURNING = ("revolute", "continuous")
 
 HINT = (
-    "if it is in degrees, say --degrees, if in -100 to 100 of each joint's range, --units"
-    " normalised; if the joint is prismatic or continuous, say which robot it is (--robot)"
+    "if it is in degrees, say --degrees; if in -100 to 100 of each joint's range, --units"
+    " normalised; if the joint is prismatic or continuous, name the robot (--robot)"
 )
 
 
@@ -83,7 +83,7 @@ def _from_normalised(path: Path, track: Track, robot: Robot | None) -> Track:
         return track
     if robot is None:
         raise LogError(
-            path, "normalised units are shares of the joints' ranges; say which robot (--robot)"
+            path, "normalised units are shares of the joints' ranges; name the robot (--robot)"
         )
     joints = {joint.name: joint for joint in robot.joints}
     scales, zeros = [], []

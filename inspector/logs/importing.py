@@ -18,10 +18,10 @@ from inspector.logs.synchronisation import Synchronised, no_overlap, synchronise
 from noisemodel import Robot, Run
 from noisemodel.types import Array, Mask
 
-FARTHEST = 1.5
+LARGEST_RATE_RATIO = 1.5
 """Largest ratio of the specified rate to that of the stamps, or the inverse."""
 
-EMPTIEST = 20
+MOST_SAMPLES_PER_STAMP = 20
 """Largest number of the run's samples per logged sample; above it most of the run is gaps."""
 
 
@@ -73,18 +73,18 @@ def run_of(
         robot=robot,
         offset=options.offset,
     )
-    leading = next(each for each in synchronised.tracks if each.track.stamps is main)
-    time, valid = common_time(synchronised.tracks, leading)
+    main_track = next(each for each in synchronised.tracks if each.track.stamps is main)
+    time, valid = common_time(synchronised.tracks, main_track)
     if len(time) < 2 or not valid.any():
         others = [each for each in synchronised.tracks if each.track.stamps is not main]
-        raise LogError(logs[-1].path, no_overlap(others[-1] if others else leading, leading))
-    clock, covered = leading.clock, float(leading.time[-1])
+        raise LogError(logs[-1].path, no_overlap(others[-1] if others else main_track, main_track))
+    clock, covered = main_track.clock, float(main_track.time[-1])
     remarks = [*_remarks(logs, synchronised)]
     meta = _meta(logs, synchronised, main.start + Decimal(str(time[0])), clock)
     urdf = logs[0].urdf if robot and not options.robot else ""
     tracks = list(synchronised.tracks)
     logs.clear()
-    del synchronised, leading  # each signal is freed when it has been resampled
+    del synchronised, main_track  # each signal is freed when it has been resampled
     motion = motion_of([*_resampled(tracks, time, valid, clock)], time - time[0], valid)
     if motion.differentiated:
         meta["differentiated"] = dict(motion.differentiated)
@@ -115,12 +115,12 @@ def _main(log: PreparedLog, rate: float | None) -> Stamps:
     track = next(track for track in log.tracks if id(track.stamps) == chosen)
     time = track.stamps.time
     nominal = clock_of(time).nominal
-    if rate is not None and not 1 / FARTHEST <= rate / nominal <= FARTHEST:
+    if rate is not None and not 1 / LARGEST_RATE_RATIO <= rate / nominal <= LARGEST_RATE_RATIO:
         raise LogError(
             log.path,
             f"the rate of the stamps is {nominal:g} Hz; a run of {rate:g} Hz cannot be made of it",
         )
-    if time[-1] * nominal > EMPTIEST * len(time):
+    if time[-1] * nominal > MOST_SAMPLES_PER_STAMP * len(time):
         steps = np.diff(time)
         jump = int(np.argmax(steps))
         raise track.fault(

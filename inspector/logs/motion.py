@@ -53,42 +53,38 @@ def motion_of(tracks: Sequence[ResampledTrack], time: Array, valid: Mask) -> Mot
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}
     remarks: list[str] = []
-    logged_tracks = {
+    by_signal = {
         signal: _joined([track for track in tracks if track.signal == signal])
         for signal in dict.fromkeys(track.signal for track in tracks)
     }
     for suffix, names in (("", "joint_names"), ("_desired", "desired_joint_names")):
         velocity, position = f"velocity{suffix}", f"position{suffix}"
-        known = [
-            logged_tracks[signal] for signal in (velocity, position) if signal in logged_tracks
-        ]
+        known = [by_signal[signal] for signal in (velocity, position) if signal in by_signal]
         joints = tuple(dict.fromkeys(joint for track in known for joint in track.joints))
         if not joints:
             continue
-        logged = logged_tracks[velocity].joints if velocity in logged_tracks else ()
+        logged = by_signal[velocity].joints if velocity in by_signal else ()
         missing = tuple(joint for joint in joints if joint not in logged)
         if missing:
-            slopes = joint_velocity(time, _ordered(logged_tracks[position], missing), valid)
+            slopes = joint_velocity(time, _ordered(by_signal[position], missing), valid)
             added = ResampledTrack(velocity, missing, slopes)
-            logged_tracks[velocity] = _joined(
-                [logged_tracks[velocity], added] if velocity in logged_tracks else [added]
+            by_signal[velocity] = _joined(
+                [by_signal[velocity], added] if velocity in by_signal else [added]
             )
             of_joints = f" of {', '.join(missing)}" if logged else ""
             differentiated[velocity] = METHOD + of_joints
             remarks.append(f"{velocity}{of_joints}: differentiated from positions ({METHOD})")
         signals[names] = joints
         for signal in (velocity, position) if suffix else (velocity, position, "effort"):
-            if signal not in logged_tracks:
+            if signal not in by_signal:
                 continue
-            lacking = [joint for joint in joints if joint not in logged_tracks[signal].joints]
+            lacking = [joint for joint in joints if joint not in by_signal[signal].joints]
             if not lacking:
-                signals[signal] = _ordered(logged_tracks[signal], joints)
+                signals[signal] = _ordered(by_signal[signal], joints)
             else:
                 remarks.append(f"{signal}: left out, missing for {', '.join(lacking)}")
     signals |= {
-        name: logged_tracks[name].values
-        for name in ("base_pose", "base_velocity")
-        if name in logged_tracks
+        name: by_signal[name].values for name in ("base_pose", "base_velocity") if name in by_signal
     }
     if "base_pose" in signals and "base_velocity" not in signals:
         signals["base_velocity"] = base_velocity(time, signals["base_pose"], valid)

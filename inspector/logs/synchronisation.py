@@ -86,19 +86,19 @@ def synchronise(
     )
     measured = {id(track.stamps) for track in tracks if not track.is_desired}
     others = [each for each in clocked if id(each.track.stamps) not in measured]
-    leading = next(each for each in clocked if each.track.stamps is main)
-    if not others or all(np.array_equal(each.time, leading.time) for each in others):
+    main_track = next(each for each in clocked if each.track.stamps is main)
+    if not others or all(np.array_equal(each.time, main_track.time) for each in others):
         return Synchronised(clocked)
     if offset is not None:
         given = Offset(offset, 0.0, 1.0, 0.0, float(np.ptp(others[0].time)))
         return Synchronised(
-            _moved(clocked, others, given), f"offset {offset:+g} s, as given", given
+            _shifted(clocked, others, given), f"offset {offset:+g} s, as given", given
         )
     found = _estimated(clocked, others)
-    together = others[0].time[0] <= leading.time[-1] and leading.time[0] <= others[0].time[-1]
+    overlap = others[0].time[0] <= main_track.time[-1] and main_track.time[0] <= others[0].time[-1]
     if found is None or not found.is_unambiguous:
-        if not together:
-            raise ClockError(path, no_overlap(others[0], leading), found)
+        if not overlap:
+            raise ClockError(path, no_overlap(others[0], main_track), found)
         if found is None:
             return Synchronised(clocked)
         remark = (
@@ -109,7 +109,7 @@ def synchronise(
     if not found.exceeds_lag:
         return Synchronised(clocked, f"{found}: a controller's lag, the stamps are not changed")
     return Synchronised(
-        _moved(clocked, others, found), f"{found}: its stamps are shifted by that", found
+        _shifted(clocked, others, found), f"{found}: its stamps are shifted by that", found
     )
 
 
@@ -133,16 +133,16 @@ def _estimated(clocked: Sequence[TimedTrack], others: Sequence[TimedTrack]) -> O
     return estimate(measured, desired)
 
 
-def _moved(
+def _shifted(
     clocked: Sequence[TimedTrack], others: Sequence[TimedTrack], offset: Offset
 ) -> tuple[TimedTrack, ...]:
     first = min(float(each.time[0]) for each in others)
-    moved = []
+    shifted = []
     for each in clocked:
         if each in others:
             time = each.time + offset.seconds + offset.drift * (each.time - first)
             clock = clock_of(time, held=each.track.stamps.held)
-            moved.append(replace(each, time=time, clock=clock))
+            shifted.append(replace(each, time=time, clock=clock))
         else:
-            moved.append(each)
-    return tuple(moved)
+            shifted.append(each)
+    return tuple(shifted)
