@@ -1,4 +1,4 @@
-"""Exported data of a run: its noise, its labels, and the scores of each frame."""
+"""Content of an export: a run's analysis, with its noise sample by sample."""
 
 from dataclasses import dataclass
 
@@ -11,16 +11,14 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """Noise, labels and scores of a run, without gaps.
+    """The noise and the analysis of a run; gaps are left out.
 
     Attributes:
-        run: The run.
-        time: Time of each sample, shape (samples,), in [s].
+        analysis: The run with what was found in it.
+        time: Of each sample, shape (samples,), in [s].
         simplified: Simplified noise, shape (samples,), in [rad/s].
         extended: Sound power of all links, shape (samples,), in [W]; None without a robot.
         kind: Kind of the extended noise.
-        labels: One for each frame; None if no model fits.
-        model: Name of the model; empty if none fits.
         remarks: What is missing and why, a sentence each.
     """
 
@@ -32,7 +30,8 @@ class Content:
     remarks: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Counts of the contents, in one line."""
+        """Say it in a line."""
+        labels = self.analysis.labels
         parts = [
             f"{len(self.time)} samples of noise{'' if self.extended is None else ' of two kinds'}",
             f"{0 if labels is None else len(labels)} frames",
@@ -43,7 +42,7 @@ class Content:
 
 
 def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
-    """Noise, labels and scores of a run.
+    """Analyse a run and compute its noise.
 
     Args:
         run: The run.
@@ -51,7 +50,7 @@ def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
         kind: Kind of the extended noise, see ``noisemodel.extended``.
 
     Returns:
-        What could be computed; remarks say what is missing.
+        What there is; remarks say what is not.
 
     Raises:
         UnknownKindError: If there is no such kind.

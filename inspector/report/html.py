@@ -12,7 +12,7 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
-from inspector.report.markdown import ORIGIN, note, origin, verdict
+from inspector.report.markdown import ORIGIN, note, origin
 from inspector.sound.clip import clip, worst_time
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
@@ -113,8 +113,8 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_sound(body: ET.Element, inspection: Inspection) -> None:
-    heard = clip(inspection.run, around=worst_time(inspection))
+def _add_sound(body: ET.Element, analysis: Analysis) -> None:
+    heard = clip(analysis.run, around=worst_time(analysis))
     _text(body, "h2", "To be heard")
     if heard is None:
         _text(body, "p", "The log is too slow for ears.", "note")

@@ -32,22 +32,22 @@ class Clip:
     description: str
 
 
-def of_recording(inspection: Inspection) -> bytes:
+def of_recording(analysis: Analysis) -> bytes:
     """Sound for a recording, that starts with the run and contains its worst moment.
 
     Args:
-        inspection: A run with its findings.
+        analysis: A run with its findings.
 
     Returns:
         A WAV file; empty if nothing is audible.
     """
-    found = clip(inspection.run, around=worst_time(inspection), lead=True)
+    found = clip(analysis.run, around=worst_time(analysis), lead=True)
     return b"" if found is None else found.data
 
 
-def worst_time(inspection: Inspection) -> float:
+def worst_time(analysis: Analysis) -> float:
     """Time of the worst moment of a run, in [s]; 0 if the run has no valid samples."""
-    moments = worst(inspection)
+    moments = worst(analysis)
     return moments[0].peak if moments else 0.0
 
 
