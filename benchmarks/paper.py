@@ -32,11 +32,11 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
-from inspector.parallel import each
 from inspector.training import training
 from inspector.training.part import Part
 from models.evaluation.assessment import measure, number, percent
 from models.evaluation.predictions import Predictions, predict
+from noisemodel.parallel import each
 from scenarios.sample import Sample
 from scenarios.signals import WHOLE
 

@@ -8,13 +8,15 @@ and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robot
 from noisemodel.block import Block
 from noisemodel.catalog import ROBOTS
 from noisemodel.compare import compare
-from noisemodel.comparison import Comparison
+from noisemodel.comparison import Comparison, RobotComparison
+from noisemodel.comparisons import Comparisons, LeftOut
 from noisemodel.decimation import decimated
 from noisemodel.errors import (
     CornerError,
     GeometryError,
     MeshError,
     MissingMeshError,
+    MotionError,
     NoiseModelError,
     OutputError,
     RobotError,
@@ -22,6 +24,7 @@ from noisemodel.errors import (
     RunFileError,
     UnknownJointError,
     UnknownKindError,
+    UnknownMotionError,
     UnknownRobotError,
 )
 from noisemodel.extended import extended, extended_chunks
@@ -39,14 +42,18 @@ __all__ = [
     "ROBOTS",
     "Block",
     "Comparison",
+    "Comparisons",
     "CornerError",
     "GeometryError",
+    "LeftOut",
     "MeshError",
     "MissingMeshError",
+    "MotionError",
     "Noise",
     "NoiseModelError",
     "OutputError",
     "Robot",
+    "RobotComparison",
     "RobotError",
     "Run",
     "RunError",
@@ -54,6 +61,7 @@ __all__ = [
     "Surface",
     "UnknownJointError",
     "UnknownKindError",
+    "UnknownMotionError",
     "UnknownRobotError",
     "by_joint",
     "compare",

@@ -1,133 +1,218 @@
-"""Noise models side by side: what differs between the simplified and the extended estimates."""
+"""Kinds of noise estimates side by side, on one robot or many."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import TypeAlias, overload
 
 import numpy as np
 
-from noisemodel.comparison import TERMS, Comparison
-from noisemodel.errors import NoiseModelError, UnknownKindError
-from noisemodel.extended import extended_chunks
-from noisemodel.kinematics import CHUNK
-from noisemodel.noise import check_positive, check_stretches
+from noisemodel.comparison import Comparison, RobotComparison
+from noisemodel.comparisons import Comparisons, LeftOut
+from noisemodel.errors import GeometryError, MotionError, NoiseModelError, UnknownKindError
+from noisemodel.estimates import SIMPLIFIED, check_length, estimates
+from noisemodel.geometry import GEOMETRIES
+from noisemodel.links import vibrating
+from noisemodel.motions import EXCITATION, Motions, Moving, Source, Task, tasks
+from noisemodel.noise import check_positive, check_stretches, decibel
+from noisemodel.parallel import each
 from noisemodel.robot import Robot
-from noisemodel.similarity import (
-    contrasts,
-    correlation,
-    envelopes,
-    log_spectra,
-    spectral_distances,
-)
-from noisemodel.simplified import simplified
-from noisemodel.speed import KINDS, check_motion, chunk_speeds
+from noisemodel.speed import KINDS, check_motion
 from noisemodel.surface import Surface, check_surface
-from noisemodel.turning import TINY
 from noisemodel.types import Array, Real
 
-SIMPLIFIED = "simplified"
 COMPARED = (SIMPLIFIED, "C", "paper", "mean", "rms", "normal")
 """The kinds that are compared unless others are named."""
 
-ENVELOPE = 0.02
-"""Stretch of time whose root mean square is one value of the envelope, in [s]."""
+Progress: TypeAlias = Callable[..., Iterable[RobotComparison | LeftOut]]
+"""Takes an iterable and its length (``total``), and passes the items on, as tqdm does."""
 
-WINDOW = 0.1024
-"""Length of a spectrum's Hann window, in [s]: the paper's 1024 samples at 10 kHz."""
+
+@overload
+def compare(
+    robots: Robot,
+    q: Real,
+    v: Real,
+    kinds: Sequence[str] = ...,
+    *,
+    rate: float,
+    surface: Surface | str | None = ...,
+    events: Sequence[tuple[int, int]] = ...,
+) -> Comparison: ...
+
+
+@overload
+def compare(
+    robots: Source | Iterable[Source],
+    *,
+    motion: Motions | None = ...,
+    kinds: Sequence[str] = ...,
+    rate: float | None = ...,
+    surface: Surface | str | None = ...,
+    seed: int = ...,
+    jobs: int = ...,
+    progress: Progress | None = ...,
+) -> Comparisons: ...
 
 
 def compare(
-    robot: Robot,
-    q: Real,
-    v: Real,
+    robots: Source | Iterable[Source],
+    q: Real | None = None,
+    v: Real | None = None,
     kinds: Sequence[str] = COMPARED,
     *,
-    rate: float,
-    surface: Surface | None = None,
+    motion: Motions | None = None,
+    rate: float | None = None,
+    surface: Surface | str | None = None,
     events: Sequence[tuple[int, int]] = (),
-) -> Comparison:
-    """Compare kinds of noise estimates on one motion.
+    seed: int = 0,
+    jobs: int = 1,
+    progress: Progress | None = None,
+) -> Comparison | Comparisons:
+    """Comparison of kinds of noise estimates, on the motions of one robot or many.
 
-    All estimates are compared as pressures, whose scale is arbitrary and plays no part: a factor
-    between two kinds changes neither their correlation nor their distance.
+    All estimates are compared as pressures, whose scale is arbitrary: a factor between two kinds
+    changes neither their correlation nor their distance. Each kind is evaluated once. The kinds
+    are those of F. Sygulla and D. Rixen, "Learning the Noise of Failure", Sec. II-A, and of
+    ``surface_speed``.
+
+    ``compare(robot, q, v, kinds, rate=rate)`` compares on one motion of one robot that is at hand.
+    ``compare(robots, motion=..., kinds=...)`` compares on one robot or many. It leaves out robots
+    that cannot be read or have no surface, and runs that do not suffice, and lists them with the
+    reason.
 
     Args:
-        robot: The robot.
-        q: Configurations as Pinocchio has them, shape (samples, nq).
-        v: Velocities as Pinocchio has them, shape (samples, nv).
+        robots: One or many: a ``Robot``, a listed name, or the path of a URDF (``*.urdf``); or a
+            ``Run``, or the path of a run file (a ``Path``, or text that ends in ``.npz``), for the
+            robot that it names and the motion that it holds. Of a run with gaps the longest stretch
+            without one is compared.
+        q: Configurations as Pinocchio has them, shape (samples, nq), in [rad] and [m].
+        v: Velocities as Pinocchio has them, shape (samples, nv), in [rad/s] and [m/s].
         kinds: "simplified", or kinds of ``surface_speed``.
-        rate: Sample rate, in [Hz].
-        surface: The robot's surface; that of its visuals unless given.
-        events: First sample and the one after the last of what should stand out.
+        motion: A ``Run``, a pair ``(q, v)``, or the name of a built-in motion: "excitation", the
+            default, see ``noisemodel.excitation``. One for all robots, a list with one for each, or
+            a mapping from each robot's name to its motion. Robots that are named are read as
+            ``Robot.load(name)`` does; for built-in motions their mimic joints are coupled.
+        rate: Sample rate of ``q`` and ``v``, or of built-in motions, where it is 4000 Hz unless
+            given, in [Hz]. A run has its own.
+        surface: The surface of the robot, or the geometry that surfaces are taken from: "visual",
+            "collision", "hull" or "auto". Unless given, "visual" with ``q`` and ``v``, else "auto".
+        events: With ``q`` and ``v``: first sample and the one after the last of what should stand
+            out. The events of a run are its blocks that are not "ok".
+        seed: Random seed of built-in motions.
+        jobs: How many robots to compare at once.
+        progress: Shows the progress; takes an iterable and its length ``total``, and passes the
+            items on, as ``tqdm`` does.
 
     Returns:
-        The comparison.
+        With ``q`` and ``v`` one ``Comparison``; else ``Comparisons``, in the order of the robots.
 
     Raises:
-        UnknownKindError: If there is no such kind.
-        GeometryError: If there is no surface to be had, or it is that of another robot.
-        NoiseModelError: If the motion cannot be, or is shorter than one spectrum.
+        UnknownKindError: If a kind does not exist.
+        UnknownMotionError: If a built-in motion does not exist.
+        MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
+        GeometryError: If a geometry does not exist, or one surface is given for many robots; with
+            ``q`` and ``v`` also if the surface cannot be read or is that of another robot.
+        NoiseModelError: If fewer than two kinds are given or one repeats, the motions are not one
+            for each robot, or a rate is missing or superfluous; with ``q`` and ``v`` also if the
+            motion is shorter than one spectrum, 0.1024 s.
     """
+    kinds = (kinds,) if isinstance(kinds, str) else tuple(kinds)
     known = (SIMPLIFIED, *KINDS)
     for kind in kinds:
         if kind not in known:
             raise UnknownKindError(kind, known)
-    if not kinds:
-        raise NoiseModelError(f"no kinds to compare, expected some of {', '.join(known)}")
-    check_motion(robot, q, v)
-    check_positive("rate", rate, "Hz")
-    check_stretches(events, len(q))
-    window = round(WINDOW * rate)
-    if window < 4 or len(q) < window:
+    if rate is not None:
+        check_positive("rate", rate, "Hz")
+    if q is not None or v is not None:
+        if not kinds:
+            raise NoiseModelError(f"no kinds to compare, expected some of {', '.join(known)}")
+        if q is None or v is None or rate is None or motion is not None:
+            raise NoiseModelError("expected q, v and their rate, and no other motion")
+        if not isinstance(robots, Robot):
+            raise NoiseModelError("q and v are given; expected one Robot, or motion=(q, v)")
+        check_motion(robots, q, v)
+        check_stretches(events, len(q))
+        check_length(len(q), rate)
+        geometry = "visual" if surface is None else surface
+        return estimates(robots, _of(robots, geometry), q, v, kinds).compared(rate, events)
+    if len(set(kinds)) < max(2, len(kinds)):
         raise NoiseModelError(
-            f"{len(q)} samples at {rate:g} Hz, expected {WINDOW:g} s at least and 40 Hz"
+            f"kinds to compare are {', '.join(kinds)}; expected two different ones or more"
         )
-    surface = Surface.of(robot) if surface is None else surface
-    check_surface(surface, robot)
-    estimates = [_estimate(robot, surface, q, v, kind) for kind in kinds]
-    powers = np.array([power for power, _ in estimates])
-    energies = np.array([energy for _, energy in estimates])
-    spectra = [log_spectra(np.sqrt(power), window) for power in powers]
-    squares = spectral_distances(spectra)
-    return Comparison(
-        kinds=tuple(kinds),
-        names=surface.names,
-        correlation=correlation(envelopes(powers, max(1, round(ENVELOPE * rate)))),
-        distance=np.sqrt(squares.mean(axis=2)),
-        frequency=np.arange(window // 2 + 1) * rate / window,
-        distance_by_frequency=np.sqrt(squares),
-        contrast=contrasts(powers, events),
-        shares=energies / np.maximum(energies.sum(axis=1, keepdims=True), TINY),
-        terms=_terms(robot, surface, q, v),
+    if len(events):
+        raise NoiseModelError("events are samples of q and v; those of a run are its blocks")
+    if jobs < 1:
+        raise NoiseModelError(f"jobs is {jobs}, expected 1 or more")
+    todo = tasks(robots, EXCITATION if motion is None else motion, rate=rate, seed=seed)
+    geometry = "auto" if surface is None else surface
+    _check_geometry(geometry, len(todo))
+    results: Iterable[RobotComparison | LeftOut]
+    results = each(partial(_attempt, kinds=kinds, surface=geometry), todo, jobs=jobs)
+    return Comparisons.of(results if progress is None else progress(results, total=len(todo)))
+
+
+def _check_geometry(surface: Surface | str, robots: int) -> None:
+    if isinstance(surface, Surface):
+        if robots > 1:
+            raise GeometryError(f"one surface for {robots} robots, expected a geometry's name")
+    elif surface not in GEOMETRIES:
+        raise GeometryError(
+            f"geometry {surface!r} is not known, expected one of {', '.join(GEOMETRIES)}"
+        )
+
+
+def _attempt(task: Task, kinds: Sequence[str], surface: Surface | str) -> RobotComparison | LeftOut:
+    try:
+        return _compare(task.name, task.moving(), kinds, surface)
+    except MotionError as error:  # of a pair, which the caller made
+        raise MotionError(f"{task.name}: {error}") from error
+    except NoiseModelError as error:
+        return LeftOut(task.name, str(error).removeprefix(f"{task.name}: "))
+
+
+def _compare(
+    name: str, moving: Moving, kinds: Sequence[str], surface: Surface | str
+) -> RobotComparison:
+    robot, rate = moving.robot, moving.rate
+    check_length(len(moving.q), rate)
+    surface, geometry = _of(robot, surface), surface
+    if not surface.area.any():
+        raise GeometryError(f"no link has a surface by geometry {geometry!r}")
+    found = estimates(robot, surface, moving.q, moving.v, kinds)
+    rms = np.sqrt(np.mean(found.pressure**2, axis=1, keepdims=True))
+    return RobotComparison(
+        name=name,
+        floating_base=robot.floating_base,
+        joints=moving.joints,
+        time=moving.time,
+        rate=rate,
+        events=moving.events,
+        comparison=found.compared(rate),
+        pressure=found.pressure / np.where(rms > 0.0, rms, 1.0),
+        contrast=_contrasts(found.pressure, moving),
+        links_with_surface=len(surface.names) - len(surface.bare),
+        remarks=moving.remarks,
     )
 
 
-def _estimate(robot: Robot, surface: Surface, q: Real, v: Real, kind: str) -> tuple[Array, Array]:
-    """Power over time, shape (samples,), and energy of each link, shape (links,), to some scale."""
-    if kind == SIMPLIFIED:
-        return simplified(v) ** 2, _joint_energy(robot, surface, v)
-    power, energy = [], np.zeros(len(surface.links))
-    for chunk in extended_chunks(robot, surface, q, v, kind):
-        power.append(chunk.total)
-        energy += chunk.power.sum(axis=0)
-    return np.concatenate(power), energy
+def _of(robot: Robot, surface: Surface | str) -> Surface:
+    if isinstance(surface, str):
+        return Surface.of(robot, surface)
+    check_surface(surface, robot)
+    return surface
 
 
-def _joint_energy(robot: Robot, surface: Surface, v: Real) -> Array:
-    """Sum the squared velocities of each link's joint; a joint that follows one has none."""
-    squares = np.einsum("sj,sj->j", v, v, dtype=np.float64)
-    energy = np.zeros(len(surface.links))
-    for link, index in enumerate(surface.joint):
-        joint = robot.joints[index - 1]
-        if joint.name not in robot.mimics:
-            energy[link] = squares[joint.first_v : joint.first_v + joint.nv].sum()
-    return energy
+def _contrasts(pressure: Array, moving: Moving) -> Array:
+    """Compare the events to the rest above 10 Hz, shape (kinds, events), in [dB].
 
-
-def _terms(robot: Robot, surface: Surface, q: Real, v: Real) -> Array:
-    """Split the power of "paper" by (A + B + C)² = (A + B + C) A + (A + B + C) B + ..."""
-    energy: Array = np.zeros((len(surface.links), len(TERMS)))
-    for start in range(0, len(q), CHUNK):
-        part = slice(start, start + CHUNK)
-        terms = np.array([chunk_speeds(robot, surface, q[part], v[part], one) for one in TERMS])
-        energy += np.einsum("l,ls,tls->lt", surface.area, terms.sum(axis=0), terms)
-    shares: Array = energy / max(energy.sum(), TINY)
-    return shares
+    The slow motion is left out: its power masks vibrations in any estimate.
+    """
+    time = moving.time
+    power = vibrating(pressure.T, np.ones(len(time), dtype=bool), moving.rate).T ** 2
+    inside = [(time >= event.start) & (time < event.stop) for event in moving.events]
+    rest = ~np.any([np.zeros(len(time), dtype=bool), *inside], axis=0)
+    if not inside or not rest.any():
+        return np.full((len(power), len(inside)), np.nan)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        energy = np.array([power[:, event].sum(axis=1) / event.sum() for event in inside]).T
+        return decibel(energy / power[:, rest].mean(axis=1, keepdims=True))

@@ -34,12 +34,32 @@ class RobotError(NoiseModelError):
     """A robot that cannot be found or read, or that moves in a way that is not supported."""
 
 
-class UnknownKindError(NoiseModelError):
-    """A kind of noise estimate that there is not.
+class MotionError(NoiseModelError):
+    """Configurations or velocities that are not a robot's, or not finite."""
+
+
+class UnknownMotionError(NoiseModelError):
+    """A name that is no built-in motion.
 
     Args:
-        kind: The kind that was asked for.
-        known: The kinds that there are.
+        motion: The name.
+        known: The built-in motions.
+    """
+
+    def __init__(self, motion: str, known: Iterable[str]) -> None:
+        self.motion, self.known = motion, tuple(known)
+        super().__init__(
+            f"no built-in motion {motion!r}; there is {', '.join(self.known)};"
+            " expected such a name, a Run, or a pair (q, v)"
+        )
+
+
+class UnknownKindError(NoiseModelError):
+    """A kind of noise estimate that does not exist.
+
+    Args:
+        kind: The name of the kind.
+        known: The kinds that exist.
     """
 
     def __init__(self, kind: str, known: Sequence[str]) -> None:

@@ -17,11 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-import noisemodel as nm
+from noisemodel.block import Block
+from noisemodel.catalog import ROBOTS
+from noisemodel.errors import NoiseModelError
+from noisemodel.robot import Robot
+from noisemodel.run import Run
 from noisemodel.types import Array
 
 SECONDS = 6.0
 RATE = 4000.0
+"""Sample rate unless another is given, in [Hz]."""
 PACE = {"prismatic": 0.3}
 """Speed of the travel in [m/s]; of joints that turn it is 1 rad/s."""
 BASE_PACE = 0.1
@@ -57,47 +62,58 @@ class Limits(NamedTuple):
     speed: Array
 
 
-def made_up(robot: nm.Robot, *, seed: int = 0) -> nm.Run:
-    """Move a robot as this module's first lines say.
+def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
+    """Motion of a robot that excites every joint, as this module's first lines say.
 
     Args:
         robot: Any robot.
-        seed: Makes each motion another one.
+        seed: Random seed.
+        rate: Sample rate, in [Hz]; its Nyquist frequency has to be above that of the shakes.
 
     Returns:
-        The run; its blocks are the events.
+        The run, of 6 s; its blocks are the events.
+
+    Raises:
+        NoiseModelError: If the rate is too low or the seed is negative.
     """
+    if not 2.0 * SHAKE_HZ[1] < rate < np.inf:
+        raise NoiseModelError(
+            f"the excitation at {rate:g} Hz, expected above {2.0 * SHAKE_HZ[1]:g} Hz: its shakes"
+            f" have up to {SHAKE_HZ[1]:g} Hz"
+        )
+    if seed < 0:
+        raise NoiseModelError(f"seed is {seed}, expected 0 or more")
     random = np.random.default_rng(seed)
-    time = np.arange(round(SECONDS * RATE)) / RATE
+    time = np.arange(round(SECONDS * rate)) / rate
     joints = {joint.name: joint for joint in robot.joints if joint.name in robot.joint_names}
     pace = np.array([PACE.get(joint.kind, 1.0) for joint in joints.values()])
-    velocity = _wander(time, len(joints), random) * pace
+    velocity = _wander(time, len(joints), random, rate) * pace
     bounds = limits(robot)
-    position = np.cumsum(velocity, axis=0) / RATE
+    position = np.cumsum(velocity, axis=0) / rate
     low, high = _extent(position)
     scale = np.minimum(1.0, ROOM * bounds.room / np.maximum(high - low, 1e-9))
     scale = np.minimum(scale, ROOM * bounds.speed / np.maximum(abs(velocity).max(axis=0), 1e-9))
     velocity = velocity * scale
     hertz = random.uniform(*SHAKE_HZ)
-    blocks = [nm.Block(*JERK, "jerk")]
+    blocks = [Block(*JERK, "jerk")]
     for (label, (start, stop)), joint in zip(SHAKES.items(), ends(robot), strict=False):
         column = robot.joint_names.index(joint)
         velocity[:, column] += SHAKE * _burst(time, start, stop, hertz)
-        blocks.append(nm.Block(start, stop, label))
-    base = BASE_PACE * _wander(time, 6, random) if robot.floating_base else None
-    return nm.Run(
+        blocks.append(Block(start, stop, label))
+    base = BASE_PACE * _wander(time, 6, random, rate) if robot.floating_base else None
+    return Run(
         time=time,
         velocity=velocity,
-        position=bounds.centre + np.cumsum(velocity, axis=0) / RATE - scale * (low + high) / 2,
+        position=bounds.centre + np.cumsum(velocity, axis=0) / rate - scale * (low + high) / 2,
         base_velocity=base,
         joint_names=robot.joint_names,
-        robot=robot.name if robot.name in nm.ROBOTS else str(robot.path),
+        robot=robot.name if robot.name in ROBOTS else str(robot.path),
         blocks=tuple(blocks),
-        meta={"scenario": "made up", "seed": seed},
+        meta={"scenario": "excitation", "seed": seed},
     )
 
 
-def limits(robot: nm.Robot) -> Limits:
+def limits(robot: Robot) -> Limits:
     """Read what the URDF says about each joint that moves by itself.
 
     Args:
@@ -120,7 +136,7 @@ def limits(robot: nm.Robot) -> Limits:
     return Limits(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
 
-def ends(robot: nm.Robot) -> tuple[str, ...]:
+def ends(robot: Robot) -> tuple[str, ...]:
     """Name the joint that carries most and the one at the end of the longest chain.
 
     Args:
@@ -146,10 +162,10 @@ def ends(robot: nm.Robot) -> tuple[str, ...]:
     return tuple(dict.fromkeys(robot.joints[index - 1].name for index in (near, far)))
 
 
-def _wander(time: Array, axes: int, random: np.random.Generator) -> Array:
+def _wander(time: Array, axes: int, random: np.random.Generator, rate: float) -> Array:
     """Travel, ripple and jerk of each axis at a pace of 1, shape (samples, axes)."""
     travel = _travel(time, axes, random)
-    ripple = RIPPLE * _ripple(len(time), axes, random)
+    ripple = RIPPLE * _ripple(len(time), axes, random, rate)
     after = np.maximum(time - JERK[0], 0.0)
     jump = 0.5 * (time >= JERK[0]) * np.exp(-after / JERK_DECAY)
     wander: Array = travel + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
@@ -164,9 +180,9 @@ def _travel(time: Array, axes: int, random: np.random.Generator) -> Array:
     return travel * float(np.sqrt(2.0 / SINES))
 
 
-def _ripple(samples: int, axes: int, random: np.random.Generator) -> Array:
+def _ripple(samples: int, axes: int, random: np.random.Generator, rate: float) -> Array:
     """Make noise with a mean square of 1, shape (samples, axes)."""
-    hertz = np.fft.rfftfreq(samples, 1.0 / RATE)
+    hertz = np.fft.rfftfreq(samples, 1.0 / rate)
     white = np.fft.rfft(random.standard_normal((samples, axes)), axis=0)
     slope = np.where(hertz < RIPPLE_HZ, 0.0, 1.0 / np.sqrt(np.maximum(hertz, RIPPLE_HZ)))
     pink: Array = np.fft.irfft(white * slope[:, None], n=samples, axis=0)

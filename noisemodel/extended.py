@@ -8,7 +8,7 @@ import numpy as np
 from noisemodel.dipole import Dipole
 from noisemodel.errors import NoiseModelError
 from noisemodel.kinematics import CHUNK
-from noisemodel.noise import DENSITY, SOUND_SPEED, Noise, check_positive
+from noisemodel.noise import DENSITY, SOUND_SPEED, Noise, check_positive, sound_power
 from noisemodel.robot import Robot
 from noisemodel.speed import check_kind, check_motion, chunk_speeds
 from noisemodel.surface import Surface, check_surface
@@ -145,14 +145,19 @@ def extended_chunks(
         motions.append(motion(wanted, v_desired, base_rests=robot.floating_base))
     elif q_desired is not None:
         raise NoiseModelError("q_desired is given and v_desired is not; positions make no noise")
-    # P_i = rho c sigma_i S_i v_i², Sygulla & Rixen, Sec. II-A
-    radiation = density * sound_speed * _efficiencies(efficiency, surface) * surface.area
+    efficiencies = _efficiencies(efficiency, surface)
 
     def chunks() -> Iterator[Noise]:
         for start in range(0, len(q), chunk):
             part = slice(start, start + chunk)
-            speeds = [one.speeds(robot, surface, part, kind) for one in motions]
-            power = radiation[:, None] * sum(speed * speed for speed in speeds)
+            first, *more = (one.speeds(robot, surface, part, kind) ** 2 for one in motions)
+            power = sound_power(
+                sum(more, first),
+                surface.area[:, None],
+                efficiency=efficiencies[:, None],
+                density=density,
+                sound_speed=sound_speed,
+            )
             yield Noise(power.T, surface.names, density, sound_speed)
 
     return chunks()

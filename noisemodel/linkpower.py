@@ -6,9 +6,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-import noisemodel as nm
-from noisemodel.kinematics import CHUNK
-from noisemodel.noise import DENSITY, SOUND_SPEED
+from noisemodel.extended import extended_chunks
+from noisemodel.kinematics import CHUNK, link_twists
+from noisemodel.noise import sound_power
+from noisemodel.robot import Robot
+from noisemodel.run import Run
+from noisemodel.surface import Surface
 from noisemodel.types import Array, Mask, Real
 
 Index: TypeAlias = NDArray[np.intp]
@@ -17,7 +20,7 @@ QUADRATIC = ("rms", "normal")
 """The kinds whose square is a quadratic form of a link's twist."""
 
 
-def by_samples(robot: nm.Robot, surface: nm.Surface, run: nm.Run, kind: str, bins: Index) -> Array:
+def by_samples(robot: Robot, surface: Surface, run: Run, kind: str, bins: Index) -> Array:
     """Average the power of each link over bins, of any kind; gaps do not count.
 
     Args:
@@ -32,7 +35,7 @@ def by_samples(robot: nm.Robot, surface: nm.Surface, run: nm.Run, kind: str, bin
     """
     size = int(bins[1])
     q_desired, v_desired = robot.desired(run) or (None, None)
-    chunks = nm.extended_chunks(
+    chunks = extended_chunks(
         robot,
         surface,
         *robot.configuration(run),
@@ -52,7 +55,7 @@ def by_samples(robot: nm.Robot, surface: nm.Surface, run: nm.Run, kind: str, bin
 
 
 def by_moments(
-    robot: nm.Robot, surface: nm.Surface, q: Array, motions: Sequence[tuple[str, Array]]
+    robot: Robot, surface: Surface, q: Array, motions: Sequence[tuple[str, Array]]
 ) -> list[Array]:
     """Average powers that are quadratic in velocities: to ask each sample would be a waste.
 
@@ -81,8 +84,8 @@ def by_moments(
         seen = {kind: _seen(forms[kind], jacobian) for kind in {kind for kind, _ in motions}}
         for total, (kind, _), product in zip(power, motions, products, strict=True):
             square = np.einsum("jkb,jkb->b", seen[kind], product[entries[:, None], entries])
-            # P_i = rho c S_i v_i², Sygulla & Rixen, Sec. II-A; rounding may make a square negative
-            total[:, place] = DENSITY * SOUND_SPEED * link.area * np.maximum(square, 0.0)
+            # Rounding may make a square negative.
+            total[:, place] = sound_power(np.maximum(square, 0.0), link.area)
     return power
 
 
@@ -112,7 +115,7 @@ def second_moments(velocity: Real, valid: Mask, *, size: int) -> Array:
     return np.asarray(np.concatenate(products) / np.maximum(counts, 1.0)[:, None, None])
 
 
-def _jacobians(robot: nm.Robot, q: Array) -> Callable[[int], tuple[Index, Array]]:
+def _jacobians(robot: Robot, q: Array) -> Callable[[int], tuple[Index, Array]]:
     """Move the joints one after the other, those on different branches at once.
 
     Args:
@@ -132,7 +135,7 @@ def _jacobians(robot: nm.Robot, q: Array) -> Callable[[int], tuple[Index, Array]
         turn[chain] = np.arange(len(chain))
     unit = (turn == np.arange(turn.max(initial=0) + 1)[:, None]).astype(np.float64)
     v = np.repeat(unit, len(q), axis=0)
-    twists = nm.link_twists(robot, np.tile(q, (len(unit), 1)), v)
+    twists = link_twists(robot, np.tile(q, (len(unit), 1)), v)
     twists = twists.transpose(1, 2, 0).reshape(-1, 6, len(unit), len(q))
 
     def jacobian(joint: int) -> tuple[Index, Array]:

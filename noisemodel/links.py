@@ -5,9 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-import noisemodel as nm
 from noisemodel.differentiate import stretches
 from noisemodel.linkpower import QUADRATIC, Index, by_moments, by_samples, second_moments
+from noisemodel.robot import Robot
+from noisemodel.run import Run
+from noisemodel.surface import Surface
 from noisemodel.types import Array, Mask, Real
 
 BIN = 0.01
@@ -56,7 +58,7 @@ class LinkNoise:
 
 
 def link_noise(
-    run: nm.Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
+    run: Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
 ) -> LinkNoise:
     """Compute the extended noise of a run.
 
@@ -76,8 +78,8 @@ def link_noise(
     """
     assert run.robot is not None
     floating = True if run.base_pose is not None else None
-    robot = nm.Robot.load(run.robot, floating_base=floating)
-    surface = nm.Surface.of(robot, geometry)
+    robot = Robot.load(run.robot, floating_base=floating)
+    surface = Surface.of(robot, geometry)
     bins = _edges(run)
     middles = _middles(run, bins)
 
@@ -137,14 +139,14 @@ def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
     return fast.T
 
 
-def _edges(run: nm.Run) -> Index:
+def _edges(run: Run) -> Index:
     """First sample of each bin, and the end; there are two bins or more."""
     samples = len(run.time)
     size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
     return np.append(np.arange(0, samples, size), samples)
 
 
-def _middles(run: nm.Run, bins: Index) -> nm.Run:
+def _middles(run: Run, bins: Index) -> Run:
     """Take one sample of each bin: the middle one of those that are valid."""
     samples = (bins[:-1] + bins[1:]) // 2
     for index in np.flatnonzero(~run.mask[samples]):
@@ -155,7 +157,7 @@ def _middles(run: nm.Run, bins: Index) -> nm.Run:
     def at(signal: Real | None) -> Real | None:
         return None if signal is None else signal[samples]
 
-    return nm.Run(
+    return Run(
         time=np.arange(len(samples)) * int(bins[1]) / run.rate,
         velocity=run.velocity[samples],
         joint_names=run.joint_names,
@@ -170,7 +172,7 @@ def _middles(run: nm.Run, bins: Index) -> nm.Run:
 
 
 def _moments(
-    robot: nm.Robot, run: nm.Run, velocity: Real, bins: Index, *, desired: bool = False
+    robot: Robot, run: Run, velocity: Real, bins: Index, *, desired: bool = False
 ) -> Array:
     """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
     first = {joint.name: joint.first_v for joint in robot.joints}
@@ -187,7 +189,7 @@ def _moments(
     return moments.transpose(2, 0, 1)
 
 
-def _movers(robot: nm.Robot, carrier: int) -> frozenset[str]:
+def _movers(robot: Robot, carrier: int) -> frozenset[str]:
     names = set[str]()
     while carrier:  # 0 is the universe
         joint = robot.joints[carrier - 1]
@@ -196,7 +198,7 @@ def _movers(robot: nm.Robot, carrier: int) -> frozenset[str]:
     return frozenset(names)
 
 
-def _remarks(run: nm.Run, robot: nm.Robot, surface: nm.Surface) -> Iterator[str]:
+def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:
     resting = [name for name in robot.joint_names if name not in run.joint_names]
     if resting:
         yield f"The run does not name {', '.join(resting)}: they rest."

@@ -107,6 +107,30 @@ class Noise:
         return "\n".join([*lines, *(f"{self.names[i]:28} {share[i]:6.1%}" for i in loudest)])
 
 
+def sound_power(
+    mean_square: Array,
+    area: Array | float,
+    *,
+    efficiency: Array | float = 1.0,
+    density: float = DENSITY,
+    sound_speed: float = SOUND_SPEED,
+) -> Array:
+    """Sound power that surfaces radiate, of shapes that broadcast.
+
+    Args:
+        mean_square: Mean-square speed of each surface, in [m²/s²].
+        area: Of each surface, in [m²].
+        efficiency: Radiation efficiency of each surface.
+        density: Of the air, in [kg/m³].
+        sound_speed: In [m/s].
+
+    Returns:
+        The power, in [W].
+    """
+    # P_i = rho c sigma_i S_i v_i², Sygulla & Rixen, Sec. II-A
+    return np.asarray(density * sound_speed * efficiency * area * mean_square)
+
+
 def decibel(ratio: Array) -> Array:
     """Express ratios of powers in [dB]; 0 is -inf."""
     with np.errstate(divide="ignore"):

@@ -6,7 +6,7 @@ from typing import TypeAlias
 
 import numpy as np
 
-from noisemodel.errors import NoiseModelError, UnknownKindError
+from noisemodel.errors import MotionError, UnknownKindError
 from noisemodel.joints import Joint
 from noisemodel.kinematics import CHUNK, chunk_twists
 from noisemodel.linksurface import LinkSurface
@@ -43,7 +43,7 @@ def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = 
     Raises:
         UnknownKindError: If there is no such kind.
         GeometryError: If the surface is that of another robot.
-        NoiseModelError: If ``q`` or ``v`` are of another shape or not finite.
+        MotionError: If ``q`` or ``v`` are of another shape or not finite.
     """
     check_kind(kind)
     check_surface(surface, robot)
@@ -180,14 +180,14 @@ def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q
     """Refuse a motion that is not this robot's, or not finite.
 
     Raises:
-        NoiseModelError: If an array is of another shape, or holds nan or inf.
+        MotionError: If an array is of another shape, or holds nan or inf.
     """
     for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
         if array.ndim != 2 or array.shape != (len(q), width):
-            raise NoiseModelError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
+            raise MotionError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
         finite = np.isfinite(array)
         if not finite.all():
             row, column = np.argwhere(~finite)[0]
-            raise NoiseModelError(
+            raise MotionError(
                 f"{name}: {array[row, column]} in row {row}, column {column}; cut gaps out"
             )

@@ -1,229 +1,175 @@
-import dataclasses
-import pickle
+import csv
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
+import rerun as rr
 from chains import chain
+from rerun.chunk import RrdReader
 
-from inspector.comparison.compared import Compared, Failed
-from inspector.comparison.comparing import (
-    Settings,
-    compare_all,
-    compare_robot,
-    compare_run,
-    sorted_out,
-    sources_of,
-)
-from inspector.errors import InspectorError
-from noisemodel import (
-    ROBOTS,
-    Block,
-    GeometryError,
-    RobotError,
-    Run,
-    RunError,
-    UnknownKindError,
-    UnknownRobotError,
-)
-from noisemodel.excitation import made_up
+from inspector.cli import main
+from inspector.comparison import picture
+from inspector.comparison.output import write_csv
+from inspector.comparison.recording import levels, write
+from noisemodel import ROBOTS, Comparisons, compare
+from noisemodel.excitation import excitation
 
-FEW = Settings(("simplified", "C", "paper", "normal"))
+KINDS = ("simplified", "paper", "normal")
 
 
-def arm(folder, *kinds, **options):
-    return str(chain(folder, *kinds, **options).path)
+@pytest.fixture(scope="module")
+def urdf(tmp_path_factory):
+    return str(chain(tmp_path_factory.mktemp("arm"), "revolute", "revolute", "prismatic").path)
 
 
-def saved(folder, moved, **changes):
-    run = dataclasses.replace(made_up(moved), **changes)
-    run.save(folder / "run.npz", overwrite=True)
-    return folder / "run.npz"
+@pytest.fixture(scope="module")
+def found(urdf):
+    """One robot that makes the excitation of three seeds."""
+    seeds = (compare(urdf, kinds=KINDS, seed=seed) for seed in (0, 1, 2))
+    return Comparisons(tuple(one for (one,) in seeds))
 
 
-def test_on_one_joint_all_models_agree(tmp_path):
-    """With one degree of freedom every kind is the joint's speed times a constant."""
-    found = compare_robot(arm(tmp_path, "revolute"), FEW)
-    np.testing.assert_allclose(found.found.correlation, 1.0, rtol=1e-9)
-    np.testing.assert_allclose(found.found.distance, 0.0, atol=1e-6)
-    np.testing.assert_allclose(found.contrast, found.contrast[[0]] * np.ones((4, 1)), rtol=1e-6)
-    np.testing.assert_allclose(found.pressure, found.pressure[[0]] * np.ones((4, 1)), rtol=1e-9)
+@pytest.fixture
+def inspector(monkeypatch, capsys):
+    """Call the command line; returns exit status, what it printed, and what it complained."""
+
+    def call(*arguments):
+        monkeypatch.setattr(sys, "argv", ["inspector", "compare", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            main()
+        printed = capsys.readouterr()
+        return end.value.code or 0, printed.out, printed.err
+
+    return call
 
 
-def test_pressures_have_a_root_mean_square_of_one(tmp_path):
-    found = compare_robot(arm(tmp_path, "revolute", "continuous"), FEW)
-    np.testing.assert_allclose(np.mean(found.pressure**2, axis=1), 1.0, rtol=1e-12)
+def entities(path):
+    return set(RrdReader(path).store().schema().entity_paths())
 
 
-def test_a_jerk_stands_out_in_every_model(tmp_path):
-    found = compare_robot(arm(tmp_path, "revolute", "revolute", "prismatic"), FEW)
-    labels = [event.label for event in found.events]
-    assert labels == ["shake-near", "shake-far", "jerk"]
-    assert (found.contrast[:, labels.index("jerk")] > 3.0).all()
-    assert (found.by_label(0, ["jerk", "fall"]) > 3.0).tolist() == [True, False]
-    assert np.isnan(found.by_label(0, ["fall"])).all()
-
-
-def test_a_vibration_is_as_loud_as_it_is_above_the_ripple(tmp_path):
-    """One joint at a steady speed: p = |v|, so the contrast is that of the velocity itself."""
-    robot = chain(tmp_path, "revolute")
-    time = np.arange(8000) / 4000.0
-    velocity = 2.0 + 0.01 * np.sin(2 * np.pi * 100 * time)
-    velocity[4000:6000] += 0.1 * np.sin(2 * np.pi * 100 * time[4000:6000])
-    run = Run(
-        time=time,
-        velocity=velocity[:, None],
-        position=np.zeros((8000, 1)),
-        joint_names=robot.joint_names,
-        robot=str(robot.path),
-        blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
+def test_the_csv_has_a_row_per_robot_and_kind(found, tmp_path):
+    write_csv(Comparisons(found.robots[:2]), tmp_path / "out.csv")
+    with (tmp_path / "out.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [row["kind"] for row in rows] == [*KINDS, *KINDS]
+    assert {row["reference"] for row in rows} == {"normal"}
+    assert float(rows[0]["correlation"]) == pytest.approx(
+        found[0].comparison.correlation[0, 2], abs=1e-4
     )
+    assert sum(float(rows[0][f"share_{term}"]) for term in "ABC") == pytest.approx(1.0, abs=2e-4)
+    assert [event.label for event in found[0].events][2] == "jerk"
+    assert float(rows[1]["contrast_jerk_db"]) == pytest.approx(found[0].contrast[1, 2], abs=1e-4)
+    bands = [name for name in rows[0] if name.startswith("distance_") and name != "distance_db"]
+    assert bands[0] == "distance_0_20_db"
+    assert bands[-1] == "distance_500_up_db"
+
+
+def test_a_recording_holds_every_model_of_every_robot(found, urdf, tmp_path):
+    rr.set_strict_mode(True)
+    write(Comparisons(found.robots[:1]), tmp_path / "out.rrd")
+    root = f"/{rr.escape_entity_path_part(urdf)}"
+    held = entities(tmp_path / "out.rrd")
+    for kind in KINDS:
+        assert f"{root}/level/{kind}" in held
+        assert f"{root}/vibration/{kind}" in held
+        assert f"{root}/spectrogram/{kind}/00" in held
+    assert {f"{root}/events", "/report"} <= held
+    assert len(RrdReader(tmp_path / "out.rrd").blueprints()) == 1
+
+
+def test_levels_are_relative_to_the_root_mean_square(found):
+    time, level = levels(found[0], found[0].pressure)
+    assert level.shape == (len(time), len(KINDS))
+    np.testing.assert_allclose(np.mean(10 ** (level / 10), axis=0), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(np.diff(time), 0.01, rtol=1e-9)
+    _, silence = levels(found[0], np.zeros_like(found[0].pressure))
+    assert (silence == -60.0).all()
+
+
+def test_a_picture_is_drawn_without_a_display(found, tmp_path):
+    pytest.importorskip("matplotlib")
+    picture.draw(found, tmp_path / "out.png")
+    assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_command_writes_everything_and_goes_on_after_a_robot_that_cannot_be_had(
+    inspector, urdf, tmp_path
+):
+    pytest.importorskip("matplotlib")
+    outputs = {name: tmp_path / f"out.{name}" for name in ("csv", "rrd", "png")}
+    arguments = ["--robots", f"{urdf},ur3_empty,robby", "--kinds", ",".join(KINDS), "-j", "2"]
+    arguments += ["--csv", outputs["csv"], "--save", outputs["rrd"], "--picture", outputs["png"]]
+    status, out, err = inspector(*arguments)
+    assert status == 0
+    assert "correlation" in out
+    assert [line.split(": ")[1] for line in err.splitlines()] == ["ur3_empty", "robby"]
+    assert all(path.stat().st_size > 0 for path in outputs.values())
+    status, _, err = inspector(*arguments)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "out.csv: exists already" in err
+    status, _, _ = inspector(*arguments, "--overwrite")
+    assert status == 0
+
+
+def test_the_command_compares_runs(inspector, tmp_path):
+    run = excitation(chain(tmp_path, "revolute", "revolute"))
     run.save(tmp_path / "run.npz")
-    found = compare_run(tmp_path / "run.npz", FEW)
-    assert [event.label for event in found.events] == ["oscillations"]
-    np.testing.assert_allclose(found.contrast, 20 * np.log10(11.0), atol=0.2)
+    status, out, err = inspector(tmp_path / "run.npz", "--kinds", "simplified,C")
+    assert (status, err) == (0, "")
+    assert "Reference 'C'" in out
+    assert "run.npz" in out
 
 
-def test_distances_by_band_add_up_to_the_distance(tmp_path):
-    found = compare_robot(arm(tmp_path, "revolute", "revolute"), FEW)
-    counts = [np.sum((found.found.frequency >= a) & (found.found.frequency < b)) for a, b in
-              [(0, 20), (20, 100), (100, 500), (500, np.inf)]]  # fmt: skip
-    whole = np.sqrt(np.average(found.by_band(0) ** 2, weights=counts))
-    assert whole == pytest.approx(found.found.distance[0, found.reference], rel=1e-9)
+def test_the_command_prints_what_the_function_returns(inspector, urdf):
+    status, out, _ = inspector("--robots", f"{urdf},robby", "--kinds", ",".join(KINDS))
+    assert (status, out) == (0, f"{compare([urdf, 'robby'], kinds=KINDS)}\n")
+
+
+def test_the_command_takes_each_robot_once_and_all_of_the_list(inspector, urdf, monkeypatch):
+    given = []
+
+    def listed(sources, **_):
+        given.append(sources)
+        return Comparisons((), ())
+
+    monkeypatch.setattr("noisemodel.compare", listed)
+    inspector("a.npz", "a.npz", "--robots", "panda, go2,panda,")
+    inspector("--robots", "all")
+    assert given == [[Path("a.npz"), "panda", "go2"], list(ROBOTS)]
+
+
+def test_runs_without_robot_are_one_line_and_nothing_else_is_left(inspector, tmp_path):
+    time = np.arange(1000) / 1000
+    np.savez(tmp_path / "bare.npz", time=time, velocity=np.cos(time)[:, None])
+    np.savez(tmp_path / "still.npz", time=time, velocity=np.cos(time)[:, None], robot="panda")
+    status, out, err = inspector(tmp_path / "bare.npz", tmp_path / "still.npz")
+    assert (status, out) == (3, "")
+    first, second = err.splitlines()
+    assert first.endswith("bare.npz: the run names no robot; `inspector import --robot` adds one")
+    assert second.endswith("still.npz: the run has no positions, which the extended noise needs")
 
 
 @pytest.mark.parametrize(
-    ("kinds", "reference"),
-    [("paper,normal,mean", "normal"), ("mean,paper", "mean"), ("paper,A,simplified", "simplified")],
-)
-def test_the_reference_is_normal_else_mean_else_the_last(tmp_path, kinds, reference):
-    found = compare_robot(arm(tmp_path, "revolute"), Settings(("simplified", "C", "paper")))
-    named = dataclasses.replace(found.found, kinds=tuple(kinds.split(",")))
-    found = dataclasses.replace(found, found=named)
-    assert found.kinds[found.reference] == reference
-
-
-def test_a_recorded_motion_is_compared_as_the_robot_that_made_it(tmp_path):
-    robot = chain(tmp_path, "revolute", "prismatic", floating_base=True)
-    run = compare_run(saved(tmp_path, robot), FEW)
-    assert run.floating_base
-    assert run.joints == 2
-    assert len(run.found.names) == 3
-    assert run.remarks == ()
-
-
-def test_joints_that_a_run_does_not_name_rest_and_are_told(tmp_path):
-    robot = chain(tmp_path, "revolute", "revolute")
-    run = made_up(robot)
-    run = dataclasses.replace(
-        run,
-        velocity=run.velocity[:, :1],
-        position=run.position[:, :1],
-        joint_names=("joint1",),
-        desired_joint_names=(),
-    )
-    run.save(tmp_path / "run.npz")
-    found = compare_run(tmp_path / "run.npz", FEW)
-    assert found.remarks == ("The run does not name joint2: they rest.",)
-
-
-def test_of_a_run_with_gaps_the_longest_stretch_is_compared(tmp_path):
-    robot = chain(tmp_path, "revolute", "revolute")
-    run = made_up(robot)
-    valid = np.ones(len(run.time), dtype=bool)
-    valid[2000:2100] = False
-    path = saved(
-        tmp_path,
-        robot,
-        valid=valid,
-        velocity=run.velocity * valid[:, None],
-        position=run.position * valid[:, None],
-        blocks=(Block(0.1, 0.2, "jerk"), Block(4.6, 4.8, "jerk")),
-    )
-    found = compare_run(path, FEW)
-    assert found.time[0] == run.time[2100]
-    assert [event.start for event in found.events] == [4.6]
-    assert "The run has gaps: compared from 0.53 s on." in found.remarks
-
-
-def test_of_a_run_with_nothing_but_gaps_nothing_is_compared(tmp_path):
-    robot = chain(tmp_path, "revolute")
-    run = made_up(robot)
-    still = np.zeros_like(run.velocity)
-    valid = np.arange(len(run.time)) % 2 == 0
-    path = saved(tmp_path, robot, valid=valid, velocity=still, position=still)
-    with pytest.raises(RunError, match="expected .* at least 2 samples"):
-        compare_run(path, FEW)
-
-
-def test_an_event_between_two_samples_has_no_contrast(tmp_path):
-    robot = chain(tmp_path, "revolute")
-    found = compare_run(saved(tmp_path, robot, blocks=(Block(1.00001, 1.00002, "jerk"),)), FEW)
-    assert np.isnan(found.contrast).all()
-
-
-def test_mimic_joints_that_cannot_follow_move_by_themselves(tmp_path):
-    follow = '<mimic joint="nobody"/>'
-    found = compare_robot(arm(tmp_path, "revolute", "revolute", follow=follow), FEW)
-    assert found.joints == 2
-    assert "move by themselves" in found.remarks[0]
-
-
-def test_mimic_joints_follow(tmp_path):
-    follow = '<mimic joint="joint1" multiplier="2"/>'
-    found = compare_robot(arm(tmp_path, "revolute", "revolute", follow=follow), FEW)
-    assert found.joints == 1
-    assert len(found.found.names) == 2
-
-
-def test_robots_are_compared_many_at_once_and_alike(tmp_path):
-    sources = [arm(tmp_path, "revolute", "revolute"), "ur3_empty", str(tmp_path / "none.urdf")]
-    alone, together = (list(compare_all(sources, FEW, jobs=jobs)) for jobs in (1, 2))
-    assert [type(one) for one in together] == [Compared, Failed, Failed]
-    np.testing.assert_array_equal(alone[0].found.correlation, together[0].found.correlation)
-    assert alone[1:] == together[1:]
-    assert "empty" in together[1].message
-    assert "there is no such URDF file" in together[2].message
-    found, failed = sorted_out(together)
-    assert (len(found), len(failed)) == (1, 2)
-    assert pickle.dumps(found)  # what workers hand back
-
-
-def test_sources_are_runs_and_robots_once_each(tmp_path):
-    assert sources_of([tmp_path, tmp_path], "panda, go2,panda,") == [tmp_path, "panda", "go2"]
-    assert sources_of([], "all") == list(ROBOTS)
-    assert sources_of([], "") == []
-
-
-@pytest.mark.parametrize(
-    ("settings", "error", "message"),
+    ("arguments", "status", "message"),
     [
-        ({"kinds": ("paper", "loud")}, UnknownKindError, "no kind 'loud' of noise; .*simplified"),
-        ({"kinds": ("paper",)}, InspectorError, "are paper; expected two different ones or more"),
-        ({"kinds": ("A", "A")}, InspectorError, "expected two different ones"),
-        ({"geometry": "skin"}, GeometryError, "geometry 'skin' is not known, .* visual, collision"),
+        ([], 2, "name run files, or robots with --robots"),
+        (["--robots", "panda", "--kinds", "paper,loud"], 3, "no kind 'loud' of noise"),
+        (["--robots", "panda", "--geometry", "skin"], 3, "geometry 'skin' is not known"),
+        (["--robots", "panda", "--csv", "/no/such/folder/x.csv"], 3, "cannot be written"),
+        (["--robots", "robby"], 3, "no robot 'robby'"),
+        (["--robots", "all", "--save", "x.rrd"], 3, "x.rrd: a recording holds 8 robots and runs"),
     ],
 )
-def test_settings_are_refused_before_anything_is_done(settings, error, message):
-    with pytest.raises(error, match=message):
-        Settings(**settings)
+def test_what_cannot_be_compared_is_one_line(inspector, arguments, status, message):
+    found, out, err = inspector(*arguments)
+    assert (found, out) == (status, "")
+    assert message in err
+    assert status == 2 or err.count("\n") == 1
 
 
-def test_runs_that_do_not_suffice_are_refused(tmp_path):
-    robot = chain(tmp_path, "revolute")
-    with pytest.raises(InspectorError, match="the run names no robot; `inspector import --robot`"):
-        compare_run(saved(tmp_path, robot, robot=None), FEW)
-    with pytest.raises(InspectorError, match="the run has no positions"):
-        compare_run(saved(tmp_path, robot, position=None), FEW)
-    with pytest.raises(UnknownRobotError, match="no robot 'robby'"):
-        compare_run(saved(tmp_path, robot, robot="robby"), FEW)
-    with pytest.raises(RunError, match="cannot be read"):
-        compare_run(tmp_path / "none.npz", FEW)
-
-
-def test_robots_that_cannot_be_had_are_refused(tmp_path):
-    with pytest.raises(UnknownRobotError, match=r"no robot 'tallos'.*did you mean 'talos'"):
-        compare_robot("tallos", FEW)
-    with pytest.raises(RobotError, match="the URDF is empty"):
-        compare_robot("ur3_empty", FEW)
-    with pytest.raises(InspectorError, match="no link has a surface by geometry 'visual'"):
-        compare_robot(arm(tmp_path, "revolute", shapes=[""]), Settings(geometry="visual"))
+def test_without_matplotlib_a_picture_is_refused_before_any_work(inspector, monkeypatch, tmp_path):
+    monkeypatch.setattr(picture, "find_spec", lambda _: None)
+    status, _, err = inspector("--robots", "panda", "--picture", tmp_path / "out.png")
+    assert (status, err.count("\n")) == (3, 1)
+    assert 'a picture needs matplotlib; `pip install "noise-inspector[report]"`' in err

@@ -11,8 +11,8 @@ from inspector.analysis.analyse import Analysis, Status, Unknown, analyse, analy
 from inspector.errors import InspectorError
 from inspector.library import Library
 from inspector.localisation.localise import Origin
-from inspector.parallel import each
 from models import Event
+from noisemodel.parallel import each
 
 EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
 """The errors that are told in one line; all others are bugs."""

@@ -1,5 +1,6 @@
 """`inspector compare`: compare noise models on runs and robots."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -13,13 +14,13 @@ def compare(
         list[Path] | None, typer.Argument(help="Run files with robot and positions.")
     ] = None,
     robots: Annotated[
-        str, typer.Option(help="Robots to move by a motion of our own: talos,go2 or all.")
+        str, typer.Option(help="Robots to move by a built-in motion: talos,go2 or all.")
     ] = "",
     kinds: Annotated[
         str, typer.Option(help="Of simplified, paper, A, B, C, mean, rms, normal.")
     ] = "simplified,C,paper,mean,rms,normal",
     geometry: Annotated[str, typer.Option(help="visual, collision, hull or auto.")] = "auto",
-    seed: Annotated[int, typer.Option(min=0, help="Makes our own motion another one.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the built-in motion.")] = 0,
     csv: Annotated[Path | None, typer.Option(help="Write all numbers here.")] = None,
     save: Annotated[Path | None, typer.Option(help="Write a recording (.rrd) here.")] = None,
     picture: Annotated[
@@ -29,21 +30,27 @@ def compare(
     overwrite: Overwrite = False,
 ) -> None:
     """Compare the noise models; exit 3 if nothing could be compared."""
-    from inspector.comparison import comparing, output
-    from inspector.comparison.table import table
+    import noisemodel as nm
+    from inspector.comparison.output import Outputs
     from inspector.progress import progress
 
-    sources = comparing.sources_of(runs or (), robots)
+    names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
+    sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
     if not sources:
         raise typer.BadParameter("name run files, or robots with --robots")
-    settings = comparing.Settings(tuple(kinds.split(",")), geometry, seed)
-    outputs = output.Outputs(csv, save, picture, overwrite=overwrite)
+    outputs = Outputs(csv, save, picture, overwrite=overwrite)
     outputs.check(len(sources))
-    results = comparing.compare_all(sources, settings, jobs=jobs)
-    found, failed = comparing.sorted_out(progress(results, "compare", total=len(sources)))
-    for bad in failed:
-        typer.echo(f"inspector: {bad.name}: {bad.message}", err=True)
+    found = nm.compare(
+        sources,
+        kinds=kinds.split(","),
+        surface=geometry,
+        seed=seed,
+        jobs=jobs,
+        progress=partial(progress, what="compare"),
+    )
+    for left_out in found.left_out:
+        typer.echo(f"inspector: {left_out.name}: {left_out.reason}", err=True)
     if not found:
         raise typer.Exit(3)
     outputs.write(found)
-    typer.echo(table(found))
+    typer.echo(found)

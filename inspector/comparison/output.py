@@ -1,14 +1,13 @@
-"""The files that a comparison of noise models is written to."""
+"""The files that a comparison of noise models is written to: CSV, a recording, a picture."""
 
-from collections.abc import Sequence
+import csv
 from dataclasses import dataclass
 from pathlib import Path
 
 from inspector.comparison import picture
-from inspector.comparison.compared import Compared
-from inspector.comparison.csv import write_csv
 from inspector.errors import InspectorError
-from noisemodel.atomic import refuse_existing
+from noisemodel import Comparisons
+from noisemodel.atomic import refuse_existing, replacing
 
 MOST = 8
 """Robots that a recording may hold; more make it too slow to look at."""
@@ -50,11 +49,11 @@ class Outputs:
         if self.picture:
             picture.require()
 
-    def write(self, found: Sequence[Compared]) -> None:
+    def write(self, found: Comparisons) -> None:
         """Write the files.
 
         Args:
-            found: One comparison or more, of the same kinds.
+            found: One comparison or more.
 
         Raises:
             OutputError: If a file exists and may not be replaced, or cannot be written.
@@ -67,3 +66,32 @@ class Outputs:
             write(found, self.recording, overwrite=self.overwrite)
         if self.picture:
             picture.draw(found, self.picture, overwrite=self.overwrite)
+
+
+def write_csv(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
+    """Write a row for each robot and kind, with the columns of ``Comparisons.to_arrow``.
+
+    Args:
+        found: One comparison or more.
+        path: The file to write.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    table = found.to_arrow()
+    with (
+        replacing(path, overwrite=overwrite) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.DictWriter(file, table.column_names, lineterminator="\n")
+        writer.writeheader()
+        for row in table.to_pylist():
+            writer.writerow({name: _cell(name, value) for name, value in row.items()})
+
+
+def _cell(name: str, value: str | bool | int | float) -> str | int:
+    """Print a number as the CSV of earlier versions did."""
+    if isinstance(value, float):
+        return f"{value:g}" if name == "rate_hz" else f"{value:.4f}"
+    return int(value) if isinstance(value, bool) else value

@@ -1,4 +1,4 @@
-"""Compared noise models as a picture on paper: terms, correlation, distance by frequency."""
+"""RobotComparison noise models as a picture on paper: terms, correlation, distance by frequency."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from inspector.comparison.compared import Compared
-from inspector.comparison.table import medians
 from inspector.errors import InspectorError
+from noisemodel import Comparisons, RobotComparison
 from noisemodel.atomic import replacing
 from noisemodel.comparison import TERMS
+from noisemodel.comparisons import medians
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ DASHES = ("-", "--", "-", ":", "-.", (0, (1, 1)), (0, (5, 1)))
 ROW = 0.17
 """Height of a robot, in [inch]."""
 INDEPENDENT_DB = 10.0 / np.log(10.0) * np.pi / np.sqrt(3.0)
-"""Distance of two noises with the same mean spectrum that know nothing of each other, in [dB]."""
+"""Distance of two independent noises with the same mean spectrum, in [dB]."""
 THIRDS = 20.0 * 2.0 ** (np.arange(25) / 3.0)
 """Centres of thirds of octaves, from 20 to 5120 Hz, in [Hz]."""
 WIDTH, MARGIN, BELOW = 10.0, 1.3, 3.0
@@ -43,11 +43,11 @@ def require() -> None:
         raise InspectorError('a picture needs matplotlib; `pip install "noise-inspector[report]"`')
 
 
-def draw(found: Sequence[Compared], path: Path, *, overwrite: bool = False) -> None:
+def draw(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
     """Draw what was found as a PNG file.
 
     Args:
-        found: One comparison or more, of the same kinds.
+        found: One comparison or more.
         path: The file to write.
         overwrite: Whether a file that exists may be replaced.
 
@@ -72,7 +72,7 @@ def draw(found: Sequence[Compared], path: Path, *, overwrite: bool = False) -> N
         figure.savefig(temporary, format="png")
 
 
-def _shares(axes: "Axes", found: Sequence[Compared]) -> None:
+def _shares(axes: "Axes", found: Sequence[RobotComparison]) -> None:
     terms = np.array([_terms(one) for one in found])
     starts = np.cumsum(terms, axis=1) - terms
     for index, (term, shade) in enumerate(zip(TERMS, SHADES, strict=True)):
@@ -93,11 +93,11 @@ def _shares(axes: "Axes", found: Sequence[Compared]) -> None:
     _legend(axes)
 
 
-def _correlations(axes: "Axes", found: Sequence[Compared]) -> None:
-    kinds, held = found[0].kinds, found[0].reference
+def _correlations(axes: "Axes", found: Sequence[RobotComparison]) -> None:
+    kinds, reference = found[0].kinds, found[0].comparison.reference
     for ink, index in enumerate(_others(found)):
         axes.plot(
-            [one.found.correlation[index, held] for one in found],
+            [one.comparison.correlation[index, reference] for one in found],
             np.arange(len(found)),
             MARKS[ink],
             color=INKS[ink],
@@ -107,16 +107,16 @@ def _correlations(axes: "Axes", found: Sequence[Compared]) -> None:
         )
     axes.set_xlim(right=1.05)
     axes.grid(alpha=0.4)
-    axes.set_xlabel(f"correlation of the envelope with that of {kinds[held]!r}")
+    axes.set_xlabel(f"correlation of the envelope with that of {kinds[reference]!r}")
     _legend(axes)
 
 
-def _spectra(figure: "Figure", found: Sequence[Compared]) -> None:
+def _spectra(figure: "Figure", found: Sequence[RobotComparison]) -> None:
     """Draw distance over frequency, fixed and floating bases side by side where there are both."""
     groups = [[one for one in found if one.floating_base == floating] for floating in (False, True)]
     groups = [group for group in groups if group]
     panels = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
-    kinds, held = found[0].kinds, found[0].reference
+    kinds, reference = found[0].kinds, found[0].comparison.reference
     for axes, group in zip(panels, groups, strict=True):
         for ink, index in enumerate(_others(found)):
             distance = medians([_by_third(one, index) for one in group])
@@ -127,7 +127,7 @@ def _spectra(figure: "Figure", found: Sequence[Compared]) -> None:
         axes.axhline(INDEPENDENT_DB, color="grey", lw=0.8, label="independent noises")
         axes.grid(alpha=0.4)
         axes.set_xlabel("frequency [Hz]")
-    panels[0].set_ylabel(f"distance to {kinds[held]!r} [dB]")
+    panels[0].set_ylabel(f"distance to {kinds[reference]!r} [dB]")
     panels[0].set_ylim(0.0, 1.35 * panels[0].get_ylim()[1])
     for axes in panels:
         axes.legend(loc="upper center", ncols=3, frameon=False, fontsize=8)
@@ -145,17 +145,17 @@ def _legend(axes: "Axes") -> None:
     )
 
 
-def _by_third(one: Compared, kind: int) -> Array:
+def _by_third(one: RobotComparison, kind: int) -> Array:
     """Distance to the reference in each third of an octave, in [dB]; nan where there is none."""
-    squares = one.found.distance_by_frequency[kind, one.reference] ** 2
-    third = np.rint(3.0 * np.log2(np.maximum(one.found.frequency, 1.0) / THIRDS[0]))
+    squares = one.comparison.distance_by_frequency[kind, one.comparison.reference] ** 2
+    third = np.rint(3.0 * np.log2(np.maximum(one.comparison.frequency, 1.0) / THIRDS[0]))
     inside = [third == index for index in range(len(THIRDS))]
     return np.array([np.sqrt(squares[at].mean()) if at.any() else np.nan for at in inside])
 
 
-def _others(found: Sequence[Compared]) -> list[int]:
-    return [index for index in range(len(found[0].kinds)) if index != found[0].reference]
+def _others(found: Sequence[RobotComparison]) -> list[int]:
+    return [index for index in range(len(found[0].kinds)) if index != found[0].comparison.reference]
 
 
-def _terms(one: Compared) -> Array:
-    return np.asarray(one.found.terms.sum(axis=0))
+def _terms(one: RobotComparison) -> Array:
+    return np.asarray(one.comparison.terms.sum(axis=0))

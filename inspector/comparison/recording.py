@@ -1,7 +1,6 @@
-"""Compared noise models as a rerun recording: one above the other, on one time axis."""
+"""RobotComparison noise models as a rerun recording: one above the other, on one time axis."""
 
 import hashlib
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +8,10 @@ import rerun as rr
 from rerun.blueprint import Blueprint
 
 from inspector import colors
-from inspector.comparison.compared import Compared
-from inspector.comparison.table import table
 from inspector.recording import series, unstable
 from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
+from noisemodel import Comparisons, RobotComparison
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
 from noisemodel.noise import decibel
@@ -28,18 +26,18 @@ RANGE_DB = (-25.0, 20.0)
 """What is drawn: the same for all, so that heights compare, in [dB]."""
 
 
-def write(found: Sequence[Compared], path: Path, *, overwrite: bool = False) -> None:
+def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
     """Write comparisons as one recording, whole or not at all.
 
     Args:
-        found: One comparison or more, of the same kinds.
+        found: One comparison or more.
         path: The file to write, by convention ``*.rrd``.
         overwrite: Whether a file that exists may be replaced.
 
     Raises:
         OutputError: If the file exists or cannot be written.
     """
-    text = table(found)
+    text = str(found)
     # The same comparison has the same id: opened again, it replaces itself in the viewer.
     identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
     with replacing(path, overwrite=overwrite) as temporary:
@@ -54,7 +52,7 @@ def write(found: Sequence[Compared], path: Path, *, overwrite: bool = False) -> 
         recording.disconnect()
 
 
-def levels(one: Compared, pressure: Array) -> tuple[Array, Array]:
+def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
     """Take the level of each estimate every 10 ms, relative to its own root mean square.
 
     Args:
@@ -73,7 +71,7 @@ def levels(one: Compared, pressure: Array) -> tuple[Array, Array]:
     return one.time[firsts] + counts / 2 / one.rate, np.maximum(level, FLOOR_DB)
 
 
-def layout(found: Sequence[Compared]) -> Blueprint:
+def layout(found: Comparisons) -> Blueprint:
     """Lay out a recording: one tab per robot, in it events, levels and spectrograms.
 
     Args:
@@ -86,7 +84,7 @@ def layout(found: Sequence[Compared]) -> Blueprint:
     return unstable.blueprint(unstable.tabs(*map(_robot, found), report), series.TIMELINE)
 
 
-def _log(recording: rr.RecordingStream, one: Compared) -> None:
+def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
     whole = np.ones(len(one.time), dtype=bool)
     parts = {
         "vibration": vibrating(one.pressure.T, whole, one.rate).T,
@@ -109,7 +107,7 @@ def _log(recording: rr.RecordingStream, one: Compared) -> None:
     series.log_lane(recording, f"{_root(one)}/events", stretches, states)
 
 
-def _robot(one: Compared) -> Part:
+def _robot(one: RobotComparison) -> Part:
     parts = {"vibration": "above 10 Hz", "level": "whole motion"}
     levels = unstable.tabs(*(_lines(one, part, name) for part, name in parts.items()))
     strips = unstable.tabs(*(_strip(one, kind) for kind in one.kinds))
@@ -118,7 +116,7 @@ def _robot(one: Compared) -> Part:
     return unstable.above((lane, 1.0), (levels, height), (strips, 3.0), name=one.name)
 
 
-def _lines(one: Compared, part: str, name: str) -> Part:
+def _lines(one: RobotComparison, part: str, name: str) -> Part:
     plots = [
         unstable.plot(
             f"{kind} [dB re its own rms]", f"{_root(one)}/{part}/{kind}", between=RANGE_DB
@@ -128,11 +126,11 @@ def _lines(one: Compared, part: str, name: str) -> Part:
     return unstable.above(*((plot, 1.0) for plot in plots), name=name)
 
 
-def _strip(one: Compared, kind: str) -> Part:
+def _strip(one: RobotComparison, kind: str) -> Part:
     top = min(series.TOP_HZ, one.rate / 2)
     origin = f"{_root(one)}/spectrogram/{kind}"
     return unstable.plot(f"{kind}, 0-{top:.0f} Hz", origin, between=(0.0, top), fixed=True)
 
 
-def _root(one: Compared) -> str:
+def _root(one: RobotComparison) -> str:
     return f"/{rr.escape_entity_path_part(one.name)}"

@@ -10,7 +10,6 @@ from typing import Any
 
 import models
 from inspector.errors import InspectorError
-from inspector.parallel import each
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.training import recordings, settings
@@ -21,6 +20,7 @@ from models.tuning.grid import LEARNT, Grid, Point
 from models.tuning.search import Asked, Criterion, Measures, ask, measure, order
 from models.tuning.trial import Trial
 from noisemodel.atomic import refuse_existing
+from noisemodel.parallel import each
 
 BATCHES = 4
 """Batches of points for each job at least: a killed job loses one, and the last wait less."""

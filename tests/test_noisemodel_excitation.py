@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from chains import chain
 
-from noisemodel import Robot
-from noisemodel.excitation import RATE, SHAKES, ends, limits, made_up
+from noisemodel import NoiseModelError, Robot
+from noisemodel.excitation import RATE, SHAKES, ends, excitation, limits
 
 ODD = (
     "panda",  # prismatic, mimic
@@ -22,13 +22,13 @@ def robot(request):
 
 
 def test_positions_stay_within_the_limits(robot):
-    run, bounds = made_up(robot), limits(robot)
+    run, bounds = excitation(robot), limits(robot)
     assert (np.abs(run.position - bounds.centre) <= bounds.room / 2).all()
     assert np.isfinite(run.position).all()
 
 
 def test_every_joint_moves_and_the_base_sways_if_it_can(robot):
-    run = made_up(robot)
+    run = excitation(robot)
     assert (np.ptp(run.velocity, axis=0) > 0.0).all()
     assert (run.base_velocity is not None) == robot.floating_base
     if robot.floating_base:
@@ -36,21 +36,21 @@ def test_every_joint_moves_and_the_base_sways_if_it_can(robot):
 
 
 def test_velocities_are_the_slopes_of_positions(robot):
-    run = made_up(robot)
+    run = excitation(robot)
     slope = np.diff(run.position, axis=0) * RATE
     np.testing.assert_allclose(slope, run.velocity[1:], atol=1e-7)
 
 
 def test_a_seed_makes_one_motion_and_another_seed_another():
     robot = Robot.load("panda")
-    one, same, other = (made_up(robot, seed=seed) for seed in (3, 3, 4))
+    one, same, other = (excitation(robot, seed=seed) for seed in (3, 3, 4))
     np.testing.assert_array_equal(one.velocity, same.velocity)
     assert not np.allclose(one.velocity, other.velocity)
 
 
 def test_both_shakes_are_equally_fast(tmp_path):
     robot = chain(tmp_path, "revolute", "revolute", "revolute")
-    run = made_up(robot)
+    run = excitation(robot)
     near, far = ends(robot)
     energies = []
     for label, name in zip(SHAKES, (near, far), strict=True):
@@ -77,3 +77,23 @@ def test_limits_that_leave_no_room_are_none(tmp_path):
     bounds = limits(chain(tmp_path, "revolute", "continuous"))
     np.testing.assert_array_equal(bounds.room, [18.0, np.inf])
     np.testing.assert_array_equal(bounds.speed, [1.0, 1.0])
+
+
+def test_the_rate_changes_the_samples_and_not_the_events(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    slow, fast = excitation(robot, rate=1000.0), excitation(robot)
+    assert (slow.rate, fast.rate) == (1000.0, RATE)
+    assert slow.duration == fast.duration
+    assert slow.blocks == fast.blocks
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"rate": 400.0}, "the excitation at 400 Hz, expected above 400 Hz"),
+        ({"seed": -1}, "seed is -1, expected 0 or more"),
+    ],
+)
+def test_a_rate_or_a_seed_that_cannot_be_is_refused(tmp_path, options, message):
+    with pytest.raises(NoiseModelError, match=message):
+        excitation(chain(tmp_path, "revolute"), **options)

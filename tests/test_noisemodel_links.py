@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 
-from inspector.recording.links import STATES, levels, shades, states
 from noisemodel import Robot, Run, Surface, extended
 from noisemodel.links import link_noise, vibrating
 
@@ -82,31 +81,3 @@ def test_joints_that_the_run_does_not_name_are_said_to_rest():
         robot="ur5",
     )
     assert "wrist_3_joint: they rest" in link_noise(part).remarks[0]
-
-
-def test_levels_are_relative_to_the_loudest_peak():
-    found = levels(link_noise(arm_run(5)))
-    assert found.level.max() == 0.0
-    assert 2.0 <= found.time[np.unravel_index(found.level.argmax(), found.level.shape)[0]] < 2.5
-
-
-def test_states_do_not_flicker_around_a_threshold():
-    level = np.array([-30.0, -19.9, -20.1, -19.9, -20.1, -22.9, -23.1, -5.0, -8.0, -9.1])
-    assert states(level) == [
-        "quiet",
-        *["elevated"] * 5,
-        "quiet",
-        "critical",
-        "critical",
-        "high",
-    ]
-    assert states(np.array([-np.inf])) == ["quiet"]
-
-
-def test_shades_go_from_quiet_to_critical_in_few_steps():
-    rgba = shades(np.linspace(-60, 0, 1000))
-    assert rgba[0].tolist() == [*STATES["quiet"], 255]
-    assert rgba[-1].tolist() == [*STATES["critical"], 255]
-    assert len(np.unique(rgba, axis=0)) <= 16
-    assert shades(np.array([-np.inf]))[0].tolist() == [*STATES["quiet"], 255]
-    assert list(STATES) == ["quiet", "elevated", "high", "critical"]

@@ -1,0 +1,482 @@
+import dataclasses
+import pickle
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+from chains import chain, motion
+
+from noisemodel import (
+    Block,
+    Comparisons,
+    GeometryError,
+    LeftOut,
+    MotionError,
+    NoiseModelError,
+    Robot,
+    Run,
+    Surface,
+    UnknownKindError,
+    UnknownMotionError,
+    compare,
+    estimates,
+)
+from noisemodel.comparison import BANDS
+from noisemodel.comparisons import medians
+from noisemodel.excitation import excitation
+
+FEW = ("simplified", "C", "paper", "normal")
+THREE = ("simplified", "paper", "normal")
+ARM, SLIDING = ("revolute", "revolute"), ("revolute", "revolute", "prismatic")
+
+
+def arm(folder, *kinds, **options):
+    return str(chain(folder, *kinds, **options).path)
+
+
+def saved(folder, moved, **changes):
+    run = dataclasses.replace(excitation(moved), **changes)
+    run.save(folder / "run.npz", overwrite=True)
+    return folder / "run.npz"
+
+
+def alone(source, kinds=FEW, **options):
+    """What a comparison of one robot finds."""
+    found = compare(source, kinds=kinds, **options)
+    assert found.left_out == ()
+    (one,) = found
+    return one
+
+
+def reason(source, **options):
+    """Why a comparison leaves a robot out."""
+    found = compare(source, **options)
+    assert len(found) == 0
+    (left_out,) = found.left_out
+    assert left_out.name == str(source)
+    return left_out.reason
+
+
+def test_on_one_joint_all_models_agree(tmp_path):
+    """With one degree of freedom every kind is the joint's speed times a constant."""
+    found = alone(arm(tmp_path, "revolute"))
+    np.testing.assert_allclose(found.comparison.correlation, 1.0, rtol=1e-9)
+    np.testing.assert_allclose(found.comparison.distance, 0.0, atol=1e-6)
+    np.testing.assert_allclose(found.contrast, found.contrast[[0]] * np.ones((4, 1)), rtol=1e-6)
+    np.testing.assert_allclose(found.pressure, found.pressure[[0]] * np.ones((4, 1)), rtol=1e-9)
+
+
+def test_pressures_have_a_root_mean_square_of_one(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "continuous"))
+    np.testing.assert_allclose(np.mean(found.pressure**2, axis=1), 1.0, rtol=1e-12)
+
+
+def test_a_jerk_stands_out_in_every_model(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "revolute", "prismatic"))
+    labels = [event.label for event in found.events]
+    assert labels == ["shake-near", "shake-far", "jerk"]
+    assert (found.contrast[:, labels.index("jerk")] > 3.0).all()
+    assert (found.by_label(0, ["jerk", "fall"]) > 3.0).tolist() == [True, False]
+    assert np.isnan(found.by_label(0, ["fall"])).all()
+
+
+def test_a_vibration_is_as_loud_as_it_is_above_the_ripple(tmp_path):
+    """One joint at a steady speed: p = |v|, so the contrast is that of the velocity itself."""
+    robot = chain(tmp_path, "revolute")
+    time = np.arange(8000) / 4000.0
+    velocity = 2.0 + 0.01 * np.sin(2 * np.pi * 100 * time)
+    velocity[4000:6000] += 0.1 * np.sin(2 * np.pi * 100 * time[4000:6000])
+    run = Run(
+        time=time,
+        velocity=velocity[:, None],
+        position=np.zeros((8000, 1)),
+        joint_names=robot.joint_names,
+        robot=str(robot.path),
+        blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 1.5, "oscillations")),
+    )
+    run.save(tmp_path / "run.npz")
+    found = alone(tmp_path / "run.npz")
+    assert [event.label for event in found.events] == ["oscillations"]
+    np.testing.assert_allclose(found.contrast, 20 * np.log10(11.0), atol=0.2)
+
+
+def test_distances_by_band_add_up_to_the_distance(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "revolute"))
+    frequency = found.comparison.frequency
+    counts = [np.sum((frequency >= low) & (frequency < high)) for low, high in BANDS]
+    whole = np.sqrt(np.average(found.comparison.by_band(0, 3) ** 2, weights=counts))
+    assert whole == pytest.approx(found.comparison.distance[0, 3], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "reference"),
+    [("paper,normal,mean", "normal"), ("mean,paper", "mean"), ("paper,A,simplified", "simplified")],
+)
+def test_the_reference_is_normal_else_mean_else_the_last(tmp_path, kinds, reference):
+    found = alone(arm(tmp_path, "revolute"), ("simplified", "C", "paper")).comparison
+    named = dataclasses.replace(found, kinds=tuple(kinds.split(",")))
+    assert named.kinds[named.reference] == reference
+
+
+def test_a_recorded_motion_is_compared_as_the_robot_that_made_it(tmp_path):
+    robot = chain(tmp_path, "revolute", "prismatic", floating_base=True)
+    run = alone(saved(tmp_path, robot))
+    assert run.floating_base
+    assert run.joints == 2
+    assert len(run.comparison.names) == 3
+    assert run.remarks == ()
+
+
+def test_joints_that_are_not_in_the_log_are_named(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    run = excitation(robot)
+    run = dataclasses.replace(
+        run,
+        velocity=run.velocity[:, :1],
+        position=run.position[:, :1],
+        joint_names=("joint1",),
+        desired_joint_names=(),
+    )
+    run.save(tmp_path / "run.npz")
+    found = alone(tmp_path / "run.npz")
+    assert found.remarks == ("Not in the log, assumed stationary: joint2.",)
+
+
+def test_of_a_run_with_gaps_the_longest_stretch_is_compared(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    run = excitation(robot)
+    valid = np.ones(len(run.time), dtype=bool)
+    valid[2000:2100] = False
+    path = saved(
+        tmp_path,
+        robot,
+        valid=valid,
+        velocity=run.velocity * valid[:, None],
+        position=run.position * valid[:, None],
+        blocks=(Block(0.1, 0.2, "jerk"), Block(4.6, 4.8, "jerk")),
+    )
+    found = alone(path)
+    assert found.time[0] == run.time[2100]
+    assert [event.start for event in found.events] == [4.6]
+    assert "The run has gaps: compared from 0.53 s on." in found.remarks
+
+
+def test_of_a_run_with_nothing_but_gaps_nothing_is_compared(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    run = excitation(robot)
+    still = np.zeros_like(run.velocity)
+    valid = np.arange(len(run.time)) % 2 == 0
+    path = saved(tmp_path, robot, valid=valid, velocity=still, position=still)
+    assert "with at least 2 samples" in reason(path)
+
+
+def test_an_event_between_two_samples_has_no_contrast(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    found = alone(saved(tmp_path, robot, blocks=(Block(1.00001, 1.00002, "jerk"),)))
+    assert np.isnan(found.contrast).all()
+
+
+def test_mimic_joints_that_cannot_follow_move_by_themselves(tmp_path):
+    follow = '<mimic joint="nobody"/>'
+    found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
+    assert found.joints == 2
+    assert "move by themselves" in found.remarks[0]
+
+
+def test_mimic_joints_follow(tmp_path):
+    follow = '<mimic joint="joint1" multiplier="2"/>'
+    found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
+    assert found.joints == 1
+    assert len(found.comparison.names) == 2
+
+
+def rows(found):
+    """The numbers of a comparison, by robot and kind."""
+    return {(row["name"], row["kind"]): row for row in found.to_arrow().to_pylist()}
+
+
+@pytest.fixture(scope="module")
+def urdfs(tmp_path_factory):
+    """An arm, and another with a slider."""
+    return [arm(tmp_path_factory.mktemp("arm"), *kinds) for kinds in (ARM, SLIDING)]
+
+
+def test_a_robot_compared_with_itself_gives_equal_rows(urdfs):
+    table = compare([urdfs[0], urdfs[0]], kinds=FEW).to_arrow().to_pylist()
+    assert len(table) == 2 * len(FEW)
+    assert table[: len(FEW)] == table[len(FEW) :]
+
+
+def test_the_order_of_robots_does_not_matter(urdfs):
+    there, back = (compare(robots, kinds=FEW) for robots in (urdfs, urdfs[::-1]))
+    assert rows(there) == rows(back)
+    assert [one.name for one in there] == [one.name for one in back][::-1] == urdfs
+
+
+def test_many_robots_are_compared_as_each_alone(urdfs):
+    together = compare(urdfs, kinds=FEW)
+    for one, urdf in zip(together, urdfs, strict=True):
+        np.testing.assert_array_equal(one.pressure, alone(urdf).pressure)
+
+
+def test_a_robot_is_the_same_by_its_path_as_text_its_path_and_itself(urdfs):
+    robot = Robot.load(urdfs[0])
+    found = compare([urdfs[0], Path(urdfs[0]), robot], kinds=FEW)
+    assert [one.name for one in found] == [urdfs[0], urdfs[0], robot.name]
+    for one in found:
+        np.testing.assert_array_equal(one.pressure, found[0].pressure)
+
+
+def test_a_run_brings_its_robot_and_its_motion(urdfs, tmp_path):
+    robot = Robot.load(urdfs[0])
+    run = excitation(robot, seed=3)
+    run.save(tmp_path / "run.npz")
+    paths = (tmp_path / "run.npz", str(tmp_path / "run.npz"))
+    found = compare([run, *paths], kinds=FEW)
+    assert [one.name for one in found] == [urdfs[0], str(paths[0]), paths[1]]
+    expected = alone(robot, motion=run)
+    for one in found:
+        np.testing.assert_array_equal(one.pressure, expected.pressure)
+        assert one.events == run.blocks
+
+
+def test_a_run_a_pair_and_a_name_are_the_same_motion(urdfs):
+    robot = Robot.load(urdfs[0])
+    run = excitation(robot, seed=2)
+    pair = alone(robot, motion=robot.configuration(run), rate=run.rate)
+    np.testing.assert_array_equal(pair.pressure, alone(robot, motion=run).pressure)
+    named = alone(robot, motion="excitation", seed=2)
+    np.testing.assert_array_equal(pair.pressure, named.pressure)
+    assert (pair.events, len(named.events)) == ((), 3)
+
+
+def test_one_comparison_of_a_pair_is_that_of_its_configurations(urdfs):
+    robot = Robot.load(urdfs[0])
+    q, v = motion(robot, samples=400)
+    one = compare(robot, q, v, FEW, rate=1000.0)
+    found = alone(robot, motion=(q, v), rate=1000.0).comparison
+    for name in ("correlation", "distance", "shares", "terms"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(found, name))
+
+
+def test_each_robot_may_have_its_own_motion(urdfs):
+    runs = [excitation(Robot.load(urdf), seed=seed) for seed, urdf in enumerate(urdfs, start=1)]
+    apart = [alone(urdf, motion=run) for urdf, run in zip(urdfs, runs, strict=True)]
+    in_order = compare(urdfs, kinds=FEW, motion=runs)
+    by_name = compare(urdfs, kinds=FEW, motion=dict(zip(urdfs[::-1], runs[::-1], strict=True)))
+    for one, other, expected in zip(in_order, by_name, apart, strict=True):
+        np.testing.assert_array_equal(one.pressure, expected.pressure)
+        np.testing.assert_array_equal(other.pressure, expected.pressure)
+
+
+def test_a_surface_that_is_at_hand_is_taken(urdfs):
+    robot = Robot.load(urdfs[0])
+    found = alone(robot, surface=Surface.of(robot))
+    np.testing.assert_array_equal(found.pressure, alone(robot, surface="visual").pressure)
+
+
+def test_each_kind_is_evaluated_once(urdfs, monkeypatch):
+    """A, B and C are evaluated for their shares; "paper" is their sum."""
+    calls, evaluate = Counter(), estimates.chunk_speeds
+
+    def counted(robot, surface, q, v, kind):
+        calls[kind] += len(q)
+        return evaluate(robot, surface, q, v, kind)
+
+    monkeypatch.setattr("noisemodel.estimates.chunk_speeds", counted)
+    samples = len(alone(urdfs[0], ("simplified", "C", "paper", "mean", "normal")).time)
+    assert calls == dict.fromkeys(("A", "B", "C", "mean", "normal"), samples)
+
+
+def test_robots_are_compared_many_at_once_and_alike(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute")
+    sources = [str(robot.path), robot, excitation(robot), "ur3_empty", str(tmp_path / "none.urdf")]
+    one, two = (compare(sources, kinds=FEW, jobs=jobs) for jobs in (1, 2))
+    assert rows(one) == rows(two)
+    assert one.left_out == two.left_out
+    assert len(two) == 3
+    assert pickle.dumps(two)  # what workers hand back
+
+
+def test_robots_that_are_left_out_are_named_with_the_reason(urdfs, tmp_path):
+    missing = str(tmp_path / "none.urdf")
+    found = compare([missing, urdfs[0], "tallos"], kinds=FEW)
+    assert [one.name for one in found] == [urdfs[0]]
+    first, second = found.left_out
+    assert first == LeftOut(missing, "there is no such URDF file")
+    assert second.name == "tallos"
+    assert "did you mean 'talos'" in second.reason
+    assert str(found).splitlines()[-2:] == [str(first), str(second)]
+    assert str(first) == f"{missing}: left out: there is no such URDF file"
+
+
+def test_progress_passes_each_robot_on(urdfs):
+    passed = []
+
+    def progress(results, *, total):
+        for result in results:
+            passed.append((result.name, total))
+            yield result
+
+    found = compare([*urdfs, "tallos"], kinds=FEW, progress=progress)
+    assert passed == [(name, 3) for name in (*urdfs, "tallos")]
+    assert len(found) == 2
+
+
+def test_where_every_robot_is_left_out_the_reasons_remain():
+    found = compare("tallos", kinds=FEW)
+    assert (list(found), str(found)) == ([], str(found.left_out[0]))
+    with pytest.raises(NoiseModelError, match="no robot was compared; tallos: left out: no robot"):
+        found.to_arrow()
+
+
+def test_runs_that_do_not_suffice_are_left_out(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    assert "the run names no robot; `inspector import --robot`" in reason(
+        saved(tmp_path, robot, robot=None)
+    )
+    assert "the run has no positions" in reason(saved(tmp_path, robot, position=None))
+    assert "no robot 'robby'" in reason(saved(tmp_path, robot, robot="robby"))
+    assert "cannot be read" in reason(tmp_path / "none.npz")
+    short = excitation(robot)
+    short = dataclasses.replace(
+        short,
+        time=short.time[:40],
+        velocity=short.velocity[:40],
+        position=short.position[:40],
+        valid=None,
+        blocks=(),
+    )
+    short.save(tmp_path / "short.npz")
+    assert "40 samples at 4000 Hz, expected 0.1024 s at least" in reason(tmp_path / "short.npz")
+
+
+def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
+    assert "the URDF is empty" in reason("ur3_empty")
+    empty = arm(tmp_path, "revolute", shapes=[""])
+    assert reason(empty, surface="visual") == "no link has a surface by geometry 'visual'"
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        ({"kinds": ("paper", "loud")}, UnknownKindError, "no kind 'loud' of noise; .*simplified"),
+        ({"kinds": ("paper",)}, NoiseModelError, "are paper; expected two different ones or more"),
+        ({"kinds": "paper"}, NoiseModelError, "are paper; expected two different ones or more"),
+        ({"kinds": ("A", "A")}, NoiseModelError, "expected two different ones"),
+        ({"kinds": ()}, NoiseModelError, "expected two different ones"),
+        ({"surface": "skin"}, GeometryError, "geometry 'skin' is not known, .* visual, collision"),
+        (
+            {"motion": "dance"},
+            UnknownMotionError,
+            "no built-in motion 'dance'; there is excitation",
+        ),
+        ({"motion": ["excitation"] * 3}, NoiseModelError, "3 motions for 2 robots"),
+        ({"motion": {"panda": "excitation"}}, NoiseModelError, "for panda, expected .* panda, go2"),
+        ({"motion": 7}, NoiseModelError, "a motion is of type int, expected a Run, a pair"),
+        ({"motion": ["excitation", None]}, NoiseModelError, "a motion is of type NoneType"),
+        ({"motion": (np.zeros((9, 9)),) * 2}, NoiseModelError, "needs the rate of its samples"),
+        ({"robots": []}, NoiseModelError, "no robots to compare"),
+        ({"robots": ["panda", 3]}, NoiseModelError, "a robot is of type int, expected a Robot"),
+        ({"rate": 0.0}, NoiseModelError, "rate is 0 Hz"),
+        ({"seed": -1}, NoiseModelError, "seed is -1, expected 0 or more"),
+        ({"jobs": 0}, NoiseModelError, "jobs is 0, expected 1 or more"),
+        ({"events": [(0, 9)]}, NoiseModelError, "events are samples of q and v"),
+        ({"q": np.zeros((9, 9))}, NoiseModelError, "expected q, v and their rate"),
+        (
+            {"q": np.zeros((9, 9)), "v": np.zeros((9, 9)), "rate": 1e3},
+            NoiseModelError,
+            "q and v are given; expected one Robot",
+        ),
+    ],
+)
+def test_what_cannot_be_compared_is_refused_before_any_work(options, error, message):
+    with pytest.raises(error, match=message):
+        compare(**({"robots": ["panda", "go2"]} | options))
+
+
+def test_a_rate_beside_runs_alone_is_refused(urdfs):
+    run = excitation(Robot.load(urdfs[0]))
+    for options in ({"robots": run}, {"robots": urdfs[0], "motion": run}):
+        with pytest.raises(NoiseModelError, match="a rate of 10 Hz is given, but runs have their"):
+            compare(**options, rate=10.0)
+
+
+def test_one_surface_for_many_robots_is_refused(urdfs):
+    surface = Surface.of(Robot.load(urdfs[0]))
+    with pytest.raises(GeometryError, match="one surface for 2 robots, expected a geometry's name"):
+        compare(urdfs, surface=surface)
+
+
+def test_a_pair_that_is_not_the_robots_is_refused(urdfs):
+    q, v = np.zeros((200, 3)), np.zeros((200, 2))
+    with pytest.raises(MotionError, match=r"chain.urdf: q has shape \(200, 3\), expected \(200, 2"):
+        compare(urdfs[0], motion=(q, v), rate=1000.0)
+    v[7, 1] = np.nan
+    with pytest.raises(MotionError, match="v: nan in row 7, column 1"):
+        compare(urdfs[0], motion=(q[:, :2], v), rate=1000.0)
+
+
+def test_a_pair_of_runs_is_a_motion_for_each(urdfs):
+    runs = tuple(excitation(Robot.load(urdf)) for urdf in urdfs)
+    assert len(compare(urdfs, kinds=FEW, motion=runs)) == 2
+
+
+@pytest.fixture(scope="module")
+def thrice(urdfs):
+    """One robot that makes the excitation of three seeds."""
+    seeds = (compare(urdfs[1], kinds=THREE, seed=seed) for seed in (0, 1, 2))
+    return Comparisons(tuple(one for (one,) in seeds))
+
+
+def test_a_table_has_a_row_per_robot_and_medians(thrice):
+    lines = str(thrice).splitlines()
+    assert "Reference 'normal'" in lines[0]
+    assert sum("chain.urdf" in line for line in lines) == 3
+    assert sum(line.startswith("median of 3 fixed") for line in lines) == 1
+    assert not any("of 3 floating" in line for line in lines)
+    (row,) = (line for line in lines if line.startswith("normal"))
+    assert row.split()[1:5] == ["0.0"] * 4
+    assert len({line.index("A") for line in lines if line.split()[:3] == ["A", "B", "C"]}) == 1
+    assert max(map(len, lines)) <= 130
+
+
+def test_a_table_prints_the_numbers_of_the_comparison(thrice):
+    one = thrice[0]
+    row = next(line for line in str(Comparisons((one,))).splitlines() if "chain.urdf" in line)
+    shares = [f"{share:.0%}" for share in one.comparison.terms.sum(axis=0)]
+    numbers = [f"{n:.2f}" for n in one.comparison.correlation[2, :2]]
+    numbers += [f"{n:.1f}" for n in one.comparison.distance[2, :2]]
+    assert row.split()[1:8] == [*shares, *numbers]
+    assert row.endswith(one.comparison.loudest[0])
+
+
+def test_medians_pass_over_what_is_not_there():
+    rows = [np.array([1.0, np.nan, np.nan]), np.array([3.0, 5.0, np.nan])]
+    np.testing.assert_array_equal(medians(rows), [2.0, 5.0, np.nan])
+
+
+def test_an_arrow_table_has_a_row_per_robot_and_kind(thrice):
+    table = thrice.to_arrow()
+    assert table.num_rows == 3 * len(THREE)
+    assert table["kind"].to_pylist() == [*THREE] * 3
+    one, distances = thrice[1], table["distance_db"].to_pylist()[3:6]
+    np.testing.assert_array_equal(distances, one.comparison.distance[:, 2])
+    np.testing.assert_array_equal(table["contrast_jerk_db"][3:6], one.contrast[:, 2])
+    assert table["floating_base"].to_pylist() == [False] * 9
+
+
+def test_an_arrow_table_of_one_comparison_has_a_row_per_pair_of_kinds(thrice):
+    found = thrice[0].comparison
+    table = found.to_arrow()
+    assert table.column_names[:4] == ["kind", "other", "correlation", "distance_db"]
+    pairs = list(zip(table["kind"].to_pylist(), table["other"].to_pylist(), strict=True))
+    assert pairs == [(kind, other) for kind in THREE for other in THREE]
+    np.testing.assert_array_equal(table["correlation"], found.correlation.ravel())
+
+
+def test_one_robot_prints_its_name_over_its_comparison(thrice):
+    head, *rest = str(thrice[0]).splitlines()
+    assert head == f"{thrice[0].name}, 24000 samples at 4000 Hz"
+    assert "\n".join(rest) == str(thrice[0].comparison)
