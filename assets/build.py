@@ -19,7 +19,7 @@ import scenarios
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.training import recordings, train
-from noisemodel import Block, Run
+from noisemodel import Run
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.simulation import RECIPE
@@ -136,22 +136,16 @@ def demo() -> Run:
     """Cut the demo from a run: what the inspector shows, no more."""
     robot, scenario, seed, seconds = DEMO
     run = scenarios.simulate(robot, scenario, seed)
-    kept = slice(0, int(np.searchsorted(run.time, seconds)))
-    assert run.position is not None
-    assert run.velocity_desired is not None
+    cut = run.cut(-np.inf, seconds)
     return Run(
-        time=run.time[kept],
-        velocity=run.velocity[kept],
-        position=run.position[kept],
-        velocity_desired=run.velocity_desired[kept],
-        joint_names=run.joint_names,
-        robot=run.robot,
-        blocks=tuple(
-            Block(block.start, min(block.stop, seconds), block.label)
-            for block in run.blocks
-            if block.start < seconds
-        ),
-        meta=run.meta,
+        time=cut.time,
+        velocity=cut.velocity,
+        position=cut.position,
+        velocity_desired=cut.velocity_desired,
+        joint_names=cut.joint_names,
+        robot=cut.robot,
+        blocks=cut.blocks,
+        meta=cut.meta,
     )
 
 

@@ -13,7 +13,7 @@ from noisemodel.differentiate import stretches
 from noisemodel.errors import NoiseModelError, RobotError, RunError, UnknownMotionError
 from noisemodel.excitation import RATE, excitation
 from noisemodel.robot import Robot
-from noisemodel.run import Run
+from noisemodel.run import Run, part
 from noisemodel.speed import check_motion
 from noisemodel.types import Array, Real
 
@@ -243,18 +243,7 @@ def _of_run(robot: Robot, run: Run, remarks: tuple[str, ...]) -> Moving:
 def _longest(run: Run) -> Run:
     """Cut the longest stretch without a gap out of a run, with the blocks that lie in it."""
     parts = stretches(run.mask, len(run.time))
-    part = max(parts, key=lambda part: part.stop - part.start, default=slice(0, 1))
-    time = run.time[part]
+    longest = max(parts, key=lambda each: each.stop - each.start, default=slice(0, 1))
+    time = run.time[longest]
     within = [b for b in run.blocks if b.start >= time[0] and b.stop <= time[-1]]
-    assert run.position is not None
-    return Run(
-        time=time,
-        velocity=run.velocity[part],
-        position=run.position[part],
-        joint_names=run.joint_names,
-        base_pose=None if run.base_pose is None else run.base_pose[part],
-        base_velocity=None if run.base_velocity is None else run.base_velocity[part],
-        robot=run.robot,
-        blocks=tuple(within),
-        meta=run.meta,
-    )
+    return part(run, longest.start, longest.stop, blocks=tuple(within))

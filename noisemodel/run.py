@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -17,8 +17,21 @@ from noisemodel.block import Block
 from noisemodel.errors import RunError, RunFileError
 from noisemodel.types import Array, Mask, Real
 
+SAMPLED = (
+    "time",
+    "velocity",
+    "position",
+    "velocity_desired",
+    "position_desired",
+    "effort",
+    "valid",
+    "base_pose",
+    "base_velocity",
+)
+"""The fields of a run that hold a row or a value for each sample; ``stages`` hold such fields."""
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run:
     """One recording of one robot, in SI units; optional signals are None or empty.
 
@@ -97,6 +110,13 @@ class Run:
         ]
         return [(name, signal, width) for name, signal, width in signals if signal is not None]
 
+    def __repr__(self) -> str:
+        return (
+            f"Run({self.robot or 'no robot'}, {len(self.joint_names)} joints,"
+            f" {len(self.time)} samples at {self.rate:g} Hz, {self.duration:g} s,"
+            f" {len(self.blocks)} blocks)"
+        )
+
     @property
     def mask(self) -> Mask:
         """The samples that are not in a gap, shape (samples,)."""
@@ -122,6 +142,37 @@ class Run:
         if self.base_velocity is None:
             return self.velocity
         return np.hstack((self.base_velocity, self.velocity))
+
+    def cut(self, start: float, stop: float) -> "Run":
+        """The part of the run with ``start <= time < stop``, and all that belongs to it.
+
+        Args:
+            start: Time of the first sample or before it, in [s]; -inf for the beginning.
+            stop: Time after the last sample, in [s]; inf for the end.
+
+        Returns:
+            A run with the same times and names and the same meta. Blocks that reach out of the part
+            are clipped: to its first sample and to ``stop``.
+
+        Raises:
+            RunError: If the part has fewer than two samples, or gaps alone.
+        """
+        first, last = np.searchsorted(self.time, (start, stop)).tolist()
+        if last - first < 2:
+            raise RunError(
+                f"{max(0, last - first)} samples from {start:g} s to {stop:g} s, expected 2 at"
+                f" least; the run has {self.time[0]:g} s to {self.time[-1]:g} s"
+            )
+        clipped = [
+            Block(
+                float(self.time[first]) if block.start < start else block.start,
+                min(block.stop, stop),
+                block.label,
+            )
+            for block in self.blocks
+        ]
+        blocks = tuple(block for block in clipped if block.start < block.stop)
+        return part(self, first, last, blocks=blocks)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the run as a run file, whole or not at all.
@@ -156,6 +207,30 @@ class Run:
             return cls(**_fields(arrays, folder=path.parent))
         except RunError as error:
             raise RunFileError(path, str(error)) from error
+
+
+def part(run: Run, first: int, stop: int, **changes: Any) -> Run:
+    """Samples of a run, without its blocks.
+
+    Args:
+        run: The run.
+        first: Index of the first sample.
+        stop: Index after the last one.
+        changes: Other fields of the part, as ``dataclasses.replace`` takes them.
+
+    Returns:
+        The part, with the same names and meta.
+
+    Raises:
+        RunError: If the part has fewer than two samples, or gaps alone.
+    """
+    samples = slice(first, stop)
+    fields: dict[str, Any] = {
+        name: None if getattr(run, name) is None else getattr(run, name)[samples]
+        for name in SAMPLED
+    }
+    stages = {name: stage[samples] for name, stage in run.stages.items()}
+    return replace(run, **(fields | {"stages": stages, "blocks": ()} | changes))
 
 
 def _arrays(run: Run, *, folder: Path) -> dict[str, Any]:

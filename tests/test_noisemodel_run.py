@@ -1,16 +1,19 @@
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from noisemodel import Block, Run, RunError
+from noisemodel.run import part
 
 TIME = np.arange(100) / 1000
 
 
 def run(**changes):
-    given = {"time": TIME, "velocity": np.ones((100, 2)), "joint_names": ("a", "b")}
-    return Run(**(given | changes))
+    least = {"time": TIME, "velocity": np.ones((100, 2)), "joint_names": ("a", "b")}
+    return Run(**(least | changes))
 
 
 def test_time_and_velocity_alone_are_a_run():
@@ -123,3 +126,117 @@ def test_quaternions_in_gaps_are_not_looked_at():
     pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (100, 1))
     pose[50] = 0.0
     assert run(base_pose=pose, valid=np.arange(100) != 50).base_pose is not None
+
+
+def filled():
+    """A run with every signal, a gap, and two blocks."""
+    random = np.random.default_rng(0)
+    names = ("position", "velocity_desired", "position_desired", "effort")
+    valid = np.ones(100, dtype=bool)
+    valid[40:45] = False
+    signals = {name: random.standard_normal((100, 2)) * valid[:, None] for name in names}
+    pose = np.zeros((100, 7))
+    pose[:, 6] = 1.0
+    return run(
+        velocity=random.standard_normal((100, 2)) * valid[:, None],
+        stages={"motor": random.standard_normal((100, 2))},
+        valid=valid,
+        base_pose=pose,
+        base_velocity=random.standard_normal((100, 6)),
+        desired_joint_names=("c", "d"),
+        robot="panda",
+        blocks=(Block(0.0, 0.0205, "ok"), Block(0.0205, 0.08, "impact")),
+        meta={"seed": 1},
+        **signals,
+    )
+
+
+def same(one, other):
+    """Compare two runs field by field."""
+    for field in fields(Run):
+        left, right = getattr(one, field.name), getattr(other, field.name)
+        if isinstance(left, np.ndarray):
+            np.testing.assert_array_equal(left, right)
+        elif field.name == "stages":
+            assert set(left) == set(right)
+            for name in left:
+                np.testing.assert_array_equal(left[name], right[name])
+        else:
+            assert left == right
+    return True
+
+
+@pytest.mark.parametrize("stretch", [(-np.inf, np.inf), (0.0, 1.0), (-5.0, 0.0991)])
+def test_a_cut_of_everything_is_the_run(stretch):
+    whole = filled()
+    assert same(whole.cut(*stretch), whole)
+
+
+@given(
+    st.tuples(*[st.floats(-0.01, 0.11)] * 4).filter(
+        lambda t: min(t[1], t[3]) - max(t[0], t[2]) > 0.02 and t[0] < t[1] and t[2] < t[3]
+    )
+)
+def test_cutting_twice_is_cutting_once(times):
+    first, stop, later, earlier = times
+    twice = filled().cut(first, stop).cut(later, earlier)
+    assert same(twice, filled().cut(max(first, later), min(stop, earlier)))
+
+
+def test_a_cut_holds_the_samples_from_its_start_to_before_its_stop():
+    whole, cut = filled(), filled().cut(0.02, 0.05)
+    assert cut.time[0] == whole.time[20]
+    assert cut.time[-1] == whole.time[49]
+    for name in ("velocity", "position", "effort", "valid", "base_pose", "base_velocity"):
+        np.testing.assert_array_equal(getattr(cut, name), getattr(whole, name)[20:50])
+    np.testing.assert_array_equal(cut.stages["motor"], whole.stages["motor"][20:50])
+    assert (cut.robot, cut.meta, cut.joint_names) == (whole.robot, whole.meta, whole.joint_names)
+
+
+def test_the_halves_of_a_run_are_the_run():
+    whole = filled()
+    halves = whole.cut(-np.inf, 0.033), whole.cut(0.033, np.inf)
+    for name in ("time", "velocity", "velocity_desired", "valid"):
+        joined = np.concatenate([getattr(half, name) for half in halves])
+        np.testing.assert_array_equal(joined, getattr(whole, name))
+
+
+def test_blocks_are_clipped_to_a_cut():
+    assert filled().cut(0.01, 0.05).blocks == (
+        Block(0.01, 0.0205, "ok"),
+        Block(0.0205, 0.05, "impact"),
+    )
+    assert filled().cut(0.0301, 0.09).blocks == (Block(TIME[31], 0.08, "impact"),)
+    assert filled().cut(0.08, 0.09).blocks == ()
+
+
+@pytest.mark.parametrize(
+    ("stretch", "message"),
+    [
+        (
+            (0.05, 0.05),
+            "0 samples from 0.05 s to 0.05 s, expected 2 at least; the run has 0 s to 0",
+        ),
+        ((0.05, 0.01), "0 samples from 0.05 s to 0.01 s"),
+        ((0.05, 0.0505), "1 samples from"),
+        ((7.0, 8.0), "0 samples from 7 s to 8 s, .* the run has 0 s to 0.099 s"),
+        ((np.nan, np.nan), "0 samples from nan s"),
+        ((0.04, 0.0445), "false in every sample"),
+    ],
+)
+def test_an_empty_cut_is_refused(stretch, message):
+    with pytest.raises(RunError, match=message):
+        filled().cut(*stretch)
+
+
+def test_a_part_has_no_blocks_and_the_changes_that_are_given():
+    whole = filled()
+    found = part(whole, 10, 30, effort=None)
+    assert (found.blocks, found.effort) == ((), None)
+    np.testing.assert_array_equal(found.position, whole.position[10:30])
+
+
+def test_a_run_is_represented_in_one_line():
+    line = "Run(panda, 2 joints, 100 samples at 1000 Hz, 0.1 s, 2 blocks)"
+    assert repr(filled()) == line
+    assert repr(run()) == "Run(no robot, 2 joints, 100 samples at 1000 Hz, 0.1 s, 0 blocks)"

@@ -1,7 +1,8 @@
 """The audit: what a log can show, and what looks wrong with it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from inspector.audit.sight import ClassSight, Sight, sights
 from inspector.audit.units import unit_doubts
 from inspector.library import for_robot, signals_of
 from noisemodel import Run
-from noisemodel.types import Real
+from noisemodel.run import part
 
 
 @dataclass(frozen=True)
@@ -179,22 +180,10 @@ def excerpt(run: Run) -> Run:
     speed = np.einsum("sj,sj->s", run.velocity, run.velocity)
     fastest = int(np.argmax(np.where(run.mask, speed, -1.0)))
     start = min(max(0, fastest - LONGEST // 2), len(run.time) - LONGEST)
-    part = slice(start, start + LONGEST)
-
-    def cut(signal: Real | None) -> Real | None:
-        return None if signal is None else signal[part]
-
-    return replace(
-        run,
-        time=run.time[part],
-        velocity=run.velocity[part],
-        position=cut(run.position),
-        velocity_desired=cut(run.velocity_desired),
-        position_desired=cut(run.position_desired),
-        valid=run.mask[part],
-        effort=None,
-        base_pose=None,
-        base_velocity=None,
-        stages={},
-        blocks=(),
-    )
+    motion_alone: dict[str, Any] = {
+        "effort": None,
+        "base_pose": None,
+        "base_velocity": None,
+        "stages": {},
+    }
+    return part(run, start, start + LONGEST, **motion_alone)

@@ -8,6 +8,7 @@ import numpy as np
 from inspector.errors import InspectorError
 from inspector.pair.alignment import Alignment
 from noisemodel import Block, Run, decimated
+from noisemodel.run import part
 from noisemodel.types import Array, Real
 
 SAME_RATE = 1e-3
@@ -82,11 +83,6 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
     return cut_before, cut_after, tuple(remarks)
 
 
-def part(run: Run, first: int, stop: int) -> Run:
-    """Cut samples out of a run, those of its blocks that lie there included."""
-    return _cut(run, first, stop, run.time[first:stop])
-
-
 def _at_rate(run: Run, rate: float) -> Run:
     """Lower a run, but keep the positions that its links are placed by."""
     if run.rate <= rate * (1 + SAME_RATE):
@@ -108,25 +104,8 @@ def _at_rate(run: Run, rate: float) -> Run:
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
     """Take samples out of a run and give them other times."""
-    inside = slice(first, stop)
-
-    def at(signal: Real | None) -> Real | None:
-        return None if signal is None else signal[inside]
-
-    return replace(
-        run,
-        time=time,
-        velocity=run.velocity[inside],
-        position=at(run.position),
-        velocity_desired=at(run.velocity_desired),
-        position_desired=at(run.position_desired),
-        stages={name: stage[inside] for name, stage in run.stages.items()},
-        effort=at(run.effort),
-        valid=run.mask[inside],
-        base_pose=at(run.base_pose),
-        base_velocity=at(run.base_velocity),
-        blocks=_moved(run, float(time[0] - run.time[first]), float(time[0]), float(time[-1])),
-    )
+    blocks = _moved(run, float(time[0] - run.time[first]), float(time[0]), float(time[-1]))
+    return part(run, first, stop, time=time, blocks=blocks)
 
 
 def _moved(run: Run, shift: float, start: float, stop: float) -> tuple[Block, ...]:

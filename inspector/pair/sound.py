@@ -3,10 +3,10 @@
 import numpy as np
 
 from inspector.errors import InspectorError
-from inspector.pair.common import part
 from inspector.pair.pair import Pair
 from inspector.sound.sonification import Settings, common_gain, sound_of
 from inspector.sound.sound import SMALL_RATE
+from noisemodel.run import part
 
 MOST = 8_000_000
 """Velocities of a run that are mixed: a second of work."""

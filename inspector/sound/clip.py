@@ -10,6 +10,7 @@ from inspector.errors import InspectorError
 from inspector.sound.sonification import Settings, common_gain, description, sound_of
 from inspector.sound.sound import SMALL_RATE
 from noisemodel import Run
+from noisemodel.run import part
 
 MOST_VELOCITIES = 4_000_000
 """Largest number of velocities that are mixed: 6 s of 32 joints at 10 kHz, within 0.25 s."""
@@ -64,7 +65,7 @@ def clip(run: Run, *, around: float = 0.0, lead: bool = False) -> Clip | None:
     """
     first, last = _kept(run, around)
     try:
-        sound = replace(sound_of(_part(run, first, last), Settings()), playing=SMALL_RATE)
+        sound = replace(sound_of(part(run, first, last), Settings()), playing=SMALL_RATE)
     except InspectorError:
         return None
     gain = common_gain([sound])
@@ -84,22 +85,3 @@ def _kept(run: Run, around: float) -> tuple[int, int]:
     middle = int(np.searchsorted(run.time, around))
     first = min(max(middle - count // 2, 0), len(run.time) - count)
     return first, first + count
-
-
-def _part(run: Run, first: int, last: int) -> Run:
-    """Run of a part of the velocities."""
-    part = slice(first, last)
-    return replace(
-        run,
-        time=run.time[part],
-        velocity=run.velocity[part],
-        velocity_desired=None if run.velocity_desired is None else run.velocity_desired[part],
-        base_velocity=None if run.base_velocity is None else run.base_velocity[part],
-        valid=run.mask[part],
-        position=None,
-        position_desired=None,
-        base_pose=None,
-        effort=None,
-        stages={},
-        blocks=(),
-    )
