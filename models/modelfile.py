@@ -7,18 +7,19 @@ made. The same model is the same bytes. Version 4 is read too: it differs in two
 
 import io
 import json
+import os
 import zipfile
 from collections.abc import Mapping
 from math import prod
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from models.atomic import write_bytes
-from models.errors import ModelFileError, ProfileError
+from models.errors import ModelFileError, OutputError, ProfileError
 from models.estimators.estimator import DIMENSIONS, shapes
 from models.features import feature_count
 from models.labels import ANOMALY
@@ -56,7 +57,35 @@ def write(
     text = json.dumps({"format": FORMAT, **manifest}, sort_keys=True, allow_nan=False)
     content = io.BytesIO()
     np.savez(content, allow_pickle=False, manifest=np.array(text), **arrays)  # dated 1980 always
-    write_bytes(path, content.getvalue(), overwrite=overwrite)
+    _replace(Path(path), content.getvalue(), overwrite=overwrite)
+
+
+def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
+    """Write a file beside its place, and move it there when it is safely on the disk.
+
+    `noisemodel.atomic` offers a path for other writers; this package must not import it.
+    """
+    if path.is_dir():
+        raise OutputError(path, "is a folder; name a file")
+    if path.exists() and not overwrite:
+        raise OutputError(
+            path, "exists already; choose another name, or overwrite it (--overwrite)"
+        )
+    temporary = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
+    try:
+        file = temporary.open("xb")
+    except OSError as error:
+        raise OutputError(path, f"cannot be written ({error.strerror})") from error
+    try:
+        with file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:

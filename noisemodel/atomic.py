@@ -1,10 +1,9 @@
-"""Write a file whole or not at all."""
+"""Files that are written whole or not at all."""
 
-import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from uuid import uuid4
 
 from noisemodel.errors import OutputError
 
@@ -25,15 +24,13 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     refuse_existing(path, overwrite=overwrite)
+    temporary = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
     try:
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        temporary.touch(exist_ok=False)  # with the permissions that the umask leaves to any file
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
-    os.close(handle)
-    temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())
         temporary.replace(path)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
@@ -60,10 +57,3 @@ def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
         )
     if not path.parent.is_dir():
         raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
-
-
-def _umask() -> int:
-    """Read the process's umask (POSIX only tells it by setting it)."""
-    mask = os.umask(0o077)
-    os.umask(mask)
-    return mask

@@ -106,6 +106,18 @@ def test_a_model_is_not_overwritten_unless_asked(path):
     assert path.read_bytes() == before
 
 
+@pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
+def test_a_model_has_the_permissions_of_any_new_file(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        CLASSIFIER.save(tmp_path / "model.npz")
+        (tmp_path / "other").touch()
+    finally:
+        os.umask(before)
+    found, expected = ((tmp_path / name).stat().st_mode for name in ("model.npz", "other"))
+    assert found == expected
+
+
 def test_a_failed_write_leaves_nothing_behind(path, monkeypatch):
     def fail(_):
         raise OSError(28, "No space left on device")

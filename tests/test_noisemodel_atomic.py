@@ -23,9 +23,14 @@ def test_nothing_is_seen_under_the_name_before_the_end(tmp_path):
         assert not (tmp_path / "out.txt").exists()
 
 
-def test_the_file_has_the_permissions_of_any_new_file(tmp_path):
-    write(tmp_path / "out.txt", "")
-    (tmp_path / "other.txt").touch()
+@pytest.mark.parametrize("mask", [0o022, 0o027, 0o077])
+def test_the_file_has_the_permissions_of_any_new_file(tmp_path, mask):
+    before = os.umask(mask)
+    try:
+        write(tmp_path / "out.txt", "")
+        (tmp_path / "other.txt").touch()
+    finally:
+        os.umask(before)
     assert (tmp_path / "out.txt").stat().st_mode == (tmp_path / "other.txt").stat().st_mode
 
 
