@@ -73,3 +73,8 @@ __all__ = [
     "simplified",
     "surface_speed",
 ]
+
+
+def __dir__() -> list[str]:
+    """Public names alone: submodules are found by importing them."""
+    return __all__
