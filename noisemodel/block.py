@@ -10,7 +10,7 @@ class Block:
     Attributes:
         start: Time of its first sample, in [s].
         stop: Time of its end, in [s].
-        label: The class that somebody or some simulator gave it.
+        label: The class that an annotator or a simulator gave it.
     """
 
     start: float

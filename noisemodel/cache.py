@@ -17,7 +17,7 @@ from noisemodel.errors import OutputError
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 DIGEST = 32
-"""Bytes after the archive that tell whether it is whole; npz does not mind them."""
+"""Bytes after the archive that show whether it is whole; npz does not mind them."""
 
 
 def remembered(key: str, make: Callable[[], Arrays]) -> Arrays:

@@ -1,4 +1,4 @@
-"""The robots that can be had by name: those of example-robot-data."""
+"""The robots that can be loaded by name: those of example-robot-data."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -75,7 +75,7 @@ def compare(
     are those of F. Sygulla and D. Rixen, "Learning the Noise of Failure", Sec. II-A, and of
     ``surface_speed``.
 
-    ``compare(robot, q, v, kinds, rate=rate)`` compares on one motion of one robot that is at hand.
+    ``compare(robot, q, v, kinds, rate=rate)`` compares on one motion of one ``Robot``.
     ``compare(robots, motion=..., kinds=...)`` compares on one robot or many. It leaves out robots
     that cannot be read or have no surface, and runs that do not suffice, and lists them with the
     reason.
@@ -190,7 +190,7 @@ def _compare(
         comparison=found.compared(rate),
         pressure=found.pressure / np.where(rms > 0.0, rms, 1.0),
         contrast=_contrasts(found.pressure, moving),
-        links_with_surface=len(surface.names) - len(surface.bare),
+        links_with_surface=len(surface.names) - len(surface.without_geometry),
         remarks=moving.remarks,
     )
 

@@ -101,7 +101,7 @@ class Comparison:
         )
 
     def pair(self, kind: int, other: int) -> dict[str, float]:
-        """Numbers that tell two kinds apart, by the names of their columns in a table.
+        """Correlation and distances of two kinds, by the names of their columns in a table.
 
         Args:
             kind: Index of a kind.

@@ -1,4 +1,4 @@
-"""A lower sample rate, as a slower logger would have seen the same motion."""
+"""Runs decimated to a lower sample rate, as a logger of that rate would have seen the motion."""
 
 from dataclasses import replace
 from fractions import Fraction
@@ -14,13 +14,13 @@ EDGE = 10
 
 
 def decimated(run: Run, rate: float) -> Run:
-    """Low-pass and decimate the velocities of a run.
+    """The run at a lower rate: its velocities, low-pass filtered and decimated.
 
     The noise of a run at a lower rate is computed after this: it is not the decimated noise.
 
     Args:
         run: The run.
-        rate: The rate to come down to, in [Hz].
+        rate: The lower sample rate, in [Hz].
 
     Returns:
         A run with its velocities alone (measured, desired, base, stages), its names, blocks and
@@ -31,14 +31,14 @@ def decimated(run: Run, rate: float) -> Run:
     """
     ratio = Fraction(rate / run.rate).limit_denominator(1000)  # jitter of 0.1 % is none
     if not 0 < ratio <= 1:
-        raise RunError(f"a run of {run.rate:g} Hz cannot be lowered to {rate:g} Hz")
+        raise RunError(f"a run of {run.rate:g} Hz cannot be decimated to {rate:g} Hz")
     samples = int(len(run.time) * ratio)
     if samples < 2:
         raise RunError(f"{run.duration:.3g} s of motion are too short for {rate:g} Hz")
     if ratio == 1:
         return run
 
-    def slower(signal: Real | None) -> Real | None:
+    def optional(signal: Real | None) -> Real | None:
         return None if signal is None else _resampled(signal, ratio)[:samples]
 
     time = run.time[0] + np.arange(samples) / rate
@@ -52,8 +52,8 @@ def decimated(run: Run, rate: float) -> Run:
         run,
         time=time,
         velocity=velocity,
-        velocity_desired=slower(run.velocity_desired),
-        base_velocity=slower(run.base_velocity),
+        velocity_desired=optional(run.velocity_desired),
+        base_velocity=optional(run.base_velocity),
         stages={name: _resampled(stage, ratio)[:samples] for name, stage in run.stages.items()},
         position=None,
         position_desired=None,
@@ -66,7 +66,7 @@ def decimated(run: Run, rate: float) -> Run:
 def _resampled(signal: Real, ratio: Fraction) -> Real:
     from scipy.signal import resample_poly
 
-    lower: Real = resample_poly(
+    resampled: Real = resample_poly(
         signal.astype(np.float64), ratio.numerator, ratio.denominator, axis=0, padtype="line"
     )
-    return lower
+    return resampled

@@ -13,7 +13,7 @@ from noisemodel.types import Array, Mask, Real
 WINDOW, ORDER = 7, 3
 METHOD = f"Savitzky-Golay, window {WINDOW}, order {ORDER}"
 SOURCES = {"velocity": "position", "velocity_desired": "position_desired"}
-"""The joint velocities and the positions that each can be had from."""
+"""The joint velocities and the positions that each can be differentiated from."""
 
 
 def fill_in(

@@ -1,4 +1,4 @@
-"""Radiation of small bodies that move to and fro: the slower, the less they are heard.
+"""Radiation of small bodies that oscillate: the lower the frequency, the less they radiate.
 
 A sphere of radius a that oscillates at the frequency f radiates with the efficiency
 x^4 / (4 + x^4), x = 2 pi f a / c. That is the squared magnitude of a Butterworth high-pass of
@@ -47,12 +47,13 @@ class Dipole:
         from scipy.signal import butter
 
         corners = corner_frequencies(surface, sound_speed=sound_speed)
-        heard = np.flatnonzero(surface.area)
-        small = [link for link in heard if corners[link] >= 0.5 * rate]
+        sources = np.flatnonzero(surface.area)
+        small = [link for link in sources if corners[link] >= 0.5 * rate]
         if small:
             raise CornerError([surface.names[i] for i in small], corners[small].tolist(), rate)
         self._filters = {
-            int(link): butter(2, corners[link], "highpass", fs=rate, output="sos") for link in heard
+            int(link): butter(2, corners[link], "highpass", fs=rate, output="sos")
+            for link in sources
         }
         self._states: dict[int, Array] = {}
 

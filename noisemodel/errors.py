@@ -1,4 +1,4 @@
-"""What can be wrong with a run or a robot: one base error, subclasses that keep their facts."""
+"""Errors of runs, robots and noise estimates: one base, subclasses that keep their facts."""
 
 from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
@@ -68,7 +68,7 @@ class UnknownKindError(NoiseModelError):
 
 
 class CornerError(NoiseModelError):
-    """A sample rate at which the radiation of small links cannot be told.
+    """A sample rate that is too low for the radiation of small links.
 
     Args:
         links: The links that are too small.
@@ -88,7 +88,7 @@ class CornerError(NoiseModelError):
 
 
 class GeometryError(NoiseModelError):
-    """A robot whose surface cannot be had."""
+    """A robot whose surface is unknown or cannot be read."""
 
 
 class MeshError(GeometryError):
@@ -105,7 +105,7 @@ class MeshError(GeometryError):
 
 
 class MissingMeshError(MeshError):
-    """A mesh that the URDF names and nobody has."""
+    """A mesh that the URDF names and that does not exist."""
 
     def __init__(self, mesh: str | Path, problem: str) -> None:
         super().__init__(mesh, problem)
@@ -116,7 +116,7 @@ class UnknownRobotError(RobotError):
     """A name that is no listed robot, and no URDF file either.
 
     Args:
-        name: The name that was asked for.
+        name: The name that was given.
         known: The names that are listed.
     """
 
@@ -132,7 +132,7 @@ class UnknownJointError(RobotError):
     """A run names a joint that the robot does not have.
 
     Args:
-        joint: The joint that was asked for.
+        joint: The joint that the run names.
         robot: The name of the robot.
         known: The joints that the robot has.
     """
@@ -143,6 +143,6 @@ class UnknownJointError(RobotError):
 
 
 def hint(name: str, known: Iterable[str]) -> str:
-    """Say which known name was probably meant, or nothing."""
+    """The known name that is closest, as a question; empty if none is close."""
     close = get_close_matches(name, list(known), n=1, cutoff=0.7)
     return f" (did you mean {close[0]!r}?)" if close else ""

@@ -1,16 +1,17 @@
-"""A motion that any robot can make, without a simulator: slow travel, ripple, two shakes, a jerk.
+"""Excitation motion of any robot without a simulator: slow sines, ripple, two shakes, a jerk.
 
-Every joint travels by three slow sines and ripples a little at all frequencies above, as real
-drives do. A floating base sways in the same way at a tenth of the speed. Three events stand out:
+Every joint follows three slow sines, its travel, with a small ripple at all frequencies above, as
+of real drives. A floating base moves in the same way at a tenth of the speed. There are three
+events:
 
 - ``shake-near`` and ``shake-far``: the joint that carries most of the robot and the one at the end
-  of the longest chain vibrate, one after the other, equally fast and at one frequency. To the
-  simplified noise they are alike;
-- ``jerk``: all joints change their speed within one sample, and recover.
+  of the longest chain vibrate, one after the other, equally fast and at one frequency. The
+  simplified noise does not distinguish them;
+- ``jerk``: the speed of all joints jumps within one sample, and the jump decays.
 
 Positions keep to the limits of the URDF: the travel of a joint with little room or speed is scaled
 down. Limits that leave no room at all (lower = upper) or no speed are not taken for limits. Joints
-that mimic another one follow it; the base's place makes no noise and stays at the origin.
+that mimic another one follow it; the base's pose does not change the noise and stays at the origin.
 """
 
 from typing import NamedTuple
@@ -27,16 +28,16 @@ from noisemodel.types import Array
 SECONDS = 6.0
 RATE = 4000.0
 """Sample rate unless another is given, in [Hz]."""
-PACE = {"prismatic": 0.3}
+NOMINAL_SPEED = {"prismatic": 0.3}
 """Speed of the travel in [m/s]; of joints that turn it is 1 rad/s."""
-BASE_PACE = 0.1
+BASE_SPEED = 0.1
 """Speed of a floating base, in [m/s] and [rad/s]."""
 TRAVEL_HZ = (0.1, 0.8)
 SINES = 3
 RIPPLE = 0.01
-"""Root mean square of the ripple, as a share of the joint's pace."""
+"""Root mean square of the ripple, as a share of the joint's nominal speed."""
 RIPPLE_HZ = 10.0
-"""The ripple begins here, and has the same power in every octave above."""
+"""Lowest frequency of the ripple, which has the same power in every octave above, in [Hz]."""
 ROOM = 0.9
 """Share of its room and its speed that a joint may use for its travel."""
 SHAKE = 0.2
@@ -45,11 +46,11 @@ SHAKE_HZ = (40.0, 200.0)
 SHAKES = {"shake-near": (1.0, 1.8), "shake-far": (2.6, 3.4)}
 JERK = (4.6, 4.8)
 JERK_DECAY = 0.03
-"""Time in which the change of speed is taken back, in [s]."""
+"""Time constant of the decay of the jump, in [s]."""
 
 
 class Limits(NamedTuple):
-    """What a robot's joints can do, each of shape (joints,); inf where nothing is said.
+    """Limits of a robot's joints, each of shape (joints,); inf where the URDF has none.
 
     Attributes:
         centre: Middle of the range, 0 without one, in [rad] or [m].
@@ -86,8 +87,8 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     random = np.random.default_rng(seed)
     time = np.arange(round(SECONDS * rate)) / rate
     joints = {joint.name: joint for joint in robot.joints if joint.name in robot.joint_names}
-    pace = np.array([PACE.get(joint.kind, 1.0) for joint in joints.values()])
-    velocity = _wander(time, len(joints), random, rate) * pace
+    speed = np.array([NOMINAL_SPEED.get(joint.kind, 1.0) for joint in joints.values()])
+    velocity = _travel_and_events(time, len(joints), random, rate) * speed
     bounds = limits(robot)
     position = np.cumsum(velocity, axis=0) / rate
     low, high = _extent(position)
@@ -100,7 +101,7 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
         column = robot.joint_names.index(joint)
         velocity[:, column] += SHAKE * _burst(time, start, stop, hertz)
         blocks.append(Block(start, stop, label))
-    base = BASE_PACE * _wander(time, 6, random, rate) if robot.floating_base else None
+    base = BASE_SPEED * _travel_and_events(time, 6, random, rate) if robot.floating_base else None
     return Run(
         time=time,
         velocity=velocity,
@@ -114,7 +115,7 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
 
 
 def limits(robot: Robot) -> Limits:
-    """Read what the URDF says about each joint that moves by itself.
+    """Limits in the URDF of each joint that does not mimic another one.
 
     Args:
         robot: The robot.
@@ -137,7 +138,7 @@ def limits(robot: Robot) -> Limits:
 
 
 def ends(robot: Robot) -> tuple[str, ...]:
-    """Name the joint that carries most and the one at the end of the longest chain.
+    """Names of the joint that carries most and the one at the end of the longest chain.
 
     Args:
         robot: The robot.
@@ -162,14 +163,14 @@ def ends(robot: Robot) -> tuple[str, ...]:
     return tuple(dict.fromkeys(robot.joints[index - 1].name for index in (near, far)))
 
 
-def _wander(time: Array, axes: int, random: np.random.Generator, rate: float) -> Array:
-    """Travel, ripple and jerk of each axis at a pace of 1, shape (samples, axes)."""
+def _travel_and_events(time: Array, axes: int, random: np.random.Generator, rate: float) -> Array:
+    """Travel, ripple and jerk of each axis at a nominal speed of 1, shape (samples, axes)."""
     travel = _travel(time, axes, random)
     ripple = RIPPLE * _ripple(len(time), axes, random, rate)
     after = np.maximum(time - JERK[0], 0.0)
     jump = 0.5 * (time >= JERK[0]) * np.exp(-after / JERK_DECAY)
-    wander: Array = travel + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
-    return wander
+    velocity: Array = travel + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
+    return velocity
 
 
 def _travel(time: Array, axes: int, random: np.random.Generator) -> Array:
@@ -191,7 +192,7 @@ def _ripple(samples: int, axes: int, random: np.random.Generator, rate: float) -
 
 
 def _burst(time: Array, start: float, stop: float, hertz: float) -> Array:
-    """Swell and fade away between two times, shape (samples,)."""
+    """A sine with a Hann envelope between two times, shape (samples,)."""
     place = np.clip((time - start) / (stop - start), 0.0, 1.0)
     burst: Array = np.sin(np.pi * place) ** 2 * np.sin(2.0 * np.pi * hertz * time)
     return burst

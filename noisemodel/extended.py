@@ -40,22 +40,23 @@ def extended(
         density: Of the air, in [kg/m³].
         sound_speed: In [m/s].
         efficiency: Radiation efficiency: one for all links, one for each, shape (links,), or
-            "dipole", that of a small body that moves to and fro, by its frequency (see
+            "dipole", that of a small body that oscillates, by its frequency (see
             ``noisemodel.dipole``). With the kind "normal" that is the physics; the motion that
             the other kinds see is filtered alike, so that they can be compared.
         rate: Sample rate, which only "dipole" needs, in [Hz].
         q_desired: Desired configurations, shape (samples, nq); ``q`` unless given.
         v_desired: Desired velocities, shape (samples, nv); the power of this motion is added.
-            A floating base rests in it, whatever is given.
+            A floating base is stationary in it, whatever is given.
 
     Returns:
         The sound power of every link.
 
     Raises:
-        UnknownKindError: If there is no such kind.
+        UnknownKindError: If the kind does not exist.
         GeometryError: If the surface is that of another robot.
         CornerError: If a link is too small for "dipole" at this rate.
-        NoiseModelError: If a motion or a number cannot be.
+        MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
+        NoiseModelError: If a number is not positive, or lengths differ.
     """
     chunks = extended_chunks(
         robot,
@@ -111,13 +112,14 @@ def extended_chunks(
         chunk: Samples in each chunk but the last.
 
     Returns:
-        The noise of one chunk after the other; nothing is computed before it is asked for.
+        The noise of one chunk after the other; each is computed when it is taken.
 
     Raises:
-        UnknownKindError: If there is no such kind.
+        UnknownKindError: If the kind does not exist.
         GeometryError: If the surface is that of another robot.
         CornerError: If a link is too small for "dipole" at this rate.
-        NoiseModelError: If a motion or a number cannot be.
+        MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
+        NoiseModelError: If a number is not positive, or lengths differ.
     """
     check_kind(kind)
     check_surface(surface, robot)
@@ -126,15 +128,15 @@ def extended_chunks(
     check_positive("sound_speed", sound_speed, "m/s")
     check_positive("chunk", chunk, "samples")
 
-    def motion(q: Real, v: Real, *, base_rests: bool = False) -> _Motion:
+    def motion(q: Real, v: Real, *, base_stationary: bool = False) -> _Motion:
         if not isinstance(efficiency, str):
-            return _Motion(q, v, None, base_rests)
+            return _Motion(q, v, None, base_stationary)
         if efficiency != "dipole":
             raise NoiseModelError(f"efficiency is {efficiency!r}, expected numbers or 'dipole'")
         if rate is None:
             raise NoiseModelError("efficiency 'dipole' needs the rate of the samples, in Hz")
         check_positive("rate", rate, "Hz")
-        return _Motion(q, v, Dipole(surface, rate=rate, sound_speed=sound_speed), base_rests)
+        return _Motion(q, v, Dipole(surface, rate=rate, sound_speed=sound_speed), base_stationary)
 
     motions = [motion(q, v)]
     if v_desired is not None:
@@ -142,9 +144,11 @@ def extended_chunks(
         check_motion(robot, wanted, v_desired, names=("q_desired", "v_desired"))
         if len(v_desired) != len(v):
             raise NoiseModelError(f"v has {len(v)} samples, v_desired {len(v_desired)}")
-        motions.append(motion(wanted, v_desired, base_rests=robot.floating_base))
+        motions.append(motion(wanted, v_desired, base_stationary=robot.floating_base))
     elif q_desired is not None:
-        raise NoiseModelError("q_desired is given and v_desired is not; positions make no noise")
+        raise NoiseModelError(
+            "q_desired is given and v_desired is not; positions alone radiate nothing"
+        )
     efficiencies = _efficiencies(efficiency, surface)
 
     def chunks() -> Iterator[Noise]:
@@ -171,17 +175,17 @@ class _Motion:
         q: Configurations, shape (samples, nq).
         v: Velocities, shape (samples, nv).
         dipole: The filter that it passes, or None.
-        base_rests: Whether the velocities of the floating base count as 0.
+        base_stationary: Whether the velocities of the floating base count as 0.
     """
 
     q: Real
     v: Real
     dipole: Dipole | None
-    base_rests: bool
+    base_stationary: bool
 
     def speeds(self, robot: Robot, surface: Surface, part: slice, kind: str) -> Array:
         v = self.v[part]
-        if self.base_rests:
+        if self.base_stationary:
             v = np.hstack((np.zeros((len(v), 6)), v[:, 6:]))
         return chunk_speeds(robot, surface, self.q[part], v, kind, self.dipole)
 

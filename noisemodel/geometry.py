@@ -25,7 +25,7 @@ GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "auto": ("visual", "collision"),
     }
 )
-"""What can be asked for, and what is taken for it from the URDF: the first that a link has."""
+"""The geometries, and the shapes in the URDF that each takes: the first that a link has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class LinkTriangles:
     missing: tuple[str, ...]
 
     @property
-    def bare(self) -> tuple[str, ...]:
+    def without_geometry(self) -> tuple[str, ...]:
         """Names of the links without geometry."""
         return tuple(
             name for name, kind in zip(self.names, self.kind, strict=True) if kind == "none"
@@ -59,8 +59,8 @@ class LinkTriangles:
     def __str__(self) -> str:
         count = sum(map(len, self.triangles))
         lines = [f"{count} triangles on {len(self.names)} links"]
-        if self.bare:
-            lines.append(f"without geometry: {', '.join(self.bare)}")
+        if self.without_geometry:
+            lines.append(f"without geometry: {', '.join(self.without_geometry)}")
         if self.missing:
             lines.append(f"not found: {', '.join(self.missing)}")
         return "\n".join(lines)

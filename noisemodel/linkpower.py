@@ -46,18 +46,18 @@ def by_samples(robot: Robot, surface: Surface, run: Run, kind: str, bins: Index)
     )
     means, start = [], 0
     for chunk in chunks:
-        heard = run.mask[start : start + len(chunk.power), None]
-        firsts = np.arange(0, len(heard), size)
-        energy = np.add.reduceat(chunk.power * heard, firsts, axis=0)
-        means.append(energy / np.maximum(np.add.reduceat(heard.astype(float), firsts), 1.0))
-        start += len(heard)
+        counted = run.mask[start : start + len(chunk.power), None]
+        firsts = np.arange(0, len(counted), size)
+        energy = np.add.reduceat(chunk.power * counted, firsts, axis=0)
+        means.append(energy / np.maximum(np.add.reduceat(counted.astype(float), firsts), 1.0))
+        start += len(counted)
     return np.concatenate(means)
 
 
 def by_moments(
     robot: Robot, surface: Surface, q: Array, motions: Sequence[tuple[str, Array]]
 ) -> list[Array]:
-    """Average powers that are quadratic in velocities: to ask each sample would be a waste.
+    """Average powers that are quadratic in velocities, from second moments instead of samples.
 
     Within a bin of some ten milliseconds the robot hardly moves. With a link's Jacobian J as it
     is in the middle of the bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >.

@@ -17,7 +17,7 @@ BIN = 0.01
 BINS = 4000
 """Most bins that a run is divided into."""
 FAST = 10.0
-"""Motion below this moves the robot and is not heard, in [Hz]."""
+"""Motion below this frequency moves the robot and does not vibrate, in [Hz]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,8 +33,8 @@ class LinkNoise:
         vibration: That of the measured motion above 10 Hz alone, normal to the surface,
             shape (bins, links), in [W].
         terms: Total power by each of the paper's terms A, B and C, shape (bins,), in [W]; empty
-            unless asked for.
-        remarks: What the surface lacks, a sentence each.
+            unless they are requested.
+        remarks: What is missing or assumed, a sentence each.
     """
 
     kind: str
@@ -74,7 +74,7 @@ def link_noise(
 
     Raises:
         RobotError: If the robot cannot be read, or lacks one of the run's joints.
-        GeometryError: If its surface cannot be had.
+        GeometryError: If its surface cannot be read.
     """
     assert run.robot is not None
     floating = True if run.base_pose is not None else None
@@ -85,16 +85,16 @@ def link_noise(
 
     q, wanted = robot.configuration(middles)[0], robot.desired(middles)
     fast = _moments(robot, run, vibrating(run.motion, run.mask, run.rate), bins)
-    motions, told = [("normal", fast)], []
+    motions, desired = [("normal", fast)], []
     if kind in QUADRATIC:
         motions.append((kind, _moments(robot, run, run.motion, bins)))
         if run.velocity_desired is not None:
-            told = [(kind, _moments(robot, run, run.velocity_desired, bins, desired=True))]
-    if run.position_desired is None:  # told to move where it is: one pose for all
-        motions, told = [*motions, *told], []
+            desired = [(kind, _moments(robot, run, run.velocity_desired, bins, desired=True))]
+    if run.position_desired is None:  # desired velocities at measured positions: one pose for all
+        motions, desired = [*motions, *desired], []
     vibration, *power = by_moments(robot, surface, q, motions)
-    if told and wanted is not None:
-        power += by_moments(robot, surface, wanted[0], told)
+    if desired and wanted is not None:
+        power += by_moments(robot, surface, wanted[0], desired)
     if kind not in QUADRATIC:
         power = [by_samples(robot, surface, run, kind, bins)]
     return LinkNoise(
@@ -113,7 +113,7 @@ def link_noise(
 
 
 def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
-    """Leave the slow part of a motion out: its running mean over a tenth of a second.
+    """The fast part of a motion: without its running mean over a tenth of a second.
 
     Args:
         velocity: Shape (samples, nv).
@@ -199,10 +199,10 @@ def _movers(robot: Robot, carrier: int) -> frozenset[str]:
 
 
 def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:
-    resting = [name for name in robot.joint_names if name not in run.joint_names]
-    if resting:
-        yield f"The run does not name {', '.join(resting)}: they rest."
-    if surface.bare:
-        yield f"Links without geometry make no noise: {', '.join(surface.bare)}."
+    missing = [name for name in robot.joint_names if name not in run.joint_names]
+    if missing:
+        yield f"Not in the log, assumed stationary: {', '.join(missing)}."
+    if surface.without_geometry:
+        yield f"Links without geometry make no noise: {', '.join(surface.without_geometry)}."
     if robot.floating_base and run.base_velocity is None:
-        yield "The run has no base velocity: the link noise is that of a base at rest."
+        yield "The run has no base velocity: its base is assumed stationary."

@@ -206,7 +206,7 @@ def _coupled(source: Source) -> tuple[Robot, tuple[str, ...]]:
         return _read(source, mimic=True), ()
     except RobotError:
         robot = _read(source)  # a mimic joint may name one that the URDF does not have
-        return robot, ("Its mimic joints cannot follow theirs: they move by themselves.",)
+        return robot, ("Its mimic joints cannot be coupled: they move independently.",)
 
 
 def _measured(source: Source, run: Run) -> Moving:

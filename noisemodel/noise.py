@@ -1,4 +1,4 @@
-"""The sound that a robot radiates: power, pressure, levels, and who has which share in it."""
+"""The sound that a robot radiates: power, pressure, levels, and the share of each link."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""One call per item, several at once if asked, results in order as they come."""
+"""One call per item, several at once if requested; results come in order."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import TypeVar

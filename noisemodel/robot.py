@@ -100,8 +100,8 @@ class Robot:
     def configuration(self, run: Run) -> tuple[Array, Array]:
         """Order a run's motion as Pinocchio does, joint by joint, by name.
 
-        Joints that the run does not name rest in their neutral position, and so does a base of
-        which the run says nothing. Columns of joints that follow another one are passed over.
+        Joints that are not in the log are assumed stationary in their neutral position, and so is a
+        base of which the run has no pose. Columns of joints that follow another one are ignored.
 
         Args:
             run: A run with positions.
@@ -125,7 +125,7 @@ class Robot:
         return q, v
 
     def desired(self, run: Run) -> tuple[Array, Array] | None:
-        """Order a run's desired motion as Pinocchio does; its base rests.
+        """Order a run's desired motion as Pinocchio does; its base is stationary.
 
         Args:
             run: A run with positions, measured or desired: without desired ones the joints are

@@ -1,4 +1,4 @@
-"""The run file, version 1: which arrays it has, read without trusting it."""
+"""The run file, version 1: which arrays it has, and how they are read, checked and written."""
 
 import lzma
 import struct
@@ -44,7 +44,7 @@ DAMAGE = (EOFError, MemoryError, RuntimeError, struct.error, zlib.error, lzma.LZ
 """What zipfile and NumPy raise on archives that are broken, encrypted or lie about their size."""
 
 WORTH = 0.8
-"""What compression has to make of an array to be worth its time, as a share of its size."""
+"""Arrays are compressed if that leaves less than this share of their size."""
 STRETCH, STRETCHES = 4096, 16
 """Bytes of a stretch on which compression is tried, and how many there are."""
 

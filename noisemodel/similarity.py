@@ -1,4 +1,4 @@
-"""How alike the noise of several estimates sounds; a factor between two of them is no matter."""
+"""Similarity of several noise estimates; a factor between two of them changes nothing."""
 
 from collections.abc import Sequence
 from itertools import combinations

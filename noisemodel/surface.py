@@ -45,13 +45,13 @@ class Surface:
             The surface.
 
         Raises:
-            GeometryError: If a shape or a mesh cannot be had, or has no surface.
+            GeometryError: If a shape or a mesh cannot be read, or has no surface.
         """
         return cls.of_triangles(robot, triangles(robot, geometry, missing=missing))
 
     @classmethod
     def of_triangles(cls, robot: Robot, drawn: LinkTriangles) -> Self:
-        """Integrate over triangles that are at hand.
+        """Integrate over triangles that have been read.
 
         Args:
             robot: The robot.
@@ -93,7 +93,7 @@ class Surface:
         return self._each(lambda link: link.mean_square_normal)
 
     @property
-    def bare(self) -> tuple[str, ...]:
+    def without_geometry(self) -> tuple[str, ...]:
         """Names of the links without geometry."""
         pairs = zip(self.names, self.links, strict=True)
         return tuple(name for name, link in pairs if link.area == 0.0)

@@ -109,8 +109,8 @@ def test_without_events_there_is_no_contrast(panda):
     assert "contrast" not in str(found)
 
 
-def test_a_chatter_that_one_kind_cannot_hear_is_found_in_its_frequencies(tmp_path):
-    """A slider's bare carrier chatters: "C" has no link to hear it by, "paper" has the slider."""
+def test_a_vibration_that_one_kind_lacks_is_found_in_its_frequencies(tmp_path):
+    """A slider's carrier without geometry vibrates: "C" has no link that shows it."""
     robot = chain(tmp_path, "revolute", "prismatic", shapes=["", BAR])
     q, v = swinging(robot, samples=4000)
     v[:, 0] += 0.5 * np.cos(2 * np.pi * 200 * np.arange(4000) / RATE)
@@ -124,7 +124,7 @@ def test_a_chatter_that_one_kind_cannot_hear_is_found_in_its_frequencies(tmp_pat
     assert apart[np.abs(found.frequency - 200).argmin()] > 2 * np.median(apart)
 
 
-def test_silence_is_compared_without_a_word(panda):
+def test_silence_is_compared_without_a_warning(panda):
     robot, surface = panda
     q, v = swinging(robot)
     found = compare(robot, q, 0 * v, rate=RATE, surface=surface)

@@ -177,11 +177,11 @@ def test_an_event_between_two_samples_has_no_contrast(tmp_path):
     assert np.isnan(found.contrast).all()
 
 
-def test_mimic_joints_that_cannot_follow_move_by_themselves(tmp_path):
+def test_mimic_joints_that_cannot_be_coupled_move_independently(tmp_path):
     follow = '<mimic joint="nobody"/>'
     found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
     assert found.joints == 2
-    assert "move by themselves" in found.remarks[0]
+    assert "move independently" in found.remarks[0]
 
 
 def test_mimic_joints_follow(tmp_path):

@@ -76,7 +76,7 @@ def test_the_same_rate_changes_nothing():
 
 
 def test_a_rate_is_never_raised():
-    with pytest.raises(RunError, match="a run of 1000 Hz cannot be lowered to 2000 Hz"):
+    with pytest.raises(RunError, match="a run of 1000 Hz cannot be decimated to 2000 Hz"):
         decimated(run_of(20.0, rate=1000), 2000.0)
 
 

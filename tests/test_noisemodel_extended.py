@@ -131,7 +131,7 @@ def test_shares_add_up_link_by_link_and_stretch_by_stretch(solo):
     assert noise.shares([]).shape == (0, len(surface.links))
 
 
-def test_the_share_of_a_silent_stretch_is_nobodys(solo):
+def test_the_shares_of_a_silent_stretch_are_zero(solo):
     robot, surface = solo
     q, v = motion(robot)
     v[:10] = 0

@@ -103,7 +103,7 @@ def test_what_is_fixed_to_the_world_is_left_out_unless_the_base_floats(tmp_path)
 
 def test_a_link_without_geometry_is_listed_and_has_no_triangles(tmp_path):
     links = triangles(robot(tmp_path, arm=visual(BOX)))
-    assert links.bare == ("slide",)
+    assert links.without_geometry == ("slide",)
     assert links.kind == ("visual", "none")
     assert links.triangles[1].shape == (0, 3, 3)
     assert str(links) == "12 triangles on 2 links\nwithout geometry: slide"
@@ -284,7 +284,7 @@ def test_every_listed_robot_can_be_drawn_but_one_whose_meshes_nobody_has():
         except MissingMeshError:
             refused.append(name)
             continue
-        if len(links.bare) == len(links.names):
+        if len(links.without_geometry) == len(links.names):
             bare.append(name)
     assert refused == ["romeo_laas_small"]
     assert bare == ["simple_humanoid", "simple_humanoid_classical"]
@@ -298,7 +298,7 @@ def test_meshes_that_are_missing_can_be_skipped_and_are_named():
         triangles(built)
     assert "\n" not in str(caught.value)
     links = triangles(built, missing="skip")
-    assert links.bare == links.names
+    assert links.without_geometry == links.names
     assert "file:///usr/Romeo" in links.missing[0]
     assert "not found: file:///usr/Romeo" in str(links)
     assert "collision" in triangles(built, "auto", missing="skip").kind

@@ -71,7 +71,7 @@ def test_a_long_run_has_no_more_bins_than_a_short_one():
     assert len(link_noise(arm_run(rate=100.0, seconds=120.0)).time) <= 4001
 
 
-def test_joints_that_the_run_does_not_name_are_said_to_rest():
+def test_joints_that_are_not_in_the_log_are_assumed_stationary():
     run = arm_run()
     part = Run(
         time=run.time,
@@ -80,4 +80,4 @@ def test_joints_that_the_run_does_not_name_are_said_to_rest():
         joint_names=run.joint_names[:5],
         robot="ur5",
     )
-    assert "wrist_3_joint: they rest" in link_noise(part).remarks[0]
+    assert "Not in the log, assumed stationary: wrist_3_joint" in link_noise(part).remarks[0]

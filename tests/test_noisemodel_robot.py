@@ -66,7 +66,7 @@ def test_a_listed_robot_has_what_its_urdf_has():
     assert (Robot.load("talos", floating_base=False).nq) == 32
 
 
-def test_a_urdf_of_ones_own_stands_still_unless_told(tmp_path):
+def test_a_urdf_of_ones_own_has_a_fixed_base_unless_requested(tmp_path):
     robot = arm(tmp_path)
     assert robot.name == "arm"
     assert robot.joint_names == ("shoulder", "elbow", "finger")

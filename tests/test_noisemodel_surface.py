@@ -32,16 +32,16 @@ def test_links_are_those_that_move(tmp_path):
     surface = Surface.of(robot)
     assert surface.names == ("link0", "link1", "link3")
     assert surface.joint.tolist() == [1, 2, 3]
-    assert surface.bare == ("link0",)
+    assert surface.without_geometry == ("link0",)
     one = 2 * (0.2 * 0.1 + 0.1 * 0.6 + 0.6 * 0.2)
     assert np.allclose(surface.area, [0, 2 * one, one], rtol=1e-14)
     assert surface.lever[2] == 0.0
 
 
-def test_a_link_without_geometry_is_bare_and_silent(tmp_path):
+def test_a_link_without_geometry_is_named_and_silent(tmp_path):
     robot = chain(tmp_path, "revolute", "revolute", shapes=[BAR, ""])
     surface = Surface.of(robot)
-    assert surface.bare == ("link2",)
+    assert surface.without_geometry == ("link2",)
     for kind in ("paper", "mean", "rms", "normal"):
         speed = surface_speed(robot, surface, np.zeros((3, 2)), np.ones((3, 2)), kind)
         assert speed[:, 0].all()
@@ -66,8 +66,8 @@ def test_a_mesh_in_two_parts_is_the_same_mesh(tmp_path):
 def test_geometry_can_be_chosen(tmp_path):
     collision = BAR.replace("visual", "collision").replace("0.6", "1.2")
     robot = chain(tmp_path, "revolute", "revolute", shapes=[BAR + collision, collision])
-    assert Surface.of(robot).bare == ("link2",)
-    assert Surface.of(robot, "auto").bare == ()
+    assert Surface.of(robot).without_geometry == ("link2",)
+    assert Surface.of(robot, "auto").without_geometry == ()
     assert Surface.of(robot, "collision").area[0] > Surface.of(robot, "visual").area[0]
     with pytest.raises(GeometryError, match="'drawing' is not known, expected one of visual"):
         Surface.of(robot, "drawing")

@@ -100,7 +100,11 @@ def estimate(run: Run, kind: str, *, geometry: str = "auto") -> Estimate:
     noise = nm.extended(
         robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
     )
-    bare = (f"links without geometry: {', '.join(surface.bare)}",) if surface.bare else ()
+    bare = (
+        (f"links without geometry: {', '.join(surface.without_geometry)}",)
+        if surface.without_geometry
+        else ()
+    )
     return Estimate(kind, "√W", noise.power, noise.names, bare)
 
 
