@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SHADES = ("#3b3b6d", "#d98c4a", "#f2e3c4")
+TERM_COLORS = ("#3b3b6d", "#d98c4a", "#f2e3c4")
 """Of A, B and C: dark, middle and light, so that they differ in grey too."""
-INKS = ("#d55e00", "#0072b2", "#000000", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-MARKS = "ovs^DPX"
-DASHES = ("-", "--", "-", ":", "-.", (0, (1, 1)), (0, (5, 1)))
+COLORS = ("#d55e00", "#0072b2", "#000000", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+MARKERS = "ovs^DPX"
+LINES = ("-", "--", "-", ":", "-.", (0, (1, 1)), (0, (5, 1)))
 ROW = 0.17
 """Height of a robot, in [inch]."""
 INDEPENDENT_DB = 10.0 / np.log(10.0) * np.pi / np.sqrt(3.0)
@@ -75,12 +75,12 @@ def draw(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
 def _shares(axes: "Axes", found: Sequence[RobotComparison]) -> None:
     terms = np.array([_terms(one) for one in found])
     starts = np.cumsum(terms, axis=1) - terms
-    for index, (term, shade) in enumerate(zip(TERMS, SHADES, strict=True)):
+    for index, (term, color) in enumerate(zip(TERMS, TERM_COLORS, strict=True)):
         axes.barh(
             np.arange(len(found)),
             terms[:, index],
             left=starts[:, index],
-            color=shade,
+            color=color,
             edgecolor="black",
             linewidth=0.3,
             label=term,
@@ -95,13 +95,13 @@ def _shares(axes: "Axes", found: Sequence[RobotComparison]) -> None:
 
 def _correlations(axes: "Axes", found: Sequence[RobotComparison]) -> None:
     kinds, reference = found[0].kinds, found[0].comparison.reference
-    for ink, index in enumerate(_others(found)):
+    for number, index in enumerate(_others(found)):
         axes.plot(
             [one.comparison.correlation[index, reference] for one in found],
             np.arange(len(found)),
-            MARKS[ink],
-            color=INKS[ink],
-            markerfacecolor="none" if ink % 2 else INKS[ink],
+            MARKERS[number],
+            color=COLORS[number],
+            markerfacecolor="none" if number % 2 else COLORS[number],
             markersize=4.5,
             label=kinds[index],
         )
@@ -118,9 +118,9 @@ def _spectra(figure: "Figure", found: Sequence[RobotComparison]) -> None:
     panels = figure.subplots(1, len(groups), sharey=True, squeeze=False)[0]
     kinds, reference = found[0].kinds, found[0].comparison.reference
     for axes, group in zip(panels, groups, strict=True):
-        for ink, index in enumerate(_others(found)):
+        for number, index in enumerate(_others(found)):
             distance = medians([_by_third(one, index) for one in group])
-            axes.plot(THIRDS, distance, color=INKS[ink], ls=DASHES[ink], label=kinds[index])
+            axes.plot(THIRDS, distance, color=COLORS[number], ls=LINES[number], label=kinds[index])
         base = "floating base" if group[0].floating_base else "fixed base"
         axes.set_title(f"{base}, median of {len(group)}", fontsize=9)
         axes.set_xscale("log")

@@ -110,10 +110,10 @@ def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
 def _robot(one: RobotComparison) -> Part:
     parts = {"vibration": "above 10 Hz", "level": "whole motion"}
     levels = unstable.tabs(*(_lines(one, part, name) for part, name in parts.items()))
-    strips = unstable.tabs(*(_strip(one, kind) for kind in one.kinds))
+    spectrograms = unstable.tabs(*(_spectrogram(one, kind) for kind in one.kinds))
     lane = unstable.lanes("Events", f"{_root(one)}/events")
     height = 1.2 * len(one.kinds)
-    return unstable.above((lane, 1.0), (levels, height), (strips, 3.0), name=one.name)
+    return unstable.above((lane, 1.0), (levels, height), (spectrograms, 3.0), name=one.name)
 
 
 def _lines(one: RobotComparison, part: str, name: str) -> Part:
@@ -126,7 +126,7 @@ def _lines(one: RobotComparison, part: str, name: str) -> Part:
     return unstable.above(*((plot, 1.0) for plot in plots), name=name)
 
 
-def _strip(one: RobotComparison, kind: str) -> Part:
+def _spectrogram(one: RobotComparison, kind: str) -> Part:
     top = min(series.TOP_HZ, one.rate / 2)
     origin = f"{_root(one)}/spectrogram/{kind}"
     return unstable.plot(f"{kind}, 0-{top:.0f} Hz", origin, between=(0.0, top), fixed=True)
