@@ -7,8 +7,7 @@ import pytest
 
 from inspector.analysis.analyse import Status, Unknown
 from inspector.analysis.verdict import Verdict, exit_status
-from inspector.localisation.localise import Origin
-from inspector.localisation.stage import First
+from inspector.localisation.localise import Localisation
 from inspector.report.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
 from models import Event
 
@@ -62,10 +61,9 @@ def test_json_is_noise_verdict_2():
 
 def test_json_has_the_localisation_of_findings_that_were_localised():
     joints = (("knee", 0.75), ("hip", 0.25))
-    blow = Origin(First("desired", "measured", 0.002, lasting=False, joints=joints), (85.0, 130.0))
-    known = {LOUD.events[0]: blow, LOUD.events[1]: Origin(None, None)}
-    localised = replace(LOUD, localisations=known)
-    quiet, loud = json.loads(as_json([QUIET, localised]))["runs"]
+    blow = Localisation("desired", "measured", 0.002, joints=joints, band=(85.0, 130.0))
+    known = {LOUD.events[0]: blow, LOUD.events[1]: Localisation()}
+    quiet, loud = json.loads(as_json([QUIET, LOUD], [{}, known]))["runs"]
     assert quiet["events"] == []
     assert loud["events"][0]["localisation"] == {
         "stage": "desired",

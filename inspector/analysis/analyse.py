@@ -21,7 +21,7 @@ from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.errors import InspectorError
 from inspector.library import CannotTellError, Library, label_noise, label_run, load_library
 from inspector.localisation.extent import extent
-from inspector.localisation.localise import Origin, origins
+from inspector.localisation.localise import Localisation, localise
 from models import Event
 from noisemodel.links import LinkNoise, link_noise
 from noisemodel.types import Array
@@ -88,10 +88,10 @@ class Analysis:
         return nm.simplified(self.run.motion, self.run.velocity_desired)
 
     @cached_property
-    def localisations(self) -> dict[Event | nm.Block, Origin]:
+    def localisations(self) -> dict[Event | nm.Block, Localisation]:
         """The localisation of each finding, and of each annotated failure."""
         frame = 0.0 if self.labels is None else float(self.labels.stop[0] - self.labels.start[0])
-        found = origins(self.run, self.spans, frame=frame)
+        found = localise(self.run, self.spans, frame=frame)
         events = zip(self.spans, self.findings, strict=True)
         named: dict[Event | nm.Block, Event] = dict(events)
         return {named.get(failure, failure): each for failure, each in found.items()}

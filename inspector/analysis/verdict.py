@@ -10,7 +10,7 @@ import noisemodel as nm
 from inspector.analysis.analyse import Analysis, Status, Unknown, analyse, analyse_noise
 from inspector.errors import InspectorError
 from inspector.library import Library
-from inspector.localisation.localise import Origin
+from inspector.localisation.localise import Localisation
 from models import Event
 from noisemodel.parallel import each
 
@@ -41,7 +41,7 @@ class Verdict:
     model: str = ""
     events: tuple[Event, ...] = ()
     message: str = ""
-    localisations: Mapping[Event, Origin] = field(default_factory=dict)
+    localisations: Mapping[Event, Localisation] = field(default_factory=dict)
     unknown: Unknown = Unknown.FINDING
     model_sha256: str = ""
 

@@ -1,10 +1,10 @@
-"""The band of frequencies in which a failure lies."""
+"""Frequency band of a failure."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from inspector.localisation.quiet import quiet
+from inspector.localisation.quiet import quiet_stretches
 from models import Event
 from noisemodel import Block, Run
 from noisemodel.links import FAST
@@ -13,21 +13,22 @@ from noisemodel.types import Array, Real
 SHORTEST, LONGEST = 0.1, 0.4
 """Windows of the spectrum, in [s]: as long as the failure, between these."""
 MOST = 16
-"""Windows that are looked at of a failure."""
-USUAL = 90.0
-"""Percentile of what quiet stretches have: a robot that walks hums now and then."""
+"""Most windows of a failure."""
+PERCENTILE = 90.0
+"""Percentile of the quiet stretches' spectra that is subtracted: vibration of a robot that walks
+comes and goes."""
 SHARE = 0.7
-"""Of the excess power that lies in the band."""
+"""Share of the excess power that lies in the band."""
 
 
 def band(
     run: Run, failure: Event | Block, failures: Sequence[Event | Block]
 ) -> tuple[float, float] | None:
-    """Find the frequencies at which the joints vibrate more than they use to.
+    """Frequency band in which the joints vibrate more than in quiet stretches.
 
-    The power spectrum of the measured velocities above 10 Hz, mean over the failure, less what
-    one of ten quiet stretches exceeds, is the excess; the band is the narrowest that holds 70 %
-    of it.
+    The excess is the power spectrum of the measured velocities above 10 Hz, mean over the failure,
+    less the 90th percentile of the quiet stretches' spectra. The band is the narrowest that holds
+    70 % of it.
 
     Args:
         run: The run.
@@ -35,13 +36,13 @@ def band(
         failures: All failures of the run, found and annotated.
 
     Returns:
-        Lowest and highest frequency, in [Hz], as sharp as the inverse of the failure's duration
-        or 2.5 Hz; None if nothing exceeds the usual.
+        Lowest and highest frequency, in [Hz]; None without excess. The resolution is the inverse
+        of the failure's duration, and 2.5 Hz at best.
     """
     length = min(max(failure.stop - failure.start, SHORTEST), LONGEST, run.duration)
     size = max(2, round(length * run.rate))
     first, last = np.searchsorted(run.time, (failure.start, failure.stop))
-    # A failure that is shorter than a window is looked at with what is around it.
+    # The window of a shorter failure extends beyond it.
     first = max(0, min(int(first), len(run.time) - size))
     starts = np.arange(first, max(first + 1, int(last) - size + 1), max(1, size // 2))
     if len(starts) > MOST:
@@ -50,10 +51,12 @@ def band(
     during = [part for part in during if run.mask[part].all()]
     if not during:
         return None
-    usual = [_spectrum(run.velocity[part]) for part in quiet(run, failures, length=length)]
+    reference = [
+        _spectrum(run.velocity[part]) for part in quiet_stretches(run, failures, length=length)
+    ]
     excess = np.mean([_spectrum(run.velocity[part]) for part in during], axis=0)
-    if usual:
-        excess = excess - np.percentile(usual, USUAL, axis=0)
+    if reference:
+        excess = excess - np.percentile(reference, PERCENTILE, axis=0)
     frequency = np.arange(len(excess)) * run.rate / size
     excess = np.where(frequency >= FAST, np.maximum(excess, 0.0), 0.0)
     if not excess.sum() > 0.0:
@@ -64,14 +67,14 @@ def band(
 
 def _spectrum(velocity: Real) -> Array:
     """Power of all joints together, shape (frequency,)."""
-    # A straight line is no vibration, and would leak into all frequencies.
+    # A trend would leak into all frequencies.
     line = np.linspace(velocity[0], velocity[-1], len(velocity), dtype=np.float64)
     waves = np.fft.rfft((velocity - line).T * np.hanning(len(velocity)), axis=1)
     return np.asarray(np.square(np.abs(waves)).sum(axis=0))
 
 
 def _narrowest(excess: Array) -> tuple[int, int]:
-    """First and last bin of the shortest stretch that holds its share of the whole."""
+    """First and last bin of the narrowest band that holds `SHARE` of the whole."""
     below = np.concatenate(([0.0], np.cumsum(excess)))
     wanted = below[:-1] + SHARE * below[-1]
     ends = np.searchsorted(below, wanted, side="left")

@@ -1,4 +1,4 @@
-"""The stages of the control flow, in the order in which a motion passes them."""
+"""Stages of the control flow, in the order in which a motion passes them."""
 
 from dataclasses import dataclass
 
@@ -31,16 +31,16 @@ class Flow:
     rate: float
 
     def samples(self, seconds: float) -> int:
-        """Count the samples of a time, at least one."""
+        """Number of samples in a time, at least one."""
         return max(1, round(seconds * self.rate))
 
 
 def flow(run: Run, part: slice) -> Flow:
-    """Gather the stages of a run, of the joints that all of them have.
+    """Gather the stages of a run, for the joints that all of them have.
 
     Args:
         run: The run.
-        part: Its samples that are wanted.
+        part: Samples of it.
 
     Returns:
         The stages; the measured one alone if the run has no other.

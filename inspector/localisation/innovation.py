@@ -1,9 +1,10 @@
-"""What is new in each stage of the control flow: what the stage before it does not foretell.
+"""Innovation of each stage of the control flow: its changes less their linear prediction.
 
-What counts is how suddenly velocities change: over 1 ms, less the mean of such changes over the
-20 ms before. Both look back only, so that nothing shows before it happens. The change of each
-joint at a stage is foretold from those at the stage before, now and up to 12 ms ago, by least
-squares over quiet stretches of the same run; the rest is new. In the first stage everything is.
+Sudden changes of velocities are looked at: over 1 ms, less the mean of such changes over the past
+20 ms. Both filters are causal, so that nothing shows before it happens. The change of each joint
+at a stage is predicted from those at the stage before, now and up to 12 ms ago, by least squares
+over quiet stretches of the same run; the prediction residual is the innovation. The first stage
+has no prediction.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspector.localisation.flow import Flow, flow
-from inspector.localisation.quiet import quiet
+from inspector.localisation.quiet import quiet_stretches
 from models import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array, Indices, Mask
@@ -20,107 +21,111 @@ from noisemodel.types import Array, Indices, Mask
 SPAN = 0.001
 """Time over which a velocity's change is taken, in [s]."""
 TRAIL = 0.02
-"""What changes for longer than this is a motion, in [s]."""
+"""Time of the mean that is subtracted from changes, in [s]."""
 LAGS = (0.0, 0.0005, 0.001, 0.0015, 0.002, 0.003, 0.004, 0.006, 0.008, 0.012)
-"""How long ago the stage before may have done what a stage does, in [s]."""
+"""Lags of the prediction, in [s]."""
 LENGTH = 0.1
-"""Of a quiet stretch, in [s]."""
+"""Length of a quiet stretch, in [s]."""
 WARM = TRAIL + LAGS[-1] + SPAN
-"""Time that has to pass until what is new is known, in [s]."""
+"""Transient of filters and prediction, in [s]."""
 PARTS = 16
-"""Quiet stretches that are learnt from."""
+"""Most quiet stretches that the prediction is fitted to."""
 ROWS = 3000
-"""Samples that the least squares are taken over, at most."""
+"""Most samples of the least squares."""
 RIDGE = 1e-3
-"""Share of the mean power that keeps them determined."""
+"""Regularisation of the least squares, as a share of the mean power."""
 
 
 @dataclass(frozen=True, eq=False)
-class News:
-    """What is new in a stretch of a run.
+class Innovation:
+    """Innovation of a stretch of a run.
 
     Attributes:
-        change: What changes suddenly, shape (stages, samples, joints), in [rad/s²].
-        unforetold: What of it the stage before did not foretell, of the same shape.
-        whole: Norm of all changes over the joints, shape (stages, samples), in [rad/s²].
-        new: That of what is new, shape (stages, samples), in [rad/s²]: what is not foretold, but
-            no more than all changes, for what was foretold and stays away is no news.
+        change: Sudden changes, shape (stages, samples, joints), in [rad/s²].
+        residual: Their prediction residual, of the same shape.
+        total: Norm of the changes over the joints, shape (stages, samples), in [rad/s²].
+        level: Norm of the residual, but no more than ``total``, shape (stages, samples), in
+            [rad/s²]: a change that was predicted and stays away is no innovation.
     """
 
     change: Array
-    unforetold: Array
-    whole: Array
-    new: Array
+    residual: Array
+    total: Array
+    level: Array
 
 
 @dataclass(frozen=True, eq=False)
-class Usual:
-    """What a run's stages do when nothing fails.
+class QuietStatistics:
+    """Prediction and innovation of a run's stages in its quiet stretches.
 
     Attributes:
-        weights: Of what a stage foretells about the next, shape (stages - 1, joints, lags).
-        power: Mean square of what is new in each stage, shape (stages,), in [rad²/s⁴].
-        peak: Its peak in one of ten quiet stretches, shape (stages,), in [rad/s²].
+        weights: Of the linear prediction of each stage but the first, shape
+            (stages - 1, joints, lags).
+        power: 90th percentile over the stretches of the innovation's mean square, shape
+            (stages,), in [rad²/s⁴].
+        peak: 90th percentile of its peak, shape (stages,), in [rad/s²].
     """
 
     weights: Array
     power: Array
     peak: Array
 
-    def news(self, stages: Flow) -> News:
-        """Tell what is new in a stretch of the run."""
+    def innovation(self, stages: Flow) -> Innovation:
+        """Compute the innovation of a stretch of the run."""
         change = changes(stages)
         lags = _lags(stages.rate)
-        new = change.copy()
+        residual = change.copy()
         for place, weights in enumerate(self.weights):
             for column, lag in enumerate(lags.tolist()):
                 past = change[place, : change.shape[1] - lag]
-                new[place + 1, lag:] -= weights[:, column] * past
-        new[:, ~stages.valid] = 0.0
-        whole, rest = np.linalg.norm(change, axis=2), np.linalg.norm(new, axis=2)
-        return News(change, new, whole, np.minimum(whole, rest))
+                residual[place + 1, lag:] -= weights[:, column] * past
+        residual[:, ~stages.valid] = 0.0
+        total, rest = np.linalg.norm(change, axis=2), np.linalg.norm(residual, axis=2)
+        return Innovation(change, residual, total, np.minimum(total, rest))
 
 
-def usual(run: Run, failures: Sequence[Event | Block]) -> Usual:
-    """Learn from the quiet stretches of a run what its stages do.
+def quiet_statistics(run: Run, failures: Sequence[Event | Block]) -> QuietStatistics:
+    """Fit the prediction to the quiet stretches of a run, and measure its residual there.
 
     Args:
         run: The run.
         failures: All of its failures, found and annotated.
 
     Returns:
-        What is usual; without quiet stretches nothing is, and all is new.
+        The statistics; all 0 without quiet stretches, so that every change is an innovation.
     """
-    parts = quiet(run, failures, length=LENGTH + WARM, most=PARTS)
-    calm = [flow(run, part) for part in parts]
-    stages, _, joints = (calm[0] if calm else flow(run, slice(0, 1))).velocity.shape
+    parts = quiet_stretches(run, failures, length=LENGTH + WARM, most=PARTS)
+    stretches = [flow(run, part) for part in parts]
+    first = stretches[0] if stretches else flow(run, slice(0, 1))
+    stages, _, joints = first.velocity.shape
     lags = _lags(run.rate)
-    nothing = Usual(np.zeros((stages - 1, joints, len(lags))), np.zeros(stages), np.zeros(stages))
-    if not calm:
-        return nothing
-    warm = min(calm[0].samples(WARM), calm[0].velocity.shape[1] - 1)
-    change = [changes(each) for each in calm]
+    zeros = np.zeros(stages)
+    if not stretches:
+        return QuietStatistics(np.zeros((stages - 1, joints, len(lags))), zeros, zeros)
+    warm = min(first.samples(WARM), first.velocity.shape[1] - 1)
+    change = [changes(each) for each in stretches]
     size = change[0].shape[1]
     rows = np.arange(warm, size, max(1, (size - warm) * len(change) // ROWS))
-    told = np.concatenate([each[:, rows] for each in change], axis=1)
+    target = np.concatenate([each[:, rows] for each in change], axis=1)
     past = np.concatenate([each[:-1, rows[:, None] - lags] for each in change], axis=1)
     past = past.transpose(0, 3, 1, 2)  # stages, joints, samples, lags
     square = past.transpose(0, 1, 3, 2) @ past
     mean = np.trace(square, axis1=2, axis2=3)[..., None, None] / len(lags)
     square = square + (RIDGE * mean + np.finfo(float).tiny) * np.eye(len(lags))
-    right = np.einsum("kjsl,ksj->kjl", past, told[1:])
+    right = np.einsum("kjsl,ksj->kjl", past, target[1:])
     weights = np.linalg.solve(square, right[..., None])[..., 0]
-    known = Usual(weights, nothing.power, nothing.peak)
-    new = np.array([known.news(each).new[:, warm:] for each in calm])  # parts, stages, samples
-    return Usual(
+    fitted = QuietStatistics(weights, zeros, zeros)
+    # stretches, stages, samples
+    level = np.array([fitted.innovation(each).level[:, warm:] for each in stretches])
+    return QuietStatistics(
         weights,
-        power=np.percentile(np.square(new).mean(axis=2), 90.0, axis=0),
-        peak=np.percentile(new.max(axis=2), 90.0, axis=0),
+        power=np.percentile(np.square(level).mean(axis=2), 90.0, axis=0),
+        peak=np.percentile(level.max(axis=2), 90.0, axis=0),
     )
 
 
 def changes(stages: Flow) -> Array:
-    """Tell what changes suddenly at each stage.
+    """Sudden changes at each stage.
 
     Args:
         stages: A stretch of a run.

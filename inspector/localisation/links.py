@@ -1,11 +1,11 @@
-"""The links at which a failure points: those that are loud, and those in which it is new."""
+"""Links of a fault: those of the largest excess power, and those moved by the joints that fail."""
 
 from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
 
-from inspector.localisation.stage import First
+from inspector.localisation.stage import Localisation
 from models import Event
 from noisemodel import Block
 from noisemodel.links import LinkNoise
@@ -15,42 +15,46 @@ Failure: TypeAlias = Event | Block
 """A finding, or an annotated block."""
 
 MOST = 3
-"""Links that are named."""
-FRESH = 0.05
-"""Time after its onset in which a blow or jump tells by its noise where it came in, in [s]."""
+"""Most links that are named."""
+BEGINNING = 0.05
+"""Time after the onset of a blow or jump in which its excess power is measured, in [s]."""
 
 
-def culprits(
-    links: LinkNoise, failure: Failure, others: Sequence[Failure], *, first: First | None = None
+def fault_links(
+    links: LinkNoise,
+    failure: Failure,
+    others: Sequence[Failure],
+    *,
+    known: Localisation | None = None,
 ) -> tuple[tuple[str, float], ...]:
-    """Name the links at which a failure points.
+    """Name the links at which a failure is localised.
 
     A link's excess is its power above 10 Hz, less its median outside of all failures. A blow or
-    jump runs through the whole robot within a step, so that what counts of it is its beginning.
-    Even then a light foot is louder than the limb that was hit, hence a second witness: the joints
-    in which the failure is new. Named is the link of the largest excess; of each such joint that
-    moves none of those that are named, the link of the largest excess that it moves; and then
-    those of the largest excess.
+    jump spreads over the whole robot within a step, so that only its beginning counts. Even then
+    a light foot is louder than the limb that was hit, hence a second criterion: the joints of the
+    largest innovation. Named is the link of the largest excess; of each such joint that moves none
+    of those that are named, the link of the largest excess that it moves; and then those of the
+    largest excess.
 
     Args:
         links: The noise of the run's links.
         failure: The failure.
         others: All failures of the run, found and annotated.
-        first: Where it shows first, if that is known.
+        known: Its localisation, if there is one: onset and joints are used.
 
     Returns:
         Up to three links and their shares of the robot's whole excess, the largest first.
     """
-    excess = _excess(links, failure, others, None if first is None else first.onset)
+    excess = _excess(links, failure, others, None if known is None else known.onset)
     ranked = [index for index in np.argsort(-excess, kind="stable").tolist() if excess[index] > 0.0]
     named = ranked[:1]
-    for joint, _ in () if first is None else first.joints:
+    for joint, _ in () if known is None else known.joints:
         moved = [index for index in ranked if joint in links.movers[index]]
         if not set(moved) & set(named):
             named += moved[:1]
     named += [index for index in ranked if index not in named]
-    loudest_first = sorted(named[:MOST], key=ranked.index)
-    return tuple((links.links[i], float(excess[i] / excess.sum())) for i in loudest_first)
+    largest_first = sorted(named[:MOST], key=ranked.index)
+    return tuple((links.links[i], float(excess[i] / excess.sum())) for i in largest_first)
 
 
 def _excess(
@@ -61,7 +65,10 @@ def _excess(
     start, stop = failure.start, failure.stop
     if onset is not None:
         half = (time[1] - time[0]) / 2.0
-        start, stop = onset - half, onset + FRESH + half  # bins that lie in it in part count too
+        start, stop = (
+            onset - half,
+            onset + BEGINNING + half,
+        )  # bins that it covers in part count too
     inside = (time >= start) & (time < stop)
     busy = np.any([(time >= each.start) & (time < each.stop) for each in others], axis=0)
     if not inside.any():

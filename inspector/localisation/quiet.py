@@ -1,4 +1,4 @@
-"""Stretches of a run in which nothing failed: what a failure is held against."""
+"""Quiet stretches of a run, in which nothing failed: the reference for its failures."""
 
 from collections.abc import Sequence
 
@@ -8,10 +8,10 @@ from models import Event
 from noisemodel import Block, Run
 
 MOST = 16
-"""Stretches that are looked at; a long run is not read whole."""
+"""Most stretches that are picked; a long run is not read whole."""
 
 
-def quiet(
+def quiet_stretches(
     run: Run, failures: Sequence[Event | Block], *, length: float, most: int = MOST
 ) -> list[slice]:
     """Pick stretches without failures or gaps, spread evenly over a run.
@@ -19,11 +19,11 @@ def quiet(
     Args:
         run: The run.
         failures: All of its failures, found and annotated.
-        length: Of a stretch, in [s].
-        most: How many are picked at most.
+        length: Length of a stretch, in [s].
+        most: Most stretches that are picked.
 
     Returns:
-        The samples of each stretch, none if the failures leave no room.
+        Samples of each stretch; none if the failures leave no room.
     """
     size = max(1, round(length * run.rate))
     free = run.mask.copy()

@@ -1,32 +1,31 @@
-"""The first stage of the control flow in which a failure shows, told from the run alone.
+"""First stage of the control flow in which a failure shows, from the run alone.
 
-There is no run without the failure to hold it against. What tells where it came in is what is new
-in each stage, see `inspector.localisation.innovation`. Two kinds of failures are told apart:
+There is no run without the failure to compare with. The innovation of each stage shows where the
+failure enters, see `inspector.localisation.innovation`. Two kinds of failures are distinguished:
 
-- A *blow or jump* comes through one stage after the other, so these are ordered by time. It is
-  looked for where the news of a stage, relative to its usual peak, first rise steeply. In a stage
-  it sets in where the news first exceed a fifth of their peak and twice what they were in the
-  50 ms before. A stage does not show it whose peak is less than four times what was before, or
-  less than a fifth of all that changes there: it passes on what the stage before it did. Nothing
-  foretells the first stage, hence its peak also has to exceed by half what is usual for it, or
-  the stage next to it has to answer within 3 ms. The earliest onset wins; of simultaneous ones, the
-  stage that a motion passes first.
-- A *lasting vibration* has gone round the loop many times, and its onset, such as the touch that
-  starts a limit cycle, is not its source. It lies in the first stage that adds to it: whose news
-  have a quarter or more of the excess power that those of any stage have, and more than twice
-  what is usual for it.
+- A *blow or jump* passes one stage after the other, so these are ordered by onset. It is looked
+  for where the innovation of a stage, relative to its peak in quiet stretches, first rises
+  steeply. The onset in a stage is the first time at which the innovation exceeds a fifth of its
+  peak and twice its level in the 50 ms before. A stage has no onset if that peak is less than four
+  times the level before, or less than a fifth of all changes there: it passes on what the stage
+  before it did. The first stage has no prediction, hence its peak also has to exceed 1.5 times
+  that in quiet stretches, or the next stage has to follow within 3 ms. The earliest onset
+  wins; of simultaneous ones, the stage that a motion passes first.
+- A *lasting vibration* has gone round the control loop many times, and its onset, such as the
+  touch that starts a limit cycle, is not its source. It lies in the first stage that adds to it:
+  whose innovation has at least a quarter of the largest excess power of any stage, and more than
+  twice the power in quiet stretches.
 
 A failure lasts if its vibration is within 6 dB of its loudest 50 ms for 0.3 s in all, of the first
-second. What shows no onset is treated as if it lasted.
+second. A failure without an onset is treated as if it lasted.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from inspector.localisation import onset
 from inspector.localisation.flow import Flow, flow
-from inspector.localisation.innovation import WARM, News, Usual
+from inspector.localisation.innovation import WARM, Innovation, QuietStatistics
 from models import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array
@@ -34,66 +33,86 @@ from noisemodel.types import Array
 EARLY = 0.015
 """How long before its start a failure may have set in, in [s]."""
 BEFORE, AFTER = 0.1 + WARM, 0.05
-"""What is looked at around a failure, in [s]."""
+"""Time before and after a failure that is used, in [s]."""
 LONGEST = 1.0
-"""What is looked at of a failure, in [s]."""
+"""Time of a failure that is used, in [s]."""
 BIN = 0.05
 """Time over which a vibration's power is taken, in [s]."""
 LOUD = 0.25
-"""Share of the loudest bin's power from which a bin counts: 6 dB less."""
+"""Share of the loudest bin's power from which a bin counts: -6 dB."""
 LASTING = 0.3
 """Loud time of a lasting vibration, in [s]."""
 PASSED_ON = 0.2
-"""Share of a stage's change that has to be new."""
-UNHEARD = 1.5
-"""How far the first stage has to exceed its usual peak."""
-ANSWERED = 0.003
-"""Time within which the second stage else has to answer the first, in [s]."""
+"""Least share of the innovation in a stage's changes; with less it passes on the stage before."""
+EXCEEDS = 1.5
+"""Factor by which the first stage's peak has to exceed that in quiet stretches."""
+RESPONSE = 0.003
+"""Time within which the second stage else has to follow the first, in [s]."""
 ADDS = 0.25
-"""Share of the largest addition from which a stage counts as adding."""
+"""Share of the largest excess power from which a stage counts as adding to a vibration."""
 MORE = 2.0
-"""How far the power of a stage that adds exceeds the usual."""
+"""Factor by which the power of a stage that adds exceeds that in quiet stretches."""
 JOINTS = 3
-"""Joints that are named, at most."""
-FRESH = 0.005
+"""Most joints that are named."""
+SPREAD = 0.005
 """Time after its onset in which a blow or jump has not spread over the robot, in [s]."""
 SLOWEST = 0.02
 """Longest lag between two stages that vibrate together, in [s]."""
 
+AHEAD, BACK = 0.01, 0.05
+"""Times after and before a moment that are compared, in [s]."""
+AROUND = (0.02, 0.03)
+"""Times before and after the steepest rise in which the onsets of stages lie, in [s]."""
+STEEP = 0.25
+"""Least steepness of a rise, as a share of the steepest."""
+PEAK = 4.0
+"""Least peak of a stage that shows a failure, in multiples of the level before."""
+CLEAR = 2.0
+"""Level at the onset, in multiples of the level before."""
+SHARE = 0.2
+"""Level at the onset, as a share of the peak."""
+
 
 @dataclass(frozen=True)
-class First:
-    """The stage in which a failure shows first.
+class Localisation:
+    """Where a failure enters the control flow, and its frequencies.
 
     Attributes:
-        stage: Its name.
-        following: The next stage in which the failure shows; empty if it is in no other.
-        lag: By how much that one is later, in [s].
+        stage: First stage of the control flow in which it shows; empty if no stage shows it, or
+            if the run has the measured one alone.
+        following: Next stage in which it shows; empty if it is in no other.
+        lag: Time from the first of these stages to the next, in [s].
         lasting: Whether the failure is a vibration that lasts, and not a blow or jump.
-        joints: Up to three joints in which it is new there, and their shares of the power of
-            what is, the largest first.
+        joints: Up to three joints and their shares of the innovation's power in that stage, the
+            largest first.
         onset: When a blow or jump sets in, in [s]; None of a vibration that lasts.
+        band: Lowest and highest frequency of its vibration, in [Hz]; None if it is not louder
+            than quiet stretches.
     """
 
-    stage: str
-    following: str
-    lag: float
-    lasting: bool
+    stage: str = ""
+    following: str = ""
+    lag: float = 0.0
+    lasting: bool = False
     joints: tuple[tuple[str, float], ...] = ()
     onset: float | None = None
+    band: tuple[float, float] | None = None
 
 
-def first_stage(run: Run, usual: Usual, failure: Event | Block, *, reach: float) -> First | None:
+def first_stage(
+    run: Run, quiet: QuietStatistics, failure: Event | Block, *, reach: float
+) -> Localisation:
     """Find the stage in which a failure shows first.
 
     Args:
         run: The run.
-        usual: What its stages do when nothing fails.
+        quiet: Statistics of its quiet stretches.
         failure: A finding, or an annotated block.
         reach: How long after its start it may have set in, in [s].
 
     Returns:
-        The stage, and its lag to the next; None if no stage shows the failure.
+        The stage, its lag to the next and its joints, without the band; empty if no stage shows
+        the failure.
     """
     stop = min(failure.stop, failure.start + LONGEST)
     edges = (failure.start - BEFORE, max(stop, failure.start + reach) + AFTER)
@@ -101,77 +120,82 @@ def first_stage(run: Run, usual: Usual, failure: Event | Block, *, reach: float)
     stages = flow(run, slice(first, last))
     start, end = (int(index) for index in np.searchsorted(stages.time, (failure.start, stop)))
     if end <= start or not stages.valid[start:end].any():
-        return None
-    news, during = usual.news(stages), slice(start, end)
+        return Localisation()
+    innovation, during = quiet.innovation(stages), slice(start, end)
     found = None
-    if not _lasts(news.new[-1, during], float(usual.power[-1]), stages):
+    if not _lasts(innovation.level[-1, during], float(quiet.power[-1]), stages):
         edges = (failure.start - EARLY, failure.start + reach)
-        found = _earliest(stages, news, usual, *np.searchsorted(stages.time, edges).tolist())
-    return found or _adding(stages, news, usual, during)
+        first, last = np.searchsorted(stages.time, edges).tolist()
+        found = _earliest(stages, innovation, quiet, first, last)
+    return found or _adding(stages, innovation, quiet, during) or Localisation()
 
 
-def _lasts(sharp: Array, usual: float, stages: Flow) -> bool:
-    """Tell whether a vibration lasts."""
+def _lasts(level: Array, quiet: float, stages: Flow) -> bool:
+    """Whether a vibration lasts, by its level and its power in quiet stretches."""
     size = stages.samples(BIN)
-    power = np.add.reduceat(np.square(sharp), np.arange(0, len(sharp), size)) / size
-    loud = power > max(LOUD * power.max(), MORE * usual)
+    power = np.add.reduceat(np.square(level), np.arange(0, len(level), size)) / size
+    loud = power > max(LOUD * power.max(), MORE * quiet)
     return bool(loud.sum() * BIN >= LASTING)
 
 
-def _earliest(stages: Flow, news: News, usual: Usual, first: int, last: int) -> First | None:
-    """Order the stages by when a blow or jump comes through."""
+def _earliest(
+    stages: Flow, innovation: Innovation, quiet: QuietStatistics, first: int, last: int
+) -> Localisation | None:
+    """Order the stages by the onset of a blow or jump."""
     rate, samples = stages.rate, len(stages.time)
-    # Of a stage that adds nothing, anything would be unusual.
-    scale = usual.peak + PASSED_ON * (float(usual.peak.max()) or 1.0)
-    unusual = (news.new / scale[:, None]).max(axis=0)
-    moment = onset.rise(unusual, first, last, rate=rate)
-    around = onset.window(moment, samples, rate=rate)
+    # A stage without innovation in quiet stretches would exceed its peak at once.
+    scale = quiet.peak + PASSED_ON * (float(quiet.peak.max()) or 1.0)
+    relative = (innovation.level / scale[:, None]).max(axis=0)
+    moment = rise(relative, first, last, rate=rate)
+    around = _around(moment, samples, rate=rate)
     onsets = [
-        (onset.onset(new, moment, rate=rate, least=PASSED_ON * float(peak)), place)
-        for place, (new, peak) in enumerate(
-            zip(news.new, news.whole[:, around].max(axis=1), strict=True)
+        (onset(level, moment, rate=rate, least=PASSED_ON * float(peak)), place)
+        for place, (level, peak) in enumerate(
+            zip(innovation.level, innovation.total[:, around].max(axis=1), strict=True)
         )
     ]
     found = sorted((at, place) for at, place in onsets if at is not None)
-    if found and found[0][1] == 0 and len(news.new) > 1:
-        common = float(news.new[0, around].max()) <= UNHEARD * usual.peak[0]
-        answers = [at for at, place in found if place == 1]
-        if common and not any(at - found[0][0] <= ANSWERED * rate for at in answers):
+    if found and found[0][1] == 0 and len(innovation.level) > 1:
+        common = float(innovation.level[0, around].max()) <= EXCEEDS * quiet.peak[0]
+        responses = [at for at, place in found if place == 1]
+        if common and not any(at - found[0][0] <= RESPONSE * rate for at in responses):
             found = found[1:]
     if not found:
         return None
     earliest, place = found[0]
     at, other = next((later for later in found if later[0] > earliest), (earliest, None))
-    return First(
+    fresh = slice(earliest, earliest + stages.samples(SPREAD))
+    return Localisation(
         stage=stages.names[place],
         following="" if other is None else stages.names[other],
         lag=(at - earliest) / rate,
-        lasting=False,
-        joints=_joints(stages, news.unforetold[place, earliest : earliest + stages.samples(FRESH)]),
+        joints=_joints(stages, innovation.residual[place, fresh]),
         onset=float(stages.time[earliest]),
     )
 
 
-def _adding(stages: Flow, news: News, usual: Usual, during: slice) -> First | None:
+def _adding(
+    stages: Flow, innovation: Innovation, quiet: QuietStatistics, during: slice
+) -> Localisation | None:
     """Find the first stage that adds to a vibration."""
-    power = np.square(news.new[:, during]).mean(axis=1)
-    least = np.maximum(
-        MORE * usual.power, PASSED_ON**2 * np.square(news.whole[:, during]).mean(axis=1)
-    )
-    excess = np.where(power > least, power - usual.power, 0.0)
+    power = np.square(innovation.level[:, during]).mean(axis=1)
+    total = np.square(innovation.total[:, during]).mean(axis=1)
+    least = np.maximum(MORE * quiet.power, PASSED_ON**2 * total)
+    excess = np.where(power > least, power - quiet.power, 0.0)
     if not excess.max() > 0.0:
         return None
     place = int(np.argmax(excess >= ADDS * excess.max()))
-    joints = _joints(stages, news.unforetold[place, during])
+    joints = _joints(stages, innovation.residual[place, during])
     if place == len(excess) - 1:
-        return First(stages.names[place], "", 0.0, lasting=True, joints=joints)
-    lag = _lag(news.change[place, during], news.change[-1, during], stages.samples(SLOWEST))
-    return First(stages.names[place], stages.names[-1], lag / stages.rate, True, joints)
+        return Localisation(stages.names[place], lasting=True, joints=joints)
+    cause, effect = innovation.change[place, during], innovation.change[-1, during]
+    lag = _lag(cause, effect, stages.samples(SLOWEST)) / stages.rate
+    return Localisation(stages.names[place], stages.names[-1], lag, lasting=True, joints=joints)
 
 
-def _joints(stages: Flow, unforetold: Array) -> tuple[tuple[str, float], ...]:
-    """Name the joints in which something is new, shape (samples, joints), and their shares."""
-    power = np.square(unforetold).sum(axis=0)
+def _joints(stages: Flow, residual: Array) -> tuple[tuple[str, float], ...]:
+    """Joints of the largest residual, shape (samples, joints), and their shares of its power."""
+    power = np.square(residual).sum(axis=0)
     shares = power / (power.sum() or 1.0)
     ranked = np.argsort(-shares, kind="stable")[:JOINTS].tolist()
     return tuple((stages.joints[i], float(shares[i])) for i in ranked if shares[i] > 0.0)
@@ -183,3 +207,59 @@ def _lag(cause: Array, effect: Array, most: int) -> int:
     waves = [np.fft.rfft(signal, size, axis=0) for signal in (effect, cause)]
     together = np.fft.irfft((waves[0] * waves[1].conj()).sum(axis=1), size)
     return int(np.argmax(together[: most + 1]))
+
+
+def rise(level: Array, first: int, last: int, *, rate: float) -> int:
+    """Find where a level first rises: 10 ms against the 50 ms before, both as mean squares.
+
+    Args:
+        level: Shape (samples,), in any unit.
+        first: First sample of the search.
+        last: The one after the last.
+        rate: Samples per second, in [Hz].
+
+    Returns:
+        The top of the first rise that is a quarter as steep as the steepest, as a sample.
+    """
+    ahead, back = (max(1, round(time * rate)) for time in (AHEAD, BACK))
+    energy = np.concatenate(([0.0], np.cumsum(np.square(level))))
+    first = min(max(first, 1), len(level) - 1)
+    at = np.arange(first, max(min(last, len(level) - ahead), first + 1))
+    behind = np.maximum(0, at - back)
+    after = (energy[np.minimum(at + ahead, len(level))] - energy[at]) / ahead
+    before = (energy[at] - energy[behind]) / (at - behind)
+    reference = before + np.median(level) ** 2 + np.finfo(float).tiny
+    steep = (after - before) / np.sqrt(reference)
+    enough = steep >= STEEP * steep.max()
+    begin = int(np.argmax(enough))
+    length = int(np.argmin(enough[begin:])) or len(enough) - begin
+    return int(at[begin + np.argmax(steep[begin : begin + length])])
+
+
+def onset(level: Array, moment: int, *, rate: float, least: float = 0.0) -> int | None:
+    """Find the onset of a blow or jump.
+
+    Args:
+        level: Shape (samples,), in any unit.
+        moment: Its approximate time, as a sample.
+        rate: Samples per second, in [Hz].
+        least: Peak that has to be exceeded in any case, in the same unit.
+
+    Returns:
+        The sample; None if the level hardly exceeds that before.
+    """
+    back, ahead = (round(time * rate) for time in (BACK, AHEAD))
+    before = level[max(0, moment - back - ahead) : max(1, moment - ahead)]
+    around = _around(moment, len(level), rate=rate)
+    reference = max(float(np.sqrt(np.mean(np.square(before)))), float(np.median(level)))
+    peak = float(level[around].max(initial=0.0))
+    if not peak > max(PEAK * reference, least):
+        return None
+    first = int(around.start)
+    return first + int(np.argmax(level[around] > max(SHARE * peak, CLEAR * reference)))
+
+
+def _around(moment: int, samples: int, *, rate: float) -> slice:
+    """Samples around the steepest rise in which the onsets of stages lie."""
+    early, late = (max(1, round(time * rate)) for time in AROUND)
+    return slice(max(0, moment - early), min(samples, moment + late))

@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 
 from inspector.analysis.analyse import IGNORED, Status, Unknown
 from inspector.analysis.verdict import Verdict
-from inspector.localisation.localise import Origin
+from inspector.localisation.localise import Localisation
 from inspector.report.markdown import novelty
 from models import Event
 
@@ -119,18 +119,17 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
 
 def _localised(verdict: Verdict, event: Event) -> dict[str, object]:
     known = verdict.localisations.get(event)
-    return {} if known is None else {"localisation": _origin(known)}
+    return {} if known is None else {"localisation": _localisation(known)}
 
 
-def _origin(origin: Origin) -> dict[str, object]:
-    """Say where a finding comes from: lag in [s], band in [Hz], null where it is not known."""
-    first = origin.first
+def _localisation(known: Localisation) -> dict[str, object]:
+    """Localisation of a finding: lag in [s], band in [Hz], null where it is not known."""
     return {
-        "stage": first and first.stage,
-        "following": first and (first.following or None),
-        "lag": first and round(first.lag, 6),
-        "joints": {} if first is None else {name: round(share, 3) for name, share in first.joints},
-        "band": origin.band and [round(frequency, 3) for frequency in origin.band],
+        "stage": known.stage or None,
+        "following": known.following or None,
+        "lag": round(known.lag, 6) if known.stage else None,
+        "joints": {name: round(share, 3) for name, share in known.joints},
+        "band": known.band and [round(frequency, 3) for frequency in known.band],
     }
 
 

@@ -217,7 +217,7 @@ def found(analysis: Analysis) -> Iterator[Table]:
                 f"{event.start:.2f}",
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
-                *_plain(origin(analysis, event)),
+                *origin(analysis, event),
             )
             for event in analysis.findings
         ]
@@ -229,17 +229,12 @@ def found(analysis: Analysis) -> Iterator[Table]:
                 block.label,
                 f"{block.start:.2f}",
                 f"{block.stop:.2f}",
-                *_plain(origin(analysis, block)),
+                *origin(analysis, block),
             )
             for block in analysis.run.blocks
         ]
         said = "" if analysis.findings else said
         yield Table("Annotated", ("class", "from [s]", "to [s]", *ORIGIN), annotated, (1, 2), said)
-
-
-def _plain(cells: tuple[str, ...]) -> tuple[str, ...]:
-    """Leave Markdown's marks out."""
-    return tuple(cell.replace("`", "") for cell in cells)
 
 
 def parts(analysis: Analysis) -> Iterator[Table]:

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 
 from inspector.analysis.analyse import Analysis
-from inspector.localisation.links import culprits
-from inspector.localisation.localise import flows
+from inspector.localisation.links import fault_links
+from inspector.localisation.localise import has_stages
+from inspector.report.localisation import words
 from models import Event
 from noisemodel import Block
 
@@ -37,13 +38,19 @@ def report(analysis: Analysis) -> str:
     ]
     if analysis.findings:
         found = [
-            (f"{e.label}{novelty(e)}", f"{e.start:.2f}", f"{e.stop:.2f}", *origin(analysis, e))
+            (
+                f"{e.label}{novelty(e)}",
+                f"{e.start:.2f}",
+                f"{e.stop:.2f}",
+                *origin(analysis, e, quote="`"),
+            )
             for e in analysis.findings
         ]
         parts += ["## Events", _table(HEAD, found)]
     if run.blocks:
         rows = [
-            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *origin(analysis, b)) for b in run.blocks
+            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *origin(analysis, b, quote="`"))
+            for b in run.blocks
         ]
         parts += ["## Annotated", _table(HEAD, rows)]
     if note(analysis):
@@ -55,7 +62,7 @@ def report(analysis: Analysis) -> str:
 
 def sentence(analysis: Analysis, event: Event | Block) -> str:
     """Say what an event is, when, and where it comes from."""
-    stage, joints, *others = origin(analysis, event)
+    stage, joints, *others = origin(analysis, event, quote="`")
     by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
     where = "; ".join(part for part in (by, *others) if part)
     when = f"{event.start:.2f} s to {event.stop:.2f} s{novelty(event)}"
@@ -67,17 +74,19 @@ def novelty(event: Event | Block) -> str:
     return ", out of distribution" if isinstance(event, Event) and event.novel else ""
 
 
-def origin(analysis: Analysis, failure: Event | Block) -> tuple[str, str, str, str]:
+def origin(
+    analysis: Analysis, failure: Event | Block, *, quote: str = ""
+) -> tuple[str, str, str, str]:
     """Say where a failure comes from: stage of the control flow, joints, band, links."""
     if failure.label == "ok":
         return "", "", "", ""
     known = analysis.localisations[failure]
-    return known.stage, known.joints, known.frequencies, _links(analysis, failure)
+    return *words(known, quote=quote), _links(analysis, failure)
 
 
 def note(analysis: Analysis) -> str:
     """Say why no failure has a stage; nothing if that is not so."""
-    if not analysis.localisations or flows(analysis.run):
+    if not analysis.localisations or has_stages(analysis.run):
         return ""
     return "No stages: the run has neither desired velocities nor named stages of the control flow."
 
@@ -87,8 +96,8 @@ def _links(analysis: Analysis, failure: Event | Block) -> str:
         return ""
     annotated = [block for block in analysis.run.blocks if block.label != "ok"]
     failures: list[Event | Block] = [*analysis.findings, *annotated]
-    first = analysis.localisations[failure].first
-    named = culprits(analysis.links, failure, failures, first=first)
+    known = analysis.localisations[failure]
+    named = fault_links(analysis.links, failure, failures, known=known)
     return ", ".join(f"{link} {share:.0%}" for link, share in named)
 
 

@@ -1,10 +1,10 @@
-"""The links at which a failure points."""
+"""Links of a fault."""
 
 import numpy as np
 import pytest
 
-from inspector.localisation.links import culprits
-from inspector.localisation.stage import First
+from inspector.localisation.links import fault_links
+from inspector.localisation.stage import Localisation
 from models import Event
 from noisemodel import Robot, Run
 from noisemodel.links import LinkNoise, link_noise
@@ -15,7 +15,7 @@ BLOW = Event("impact", 1.0, 1.4, 1.0)
 
 
 def noise(**excess):
-    """Links that hum by 1 mW all the time, and by more as told: from, to, and how much."""
+    """Links that hum at 1 mW, and louder as given: from, to, and by how much."""
     time = np.arange(300) / 100 + 0.005
     vibration = np.full((300, len(LINKS)), 1e-3)
     for link, (start, stop, power) in excess.items():
@@ -25,8 +25,8 @@ def noise(**excess):
 
 
 def blow(*joints, onset=1.0):
-    """What is known of a blow that is new in some joints."""
-    return First("measured", "", 0.0, False, tuple((joint, 0.5) for joint in joints), onset)
+    """Localisation of a blow with innovation in some joints."""
+    return Localisation("measured", joints=tuple((joint, 0.5) for joint in joints), onset=onset)
 
 
 def rattling(joint):
@@ -42,7 +42,7 @@ def rattling(joint):
 
 def test_a_rattling_joint_is_named_by_its_link():
     for joint, link in ((5, "wrist_3_link"), (4, "wrist_2_link")):
-        named = dict(culprits(link_noise(rattling(joint)), BLOW, [BLOW]))
+        named = dict(fault_links(link_noise(rattling(joint)), BLOW, [BLOW]))
         assert link in named
         assert "shoulder_link" not in named
         assert sum(named.values()) <= 1.0 + 1e-12
@@ -50,33 +50,33 @@ def test_a_rattling_joint_is_named_by_its_link():
 
 def test_shares_are_of_the_whole_excess():
     links = noise(body=(1.0, 1.4, 0.6), thigh=(1.0, 1.4, 0.3), foot=(1.0, 1.4, 0.1))
-    named = culprits(links, BLOW, [BLOW])
+    named = fault_links(links, BLOW, [BLOW])
     assert [link for link, _ in named] == ["body", "thigh", "foot"]
     assert [share for _, share in named] == pytest.approx([0.6, 0.3, 0.1])
 
 
-def test_of_a_blow_its_beginning_counts_and_of_a_vibration_all():
+def test_the_beginning_of_a_blow_counts_and_all_of_a_vibration():
     links = noise(foot=(1.0, 1.05, 0.5), other_foot=(1.1, 1.4, 0.5))
-    assert [link for link, _ in culprits(links, BLOW, [BLOW], first=blow())] == ["foot"]
-    lasting = First("commanded", "measured", 0.001, lasting=True)
-    assert culprits(links, BLOW, [BLOW], first=lasting)[0][0] == "other_foot"
+    assert [link for link, _ in fault_links(links, BLOW, [BLOW], known=blow())] == ["foot"]
+    lasting = Localisation("commanded", "measured", 0.001, lasting=True)
+    assert fault_links(links, BLOW, [BLOW], known=lasting)[0][0] == "other_foot"
 
 
-def test_a_limb_in_which_it_is_new_is_named_though_others_are_louder():
+def test_a_limb_whose_joints_fail_is_named_though_others_are_louder():
     loud = {
         link: (1.0, 1.4, power) for link, power in zip(LINKS, (0.4, 0.3, 0.2, 0.1), strict=True)
     }
     links = noise(**loud)
-    plain = [link for link, _ in culprits(links, BLOW, [BLOW], first=blow("hip"))]
+    plain = [link for link, _ in fault_links(links, BLOW, [BLOW], known=blow("hip"))]
     assert plain == ["body", "thigh", "foot"]
-    named = culprits(links, BLOW, [BLOW], first=blow("other_knee"))
+    named = fault_links(links, BLOW, [BLOW], known=blow("other_knee"))
     assert [link for link, _ in named] == ["body", "thigh", "other_foot"]
     assert [share for _, share in named] == pytest.approx([0.4, 0.3, 0.1])
 
 
-def test_a_failure_in_which_nothing_changes_points_at_no_link():
-    assert culprits(noise(), BLOW, [BLOW], first=blow("hip")) == ()
+def test_a_failure_without_excess_has_no_links():
+    assert fault_links(noise(), BLOW, [BLOW], known=blow("hip")) == ()
 
 
-def test_a_failure_after_all_noise_points_at_no_link():
-    assert culprits(noise(foot=(1.0, 1.4, 0.5)), Event("impact", 5.0, 5.4, 1.0), []) == ()
+def test_a_failure_after_the_end_of_the_noise_has_no_links():
+    assert fault_links(noise(foot=(1.0, 1.4, 0.5)), Event("impact", 5.0, 5.4, 1.0), []) == ()

@@ -1,12 +1,12 @@
-"""Measure how often the right stage and the right limb are named.
+"""Measure how often failures are localised in the right stage, limb and band.
 
-    python benchmarks/origins.py build/origins [--robots talos,go2,panda] [--seeds 3,4]
+    python benchmarks/localisation.py build/localisation [--robots talos,go2,panda] [--seeds 3,4]
 
 Simulates runs whose defects are known, into a folder; those that are there are not simulated
-again. Of each event that became a label, the stage named is held against the one in which the
-defect acts, the first three links against the limb on which it acts: the leg whose foot met
+again. The stage of each event that became a label is compared with the one in which the
+defect acts, the first three links with the limb on which it acts: the leg whose foot met
 something, whose sensor or plan jumped, or that was shaken alone; arms have one limb. Events
-without a limb of their own are left out of that column. The band named is held against that of
+without a limb of their own are left out of that column. The band is compared with that of
 oscillations that were commanded in one: right if they overlap.
 """
 
@@ -20,8 +20,8 @@ from typing import Any
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import noisemodel as nm
-from inspector.localisation.links import culprits
-from inspector.localisation.localise import Origin, origins
+from inspector.localisation.links import fault_links
+from inspector.localisation.localise import Localisation, localise
 from noisemodel.links import LinkNoise, link_noise
 from scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from scenarios.limbs import limbs
@@ -96,19 +96,17 @@ def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:
     return {name for name, index in carried if known.joints[index - 1].name in joints}
 
 
-def decide(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str, bool]]]:
-    """Judge each event: cause, what was found, and whether stage, limb and band are right."""
-    robot, known = str(run.robot), origins(run, ())
+def decide(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Localisation, dict[str, bool]]]:
+    """Cause and localisation of each event, and whether stage, limb and band are right."""
+    robot, known = str(run.robot), localise(run, ())
     for event, block in labelled(run):
         found = known[block]
-        stage = None if found.first is None else found.first.stage
-        marks = {"stage": stage == ACTS.get(event["cause"], "commanded")}
+        marks = {"stage": found.stage == ACTS.get(event["cause"], "commanded")}
         joints = limb_of(robot, event)
         if joints:
-            named = {link for link, _ in culprits(links, block, list(known), first=found.first)}
+            named = {link for link, _ in fault_links(links, block, list(known), known=found)}
             marks["limb"] = bool(named & links_of(robot, joints))
-            new = () if found.first is None else found.first.joints
-            marks["joints"] = any(joint in joints for joint, _ in new)
+            marks["joints"] = any(joint in joints for joint, _ in found.joints)
         if "band" in event["facts"]:
             low, high = event["facts"]["band"]
             marks["band"] = found.band is not None and (
@@ -118,7 +116,7 @@ def decide(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[st
 
 
 def main() -> None:
-    """Simulate, judge, and print."""
+    """Simulate, compare, and print."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("folder", type=Path)
     arguments.add_argument("--robots", default="talos,go2,panda")

@@ -1,10 +1,9 @@
 import numpy as np
 import pytest
 
-from inspector.localisation import onset
 from inspector.localisation.flow import flow
-from inspector.localisation.innovation import changes, usual
-from inspector.localisation.stage import first_stage
+from inspector.localisation.innovation import changes, quiet_statistics
+from inspector.localisation.stage import Localisation, first_stage, onset, rise
 from models import Event
 from noisemodel import Block, Run
 
@@ -34,8 +33,8 @@ def flowing_run(acts_in=None, kind="jump", *, feedback=0.0, **changed):
         for name in ("planned", "commanded", "desired", "measured")
     }
     planned = swing + added["planned"]
-    answer = feedback * later(added["measured"], 3 * DELAY)
-    commanded = later(planned, DELAY) + added["commanded"] + answer
+    response = feedback * later(added["measured"], 3 * DELAY)
+    commanded = later(planned, DELAY) + added["commanded"] + response
     desired = commanded + added["desired"]
     noise = 1e-4 * random.standard_normal(swing.shape)
     fields = {
@@ -51,7 +50,7 @@ def flowing_run(acts_in=None, kind="jump", *, feedback=0.0, **changed):
 
 def found(run, failure=None, reach=0.1):
     failure = failure or run.blocks[0]
-    return first_stage(run, usual(run, run.blocks), failure, reach=reach)
+    return first_stage(run, quiet_statistics(run, run.blocks), failure, reach=reach)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +61,7 @@ def found(run, failure=None, reach=0.1):
         ("desired", "measured", 0.002),
     ],
 )
-def test_a_jump_is_named_by_the_stage_in_which_it_is_new_and_its_lead(stage, following, lag):
+def test_a_jump_is_localised_in_the_stage_at_which_it_enters_with_its_lead(stage, following, lag):
     first = found(flowing_run(stage))
     assert (first.stage, first.following, first.lasting) == (stage, following, False)
     assert first.lag == pytest.approx(lag, abs=1.1e-3)
@@ -76,19 +75,19 @@ def test_the_joint_on_which_a_defect_acts_is_named(stage, kind):
     assert share > 0.9
 
 
-def test_a_blow_shows_in_the_measured_motion_before_the_command_answers():
+def test_a_blow_shows_in_the_measured_motion_before_the_command_responds():
     first = found(flowing_run("measured", feedback=0.5))
     assert (first.stage, first.following) == ("measured", "commanded")
     assert first.lag == pytest.approx(3 * DELAY / RATE, abs=1e-3)
 
 
-def test_a_blow_that_nothing_answers_shows_in_the_measured_motion_alone():
+def test_a_blow_without_a_response_shows_in_the_measured_motion_alone():
     first = found(flowing_run("measured"))
     assert (first.stage, first.following, first.lag) == ("measured", "", 0.0)
 
 
 @pytest.mark.parametrize("stage", ["planned", "commanded", "desired", "measured"])
-def test_a_lasting_vibration_is_named_by_the_stage_that_adds_it(stage):
+def test_a_lasting_vibration_is_localised_in_the_stage_that_adds_it(stage):
     first = found(flowing_run(stage, "shake"))
     assert first.lasting
     assert first.stage == stage
@@ -101,22 +100,22 @@ def test_a_lasting_vibration_leads_the_measured_one_by_the_delay_between_them():
     )
 
 
-def test_a_vibration_that_the_command_answers_faintly_is_not_blamed_on_the_command():
+def test_a_vibration_to_which_the_command_responds_faintly_is_not_localised_in_the_command():
     assert found(flowing_run("measured", "shake", feedback=0.1)).stage == "measured"
 
 
 def test_a_finding_is_searched_over_its_first_frame():
     event = Event("highaccelerations", 1.7, 2.3, 1.0)
     run = flowing_run("commanded")
-    first = first_stage(run, usual(run, [event, *run.blocks]), event, reach=0.4)
+    first = first_stage(run, quiet_statistics(run, [event, *run.blocks]), event, reach=0.4)
     assert first.stage == "commanded"
 
 
 def test_no_stage_shows_what_is_not_there():
-    assert found(flowing_run(None)) is None
+    assert found(flowing_run(None)) == Localisation()
 
 
-def test_without_stages_desired_and_measured_are_told_apart():
+def test_without_named_stages_desired_and_measured_are_distinguished():
     assert found(flowing_run("desired", stages={})).stage == "desired"
     assert found(flowing_run("measured", stages={})).stage == "measured"
 
@@ -152,19 +151,19 @@ def test_the_edge_of_a_gap_is_no_jump():
         valid=valid,
     )
     assert np.abs(changes(flow(gap, slice(3800, 4080)))).max() < 10.0
-    assert found(gap) is None
+    assert found(gap) == Localisation()
 
 
 def test_a_failure_that_lies_in_a_gap_has_no_stage():
     valid = np.ones(round(RATE * SECONDS), dtype=bool)
     valid[3960:4240] = False
-    assert found(flowing_run(valid=valid)) is None
+    assert found(flowing_run(valid=valid)) == Localisation()
 
 
 def test_a_run_without_quiet_time_still_names_a_stage():
     run = flowing_run("commanded")
     whole = Block(0.0, 4.0, "impact")
-    first = first_stage(run, usual(run, [whole]), run.blocks[0], reach=0.1)
+    first = first_stage(run, quiet_statistics(run, [whole]), run.blocks[0], reach=0.1)
     assert first.stage in {"planned", "commanded"}
 
 
@@ -176,14 +175,14 @@ def test_slow_motion_is_no_change():
 
 
 def test_an_onset_is_the_sample_at_which_something_sets_in():
-    sharp = np.full(2000, 1.0)
-    sharp[1000:1100] = 50.0
-    moment = onset.rise(sharp, 900, 1100, rate=10000.0)
-    assert onset.onset(sharp, moment, rate=10000.0) == 1000
-    assert onset.onset(np.ones(2000), 1000, rate=10000.0) is None
+    level = np.full(2000, 1.0)
+    level[1000:1100] = 50.0
+    moment = rise(level, 900, 1100, rate=10000.0)
+    assert onset(level, moment, rate=10000.0) == 1000
+    assert onset(np.ones(2000), 1000, rate=10000.0) is None
 
 
 def test_of_two_rises_the_first_counts_if_it_is_steep():
-    sharp = np.full(4000, 1.0)
-    sharp[1000:1100], sharp[1800:1900] = 40.0, 60.0
-    assert abs(onset.rise(sharp, 600, 2000, rate=10000.0) - 1000) < 20
+    level = np.full(4000, 1.0)
+    level[1000:1100], level[1800:1900] = 40.0, 60.0
+    assert abs(rise(level, 600, 2000, rate=10000.0) - 1000) < 20

@@ -8,10 +8,10 @@ from inspector.analysis.verdict import judge
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.localisation.band import band
-from inspector.localisation.localise import Origin, origins
-from inspector.localisation.quiet import quiet
-from inspector.localisation.stage import First
+from inspector.localisation.localise import Localisation, localise
+from inspector.localisation.quiet import quiet_stretches
 from inspector.report.html import found as tables
+from inspector.report.localisation import words
 from inspector.report.markdown import report, sentence
 from noisemodel import Block, Run
 
@@ -49,7 +49,7 @@ def test_a_failure_lies_in_the_band_in_which_it_shakes(low, high):
     assert found[1] - found[0] >= 0.4 * (high - low)
 
 
-def test_a_hum_that_is_always_there_is_no_failure():
+def test_a_hum_throughout_the_run_is_no_failure():
     quiet_block = Block(4.5, 5.5, "impact")
     found = band(shaken_run(300, 320), quiet_block, [SHAKE, quiet_block])
     assert found is None or not found[0] <= 30 <= found[1] or found[1] - found[0] > 5
@@ -70,31 +70,34 @@ def test_quiet_stretches_keep_clear_of_failures_and_gaps():
     valid = np.ones(round(RATE * SECONDS), dtype=bool)
     valid[9000:9100] = False
     run = shaken_run(valid=valid)
-    parts = quiet(run, [SHAKE], length=0.1, most=5)
+    parts = quiet_stretches(run, [SHAKE], length=0.1, most=5)
     assert len(parts) == 5
     for part in parts:
         assert valid[part].all()
         assert not ((run.time[part] >= 2.0) & (run.time[part] < 3.5)).any()
-    assert quiet(run, [Block(0.0, 6.0, "impact")], length=0.1) == []
+    assert quiet_stretches(run, [Block(0.0, 6.0, "impact")], length=0.1) == []
 
 
-def test_an_origin_says_stage_lead_and_band():
-    found = Origin(First("commanded", "measured", 0.003, lasting=True), (85.0, 130.0))
-    assert found.stage == "`commanded`, 3.0 ms before `measured`"
-    assert found.frequencies == "85-130 Hz"
-    assert Origin(First("measured", "", 0.0, lasting=False), (20.0, 20.0)).stage == "`measured`"
-    assert Origin(None, None).stage == Origin(None, None).frequencies == ""
+def test_the_words_for_a_localisation_are_stage_lead_joints_and_band():
+    joints = (("knee", 0.8), ("hip", 0.04))
+    found = Localisation("commanded", "measured", 0.003, joints=joints, band=(85.0, 130.0))
+    assert words(found) == ("commanded, 3.0 ms before measured", "knee 80%", "85-130 Hz")
+    assert words(found, quote="`")[0] == "`commanded`, 3.0 ms before `measured`"
+    slow = dataclasses.replace(found, lag=0.0123)
+    assert words(slow)[0] == "commanded, 12 ms before measured"
+    assert words(Localisation("measured", band=(20.0, 20.0))) == ("measured", "", "20 Hz")
+    assert words(Localisation(), quote="`") == ("", "", "")
 
 
-def test_every_failure_has_an_origin_and_what_is_ok_has_none():
+def test_every_failure_is_localised_and_what_is_ok_is_not():
     run = shaken_run(blocks=(Block(0.5, 1.5, "ok"), SHAKE))
-    known = origins(run, ())
+    known = localise(run, ())
     assert list(known) == [SHAKE]
-    assert known[SHAKE].first.stage == "measured"
-    assert origins(shaken_run(blocks=()), ()) == {}
+    assert known[SHAKE].stage == "measured"
+    assert localise(shaken_run(blocks=()), ()) == {}
 
 
-def test_findings_are_traced_to_what_a_view_of_their_run_says():
+def test_the_localisation_of_a_verdict_is_that_of_a_view_of_its_run():
     library = load_library(model_files())
     verdict = judge(demo_run(), library, localise=True)
     assert verdict.events
@@ -120,7 +123,7 @@ def test_the_report_says_stage_and_band_of_each_failure(tmp_path):
 def test_a_run_without_desired_velocities_says_once_that_it_has_no_stages(tmp_path):
     blocks = (SHAKE, Block(4.0, 4.2, "impact"))
     analysis = inspected(shaken_run(velocity_desired=None, blocks=blocks), tmp_path)
-    assert all(known.first is None for known in analysis.localisations.values())
+    assert all(known.stage == "" for known in analysis.localisations.values())
     assert report(analysis).count("No stages") == 1
     (annotated,) = tables(analysis)
     assert annotated.note.startswith("No stages")
