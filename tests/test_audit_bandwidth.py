@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
 
-from inspector.audit.bandwidth import ENCODERS, bandwidth
-from inspector.audit.differentiation import CENTRAL, SMOOTH, slope_of
-from inspector.audit.hold import held_for
+from inspector.audit.bandwidth import ENCODER_NOISE, bandwidth
+from inspector.audit.differentiation import CENTRAL, SMOOTH, differentiator_of
+from inspector.audit.hold import hold_length
 from inspector.audit.quantisation import step_of
 from inspector.audit.spectrum import spectrum
 from noisemodel import Run
@@ -88,7 +88,12 @@ def test_the_corner_of_a_filter_is_found(rate, order, share):
 def test_plain_sensor_noise_is_no_filter(rate, level):
     _, position, velocity = motion(rate)
     found = bandwidth(run_of(velocity + noise(velocity.shape, level), rate, position=position))
-    assert (found.corner, found.slope, found.held, found.drowned) == (None, None, 1.0, None)
+    assert (found.corner, found.differentiator, found.hold, found.floor_from) == (
+        None,
+        None,
+        1.0,
+        None,
+    )
     assert found.usable == rate / 2
 
 
@@ -102,16 +107,16 @@ def test_a_vibration_in_one_band_is_no_filter(rate, band):
     assert found.corner is None
 
 
-def test_an_encoder_filter_of_first_order_is_no_reason_for_doubt():
+def test_an_encoder_filter_of_first_order_gives_no_warning():
     _, _, velocity = motion(10_000.0)
     noisy = velocity + low_passed(noise(velocity.shape), 500.0, 10_000.0, 1)
     assert bandwidth(run_of(noisy, 10_000.0)).corner is None
 
 
-# --- rounding
+# --- quantisation
 
 
-def test_the_step_of_rounded_values_is_found():
+def test_the_step_of_quantised_values_is_found():
     values = np.random.default_rng(0).normal(size=5000)
     for step in (0.1, 1e-3, 2 * np.pi / 4096):
         assert step_of(np.round(values / step) * step) == pytest.approx(step)
@@ -120,83 +125,90 @@ def test_the_step_of_rounded_values_is_found():
     assert step_of(np.arange(3.0)) == 0.0
 
 
-def test_a_signal_drowns_where_rounding_is_louder():
+def test_the_quantisation_floor_begins_where_quantisation_noise_is_louder():
     _, _, velocity = motion(1000.0)
     fast = 0.01 * np.sin(2 * np.pi * 60 * np.arange(len(velocity)) / 1000)[:, None]
     step = 1e-3
     rounded = bandwidth(run_of(np.round((velocity + fast) / step) * step, 1000.0))
     assert rounded.step == pytest.approx(step)
-    assert rounded.drowned == pytest.approx(80, abs=25)
+    assert rounded.floor_from == pytest.approx(80, abs=25)
     # step² / 12 over half the rate and six joints, a 10 Hz band of it, as an amplitude
-    assert rounded.hidden == pytest.approx(np.sqrt(2 * 10 * 6 * step**2 / 12 / 500), rel=1e-6)
+    assert rounded.floor_amplitude == pytest.approx(
+        np.sqrt(2 * 10 * 6 * step**2 / 12 / 500), rel=1e-6
+    )
     assert rounded.usable == 500.0
 
 
-def test_rounding_below_the_sensor_noise_hides_nothing():
+def test_quantisation_below_the_sensor_noise_masks_nothing():
     _, _, velocity = motion(1000.0)
     noisy = np.round((velocity + noise(velocity.shape)) / 1e-3) * 1e-3
-    assert bandwidth(run_of(noisy, 1000.0)).drowned is None
-    assert bandwidth(run_of(noisy.astype(np.float32), 1000.0)).drowned is None
+    assert bandwidth(run_of(noisy, 1000.0)).floor_from is None
+    assert bandwidth(run_of(noisy.astype(np.float32), 1000.0)).floor_from is None
 
 
-def test_rounded_positions_drown_their_differences():
+def test_quantised_positions_mask_their_differences():
     _, position, _ = motion(1000.0)
     coarse = np.round(position / 1e-3) * 1e-3
     found = bandwidth(run_of(np.gradient(coarse, 1e-3, axis=0), 1000.0, position=coarse))
-    assert found.slope is CENTRAL
+    assert found.differentiator is CENTRAL
     assert found.step == pytest.approx(1e-3)
-    assert found.drowned < 20.0
+    assert found.floor_from < 20.0
 
 
-def test_what_no_encoder_is_that_quiet_for_is_said():
+def test_a_level_below_any_encoders_noise_is_reported():
     _, _, velocity = motion(1000.0)
-    assert bandwidth(run_of(velocity, 1000.0)).quiet == pytest.approx(35, abs=15)
-    assert bandwidth(run_of(velocity + noise(velocity.shape), 1000.0)).quiet is None
-    assert ENCODERS == 3e-5
+    assert bandwidth(run_of(velocity, 1000.0)).quiet_from == pytest.approx(35, abs=15)
+    assert bandwidth(run_of(velocity + noise(velocity.shape), 1000.0)).quiet_from is None
+    assert ENCODER_NOISE == 3e-5
 
 
-def test_standstill_has_no_flaw():
+def test_standstill_has_no_limits():
     found = bandwidth(run_of(np.zeros((5000, 2)), 1000.0))
-    assert (found.corner, found.drowned, found.quiet, found.usable) == (None, None, None, 500.0)
+    assert (found.corner, found.floor_from, found.quiet_from, found.usable) == (
+        None,
+        None,
+        None,
+        500.0,
+    )
 
 
-# --- held values
+# --- zero-order hold
 
 
 @pytest.mark.parametrize("length", [2, 8, 33])
-def test_held_values_are_told_with_their_length(length):
+def test_a_zero_order_hold_is_found_with_its_length(length):
     _, _, velocity = motion(1000.0)
     held = np.repeat(velocity[::length], length, axis=0)[: len(velocity)]
     found = bandwidth(run_of(held, 1000.0))
-    assert found.held == pytest.approx(length)
+    assert found.hold == pytest.approx(length)
     assert found.usable == pytest.approx(500.0 / length)
     assert found.corner is None
 
 
-def test_values_held_for_a_broken_number_of_samples_are_told():
+def test_a_hold_of_a_fractional_number_of_samples_is_found():
     _, _, velocity = motion(1000.0)
     places = (np.arange(len(velocity)) * 30 // 1000) * 1000 // 30
-    assert held_for(velocity[places], np.ones(len(velocity), dtype=bool)) == pytest.approx(
+    assert hold_length(velocity[places], np.ones(len(velocity), dtype=bool)) == pytest.approx(
         33.3, 0.02
     )
 
 
-def test_rounding_and_rest_hold_nothing():
+def test_quantisation_and_rest_are_no_hold():
     _, _, velocity = motion(1000.0)
     everywhere = np.ones(len(velocity), dtype=bool)
-    assert held_for(np.round(velocity, 2), everywhere) == 1.0
-    assert held_for(np.round(velocity[:, :1], 1), everywhere) == 1.0
+    assert hold_length(np.round(velocity, 2), everywhere) == 1.0
+    assert hold_length(np.round(velocity[:, :1], 1), everywhere) == 1.0
     velocity[2000:8000] = velocity[2000]
-    assert held_for(velocity, everywhere) == 1.0
+    assert hold_length(velocity, everywhere) == 1.0
 
 
 # --- differentiated positions
 
 
-def test_the_slope_of_a_sine_is_told_right_where_the_method_is_good():
+def test_the_slope_of_a_sine_is_right_at_low_frequencies():
     low = np.array([1.0])
-    for slope in (CENTRAL, SMOOTH):
-        assert slope.response(low, 1000.0) == pytest.approx(2 * np.pi, rel=1e-3)
+    for method in (CENTRAL, SMOOTH):
+        assert method.response(low, 1000.0) == pytest.approx(2 * np.pi, rel=1e-3)
     assert CENTRAL.corner(1000.0) == pytest.approx(221.5, abs=1)  # sin(x) / x = sqrt(1 / 2)
 
 
@@ -205,25 +217,25 @@ def test_differences_of_positions_are_recognised(dtype):
     _, position, _ = motion(100.0)
     position = (position + noise(position.shape, 1e-4)).astype(dtype)
     differences = np.diff(position, axis=0, append=position[-1:]) * dtype(100)
-    assert "after" in slope_of(run_of(differences, 100.0, position=position)).name
+    assert "after" in differentiator_of(run_of(differences, 100.0, position=position)).name
     backward = np.vstack((differences[:1], differences[:-1]))
-    assert "before" in slope_of(run_of(backward, 100.0, position=position)).name
+    assert "before" in differentiator_of(run_of(backward, 100.0, position=position)).name
     central = np.gradient(position, 0.01, axis=0).astype(dtype)
-    assert slope_of(run_of(central, 100.0, position=position)) is CENTRAL
+    assert differentiator_of(run_of(central, 100.0, position=position)) is CENTRAL
 
 
 def test_measured_velocities_are_not_taken_for_differences():
     _, position, velocity = motion(1000.0)
-    assert slope_of(run_of(velocity, 1000.0, position=position)) is None
-    assert slope_of(run_of(velocity, 1000.0)) is None
+    assert differentiator_of(run_of(velocity, 1000.0, position=position)) is None
+    assert differentiator_of(run_of(velocity, 1000.0)) is None
 
 
-def test_what_was_differentiated_on_the_way_in_is_known(tmp_path):
+def test_velocities_differentiated_on_import_are_known(tmp_path):
     time, position, _ = motion(1000.0)
     position += noise(position.shape, 1e-5)
     np.savez(tmp_path / "run.npz", time=time, position=position)
     run = Run.load(tmp_path / "run.npz")
-    assert slope_of(run) is SMOOTH
+    assert differentiator_of(run) is SMOOTH
     assert bandwidth(run).usable == pytest.approx(194.5, abs=1)
     expected = savgol_filter(position, 7, 3, deriv=1, delta=1e-3, axis=0)
     inner = slice(10, -10)

@@ -22,7 +22,7 @@ def episode(tmp_path):
     return path
 
 
-def test_an_episode_of_30_hz_in_degrees_is_told_what_it_cannot_show(episode):
+def test_the_audit_of_a_30_hz_episode_in_degrees_gives_its_limits(episode):
     status, out, err = call("audit", episode)
     assert (status, err) == (4, "")
     assert "30 Hz" in out
@@ -32,23 +32,23 @@ def test_an_episode_of_30_hz_in_degrees_is_told_what_it_cannot_show(episode):
     assert "impact: cannot tell: 30 Hz is slower than every model; needs 1000 Hz" in out
 
 
-def test_the_demo_shows_all(tmp_path):
+def test_all_classes_are_observable_in_the_demo(tmp_path):
     status, out, err = call("audit", demo_run())
     assert (status, err) == (0, "")
     assert "oscillations: observable, 20 to 1000 Hz" in out
-    assert "looks wrong" not in out
+    assert "warning" not in out
 
 
 def test_audits_as_json(episode):
     status, out, _ = call("audit", demo_run(), episode, "--format", "json")
     assert status == 4
     found = json.loads(out)
-    assert found["format"] == "noise-audit/1"
+    assert found["format"] == "noise-audit/2"
     demo, slow = found["runs"]
     assert demo["bandwidth"]["usable"] == 5000
-    assert {each["sight"] for each in demo["classes"]} == {"observable"}
+    assert {each["observability"] for each in demo["classes"]} == {"observable"}
     assert {each["needed"] for each in slow["classes"]} == {1000}
-    assert slow["doubts"][0].startswith("positions look like degrees")
+    assert slow["warnings"][0].startswith("positions look like degrees")
 
 
 def test_one_bad_file_does_not_stop_the_rest(tmp_path):
@@ -74,11 +74,11 @@ def test_a_csv_log_is_audited_as_it_is_imported(tmp_path):
     assert "1000 Hz" in out
 
 
-def test_view_says_it_in_a_line_or_two(episode, tmp_path):
+def test_view_prints_a_summary_of_the_audit(episode, tmp_path):
     status, out, _ = call("view", episode, "--save", tmp_path / "run.rrd")
     assert status == 0
-    assert "Impact, highaccelerations and oscillations cannot be told" in out
-    assert "Looks wrong: positions look like degrees" in out
+    assert "Impact, highaccelerations and oscillations cannot be observed" in out
+    assert "Warnings: positions look like degrees" in out
 
 
 @pytest.mark.skipif(not PANDA.is_dir(), reason="needs ../shared/data/panda")
@@ -92,4 +92,4 @@ def test_the_log_of_a_real_panda(tmp_path):
     assert "missing: 4 gaps" in out
     assert "impact: observable" in out
     assert "oscillations: partly, 20 to 440 Hz" in out
-    assert "looks wrong" not in out
+    assert "warning" not in out

@@ -4,11 +4,11 @@ from test_audit_bandwidth import motion, noise, run_of
 
 from inspector.audit.audit import excerpt, gaps_of
 from inspector.audit.copies import copies
-from inspector.audit.units import unit_doubts
+from inspector.audit.units import unit_warnings
 
 
-def doubts(velocity, position=None, rate=1000.0):
-    return list(unit_doubts(run_of(velocity, rate, position=position)))
+def warnings(velocity, position=None, rate=1000.0):
+    return list(unit_warnings(run_of(velocity, rate, position=position)))
 
 
 # --- units
@@ -16,10 +16,10 @@ def doubts(velocity, position=None, rate=1000.0):
 
 @pytest.mark.parametrize("rate", [50.0, 1000.0])
 @pytest.mark.parametrize("level", [0.0, 0.01])
-def test_radians_are_not_doubted(rate, level):
+def test_radians_give_no_warning(rate, level):
     _, position, velocity = motion(rate)
-    assert doubts(velocity + noise(velocity.shape, level), position, rate) == []
-    assert doubts(velocity, None, rate) == []
+    assert warnings(velocity + noise(velocity.shape, level), position, rate) == []
+    assert warnings(velocity, None, rate) == []
 
 
 @pytest.mark.parametrize(
@@ -32,17 +32,17 @@ def test_radians_are_not_doubted(rate, level):
         (1, 1 / (2 * np.pi), "turns per second"),
     ],
 )
-def test_velocities_in_another_unit_than_positions_are_told(by_position, by_velocity, said):
+def test_velocities_in_another_unit_than_positions_give_a_warning(by_position, by_velocity, said):
     _, position, velocity = motion(1000.0)
     velocity = velocity + noise(velocity.shape, 0.01)
-    assert said in doubts(by_velocity * velocity, by_position * position)[0]
+    assert said in warnings(by_velocity * velocity, by_position * position)[0]
 
 
-def test_degrees_throughout_are_told_by_how_far_they_reach():
+def test_degrees_throughout_are_found_by_how_far_they_reach():
     _, position, velocity = motion(30.0)
-    (said, *_) = doubts(np.rad2deg(velocity), np.rad2deg(position), 30.0)
+    (said, *_) = warnings(np.rad2deg(velocity), np.rad2deg(position), 30.0)
     assert said == "positions look like degrees or normalised (joint0 reaches 63.03)"
-    (said, *_) = doubts(np.rad2deg(velocity), 2 * np.rad2deg(position), 30.0)
+    (said, *_) = warnings(np.rad2deg(velocity), 2 * np.rad2deg(position), 30.0)
     assert "or normalised" not in said
 
 
@@ -50,23 +50,23 @@ def test_positions_that_stop_at_round_ends_look_normalised():
     _, position, velocity = motion(30.0)
     assert any(
         "normalised: several joints stop at 100" in said
-        for said in doubts(velocity, np.clip(120 * position, -100, 100), 30.0)
+        for said in warnings(velocity, np.clip(120 * position, -100, 100), 30.0)
     )
     assert any(
-        "stop at 1" in said for said in doubts(velocity, np.clip(1.2 * position, -1, 1), 30.0)
+        "stop at 1" in said for said in warnings(velocity, np.clip(1.2 * position, -1, 1), 30.0)
     )
 
 
-def test_one_wheel_among_many_joints_is_no_reason_for_doubt():
+def test_one_wheel_among_many_joints_gives_no_warning():
     time, position, velocity = motion(1000.0)
     position[:, 0], velocity[:, 0] = 9 * time, 9.0
     velocity[::2, 0] += 1e-3
-    assert doubts(velocity, position) == []
+    assert warnings(velocity, position) == []
 
 
-def test_velocities_that_no_robot_reaches_are_doubted():
+def test_velocities_that_no_robot_reaches_give_a_warning():
     _, _, velocity = motion(1000.0)
-    (said,) = doubts(np.rad2deg(velocity))
+    (said,) = warnings(np.rad2deg(velocity))
     assert "degrees or turns per minute (joint4 reaches" in said
 
 
@@ -74,7 +74,7 @@ def test_velocities_that_no_robot_reaches_are_doubted():
 
 
 @pytest.mark.parametrize("lag", [0, 1, 5, -3])
-def test_a_desired_signal_that_is_the_measured_one_is_told_with_its_lag(lag):
+def test_a_copy_is_found_with_its_lag(lag):
     _, _, velocity = motion(30.0)
     measured = velocity + noise(velocity.shape)
     desired = np.roll(measured, -lag, axis=0)
@@ -117,7 +117,7 @@ def test_gaps_are_counted_and_measured():
 # --- long runs
 
 
-def test_of_a_long_run_the_fastest_part_is_looked_at():
+def test_the_fastest_part_of_a_long_run_is_examined():
     rate, samples = 1000.0, 500_000
     time = np.arange(samples) / rate
     velocity = np.cos(time)[:, None] * np.where(time < 400, 0.01, 1.0)[:, None]

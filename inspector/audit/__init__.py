@@ -1,7 +1,14 @@
-"""The audit of a log: what it can show, and what it cannot."""
+"""Audit of a log: bandwidth, observable classes, warnings."""
 
 from inspector.audit.audit import Audit, audit
 from inspector.audit.formats import shortcomings, summary
-from inspector.audit.sight import ClassSight, Sight
+from inspector.audit.observability import ClassObservability, Observability
 
-__all__ = ["Audit", "ClassSight", "Sight", "audit", "shortcomings", "summary"]
+__all__ = [
+    "Audit",
+    "ClassObservability",
+    "Observability",
+    "audit",
+    "shortcomings",
+    "summary",
+]

@@ -1,4 +1,4 @@
-"""The audit: what a log can show, and what looks wrong with it."""
+"""Audit of a run: gaps, bandwidth, observable classes, warnings."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -9,9 +9,9 @@ import numpy as np
 import models
 from inspector.audit.bandwidth import Bandwidth, bandwidth
 from inspector.audit.copies import copies
-from inspector.audit.hold import held_for
-from inspector.audit.sight import ClassSight, Sight, sights
-from inspector.audit.units import unit_doubts
+from inspector.audit.hold import hold_length
+from inspector.audit.observability import ClassObservability, Observability, observable_classes
+from inspector.audit.units import unit_warnings
 from inspector.library import for_robot, signals_of
 from noisemodel import Run
 from noisemodel.run import part
@@ -19,12 +19,12 @@ from noisemodel.run import part
 
 @dataclass(frozen=True)
 class Gaps:
-    """What is missing of a run.
+    """Gaps of a run.
 
     Attributes:
-        count: Gaps.
-        total: All of their time, in [s].
-        longest: That of the longest, in [s].
+        count: Number of gaps.
+        total: Their total duration, in [s].
+        longest: Duration of the longest, in [s].
     """
 
     count: int = 0
@@ -32,7 +32,7 @@ class Gaps:
     longest: float = 0.0
 
     def __str__(self) -> str:
-        """Say it in a clause."""
+        """Format as a clause."""
         if not self.count:
             return "no gaps"
         plural = "" if self.count == 1 else "s"
@@ -43,19 +43,19 @@ class Gaps:
 
 @dataclass(frozen=True)
 class Audit:
-    """What a run can show.
+    """Rate, gaps, bandwidth and observable classes of a run.
 
     Attributes:
         rate: Sample rate, in [Hz].
         duration: In [s].
-        joints: How many there are.
+        joints: Number of joints.
         jitter: Deviation of the stamps' steps before they were made uniform, root mean square and
-            largest, in [s]; None where nobody noted it.
-        gaps: What is missing.
-        bandwidth: How far up it reaches.
-        doubts: What looks wrong: units, copies, held or filtered signals; a clause each.
-        notes: What is good to know of the signals; a clause each.
-        classes: How well each failure class can be seen.
+            largest, in [s]; None if the run's ``meta`` has none.
+        gaps: Its gaps.
+        bandwidth: Its bandwidth.
+        warnings: Signs of wrong units, copies, zero-order hold or filters; a clause each.
+        notes: Differentiation, quantisation, missing signals; a clause each.
+        classes: Observability of each failure class.
     """
 
     rate: float
@@ -64,24 +64,24 @@ class Audit:
     jitter: tuple[float, float] | None
     gaps: Gaps
     bandwidth: Bandwidth
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
     notes: tuple[str, ...]
-    classes: tuple[ClassSight, ...]
+    classes: tuple[ClassObservability, ...]
 
     @property
-    def blind(self) -> bool:
-        """Whether no failure class can be seen at all."""
-        return all(each.sight is Sight.CANNOT_TELL for each in self.classes)
+    def observable(self) -> bool:
+        """Whether a failure class is observable, at least partly."""
+        return any(each.observability is not Observability.CANNOT_TELL for each in self.classes)
 
 
 def audit(run: Run, library: Mapping[str, models.Classifier]) -> Audit:
-    """Look at what a run can show.
+    """Audit a run.
 
-    Gaps are counted everywhere; signals are looked at in an excerpt of the run.
+    Gaps are counted in the whole run; signals are examined in an excerpt of it.
 
     Args:
         run: The run.
-        library: Models that might label it; what they look at is what can be seen.
+        library: Models that might label it; their bands limit what is observable.
 
     Returns:
         The audit.
@@ -95,9 +95,11 @@ def audit(run: Run, library: Mapping[str, models.Classifier]) -> Audit:
         jitter=_jitter(run),
         gaps=gaps_of(run),
         bandwidth=reach,
-        doubts=tuple(_doubts(part, reach)),
+        warnings=tuple(_warnings(part, reach)),
         notes=tuple(_notes(part, reach)),
-        classes=sights(reach, run.mask, for_robot(library, run.robot), signals_of(part)),
+        classes=observable_classes(
+            reach, run.mask, for_robot(library, run.robot), signals_of(part)
+        ),
     )
 
 
@@ -110,42 +112,46 @@ def _jitter(run: Run) -> tuple[float, float] | None:
     return None
 
 
-def _doubts(run: Run, reach: Bandwidth) -> Iterator[str]:
-    yield from unit_doubts(run)
+def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
+    yield from unit_warnings(run)
     for copy in copies(run):
         whose = "all joints" if len(copy.joints) == len(run.joint_names) else ", ".join(copy.joints)
         samples = f"{abs(copy.lag)} sample{'' if abs(copy.lag) == 1 else 's'}"
         when = f", {samples} {'later' if copy.lag > 0 else 'earlier'}" if copy.lag else ""
         yield f"measured {copy.signal} of {whose} is the desired one{when}: one is a copy"
-    if reach.held > 1:
+    if reach.hold > 1:
         yield (
-            f"measured values are held for {reach.held:.3g} samples:"
-            f" the log was {run.rate / reach.held:.4g} Hz once"
+            f"measured values have a zero-order hold of {reach.hold:.3g} samples:"
+            f" they come at {run.rate / reach.hold:.4g} Hz"
         )
     if reach.corner:
         yield f"velocities look filtered from {reach.corner:.3g} Hz on"
 
 
 def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
-    if reach.slope:
+    if reach.differentiator:
         yield (
-            f"velocities are differentiated positions ({reach.slope.name}),"
-            f" weak above {reach.slope.corner(run.rate):.3g} Hz"
+            f"velocities are differentiated positions ({reach.differentiator.name}),"
+            f" attenuated above {reach.differentiator.corner(run.rate):.3g} Hz"
         )
     if run.velocity_desired is None:
         yield "there is no desired motion"
-    elif (held := held_for(run.velocity_desired, run.mask)) > 1:
-        yield f"desired velocities are held for {held:.3g} samples ({run.rate / held:.4g} Hz)"
-    if reach.drowned is not None:
-        unit = "rad" if reach.slope else "rad/s"
+    elif (hold := hold_length(run.velocity_desired, run.mask)) > 1:
         yield (
-            f"above {reach.drowned:.3g} Hz there is hardly more than rounding to {reach.step:.2g}"
-            f" {unit}, which hides oscillations up to {reach.hidden:.2g} rad/s"
+            f"desired velocities have a zero-order hold of {hold:.3g} samples"
+            f" ({run.rate / hold:.4g} Hz)"
         )
-    elif reach.quiet is not None:
+    if reach.floor_from is not None:
+        unit = "rad" if reach.differentiator else "rad/s"
         yield (
-            f"above {reach.quiet:.3g} Hz it is quieter than any encoder: filtered, or simulated"
-            " without sensor noise"
+            f"above {reach.floor_from:.3g} Hz the spectrum is at the quantisation floor (step"
+            f" {reach.step:.2g} {unit}), which masks oscillations up to"
+            f" {reach.floor_amplitude:.2g} rad/s"
+        )
+    elif reach.quiet_from is not None:
+        yield (
+            f"above {reach.quiet_from:.3g} Hz the level is below any encoder's noise: filtered, or"
+            " simulated without sensor noise"
         )
 
 
@@ -167,7 +173,7 @@ LONGEST = 60_000
 
 
 def excerpt(run: Run) -> Run:
-    """Take the part of a run around its fastest motion, so that an hour costs what minutes do.
+    """Cut out the part of a run around its fastest motion, which limits the cost of long runs.
 
     Args:
         run: The run.

@@ -1,4 +1,4 @@
-"""Desired and measured signals that are one and the same."""
+"""Measured signals that equal desired ones: one is a copy."""
 
 from dataclasses import dataclass
 
@@ -9,22 +9,22 @@ from noisemodel import Run
 from noisemodel.types import Real
 
 FARTHEST = 10
-"""Samples by which a copy may come before or after."""
+"""Largest lag of a copy, before or after, in samples."""
 
 LOOKED_AT = 1000
-"""Samples in motion that are compared, evenly spread, or few more."""
+"""Samples in motion that are compared, evenly spread, or a few more."""
 
 SAME = 0.99
-"""Share of the samples, of those in motion, that are equal bit for bit."""
+"""Least share of equal samples, bit for bit, among those in motion."""
 
 
 @dataclass(frozen=True)
 class Copy:
-    """A desired signal that is a measured one.
+    """A measured signal that equals the desired one.
 
     Attributes:
         signal: "position" or "velocity".
-        joints: Whose.
+        joints: Its joints.
         lag: Samples by which the measured signal comes after the desired one.
     """
 
@@ -37,7 +37,7 @@ def copies(run: Run) -> tuple[Copy, ...]:
     """Find desired signals that equal measured ones, perhaps some samples apart.
 
     Args:
-        run: The run; only signals that were logged are looked at.
+        run: The run; only signals that were logged are compared.
 
     Returns:
         At most one for each of position and velocity.
@@ -47,10 +47,12 @@ def copies(run: Run) -> tuple[Copy, ...]:
         measured, desired = getattr(run, signal), getattr(run, f"{signal}_desired")
         if measured is None or desired is None or derived(run, signal):
             continue
-        did, told = (np.ascontiguousarray(each[run.mask].T) for each in (measured, desired))
+        actual, wanted = (np.ascontiguousarray(each[run.mask].T) for each in (measured, desired))
         lags = {}
         for name in (name for name in run.joint_names if name in run.desired_joint_names):
-            lag = _lag(did[run.joint_names.index(name)], told[run.desired_joint_names.index(name)])
+            lag = _lag(
+                actual[run.joint_names.index(name)], wanted[run.desired_joint_names.index(name)]
+            )
             if lag is not None:
                 lags[name] = lag
         if lags:

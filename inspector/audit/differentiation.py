@@ -1,4 +1,4 @@
-"""Velocities that nobody measured: positions, differentiated."""
+"""Velocities that were not measured but differentiated from positions."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,18 +10,18 @@ from noisemodel.differentiate import ORDER, WINDOW
 from noisemodel.types import Array
 
 EXACT = 1e-12
-"""Share of the largest velocity by which a difference of positions may miss it."""
+"""Largest deviation of a difference of positions, as a share of the largest velocity."""
 
 LOOKED_AT = 5000
-"""Samples that are compared, evenly spread, or few more."""
+"""Samples that are compared, evenly spread, or a few more."""
 
 COARSE = 1e-4
-"""If rounding alone explains more than this share of a velocity, nothing is told from it."""
+"""Largest share of floating-point rounding in a velocity that is compared."""
 
 
 @dataclass(frozen=True)
-class Slope:
-    """How velocities were had from positions.
+class Differentiator:
+    """Method by which velocities were computed from positions.
 
     Attributes:
         name: The method.
@@ -33,7 +33,7 @@ class Slope:
     weights: tuple[float, ...]
 
     def response(self, frequency: Array, rate: float) -> Array:
-        """Tell what the method makes of a position's vibration.
+        """Frequency response: velocity by position.
 
         Args:
             frequency: Shape (frequency,), in [Hz].
@@ -47,7 +47,7 @@ class Slope:
         return np.asarray(rate * np.abs(turns @ np.array(self.weights)))
 
     def corner(self, rate: float) -> float:
-        """Tell the frequency from which the method loses more than 3 dB of a velocity, in [Hz]."""
+        """-3 dB frequency of the method, in [Hz]."""
         frequency = np.linspace(0.0, rate / 2, 1001)[1:]
         kept = self.response(frequency, rate) / (2 * np.pi * frequency)
         lost = kept < np.sqrt(0.5)
@@ -61,10 +61,10 @@ def _savitzky_golay() -> tuple[float, ...]:
     return tuple(fit[1].tolist())
 
 
-BACKWARD = Slope("difference to the sample before", (-1.0, 1.0))
-FORWARD = Slope("difference to the sample after", (-1.0, 1.0))
-CENTRAL = Slope("difference of the samples before and after", (-0.5, 0.0, 0.5))
-SMOOTH = Slope(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savitzky_golay())
+BACKWARD = Differentiator("difference to the sample before", (-1.0, 1.0))
+FORWARD = Differentiator("difference to the sample after", (-1.0, 1.0))
+CENTRAL = Differentiator("difference of the samples before and after", (-0.5, 0.0, 0.5))
+SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savitzky_golay())
 
 
 def derived(run: Run, signal: str) -> bool:
@@ -78,15 +78,15 @@ def derived(run: Run, signal: str) -> bool:
     return isinstance(differentiated, Mapping) and signal in differentiated
 
 
-def slope_of(run: Run) -> Slope | None:
-    """Tell whether a run's velocities are its positions, differentiated.
+def differentiator_of(run: Run) -> Differentiator | None:
+    """Method by which a run's velocities were differentiated from its positions.
 
     Args:
         run: The run.
 
     Returns:
-        How they were had: as the run's ``meta`` says, or as a difference that holds in 99 of 100
-        samples; None where velocities were measured, or nobody can tell.
+        The method, by the run's ``meta`` or as a difference that holds in 99 of 100 samples; None
+        where velocities were measured, or neither is known.
     """
     if derived(run, "velocity"):
         return SMOOTH

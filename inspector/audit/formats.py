@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from inspector.audit.audit import Audit
-from inspector.audit.sight import ClassSight, Sight
+from inspector.audit.observability import ClassObservability, Observability
 
 
 def text(name: str, audit: Audit) -> str:
@@ -20,35 +20,35 @@ def text(name: str, audit: Audit) -> str:
 
 
 def summary(audit: Audit) -> tuple[str, ...]:
-    """Write the one or two lines that a report has for an audit: classes, then doubts.
+    """Write the one or two lines that a report has for an audit: classes, then warnings.
 
     Args:
         audit: The audit.
     """
-    doubts = f"Looks wrong: {'; '.join(audit.doubts)}." if audit.doubts else ""
-    return tuple(line for line in (_classes(audit), doubts) if line)
+    warnings = f"Warnings: {'; '.join(audit.warnings)}." if audit.warnings else ""
+    return tuple(line for line in (_classes(audit), warnings) if line)
 
 
 def shortcomings(audit: Audit) -> tuple[str, ...]:
-    """Write the summary of an audit, and nothing where all is well.
+    """Write the summary of an audit, and nothing without warnings or limits.
 
     Args:
         audit: The audit.
     """
-    flawed = audit.doubts or any(each.sight is not Sight.OBSERVABLE for each in audit.classes)
-    return summary(audit) if flawed else ()
+    limited = any(each.observability is not Observability.OBSERVABLE for each in audit.classes)
+    return summary(audit) if audit.warnings or limited else ()
 
 
 def as_json(found: Mapping[str, Audit], failed: Mapping[str, str]) -> str:
-    """Write audits as ``noise-audit/1``.
+    """Write audits as ``noise-audit/2``.
 
     Args:
         found: Audits by the name of the run.
-        failed: By the name of each file without one, why.
+        failed: Errors by the name of each file that cannot be read.
     """
     runs = [_plain(name, audit) for name, audit in found.items()]
     runs += [{"run": name, "message": message} for name, message in failed.items()]
-    return json.dumps({"format": "noise-audit/1", "runs": runs}, indent=2)
+    return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
 
 
 def _lines(audit: Audit) -> Iterator[str]:
@@ -59,32 +59,33 @@ def _lines(audit: Audit) -> Iterator[str]:
     yield f"  rate: {audit.rate:g} Hz, {off}"
     yield f"  missing: {audit.gaps}"
     yield f"  bandwidth: up to {audit.bandwidth.usable:.4g} Hz ({audit.bandwidth.limit})"
-    yield from (f"  looks wrong: {doubt}" for doubt in audit.doubts)
+    yield from (f"  warning: {warning}" for warning in audit.warnings)
     yield from (f"  note: {note}" for note in audit.notes)
     yield from (f"  {each}" for each in audit.classes)
 
 
 def _classes(audit: Audit) -> str:
-    """Say in a sentence which classes can be seen."""
+    """Write a sentence on which classes are observable."""
     if not audit.classes:
         return ""
-    seen = [each.label for each in audit.classes if each.sight is Sight.OBSERVABLE]
-    others = [each for each in audit.classes if each.sight is not Sight.OBSERVABLE]
+    whole = Observability.OBSERVABLE
+    shown = [each.label for each in audit.classes if each.observability is whole]
+    others = [each for each in audit.classes if each.observability is not whole]
     if len({_rest(each) for each in others}) == 1 and len(others) > 1:
         clauses = [f"{_listed([each.label for each in others])} {_rest(others[0])}"]
     else:
         clauses = [f"{each.label} {_rest(each)}" for each in others]
-    if seen:
-        clauses = [f"can show {_listed(seen)}", *clauses]
+    if shown:
+        clauses = [f"can show {_listed(shown)}", *clauses]
     sentence = "; ".join(clauses)
     return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _rest(each: ClassSight) -> str:
-    if each.sight is Sight.CANNOT_TELL:
-        needed = f"; it takes {each.needed:g} Hz" if each.needed else ""
-        return f"cannot be told ({each.reason}{needed})"
-    needed = f"; all of it takes {each.needed:g} Hz" if each.needed else ""
+def _rest(each: ClassObservability) -> str:
+    if each.observability is Observability.CANNOT_TELL:
+        needed = f"; requires {each.needed:g} Hz" if each.needed else ""
+        return f"cannot be observed ({each.reason}{needed})"
+    needed = f"; all of it requires {each.needed:g} Hz" if each.needed else ""
     return f"only from {each.low:.3g} to {each.high:.4g} Hz ({each.reason}{needed})"
 
 
@@ -104,14 +105,14 @@ def _plain(name: str, audit: Audit) -> dict[str, Any]:
         "bandwidth": {
             "usable": reach.usable,
             "limit": reach.limit,
-            "held": reach.held,
-            "differentiated": reach.slope.name if reach.slope else None,
+            "zero_order_hold": reach.hold,
+            "differentiated": reach.differentiator.name if reach.differentiator else None,
             "filtered_from": reach.corner,
-            "rounding_step": reach.step,
-            "drowned_from": reach.drowned,
-            "quiet_from": reach.quiet,
+            "quantisation_step": reach.step,
+            "quantisation_floor_from": reach.floor_from,
+            "quiet_from": reach.quiet_from,
         },
-        "doubts": list(audit.doubts),
+        "warnings": list(audit.warnings),
         "notes": list(audit.notes),
         "classes": [asdict(each) for each in audit.classes],
     }

@@ -19,7 +19,7 @@ def audit_all(paths: Sequence[Path], library: Library) -> tuple[dict[str, Audit]
 
     Returns:
         Audits by the name of the run, which is that of its file, with a number where the file
-        holds several; and by the name of each file that cannot be read, what is wrong with it.
+        holds several; and the error by the name of each file that cannot be read.
     """
     found: dict[str, Audit] = {}
     failed: dict[str, str] = {}

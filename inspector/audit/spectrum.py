@@ -1,4 +1,4 @@
-"""The spectrum of what a run's joints did, averaged over the stretches that hold no gap."""
+"""Power spectral density of joint velocities, averaged over the stretches without a gap."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,10 +13,10 @@ SEGMENT = 0.4
 """Shortest segment that is transformed: the paper's frame (Sec. III-A), in [s]."""
 
 FEWEST = 128
-"""Samples that a segment has at least, so that slow logs have a spectrum too."""
+"""Fewest samples of a segment, so that slow logs have a spectrum too."""
 
 MOST = 256
-"""Segments that are averaged at most, evenly spread: a long log costs no more than a short one."""
+"""Most segments that are averaged, evenly spread, which limits the cost of long logs."""
 
 PER_OCTAVE = 4
 """Bands of a smoothed spectrum in an octave."""
@@ -66,7 +66,7 @@ def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
     power = np.zeros((velocity.shape[1], length // 2 + 1))
     for index in chosen:
         segment = velocity[starts[index] : starts[index] + length].T.astype(np.float64, order="C")
-        power += _square(np.fft.rfft(window * _level(segment)))
+        power += _square(np.fft.rfft(window * _detrended(segment)))
     # P. Welch, IEEE Trans. Audio Electroacoust. 15 (1967): one-sided, per hertz
     density: Array = 2.0 * power / (len(chosen) * rate * np.square(window).sum())
     frequency = np.arange(1.0, length // 2 + 1.0) * (rate / length)
@@ -76,12 +76,13 @@ def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
 def smoothed(
     frequency: Array, density: Array, middle: Callable[[Array], float]
 ) -> tuple[Array, Array]:
-    """Sum a spectrum up by quarters of an octave.
+    """Level of a spectrum in quarters of an octave.
 
     Args:
         frequency: Above 0, rising, shape (frequency,), in [Hz].
         density: Shape (frequency,), in [(rad/s)²/Hz].
-        middle: Mean or median of a band's values: the mean sees a single line, the median does not.
+        middle: Mean or median of a band's values; the mean includes a single line, the median does
+            not.
 
     Returns:
         Middle of each quarter that has a value, in [Hz], and its level, in [dB]; shape (bands,).
@@ -92,8 +93,8 @@ def smoothed(
     return frequency[-1] * 2.0 ** (places / PER_OCTAVE), np.array(level)
 
 
-def _level(segment: Array) -> Array:
-    """Subtract the straight line that fits best: slow motion must not leak upwards."""
+def _detrended(segment: Array) -> Array:
+    """Subtract the least-squares line, so that slow motion does not leak to higher frequencies."""
     ramp = np.linspace(-1.0, 1.0, segment.shape[1])
     slope = segment @ ramp / np.square(ramp).sum()
     return np.asarray(segment - segment.mean(axis=1)[:, None] - slope[:, None] * ramp)

@@ -1,4 +1,4 @@
-"""Numbers that look like another unit than radians and seconds."""
+"""Signs of other units than radians and seconds."""
 
 from collections.abc import Iterator
 
@@ -9,10 +9,10 @@ from noisemodel import Run
 from noisemodel.types import Array
 
 TURNS = 4 * np.pi
-"""What a joint that does not turn without end hardly reaches, in [rad]."""
+"""Largest plausible position of a joint that is not continuous, in [rad]."""
 
 FAST = 100.0
-"""What a robot's joint hardly reaches, in [rad/s]."""
+"""Largest plausible velocity of a joint, in [rad/s]."""
 
 ROUND_ENDS = (1.0, 100.0)
 """Ends of the ranges that positions are normalised to."""
@@ -24,25 +24,25 @@ FACTORS = {
     1 / 6: "velocities look like turns per minute beside positions in degrees",
     1 / (2 * np.pi): "velocities look like turns per second beside positions in radians",
 }
-"""What is said if velocities are so many times the slope of positions."""
+"""Warnings by the ratio of velocities to the slope of positions."""
 
 NEAR = 0.02
-"""Share by which a factor may be missed, less than half of what lies between two of them."""
+"""Largest relative deviation from a factor, less than half the distance of two of them."""
 
 STRETCH = 0.2
-"""Time over which velocities are summed up and held against positions, in [s]."""
+"""Time over which velocities are integrated and compared with positions, in [s]."""
 
 
-def unit_doubts(run: Run) -> Iterator[str]:
-    """Say what looks like another unit, a clause each.
+def unit_warnings(run: Run) -> Iterator[str]:
+    """Warnings about values that look like another unit, a clause each.
 
     Args:
         run: The run.
     """
     factor = _factor(run)
-    for known, said in FACTORS.items():
+    for known, warning in FACTORS.items():
         if factor is not None and abs(factor / known - 1) <= NEAR:
-            yield f"{said} ({factor:.4g} times their slope)"
+            yield f"{warning} ({factor:.4g} times their slope)"
     if run.position is not None:
         yield from _angles(run, np.abs(run.position[run.mask]).max(axis=0))
     speeds = np.abs(run.velocity[run.mask]).max(axis=0)
@@ -55,7 +55,7 @@ def unit_doubts(run: Run) -> Iterator[str]:
 
 
 def _angles(run: Run, reach: Array) -> Iterator[str]:
-    """Doubt positions that reach too far, or round ends that no joint has."""
+    """Warnings about positions that reach too far, or stop at round numbers."""
     largest = float(reach.max())
     if largest in ROUND_ENDS and _stops_at(run, largest) >= 2:
         yield f"positions look normalised: several joints stop at {largest:g}"
@@ -76,7 +76,7 @@ def _stops_at(run: Run, end: float) -> int:
 
 
 def _factor(run: Run) -> float | None:
-    """Compare velocities, summed up, with the way of the positions; None if there is no telling."""
+    """Ratio of integrated velocities to the change of positions; None if it is not known."""
     if run.position is None or derived(run, "velocity"):
         return None
     length = max(2, round(STRETCH * run.rate))

@@ -1,4 +1,4 @@
-"""The command that says what a log can show."""
+"""The command `inspector audit`."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -10,7 +10,7 @@ from inspector.commands.options import ModelFiles
 
 
 class Format(StrEnum):
-    """How audits are written."""
+    """Formats of audits."""
 
     TEXT = "text"
     JSON = "json"
@@ -24,7 +24,7 @@ def audit(
     format: Annotated[Format, typer.Option("--format", help="How to print.")] = Format.TEXT,  # noqa: A002
     model: ModelFiles = None,
 ) -> None:
-    """Say what logs can show; exit 0 if each shows a failure class, 4 if not, 3 bad input."""
+    """Audit logs: rate, gaps, bandwidth, observable classes; exit 4 if a log shows no class."""
     from inspector import assets
     from inspector.audit.formats import as_json, text
     from inspector.audit.logs import audit_all
@@ -37,5 +37,5 @@ def audit(
         typer.echo("\n\n".join(text(name, audit) for name, audit in found.items()))
     for name, message in failed.items():
         typer.echo(f"inspector: {name}: {message}", err=True)
-    blind = any(audit.blind for audit in found.values())
-    raise typer.Exit(3 if failed else 4 if blind else 0)
+    observable = all(audit.observable for audit in found.values())
+    raise typer.Exit(3 if failed else 0 if observable else 4)

@@ -9,11 +9,11 @@ after it p2, the log likelihood of two levels exceeds that of one by
 
 if samples are independent and normal. This is the criterion by which seismologists pick the onset
 of waves (Maeda 1985), and of a change of variance in general (Inclan & Tiao 1994). Only a rise
-counts, and samples of a vibration are not independent: `INDEPENDENT` of them are as good as one.
-Two powers are looked at, and the mean of their log likelihoods is taken: the tracking error (the
-motion, if no velocity is desired) above 10 Hz, and the sudden changes of the motion, as
-`inspector.localisation.innovation` has them. Both filters look back only, so that nothing rises
-before it happens.
+counts. Samples of a vibration are not independent: a time of `INDEPENDENT` counts as one sample.
+The mean of the log likelihoods of two powers is taken: that of the tracking error (of the motion,
+if no velocity is desired) above 10 Hz, and that of the sudden changes of the motion, as
+`inspector.localisation.innovation` has them. Both filters are causal, so that nothing rises before
+it happens.
 
 The frame before the first was not labelled, so that the failure sets in during the first frame's
 last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its mean is the

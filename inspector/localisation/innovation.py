@@ -1,6 +1,6 @@
 """Innovation of each stage of the control flow: its changes less their linear prediction.
 
-Sudden changes of velocities are looked at: over 1 ms, less the mean of such changes over the past
+Sudden changes of velocities are used: over 1 ms, less the mean of such changes over the past
 20 ms. Both filters are causal, so that nothing shows before it happens. The change of each joint
 at a stage is predicted from those at the stage before, now and up to 12 ms ago, by least squares
 over quiet stretches of the same run; the prediction residual is the innovation. The first stage

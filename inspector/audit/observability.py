@@ -1,19 +1,20 @@
-"""Which failure classes can be seen in a log, and what it takes to see them.
+"""Observability of the failure classes in a log, and the sample rate that each requires.
 
-Where the limits come from:
+The limits:
 
 - *The bands of a class.* The paper puts oscillations at 20 to 1000 Hz (its table of scenarios:
   multi-sines of 20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations,
-  which are short and broad: they ask for what the model looks at, from its first band to its last.
-- *The model.* A run is labelled by the model of the nearest rate at or below its own. What that
-  one does not look at, nobody sees; below all models the answer is *cannot tell*.
-- *The log.* Its bandwidth: half its rate, or less where values are held, differentiated, filtered.
-- *Three bands.* Fewer than three of the model's bands are no spectrum: `models.LogBands` draws the
-  line there too.
-- *The frame.* A model labels frames (the paper's 0.4 s) that touch no gap; without one nothing is.
+  which are short and broad: theirs is that of the model, from its first band to its last.
+- *The model.* A run is labelled by the model of the nearest rate at or below its own. Outside of
+  its bands nothing is observable; below all models the answer is *cannot tell*.
+- *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
+  or a filter.
+- *Three bands.* Fewer than three of the model's bands are no spectrum; `models.LogBands` has the
+  same limit.
+- *The frame.* A model labels frames (the paper's 0.4 s) that touch no gap; there has to be one.
 
-A class is observable if all of its band can be seen, partly if three bands of the model or more
-can, and if rounding is all there is in some of them: then a failure must be louder than that.
+A class is observable if all of its band is, partly if three bands of the model or more are, or if
+some are at the quantisation floor: then a failure must exceed that.
 """
 
 from collections.abc import Collection, Mapping
@@ -31,11 +32,11 @@ OSCILLATIONS = (20.0, 1000.0)
 """The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz]."""
 
 FEWEST = 3
-"""Bands of a model that make a spectrum."""
+"""Fewest bands of a model that are a spectrum."""
 
 
-class Sight(StrEnum):
-    """How well a class can be seen."""
+class Observability(StrEnum):
+    """Degrees to which a class is observable."""
 
     OBSERVABLE = "observable"
     PARTLY = "partly"
@@ -43,50 +44,50 @@ class Sight(StrEnum):
 
 
 @dataclass(frozen=True)
-class ClassSight:
-    """How well one failure class can be seen.
+class ClassObservability:
+    """Observability of one failure class.
 
     Attributes:
         label: The class.
-        sight: How well.
-        low: Where what can be seen of it begins, in [Hz]; 0 if nothing can.
-        high: Where that ends, in [Hz]; 0 if nothing can.
-        needed: The sample rate that would show all of it, or show it at all, in [Hz]; None where
-            a higher one would not help.
-        reason: What stands in the way, a clause; empty for what is observable.
+        observability: The degree.
+        low: Lowest frequency at which it is observable, in [Hz]; 0 if there is none.
+        high: Highest frequency at which it is observable, in [Hz]; 0 if there is none.
+        needed: Sample rate that makes all of it observable, or any of it, in [Hz]; None where a
+            higher one would not help.
+        reason: Cause of the limit, a clause; empty for what is observable.
     """
 
     label: str
-    sight: Sight
+    observability: Observability
     low: float = 0.0
     high: float = 0.0
     needed: float | None = None
     reason: str = ""
 
     def __str__(self) -> str:
-        """Say it in a line."""
-        seen = f", {self.low:.3g} to {self.high:.4g} Hz" if self.high else ""
+        """Format as a line."""
+        band = f", {self.low:.3g} to {self.high:.4g} Hz" if self.high else ""
         reason = f": {self.reason}" if self.reason else ""
         needed = f"; needs {self.needed:g} Hz" if self.needed else ""
-        return f"{self.label}: {self.sight}{seen}{reason}{needed}"
+        return f"{self.label}: {self.observability}{band}{reason}{needed}"
 
 
-def sights(
+def observable_classes(
     bandwidth: Bandwidth,
     valid: Mask,
     library: Mapping[str, models.Classifier],
     signals: Collection[str],
-) -> tuple[ClassSight, ...]:
-    """Tell how well each failure class can be seen.
+) -> tuple[ClassObservability, ...]:
+    """Determine the observability of each failure class.
 
     Args:
-        bandwidth: How far up the log reaches.
+        bandwidth: Of the log.
         valid: False in gaps, shape (samples,).
         library: Models to choose from.
-        signals: Names of the signals that a model can listen to.
+        signals: Names of the signals that the run has.
 
     Returns:
-        One for each class of the model that would look, `ok` left out.
+        One for each class of the model that would label the run, without `ok`.
     """
     rate = 2 * bandwidth.nyquist
     profiles = [model.profile for model in library.values()]
@@ -96,23 +97,27 @@ def sights(
         classes = dict.fromkeys(name for profile in profiles for name in profile.classes[1:])
         if isinstance(error, models.MissingSignalError):
             return tuple(
-                ClassSight(label, Sight.CANNOT_TELL, reason=str(error)) for label in classes
+                ClassObservability(label, Observability.CANNOT_TELL, reason=str(error))
+                for label in classes
             )
         slowest = min((profile.rate for profile in profiles), default=None)
         reason = f"{rate:g} Hz is slower than every model"
         return tuple(
-            ClassSight(label, Sight.CANNOT_TELL, needed=slowest, reason=reason) for label in classes
+            ClassObservability(label, Observability.CANNOT_TELL, needed=slowest, reason=reason)
+            for label in classes
         )
     profile = chosen.profile
     labels = [label for label in chosen.classes if label != "ok"]
     if not has_frame(valid, profile.duration * rate):
         reason = f"no stretch of {profile.duration:g} s without a gap"
-        return tuple(ClassSight(label, Sight.CANNOT_TELL, reason=reason) for label in labels)
-    return tuple(_sight(label, bandwidth, profile, profiles) for label in labels)
+        return tuple(
+            ClassObservability(label, Observability.CANNOT_TELL, reason=reason) for label in labels
+        )
+    return tuple(_observability(label, bandwidth, profile, profiles) for label in labels)
 
 
 def has_frame(valid: Mask, length: float) -> bool:
-    """Whether some stretch without a gap is as long as a frame.
+    """Whether a stretch without a gap is as long as a frame.
 
     Args:
         valid: False in gaps, shape (samples,).
@@ -122,40 +127,44 @@ def has_frame(valid: Mask, length: float) -> bool:
     return bool((np.diff(gaps) - 1).max() >= length * (1 - 1e-3))
 
 
-def _sight(
+def _observability(
     label: str, bandwidth: Bandwidth, profile: Profile, profiles: list[Profile]
-) -> ClassSight:
+) -> ClassObservability:
     edges = band_edges(profile)
     wanted = OSCILLATIONS if label == "oscillations" else (edges[0], edges[-1])
     low, high = max(wanted[0], edges[0]), min(wanted[1], edges[-1], bandwidth.usable)
     if np.sum((edges[:-1] < high) & (edges[1:] <= high) & (edges[1:] > low)) < FEWEST:
         needed = _rate_for(low, profiles) if bandwidth.usable >= bandwidth.nyquist else None
-        return ClassSight(label, Sight.CANNOT_TELL, needed=needed, reason=bandwidth.limit)
+        return ClassObservability(
+            label, Observability.CANNOT_TELL, needed=needed, reason=bandwidth.limit
+        )
     if high < wanted[1]:
         by_model = edges[-1] <= bandwidth.usable
         reason = f"the model of {profile.rate:g} Hz ends there" if by_model else bandwidth.limit
         needed = _rate_for(wanted[1], profiles)
         helps = bandwidth.usable >= bandwidth.nyquist and needed > 2 * bandwidth.nyquist
-        return ClassSight(label, Sight.PARTLY, low, high, needed if helps else None, reason)
-    if bandwidth.drowned is not None and bandwidth.drowned < high:
-        reason = (
-            f"rounding hides what is quieter than {bandwidth.hidden:.2g} rad/s"
-            f" above {bandwidth.drowned:.3g} Hz"
+        return ClassObservability(
+            label, Observability.PARTLY, low, high, needed if helps else None, reason
         )
-        return ClassSight(label, Sight.PARTLY, low, high, reason=reason)
-    return ClassSight(label, Sight.OBSERVABLE, low, high)
+    if bandwidth.floor_from is not None and bandwidth.floor_from < high:
+        reason = (
+            f"quantisation masks amplitudes below {bandwidth.floor_amplitude:.2g} rad/s"
+            f" above {bandwidth.floor_from:.3g} Hz"
+        )
+        return ClassObservability(label, Observability.PARTLY, low, high, reason=reason)
+    return ClassObservability(label, Observability.OBSERVABLE, low, high)
 
 
 def band_edges(profile: Profile) -> Array:
-    """List the edges of the frequency bands that a profile looks at, shape (edges,), in [Hz]."""
+    """Edges of the frequency bands of a profile, shape (edges,), in [Hz]."""
     if profile.bands == "log":
         return np.array(profile.edges)
-    # Bin 0 is the mean; the first that can tell anything is the paper's f_min (Sec. III-A).
+    # Bin 0 is the mean; the first after it is the paper's f_min (Sec. III-A).
     bin_width = profile.rate / profile.window
     return np.arange(1.0, profile.bins, 3.0) * bin_width
 
 
 def _rate_for(frequency: float, profiles: list[Profile]) -> float:
-    """Find the lowest rate of a model that reaches a frequency; failing that, twice the latter."""
+    """Lowest rate of a model that reaches a frequency; without one, twice the latter."""
     reaching = [each.rate for each in profiles if band_edges(each)[-1] >= frequency]
     return min(reaching, default=2 * frequency)

@@ -5,8 +5,8 @@ from test_audit_bandwidth import motion, noise, run_of
 
 from inspector.analysis.verdict import Status, exit_status, judge
 from inspector.assets import demo_run, model_files
-from inspector.audit import Sight, audit, shortcomings, summary
-from inspector.audit.sight import OSCILLATIONS, band_edges, has_frame
+from inspector.audit import Observability, audit, shortcomings, summary
+from inspector.audit.observability import OSCILLATIONS, band_edges, has_frame
 from inspector.library import CannotTellError, label_run, load_library
 from models import Profile
 from noisemodel import Run, decimated
@@ -20,42 +20,42 @@ def noisy_run(rate, seconds=6.0, **signals):
     return run_of(velocity + noise(velocity.shape), rate, **signals)
 
 
-def seen(run, library=LIBRARY):
+def classes_of(run, library=LIBRARY):
     return {each.label: each for each in audit(run, library).classes}
 
 
 def test_a_log_of_10_khz_shows_all_classes():
-    found = seen(noisy_run(10_000.0))
+    found = classes_of(noisy_run(10_000.0))
     assert tuple(found) == FAILURES
-    assert {each.sight for each in found.values()} == {Sight.OBSERVABLE}
+    assert {each.observability for each in found.values()} == {Observability.OBSERVABLE}
     assert (found["oscillations"].low, found["oscillations"].high) == OSCILLATIONS
     assert shortcomings(audit(noisy_run(10_000.0), LIBRARY)) == ()
 
 
 @pytest.mark.parametrize("rate", [1000.0, 1250.0, 2000.0, 5000.0])
-def test_what_the_model_does_not_look_at_cannot_be_seen(rate):
-    found = seen(noisy_run(rate))
-    assert found["impact"].sight is Sight.OBSERVABLE
+def test_what_lies_outside_of_the_models_bands_is_not_observable(rate):
+    found = classes_of(noisy_run(rate))
+    assert found["impact"].observability is Observability.OBSERVABLE
     oscillations = found["oscillations"]
     top = band_edges(LIBRARY["scalar-1khz"].profile)[-1]
-    assert (oscillations.sight, oscillations.high) == (Sight.PARTLY, top)
+    assert (oscillations.observability, oscillations.high) == (Observability.PARTLY, top)
     assert oscillations.needed == 10_000.0
     assert oscillations.reason == "the model of 1000 Hz ends there"
 
 
 @pytest.mark.parametrize("rate", [30.0, 100.0, 500.0, 990.0])
-def test_below_every_model_nothing_can_be_told(rate):
+def test_below_every_model_nothing_is_observable(rate):
     found = audit(noisy_run(rate), LIBRARY)
-    assert found.blind
+    assert not found.observable
     for each in found.classes:
-        assert (each.sight, each.needed) == (Sight.CANNOT_TELL, 1000.0)
+        assert (each.observability, each.needed) == (Observability.CANNOT_TELL, 1000.0)
         assert each.reason == f"{rate:g} Hz is slower than every model"
 
 
-def test_a_run_that_feeds_no_model_shows_nothing_and_the_reason_is_said():
+def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason_is_given():
     alone = {"general-1khz": LIBRARY["general-1khz"]}
     found = audit(noisy_run(1000.0), alone)
-    assert found.blind
+    assert not found.observable
     for each in found.classes:
         assert (each.needed, each.reason) == (
             None,
@@ -63,9 +63,9 @@ def test_a_run_that_feeds_no_model_shows_nothing_and_the_reason_is_said():
         )
 
 
-def test_without_the_faster_model_twice_the_frequency_is_what_it_takes():
+def test_without_the_faster_model_twice_the_frequency_is_required():
     slow = {"scalar-1khz": LIBRARY["scalar-1khz"]}
-    assert seen(noisy_run(1000.0), slow)["oscillations"].needed == 2 * OSCILLATIONS[1]
+    assert classes_of(noisy_run(1000.0), slow)["oscillations"].needed == 2 * OSCILLATIONS[1]
     assert audit(noisy_run(1000.0), {}).classes == ()
 
 
@@ -78,39 +78,43 @@ def test_the_bands_are_those_of_the_profile():
 
 
 @pytest.mark.parametrize(
-    ("cutoff", "sight"),
-    [(15.0, Sight.CANNOT_TELL), (100.0, Sight.PARTLY), (None, Sight.OBSERVABLE)],
+    ("cutoff", "degree"),
+    [
+        (15.0, Observability.CANNOT_TELL),
+        (100.0, Observability.PARTLY),
+        (None, Observability.OBSERVABLE),
+    ],
 )
-def test_a_filter_takes_classes_out_of_sight(cutoff, sight):
+def test_a_filter_limits_observability(cutoff, degree):
     velocity = noise((8000, 3), level=0.001)
     if cutoff:
         sections = butter(4, cutoff, fs=1000, output="sos")
         velocity = sosfilt(sections, velocity, axis=0)
-    found = seen(run_of(velocity, 1000.0))
-    assert found["impact"].sight is sight
-    if sight is Sight.PARTLY:
+    found = classes_of(run_of(velocity, 1000.0))
+    assert found["impact"].observability is degree
+    if degree is Observability.PARTLY:
         assert found["impact"].high == pytest.approx(100, rel=0.2)
         assert found["impact"].needed is None  # a higher rate would not help
         assert found["impact"].reason == "the log looks filtered"
 
 
-def test_held_values_show_no_more_than_the_rate_that_they_come_at():
+def test_a_zero_order_hold_limits_observability_to_the_rate_of_its_values():
     _, _, velocity = motion(1000.0)
     noisy = velocity + noise(velocity.shape)
-    for length, sight in ((4, Sight.PARTLY), (33, Sight.CANNOT_TELL)):
+    for length, degree in ((4, Observability.PARTLY), (33, Observability.CANNOT_TELL)):
         held = run_of(np.repeat(noisy[::length], length, axis=0)[: len(noisy)], 1000.0)
-        assert seen(held)["oscillations"].sight is sight
-        assert f"held for {length} samples" in seen(held)["oscillations"].reason
+        assert classes_of(held)["oscillations"].observability is degree
+        assert f"hold of {length} samples" in classes_of(held)["oscillations"].reason
 
 
-def test_rounding_leaves_loud_failures_in_sight():
+def test_with_quantisation_loud_failures_stay_observable():
     _, _, velocity = motion(10_000.0)
-    found = seen(run_of(np.round(velocity / 0.01) * 0.01, 10_000.0))
-    assert found["impact"].sight is Sight.PARTLY
-    assert "rounding hides what is quieter than" in found["impact"].reason
+    found = classes_of(run_of(np.round(velocity / 0.01) * 0.01, 10_000.0))
+    assert found["impact"].observability is Observability.PARTLY
+    assert "quantisation masks amplitudes below" in found["impact"].reason
 
 
-def test_a_frame_takes_a_stretch_without_a_gap():
+def test_a_frame_requires_a_stretch_without_a_gap():
     valid = np.ones(1000, dtype=bool)
     valid[::400] = False
     assert not has_frame(valid, 400)
@@ -120,13 +124,13 @@ def test_a_frame_takes_a_stretch_without_a_gap():
     gaps = np.ones(len(run.time), dtype=bool)
     gaps[::300] = False
     broken = run_of(run.velocity * gaps[:, None], 1000.0, valid=gaps)
-    assert audit(broken, LIBRARY).blind
+    assert not audit(broken, LIBRARY).observable
     assert "no stretch of 0.4 s without a gap" in summary(audit(broken, LIBRARY))[0]
     with pytest.raises(CannotTellError, match="no stretch of 0.4 s without a gap"):
         label_run(broken, LIBRARY)
 
 
-def test_a_quiet_run_in_which_nothing_can_be_seen_is_no_quiet_run(tmp_path):
+def test_a_run_without_findings_in_which_nothing_is_observable_is_not_ok(tmp_path):
     still = noise((8000, 3), level=0.0005)
     sections = butter(4, 15.0, fs=1000, output="sos")
     run = run_of(sosfilt(sections, still, axis=0), 1000.0)
@@ -135,25 +139,25 @@ def test_a_quiet_run_in_which_nothing_can_be_seen_is_no_quiet_run(tmp_path):
     assert label_run(run, LIBRARY).labels.events() == ()
     assert verdict.status is Status.CANNOT_TELL
     assert exit_status([verdict]) == 4
-    assert "cannot be told (the log looks filtered)" in verdict.message
+    assert "cannot be observed (the log looks filtered)" in verdict.message
 
 
-def test_one_class_out_of_sight_is_a_remark(tmp_path):
+def test_one_class_that_is_partly_observable_is_a_remark(tmp_path):
     zeros = np.zeros((6000, 2))
     run_of(zeros, 1000.0).save(tmp_path / "still.npz")
     verdict = judge(tmp_path / "still.npz", LIBRARY)
     assert verdict.status is Status.OK
     assert verdict.message == (
         "Can show impact and highaccelerations; oscillations only from 20 to 440 Hz"
-        " (the model of 1000 Hz ends there; all of it takes 10000 Hz)."
+        " (the model of 1000 Hz ends there; all of it requires 10000 Hz)."
     )
 
 
-def test_simulated_runs_have_no_flaws_at_any_rate():
+def test_simulated_runs_have_no_warnings_at_any_rate():
     run = Run.load(demo_run())
     for rate in (10_000.0, 5000.0, 1000.0):
         found = audit(decimated(run, rate), LIBRARY)
-        assert found.doubts == ()
+        assert found.warnings == ()
         assert found.bandwidth.usable == rate / 2
 
 
@@ -165,10 +169,10 @@ def test_the_order_of_joints_does_not_matter():
 
 
 @pytest.mark.parametrize("meta", [{"jitter": 3}, {"jitter": {"rms": "x"}}, {"differentiated": 7}])
-def test_what_others_keep_in_meta_is_no_obstacle(meta):
+def test_unknown_values_in_meta_are_ignored(meta):
     assert audit(noisy_run(1000.0, meta=meta), LIBRARY).jitter is None
 
 
-def test_noted_jitter_is_said():
+def test_jitter_in_meta_is_reported():
     noted = {"jitter": {"rms": 1e-4, "max": 2e-3}}
     assert audit(noisy_run(1000.0, meta=noted), LIBRARY).jitter == (1e-4, 2e-3)
