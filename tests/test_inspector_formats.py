@@ -63,7 +63,8 @@ def test_json_has_the_localisation_of_findings_that_were_localised():
     joints = (("knee", 0.75), ("hip", 0.25))
     blow = Localisation("desired", "measured", 0.002, joints=joints, band=(85.0, 130.0))
     known = {LOUD.events[0]: blow, LOUD.events[1]: Localisation()}
-    quiet, loud = json.loads(as_json([QUIET, LOUD], [{}, known]))["runs"]
+    localised = replace(LOUD, localisations=known)
+    quiet, loud = json.loads(as_json([QUIET, localised]))["runs"]
     assert quiet["events"] == []
     assert loud["events"][0]["localisation"] == {
         "stage": "desired",

@@ -204,7 +204,7 @@ def analyse(
         return replace(empty, reason=str(error))
     labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
     spans, findings = _extents(run, labels)
-    blind = seen.blind and not spans
+    blind = not seen.observable and not spans
     return replace(
         empty,
         status=Status.CANNOT_TELL if blind else Status.FINDINGS if spans else Status.OK,

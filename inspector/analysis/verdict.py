@@ -124,34 +124,3 @@ def exit_status(verdicts: Iterable[Verdict]) -> int:
     """Take the worst of several: bad input, findings, cannot tell, ok."""
     statuses = {verdict.status for verdict in verdicts}
     return next((code for status, code in EXIT.items() if status in statuses), 0)
-
-
-def judge_all(paths: Sequence[Path], library: Library, *, jobs: int = 1) -> Iterator[Verdict]:
-    """Classify many files; one bad file never stops the rest.
-
-    Args:
-        paths: The files.
-        library: Models to choose from.
-        jobs: How many to work on at once.
-
-    Returns:
-        A verdict per file, in their order.
-    """
-    return each(partial(judge, library=library), paths, jobs=jobs)
-
-
-def _verdict(path: Path, library: Library) -> Verdict:
-    if path.suffix == ".log":
-        return _heard(path, label_noise(*models.read_log(path), library))
-    run = nm.Run.load(path)
-    labelled, seen = label_run(run, library), audit(run, library)
-    if not seen.observable and not labelled.labels.events():
-        return Verdict(path, Status.CANNOT_TELL, labelled.model, message=" ".join(summary(seen)))
-    return _heard(path, labelled, shortcomings(seen))
-
-
-def _heard(path: Path, labelled: Labelled, remarks: Sequence[str] = ()) -> Verdict:
-    events = labelled.labels.events()
-    status = Status.FINDINGS if events else Status.OK
-    message = " ".join(filter(None, (labelled.remark, *remarks)))
-    return Verdict(path, status, labelled.model, events, message)
