@@ -1,6 +1,7 @@
-"""The spectrogram that is shown: level over time and frequency."""
+"""Spectrogram for viewing: amplitude over time and frequency."""
 
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -12,46 +13,76 @@ COLUMNS = 400
 RANGE_DB = 70.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Spectrogram:
-    """Levels of a noise signal.
+    """Amplitudes of a signal in windows.
 
     Attributes:
         time: Centres of the windows, shape (columns,), in [s].
-        frequency: Shape (bins,), in [Hz]; the constant part is left out.
-        level: Shape (bins, columns), in [dB] relative to the loudest, down to -70.
+        frequency: Shape (bins,), in [Hz]; the mean is left out.
+        amplitude: Shape (bins, columns), in the unit of the signal; 0 in windows that touch a gap.
+        valid: False for windows that touch a gap, shape (columns,).
     """
 
     time: Array
     frequency: Array
-    level: Array
+    amplitude: Array
+    valid: Mask
+
+    @cached_property
+    def level(self) -> Array:
+        """Shape (bins, columns), in [dB] relative to the largest amplitude, at least -70."""
+        largest = self.amplitude.max(initial=0.0) or 1.0
+        floor = 10 ** (-RANGE_DB / 20)
+        return np.asarray(20 * np.log10(np.maximum(self.amplitude / largest, floor)))
 
 
 def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spectrogram:
-    """Compute the spectrogram of a noise signal for viewing.
+    """Compute the spectrogram of a signal for viewing.
 
     Args:
-        signal: Noise, shape (samples,), in [rad/s].
+        signal: Such as noise, shape (samples,).
         rate: Samples per second, in [Hz].
         start: Time of the first sample, in [s].
-        valid: False in gaps, shape (samples,); windows that touch one are silent.
+        valid: False in gaps, shape (samples,).
 
     Returns:
         At most 400 columns of Hann windows of about 0.1 s, each freed of its mean.
     """
-    length = min(max(round(WINDOW * rate), 8), len(signal))
+    length = min(window_length(rate), len(signal))
     hop = max(1, length // 4, -(-(len(signal) - length) // (COLUMNS - 1)))
     windows = np.lib.stride_tricks.sliding_window_view(signal, length)[::hop]
     whole = np.lib.stride_tricks.sliding_window_view(valid, length)[::hop].all(axis=1)
-    hann = np.hanning(length + 1)[:-1]
-    centred = windows - windows.mean(axis=1, keepdims=True)
-    amplitude = np.abs(np.fft.rfft(centred * hann, axis=1)).T[1:] * whole
-    loudest = amplitude.max(initial=0.0) or 1.0
-    floor = 10 ** (-RANGE_DB / 20)
     columns = np.arange(len(windows), dtype=np.float64)
     bins = np.arange(1, length // 2 + 1, dtype=np.float64)
     return Spectrogram(
         time=start + (columns * hop + length / 2) / rate,
         frequency=bins * rate / length,
-        level=20 * np.log10(np.maximum(amplitude / loudest, floor)),
+        amplitude=amplitudes(windows).T * whole,
+        valid=np.asarray(whole),
     )
+
+
+def window_length(rate: float) -> int:
+    """Length of a window, in samples; at least 8."""
+    return max(round(WINDOW * rate), 8)
+
+
+def amplitudes(windows: Array) -> Array:
+    """Amplitude spectra of Hann windows, each freed of its mean.
+
+    Args:
+        windows: Shape (windows, samples).
+
+    Returns:
+        Shape (windows, bins), in the unit of the signal; bin 0, the mean, is left out.
+    """
+    hann = _hann(windows.shape[1])
+    centred = windows - windows.mean(axis=1, keepdims=True)
+    return np.asarray(np.abs(np.fft.rfft(centred * hann, axis=1))[:, 1:] * 2 / hann.sum())
+
+
+@lru_cache(maxsize=4)
+def _hann(length: int) -> Array:
+    """Periodic Hann window."""
+    return np.hanning(length + 1)[:-1]

@@ -8,8 +8,16 @@ from inspector.library import load_library
 from inspector.pair import Align, PairError, changes, compare, report, summary
 from inspector.pair.alignment import align
 from inspector.pair.common import alike, part
-from inspector.pair.levels import by_band, by_class, by_link, link_steps, shared_links, steps, whole
-from inspector.pair.spectra import spectra
+from inspector.pair.levels import (
+    by_band,
+    by_class,
+    by_link,
+    link_steps,
+    shared_links,
+    spectra,
+    steps,
+    whole,
+)
 from models import Event, Labels
 from noisemodel import Block, Run
 

@@ -9,6 +9,7 @@ from rerun.blueprint import Blueprint
 
 from inspector import colors
 from inspector.recording import series, unstable
+from inspector.recording.spectrogram import TOP_HZ, log_bands
 from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
 from noisemodel import Comparisons, RobotComparison
@@ -100,7 +101,7 @@ def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
             )
     for kind, pressure in zip(one.kinds, one.pressure, strict=True):
         spectrum = spectrogram(pressure, one.rate, start=float(one.time[0]), valid=whole)
-        series.log_heat_strip(recording, f"{_root(one)}/spectrogram/{kind}", spectrum)
+        log_bands(recording, f"{_root(one)}/spectrogram/{kind}", spectrum)
     labels = tuple(dict.fromkeys(event.label for event in one.events))
     states = dict(zip(labels, colors.of_series(len(labels)), strict=True))
     stretches = [(event.start, event.stop, event.label) for event in one.events]
@@ -126,8 +127,8 @@ def _lines(one: RobotComparison, part: str, name: str) -> Part:
     return unstable.above(*((plot, 1.0) for plot in plots), name=name)
 
 
-def _spectrogram(one: RobotComparison, kind: str) -> Part:
-    top = min(series.TOP_HZ, one.rate / 2)
+def _strip(one: Compared, kind: str) -> Part:
+    top = min(TOP_HZ, one.rate / 2)
     origin = f"{_root(one)}/spectrogram/{kind}"
     return unstable.plot(f"{kind}, 0-{top:.0f} Hz", origin, between=(0.0, top), fixed=True)
 

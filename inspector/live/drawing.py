@@ -8,7 +8,8 @@ import rerun as rr
 from inspector import colors
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
-from inspector.recording.series import LINE_WIDTH, at, scalars
+from inspector.recording.series import at, scalars
+from inspector.recording.spectrogram import style_bands
 from inspector.thinning import extremes
 from models import UNKNOWN, Labels
 from noisemodel.types import Array
@@ -60,7 +61,8 @@ class Drawing:
                 self._style_joints(kind, plot, joint_names[columns])
         self._entities[NOISE] = [("/noise/simplified", slice(None))]
         self._style_lines("/noise/simplified", ["simplified [rad/s]"], [colors.NOISE])
-        recording.log("/spectrogram/bands", _strip_style(hertz), static=True)
+        # A line of one entity each: an entity each would cost a message each.
+        style_bands(recording, "/spectrogram/bands", hertz.tolist())
         if classes:
             self._style_lines("/score", list(classes), [self._colours[name] for name in classes])
             names = list(self._colours)
@@ -178,16 +180,6 @@ class Drawing:
             aggregation_policy="MinMax",
         )
         self._recording.log(path, style, static=True)
-
-
-def _strip_style(hertz: Array) -> rr.SeriesLines:
-    """Draw every band as a line of one entity: a line each would cost a message each."""
-    return rr.SeriesLines(
-        names=[f"{centre:.0f} Hz" for centre in hertz],
-        widths=[LINE_WIDTH] * len(hertz),
-        aggregation_policy="Off",
-        interpolation_mode="StepAfter",
-    )
 
 
 def _joints(kind: str, plot: int) -> str:

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector.live.spectrogram import QUIETEST_DB, TOP_HZ
+from inspector.live.spectrogram import QUIETEST_DB
 from inspector.recording import unstable
 from inspector.recording.series import TIMELINE
+from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
 
 SHOWN = 10.0

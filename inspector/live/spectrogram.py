@@ -4,11 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from inspector.spectrogram import WINDOW
+from inspector.recording.spectrogram import BANDS, TOP_HZ
+from inspector.spectrogram import amplitudes, window_length
 from noisemodel.types import Array, Mask
 
-BANDS = 48
-TOP_HZ = 2000.0
 QUIETEST_DB = -90.0
 """What is darkest: 3e-5 rad/s, the best encoders' noise. Brightest is 1 rad/s, 0 dB."""
 TOGETHER = 4
@@ -33,14 +32,13 @@ class Strip:
 
     def __init__(self, rate: float) -> None:
         self._rate = rate
-        self._length = max(round(WINDOW * rate), 8)
+        self._length = window_length(rate)
         self._hop = max(1, self._length // 4)
         frequency = rate / self._length * np.arange(1, self._length // 2 + 1)
         shown = int((frequency <= TOP_HZ).sum())
         edges = np.linspace(0, shown, min(BANDS, shown) + 1).astype(int)
         self._firsts, self._shown = edges[:-1], shown
         self.hertz = np.add.reduceat(frequency[:shown], self._firsts) / np.diff(edges)
-        self._hann = np.hanning(self._length + 1)[:-1]
         self._samples = np.empty(0)
         self._valid = np.empty(0, dtype=bool)
         self._dark = False
@@ -93,9 +91,7 @@ class Strip:
         view = np.lib.stride_tricks.sliding_window_view
         windows = view(samples, self._length)[:: self._hop][:count]
         whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
-        centred = windows - windows.mean(axis=1, keepdims=True)
-        spectrum = np.abs(np.fft.rfft(centred * self._hann, axis=1))[:, 1 : self._shown + 1]
-        amplitude = spectrum * (2.0 / self._hann.sum()) * whole[:, None]
+        amplitude = amplitudes(windows)[:, : self._shown] * whole[:, None]
         loudest = np.maximum.reduceat(amplitude, self._firsts, axis=1).T
         decibel = 20.0 * np.log10(np.maximum(loudest, 10.0 ** (QUIETEST_DB / 20.0)))
         return np.asarray(1.0 - decibel / QUIETEST_DB)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from inspector.analysis.analyse import Analysis
 from inspector.pair.pair import Pair
-from inspector.pair.spectra import spectra
+from inspector.spectrogram import RANGE_DB, spectrogram
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
 
@@ -53,6 +53,51 @@ class ClassLevel:
 
     seconds: tuple[float, float]
     level: Level
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Amplitudes of both noises in windows that touch no gap of either.
+
+    Attributes:
+        time: Centres of the windows, shape (columns,), in [s].
+        frequency: Shape (bins,), in [Hz]; the mean is left out.
+        amplitude: Before and after, shape (2, bins, columns), in [rad/s].
+    """
+
+    time: Array
+    frequency: Array
+    amplitude: Array
+
+    @property
+    def level(self) -> Array:
+        """Before and after, shape (2, bins, columns), in [dB re 1 rad/s].
+
+        At least that of the largest amplitude of both, less 70 dB.
+        """
+        largest = self.amplitude.max(initial=0.0) or 1.0
+        floor = largest * 10 ** (-RANGE_DB / 20)
+        return 2 * decibel(np.maximum(self.amplitude, floor))
+
+
+def spectra(pair: Pair) -> Spectra:
+    """Compute the spectrograms of both noises in the same windows.
+
+    Args:
+        pair: The two runs.
+
+    Returns:
+        At most 400 columns.
+    """
+    start = float(pair.time[0])
+    before, after = (
+        spectrogram(side.noise, pair.rate, start=start, valid=pair.valid) for _, side in pair.sides
+    )
+    return Spectra(
+        time=before.time[before.valid],
+        frequency=before.frequency,
+        amplitude=np.stack([each.amplitude[:, each.valid] for each in (before, after)]),
+    )
 
 
 def steps(pair: Pair) -> tuple[Array, Array]:

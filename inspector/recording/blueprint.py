@@ -8,7 +8,8 @@ from rerun.blueprint import Blueprint
 from inspector.recording import unstable
 from inspector.recording.details import Detail
 from inspector.recording.joints import Plot
-from inspector.recording.series import TIMELINE, TOP_HZ
+from inspector.recording.series import TIMELINE
+from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
 
 

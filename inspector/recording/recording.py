@@ -5,7 +5,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfTree
 
@@ -16,7 +15,7 @@ from inspector.recording import classes, details, joints, robot, series, unstabl
 from inspector.recording import links as link_lanes
 from inspector.recording.blueprint import Contents, layout
 from inspector.recording.limbs import limbs
-from inspector.recording.tensors import tensors
+from inspector.recording.spectrogram import log_bands, log_bars, log_tensor
 from inspector.report.markdown import report
 from inspector.spectrogram import spectrogram
 from inspector.thinning import extremes
@@ -104,11 +103,9 @@ def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> None:
         colours=[colors.NOISE],
     )
     spectrum = spectrogram(noise, run.rate, start=float(run.time[0]), valid=run.mask)
-    series.log_heat_strip(recording, "/spectrogram/bands", spectrum)
-    series.log_bars(recording, "/spectrogram/now", spectrum)
-    upright = np.ascontiguousarray(spectrum.level[::-1], dtype=np.float32)  # row 0 is drawn on top
-    tensor = tensors(upright[None], ["frequency, high to low", "time"])
-    recording.log("/spectrogram/levels", rr.Tensor.from_fields(data=tensor), static=True)
+    log_bands(recording, "/spectrogram/bands", spectrum)
+    log_bars(recording, "/spectrogram/now", spectrum)
+    log_tensor(recording, "/spectrogram/levels", spectrum)
 
 
 def _log_text(

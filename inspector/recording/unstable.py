@@ -16,15 +16,14 @@ When rerun moves on, this module follows and no other.
 """
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
-from inspector.recording.tensors import tensors
-from noisemodel.types import Array
+from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -209,13 +208,28 @@ def log_bars(
         color: Of all bars.
     """
     widths = np.diff(places, prepend=0.0)
-    heights, stands = tensors(bars), tensors(places[None])
+    heights, stands = _tensors(bars), _tensors(places[None])
     style = rr.BarChart(heights[:1], abscissa=stands, color=color, widths=widths)
     changing = rr.BarChart.descriptor_values()
     batches = style.as_component_batches()
     lasting = [batch for batch in batches if batch.component_descriptor() != changing]
     recording.log(path, lasting, static=True)
     recording.send_columns(path, indexes=[index], columns=rr.BarChart.columns(values=heights))
+
+
+def log_tensor(
+    recording: rr.RecordingStream, path: str, values: Real, names: Sequence[str]
+) -> None:
+    """Log one tensor for all times.
+
+    Args:
+        recording: Where to.
+        path: Entity path.
+        values: Of 32 or 64 bits.
+        names: Of its axes.
+    """
+    data = _tensors(values[None], names)
+    recording.log(path, rr.Tensor.from_fields(data=data), static=True)
 
 
 def log_up(recording: rr.RecordingStream) -> None:
@@ -250,3 +264,43 @@ def _alone(start: float, stop: float) -> rrb.TimeAxis:
 
 def _nanoseconds(seconds: float) -> int:
     return round(seconds * 1e9)
+
+
+def _tensors(values: Real, names: Sequence[str] | None = None) -> Any:
+    """An Arrow array of tensors, as rerun's columns hold them.
+
+    Rerun makes tensors one by one, by casts for which Arrow loads its functions for computing: a
+    tenth of a second, for what is a few offsets.
+
+    Args:
+        values: Shape (tensors, ...), of 32 or 64 bits.
+        names: Of the axes of each tensor.
+
+    Returns:
+        The array, which rerun takes as it is.
+    """
+    import pyarrow as pa
+
+    count, shape = len(values), values.shape[1:]
+    kinds = {field.name: field for field in rr.components.TensorData.arrow_type()}
+    union = kinds["buffer"].type
+    flat = pa.array(np.ascontiguousarray(values).ravel())
+    used = [field.name for field in union].index(f"F{8 * values.itemsize}")
+    children = [pa.nulls(0, field.type) for field in union]
+    children[used] = _lists(union[used].type, flat, count)
+    codes, places = np.full(count, used, dtype=np.int8), np.arange(count, dtype=np.int32)
+    buffer = pa.Array.from_buffers(
+        union, count, [None, pa.py_buffer(codes), pa.py_buffer(places)], children=children
+    )
+    sizes = pa.array(np.tile(np.array(shape, dtype=np.uint64), count))
+    called = pa.array([names and list(names)] * count, type=kinds["names"].type)
+    columns = [_lists(kinds["shape"].type, sizes, count), called, buffer]
+    return pa.StructArray.from_arrays(columns, fields=list(kinds.values()))
+
+
+def _lists(kind: Any, flat: Any, count: int) -> Any:
+    """Cut a flat array into lists of one length."""
+    import pyarrow as pa
+
+    offsets = np.arange(count + 1, dtype=np.int32) * np.int32(len(flat) // count)
+    return pa.Array.from_buffers(kind, count, [None, pa.py_buffer(offsets)], children=[flat])
