@@ -8,7 +8,7 @@ import rerun as rr
 from inspector import colors
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
-from inspector.recording.series import at, scalars
+from inspector.recording.series import at, log_events, scalars, style_lane, style_lines
 from inspector.recording.spectrogram import style_bands
 from inspector.thinning import extremes
 from models import UNKNOWN, Labels
@@ -60,16 +60,15 @@ class Drawing:
             for plot, columns in enumerate(self._slices):
                 self._style_joints(kind, plot, joint_names[columns])
         self._entities[NOISE] = [("/noise/simplified", slice(None))]
-        self._style_lines("/noise/simplified", ["simplified [rad/s]"], [colors.NOISE])
+        style_lines(
+            recording, "/noise/simplified", names=["simplified [rad/s]"], colours=[colors.NOISE]
+        )
         # A line of one entity each: an entity each would cost a message each.
         style_bands(recording, "/spectrogram/bands", hertz.tolist())
         if classes:
-            self._style_lines("/score", list(classes), [self._colours[name] for name in classes])
-            names = list(self._colours)
-            states = rr.StateConfiguration(
-                values=names, labels=names, colors=list(self._colours.values())
-            )
-            recording.log("/class/found", states, static=True)
+            shown = [self._colours[name] for name in classes]
+            style_lines(recording, "/score", names=classes, colours=shown)
+            style_lane(recording, "/class/found", self._colours)
 
     @property
     def plots(self) -> list[tuple[str, list[str]]]:
@@ -144,17 +143,11 @@ class Drawing:
         for change in changes:
             if change.state not in ("", "ok"):
                 text = f"{change.state} from {change.time:.2f} s (score {change.score:.2f})"
-                self.event(change.time, text, (*self._colours[change.state], 255))
+                self.event(change.time, text, self._colours[change.state])
 
-    def event(
-        self, time: float, text: str, colour: tuple[int, int, int, int] = (200, 200, 200, 255)
-    ) -> None:
+    def event(self, time: float, text: str, colour: colors.Color = (200, 200, 200)) -> None:
         """Add a line to the list of events."""
-        self._recording.send_columns(
-            "/events",
-            indexes=[at(np.array([time]))],
-            columns=rr.TextLog.columns(text=[text], color=np.array([colour], dtype=np.uint8)),
-        )
+        log_events(self._recording, [time], [text], [colour])
 
     def _keep(self, kind: str, time: Array, values: Array, points: float) -> None:
         """Thin a stretch, and let it wait; the arrays that it comes in will be used again."""
@@ -167,19 +160,8 @@ class Drawing:
     def _style_joints(self, kind: str, plot: int, names: Sequence[str]) -> None:
         desired = kind.endswith("_desired")
         labels = [f"{name} desired" if desired else name for name in names]
-        self._style_lines(_joints(kind, plot), labels, colors.of_series(len(names), dim=desired))
-
-    def _style_lines(
-        self, path: str, names: Sequence[str], colours: Sequence[colors.Color]
-    ) -> None:
-        # Rerun's default aggregation draws the mean of a pixel's extremes, which hides vibration.
-        style = rr.SeriesLines(
-            names=list(names),
-            colors=list(colours),
-            widths=[1.0] * len(names),
-            aggregation_policy="MinMax",
-        )
-        self._recording.log(path, style, static=True)
+        shades = colors.of_series(len(names), dim=desired)
+        style_lines(self._recording, _joints(kind, plot), names=labels, colours=shades)
 
 
 def _joints(kind: str, plot: int) -> str:

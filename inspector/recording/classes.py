@@ -1,6 +1,6 @@
 """Found and annotated classes in a recording: lanes, scores, events."""
 
-from collections.abc import Iterator
+from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
@@ -10,7 +10,10 @@ from inspector.analysis.analyse import Analysis
 from inspector.recording import series
 from inspector.report.markdown import sentence
 from models import Event, Labels
-from noisemodel import Block
+from noisemodel import Block, Run
+
+Lane: TypeAlias = list[tuple[float, float, str]]
+"""Start and stop in [s] and class of stretches in order of time."""
 
 
 def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
@@ -20,35 +23,33 @@ def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
         recording: Where to.
         analysis: The run with its labels and blocks.
     """
-    run, labels = analysis.run, analysis.labels
-    annotated = {block.label for block in run.blocks}
+    run, labels = inspection.run, inspection.labels
+    annotations = {block.label for block in run.blocks}
     known = () if labels is None else labels.classes
-    colours = colors.of_classes((*known, *sorted(annotated - set(known))))
+    colours = colors.of_classes((*known, *sorted(annotations - set(known))))
     if labels is not None:
-        heard = (*known, *sorted(set(labels.label.tolist()) - set(known)))
-        shown = colors.of_classes(heard)
-        series.log_lane(recording, "/class/found", list(_stretches(labels)), shown)
+        predicted = (*known, *sorted(set(labels.label.tolist()) - set(known)))
+        series.log_lane(recording, "/class/found", found(labels), colors.of_classes(predicted))
         _log_scores(recording, labels, colours)
     if run.blocks:
-        lane = [(block.start, block.stop, block.label) for block in run.blocks]
-        series.log_lane(recording, "/class/annotated", lane, colours)
-    _log_events(recording, analysis, colours)
+        series.log_lane(recording, "/class/annotated", annotated(run), colours)
+    _log_events(recording, inspection, colours)
 
 
-def _stretches(labels: Labels) -> Iterator[tuple[float, float, str]]:
-    """Give each frame the time around its centre, up to halfway to its neighbours."""
+def found(labels: Labels) -> Lane:
+    """The class of each frame for the time around its centre, up to halfway to its neighbours."""
     centres = (labels.start + labels.stop) / 2
     hop = float(np.median(np.diff(centres))) if len(centres) > 1 else 0.1
     halfway = (centres[1:] + centres[:-1]) / 2
     apart = np.diff(centres) > 1.5 * hop
-    begins = np.where(apart, centres[1:] - hop / 2, halfway)
-    ends = np.where(apart, centres[:-1] + hop / 2, halfway)
-    yield from zip(
-        [*(centres[:1] - hop / 2), *begins],
-        [*ends, *(centres[-1:] + hop / 2)],
-        map(str, labels.debounced),
-        strict=True,
-    )
+    starts = [*(centres[:1] - hop / 2), *np.where(apart, centres[1:] - hop / 2, halfway)]
+    stops = [*np.where(apart, centres[:-1] + hop / 2, halfway), *(centres[-1:] + hop / 2)]
+    return list(zip(starts, stops, map(str, labels.debounced), strict=True))
+
+
+def annotated(run: Run) -> Lane:
+    """The annotated blocks of a run."""
+    return [(block.start, block.stop, block.label) for block in run.blocks]
 
 
 def _log_scores(
@@ -66,18 +67,14 @@ def _log_events(
     recording: rr.RecordingStream, analysis: Analysis, colours: dict[str, colors.Color]
 ) -> None:
     """List the failures that were found and annotated, by time: findings are warnings."""
-    found: list[tuple[str, str, Event | Block]] = [
-        ("WARN", "found", event) for event in analysis.findings
-    ]
-    found += [("INFO", "annotated", block) for block in analysis.run.blocks if block.label != "ok"]
-    rows = sorted(found, key=lambda row: row[2].start)
+    rows: list[tuple[str, Event | Block]] = [("found", event) for event in inspection.events]
+    rows += [("annotated", block) for block in inspection.run.blocks if block.label != "ok"]
+    rows.sort(key=lambda row: row[1].start)
     if rows:
-        recording.send_columns(
-            "/events",
-            indexes=[series.at(np.array([event.start for _, _, event in rows]))],
-            columns=rr.TextLog.columns(
-                text=[f"{how}: {sentence(analysis, event)}" for _, how, event in rows],
-                level=[level for level, _, _ in rows],
-                color=np.array([(*colours[event.label], 255) for *_, event in rows], np.uint8),
-            ),
+        series.log_events(
+            recording,
+            [event.start for _, event in rows],
+            [f"{how}: {sentence(inspection, event)}" for how, event in rows],
+            [colours[event.label] for _, event in rows],
+            warnings=[how == "found" for how, _ in rows],
         )

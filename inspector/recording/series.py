@@ -1,6 +1,6 @@
 """Columns of a rerun recording: lines, lanes, events. Never row by row."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun as rr
@@ -47,6 +47,14 @@ def log_lines(
         names: One per series, with its unit.
         colours: One per series.
     """
+    style_lines(recording, path, names=names, colours=colours)
+    recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
+
+
+def style_lines(
+    recording: rr.RecordingStream, path: str, *, names: Sequence[str], colours: Sequence[Color]
+) -> None:
+    """Log how the lines of one entity are drawn; `log_lines` says what is what."""
     # Rerun's default aggregation draws the mean of a pixel's extremes, which hides vibration.
     style = rr.SeriesLines(
         names=list(names),
@@ -55,14 +63,13 @@ def log_lines(
         aggregation_policy="MinMax",
     )
     recording.log(path, style, static=True)
-    recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
 
 
 def log_lane(
     recording: rr.RecordingStream,
     path: str,
     stretches: Sequence[tuple[float, float, str]],
-    colours: dict[str, Color],
+    colours: Mapping[str, Color],
 ) -> None:
     """Log a lane of states.
 
@@ -72,10 +79,7 @@ def log_lane(
         stretches: Start and stop in [s] and state, in order, not overlapping.
         colours: One per state.
     """
-    states = rr.StateConfiguration(
-        values=list(colours), labels=list(colours), colors=list(colours.values())
-    )
-    recording.log(path, states, static=True)
+    style_lane(recording, path, colours)
     changes: list[tuple[float, str]] = []
     for start, stop, state in stretches:
         if changes and changes[-1][0] == start:
@@ -92,6 +96,14 @@ def log_lane(
         )
 
 
+def style_lane(recording: rr.RecordingStream, path: str, colours: Mapping[str, Color]) -> None:
+    """Log the states that a lane may have, and their colours."""
+    states = rr.StateConfiguration(
+        values=list(colours), labels=list(colours), colors=list(colours.values())
+    )
+    recording.log(path, states, static=True)
+
+
 def _without_repeats(changes: list[tuple[float, str]]) -> list[tuple[float, str]]:
     previous: str | None = None
     kept = []
@@ -100,3 +112,30 @@ def _without_repeats(changes: list[tuple[float, str]]) -> list[tuple[float, str]
             kept.append((time, state))
         previous = state
     return kept
+
+
+def log_events(
+    recording: rr.RecordingStream,
+    time: Sequence[float],
+    text: Sequence[str],
+    colours: Sequence[Color],
+    *,
+    warnings: Sequence[bool] | None = None,
+) -> None:
+    """List events, a line of text each.
+
+    Args:
+        recording: Where to.
+        time: When, in [s].
+        text: One per event.
+        colours: One per event.
+        warnings: Which of them are warnings; without it, no event has a level.
+    """
+    level = None if warnings is None else ["WARN" if each else "INFO" for each in warnings]
+    recording.send_columns(
+        "/events",
+        indexes=[at(np.array(time))],
+        columns=rr.TextLog.columns(
+            text=text, level=level, color=np.array([(*color, 255) for color in colours], np.uint8)
+        ),
+    )
