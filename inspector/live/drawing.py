@@ -8,6 +8,8 @@ import rerun as rr
 from inspector import colors
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
+from inspector.recording.joints import UNITS
+from inspector.recording.limbs import JOINTS_PER_PLOT
 from inspector.recording.series import at, log_events, scalars, style_lane, style_lines
 from inspector.recording.spectrogram import style_bands
 from inspector.thinning import extremes
@@ -17,10 +19,8 @@ from noisemodel.types import Array
 JOINT_POINTS = 400.0
 """Points of a joint's line in a second, as a recording of ten seconds has."""
 NOISE_POINTS = 4000.0
-JOINTS_PER_PLOT = 8
 TOGETHER = 0.1
 """Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
-UNITS = {"velocity": "rad/s", "position": "rad"}
 NOISE = "noise"
 
 

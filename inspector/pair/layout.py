@@ -7,6 +7,7 @@ from rerun.blueprint import Blueprint
 
 from inspector.pair.colors import RANGE_DB
 from inspector.recording import unstable
+from inspector.recording.blueprint import limbs, text
 from inspector.recording.joints import Plot
 from inspector.recording.series import TIMELINE
 from inspector.recording.spectrogram import TOP_HZ
@@ -53,10 +54,8 @@ def layout(contents: Contents) -> Blueprint:
     over_time += [(_noise(contents), 2.6), (_spectrogram(contents), 3.2)]
     if contents.links:
         over_time.append((_links(contents), 2.8))
-    over_time.append((_joints(contents), 2.8))
-    left: Part = unstable.text("Report", "/report")
-    if contents.events:
-        left = unstable.tabs(left, unstable.events("Events", "/events"))
+    over_time.append((unstable.tabs(*limbs(contents.joints)), 2.8))
+    left = text(events=contents.events)
     if contents.root is not None:
         title = "Robot after: orange is louder than before, blue quieter"
         robot = unstable.robot(title, "/robot", contents.root)
@@ -98,15 +97,3 @@ def _links(contents: Contents) -> Part:
         for name in contents.links
     )
     return unstable.tabs(change, *both)
-
-
-def _joints(contents: Contents) -> Part:
-    parts = []
-    for limb in dict.fromkeys(plot.limb for plot in contents.joints):
-        plots = [
-            unstable.plot(plot.title, "/joints", plot.paths, legend=True)
-            for plot in contents.joints
-            if plot.limb == limb
-        ]
-        parts.append(unstable.tabs(*plots, name=limb))
-    return unstable.tabs(*parts)

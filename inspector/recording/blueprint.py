@@ -60,7 +60,7 @@ def layout(contents: Contents) -> Blueprint:
     if contents.links:
         over_time.append((_links(), 4.4))
     over_time.append((_joints(contents), 2.8))
-    left = _text(contents)
+    left = text(events=contents.events)
     if contents.root is not None:
         title = "Robot, coloured by vibration" if contents.links else "Robot"
         robot = unstable.robot(title, "/robot", contents.root)
@@ -69,11 +69,10 @@ def layout(contents: Contents) -> Blueprint:
     return unstable.blueprint(whole, TIMELINE, contents.loop)
 
 
-def _text(contents: Contents) -> Part:
+def text(*, events: bool) -> Part:
+    """The report, and behind it the list of events if there are some."""
     report = unstable.text("Report", "/report")
-    if not contents.events:
-        return report
-    return unstable.tabs(report, unstable.events("Events", "/events"))
+    return unstable.tabs(report, unstable.events("Events", "/events")) if events else report
 
 
 def _noise(contents: Contents) -> Part:
@@ -112,15 +111,24 @@ def _links() -> Part:
 def _joints(contents: Contents) -> Part:
     """Scores, then each limb's signals, then the details."""
     parts = [unstable.plot("Scores", "/score", legend=True)] if contents.scores else []
-    for limb in dict.fromkeys(plot.limb for plot in contents.joints):
-        plots = [
-            unstable.plot(plot.title, "/joints", plot.paths, legend=True)
-            for plot in contents.joints
-            if plot.limb == limb
-        ]
-        parts.append(unstable.tabs(*plots, name=limb))
+    parts += limbs(contents.joints)
     parts += [_detail(detail) for detail in contents.details]
     return unstable.tabs(*parts)
+
+
+def limbs(plots: Sequence[Plot]) -> list[Part]:
+    """A part for each limb, with its plots behind each other."""
+    return [
+        unstable.tabs(
+            *(
+                unstable.plot(plot.title, "/joints", plot.paths, legend=True)
+                for plot in plots
+                if plot.limb == limb
+            ),
+            name=limb,
+        )
+        for limb in dict.fromkeys(plot.limb for plot in plots)
+    ]
 
 
 def _detail(detail: Detail) -> Part:

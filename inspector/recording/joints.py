@@ -1,7 +1,8 @@
 """The joints' signals in a recording, limb by limb, desired beside measured."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 import rerun as rr
@@ -14,6 +15,7 @@ from noisemodel.types import Array, Real
 
 POINTS = 4000
 """Of a line, so that a long run has no more than a short one."""
+UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
 
 
 @dataclass(frozen=True)
@@ -32,14 +34,43 @@ class Plot:
 
 
 @dataclass(frozen=True, eq=False)
-class _Signal:
-    """A signal of all joints, thinned for plotting."""
+class Signal:
+    """A signal of joints.
 
-    path: str
-    time: Array
-    values: Array
-    joints: tuple[str, ...]
+    Attributes:
+        kind: Such as "velocity" or "stage planned".
+        desired: Whether it is the desired one.
+        values: Shape (samples, joints), in the unit of its kind.
+        joints: Names of its joints.
+    """
+
+    kind: str
     desired: bool
+    values: Real
+    joints: tuple[str, ...]
+
+    @property
+    def unit(self) -> str:
+        """Of its values; stages are velocities."""
+        return UNITS.get(self.kind, UNITS["velocity"])
+
+
+def signals(run: Run) -> list[Signal]:
+    """The signals of a run's joints: velocity, position, effort, stages; desired after measured."""
+    names, desired = run.joint_names, run.desired_joint_names
+    every: list[tuple[str, bool, Real | None, tuple[str, ...]]] = [
+        ("velocity", False, run.velocity, names),
+        ("velocity", True, run.velocity_desired, desired),
+        ("position", False, run.position, names),
+        ("position", True, run.position_desired, desired),
+        ("effort", False, run.effort, names),
+        *((f"stage {name}", False, stage, names) for name, stage in run.stages.items()),
+    ]
+    return [
+        Signal(kind, wanted, values, joints)
+        for kind, wanted, values, joints in every
+        if values is not None
+    ]
 
 
 def log(
@@ -56,55 +87,67 @@ def log(
         Velocities, positions, efforts and stages of each limb.
     """
     found: list[Plot] = []
-    for title, signals in _signals(run):
-        for number, (limb, joints) in enumerate(limbs.items()):
-            paths = (_log(recording, signal, joints, number) for signal in signals)
-            found.append(Plot(limb, title, tuple(path for path in paths if path)))
+    for kind, group in groupby(signals(run), key=lambda signal: signal.kind):
+        both = list(group)[::-1]  # the first is drawn below the other
+        paths = [
+            log_signal(
+                recording,
+                f"/joints/{kind.replace(' ', '_')}{'_desired' * signal.desired}",
+                replace(signal, values=signal.values[run.mask]),
+                run.time[run.mask],
+                limbs,
+                suffix=" desired" * signal.desired,
+                dim=signal.desired,
+                points=POINTS,
+            )
+            for signal in both
+        ]
+        found += [
+            Plot(limb, f"{kind} [{both[0].unit}]", tuple(p[limb] for p in paths if limb in p))
+            for limb in limbs
+        ]
     return found
 
 
-def _signals(run: Run) -> Iterator[tuple[str, list[_Signal]]]:
-    """Go through the kinds of signals: title, and desired and measured values."""
-    pairs: list[tuple[str, str, Real | None, Real | None]] = [
-        ("velocity", "rad/s", run.velocity, run.velocity_desired),
-        ("position", "rad", run.position, run.position_desired),
-        ("effort", "N m", run.effort, None),
-        *((f"stage {name}", "rad/s", stage, None) for name, stage in run.stages.items()),
-    ]
-    for kind, unit, measured, desired in pairs:
-        if measured is not None:
-            path = f"/joints/{kind.replace(' ', '_')}"
-            signals = [_thin(run, path, measured, run.joint_names, desired=False)]
-            if desired is not None:
-                names = run.desired_joint_names
-                # The first is drawn below the others.
-                signals.insert(0, _thin(run, f"{path}_desired", desired, names, desired=True))
-            yield f"{kind} [{unit}]", signals
+def log_signal(
+    recording: rr.RecordingStream,
+    path: str,
+    signal: Signal,
+    time: Array,
+    limbs: Mapping[str, tuple[str, ...]],
+    *,
+    suffix: str,
+    dim: bool,
+    points: int,
+) -> dict[str, str]:
+    """Log a signal, each limb as one entity.
 
+    Args:
+        recording: Where to.
+        path: Entity path below which the limbs are numbered.
+        signal: Of joints that are in a limb.
+        time: Shape (samples,), in [s].
+        limbs: The joints of each limb, which have the same colours in all signals.
+        suffix: Of the joints' names.
+        dim: Whether the colours are paler.
+        points: How many each line may have at most.
 
-def _thin(run: Run, path: str, values: Real, joints: tuple[str, ...], *, desired: bool) -> _Signal:
-    time = run.time
-    if not run.mask.all():
-        time, values = time[run.mask], values[run.mask]
-    return _Signal(path, *extremes(time, values, points=POINTS), joints, desired)
-
-
-def _log(
-    recording: rr.RecordingStream, signal: _Signal, joints: tuple[str, ...], number: int
-) -> str:
-    """Log the lines of a limb as one entity; nothing where the signal has none of its joints."""
-    columns = [signal.joints.index(name) for name in joints if name in signal.joints]
-    if not columns:
-        return ""
-    path = f"{signal.path}/{number}"
-    names = [signal.joints[i] + (" desired" if signal.desired else "") for i in columns]
-    every = colors.of_series(len(joints), dim=signal.desired)
-    series.log_lines(
-        recording,
-        path,
-        signal.time,
-        np.ascontiguousarray(signal.values[:, columns]),
-        names=names,
-        colours=[color for name, color in zip(joints, every, strict=True) if name in signal.joints],
-    )
-    return path
+    Returns:
+        Entity path of each limb that has a joint with that signal.
+    """
+    shown, values = extremes(time, signal.values, points=points)
+    paths = {}
+    for number, (limb, joints) in enumerate(limbs.items()):
+        colours = dict(zip(joints, colors.of_series(len(joints), dim=dim), strict=True))
+        own = [name for name in joints if name in signal.joints]
+        if own:
+            paths[limb] = f"{path}/{number}"
+            series.log_lines(
+                recording,
+                paths[limb],
+                shown,
+                np.ascontiguousarray(values[:, [signal.joints.index(name) for name in own]]),
+                names=[name + suffix for name in own],
+                colours=[colours[name] for name in own],
+            )
+    return paths

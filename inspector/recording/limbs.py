@@ -6,10 +6,10 @@ from itertools import takewhile
 
 from rerun.urdf import UrdfTree
 
-MOST = 10
+MAX_JOINTS = 10
 """Joints that one plot can hold."""
-FEW = 8
-"""Joints in a part of more than that."""
+JOINTS_PER_PLOT = 8
+"""Joints in each plot if there are more than that."""
 
 
 def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, ...]]:
@@ -25,7 +25,7 @@ def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, .
     groups = [tuple(names)] if tree is None else _chains(names, tree)
     parts = []
     for group in groups:
-        size = len(group) if len(group) <= MOST else FEW
+        size = len(group) if len(group) <= MAX_JOINTS else JOINTS_PER_PLOT
         parts += [group[first : first + size] for first in range(0, len(group), size)]
     titles = [_title(part) for part in parts] if len(parts) > 1 else ["joints"]
     count = Counter(titles)
