@@ -6,11 +6,10 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import rerun as rr
-from rerun.urdf import UrdfJoint, UrdfTree
+from rerun.urdf import UrdfJoint
 
 from inspector.recording import robot as scene
-from inspector.recording import series, unstable
-from noisemodel.errors import UnknownJointError
+from inspector.recording import series
 from noisemodel.types import Array
 
 SLIDING = "prismatic"
@@ -44,12 +43,9 @@ class Moving:
         floating: bool,
     ) -> None:
         with TemporaryDirectory() as folder:
-            tree = scene.load(robot, Path(folder))
-            _log(recording, tree)
+            tree = scene.load(robot, Path(folder), joint_names)
+            scene.log_shapes(recording, tree, coloured=False)
         movable = {joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"}
-        for name in joint_names:
-            if name not in movable:
-                raise UnknownJointError(name, tree.name, tuple(movable))
         leaders = {
             name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
         }
@@ -73,7 +69,7 @@ class Moving:
             parent_frame=[parent for parent, _ in links], child_frame=self.children
         )
         self._recording = recording
-        self.root = scene.WORLD if floating else str(tree.root_link().name)
+        self.root = scene.root(tree, floating=floating)
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
         """Move the robot.
@@ -112,11 +108,6 @@ class Moving:
         # turn (axis sin half, cos half), with what does not change multiplied once
         turned = np.sin(half) * self._spin + np.cos(half) * self._turn
         return self._place + angle * self._slide, turned
-
-
-def _log(recording: rr.RecordingStream, tree: UrdfTree) -> None:
-    unstable.log_up(recording)
-    rr.send_chunks(tree.stream(), recording=recording)
 
 
 def _quaternion(joint: UrdfJoint) -> Array:

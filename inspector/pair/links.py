@@ -47,24 +47,9 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, pair: Pair) -> list[str]:
                 names=[side],
                 colours=[COLOURS[side]],
             )
-    _log_colours(recording, tree, pair)
-    return names[:BOTH]
-
-
-def _log_colours(recording: rr.RecordingStream, tree: UrdfTree, pair: Pair) -> None:
-    names, shapes = shared_links(pair), robot.shapes(tree)
-    time, change = link_steps(pair, names)
+    shared = shared_links(pair)
+    time, change = link_steps(pair, shared)
     rgba = sides.diverging(change)
-    for link, members in robot.moving_links(tree).items():
-        paths = [path for member in members for path in tree.get_visual_geometry_paths(member)]
-        if link not in names:
-            for path in paths:  # the base of an arm: it never moves
-                resting = {robot.COLOURED[shapes[path]]: sides.diverging(np.zeros(1))}
-                recording.log(path, getattr(rr, shapes[path]).from_fields(**resting), static=True)
-            continue
-        own = rgba[:, names.index(link)]
-        changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
-        for path in paths:
-            colour = {robot.COLOURED[shapes[path]]: own[changed]}
-            columns = getattr(rr, shapes[path]).columns(**colour)
-            recording.send_columns(path, indexes=[series.at(time[changed])], columns=columns)
+    colours = {link: rgba[:, index] for index, link in enumerate(shared)}
+    robot.log_colours(recording, tree, time, colours, rest=sides.diverging(np.zeros(1)))
+    return names[:BOTH]

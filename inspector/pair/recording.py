@@ -42,7 +42,7 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     parts = (pair.before.sha256, pair.after.sha256, str(pair.alignment.lag))
     identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
     with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
-        tree = _tree(pair, Path(folder))
+        tree = None if pair.links is None else robot.of_run(pair.after.run, Path(folder))
         recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
         recording.save(temporary)
         contents = _log(recording, pair, tree)
@@ -51,24 +51,14 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
         recording.disconnect()
 
 
-def _tree(pair: Pair, folder: Path) -> UrdfTree | None:
-    run = pair.after.run
-    if pair.links is None:
-        return None
-    assert run.robot is not None
-    tree = robot.load(run.robot, folder)
-    robot.check_joints(tree, run)
-    return tree
-
-
 def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Contents:
-    found, loud = changes(pair), list[str]()
+    run, found, loud = pair.after.run, changes(pair), list[str]()
     if tree is not None:
-        robot.log(recording, tree, pair.after.run, coloured=True)
+        robot.log(recording, tree, run, coloured=True)
         loud = links.log(recording, tree, pair)
     lanes = classes.log(recording, pair, found)
     noise.log(recording, pair)
-    names = dict.fromkeys((*pair.after.run.joint_names, *pair.before.run.joint_names))
+    names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
     limb_plots = joints.log(recording, pair, limbs(tuple(names), tree))
     loop = _loudest_change(pair, found)
     heard = sounds(pair, loop[0])
@@ -79,7 +69,7 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
     return Contents(
         joints=limb_plots,
         links=loud,
-        root=None if tree is None else robot.root(tree, pair.after.run),
+        root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         lanes=lanes,
         events=bool(found),
         sounds=tuple(heard),

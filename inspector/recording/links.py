@@ -120,7 +120,9 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise) -> None
         _log_power(recording, path, noise, noise.power[:, index], color)
     for place, (term, power) in enumerate(noise.terms.items()):
         _log_power(recording, f"/power/terms/{term}", noise, power, colors.of_series(3)[place])
-    _log_colours(recording, tree, noise, found)
+    rgba = shades(found.level)
+    colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
+    robot.log_colours(recording, tree, found.time, colours, rest=shades(np.array([-np.inf])))
 
 
 def _log_lane(recording: rr.RecordingStream, link: str, found: Levels, index: int) -> None:
@@ -138,23 +140,3 @@ def _log_power(
         level = np.maximum(10 * np.log10(power / REFERENCE_POWER), FLOOR_DB)
     name = path.rpartition("/")[2]
     series.log_lines(recording, path, noise.time, level[:, None], names=[name], colours=[color])
-
-
-def _log_colours(
-    recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise, found: Levels
-) -> None:
-    shapes, rgba = robot.shapes(tree), shades(found.level)
-    for link, members in robot.moving_links(tree).items():
-        paths = [path for member in members for path in tree.get_visual_geometry_paths(member)]
-        if link not in noise.links:
-            for path in paths:  # the base of an arm: it never moves
-                resting = {robot.COLOURED[shapes[path]]: shades(np.array([-np.inf]))}
-                recording.log(path, getattr(rr, shapes[path]).from_fields(**resting), static=True)
-            continue
-        index = noise.links.index(link)
-        changed = np.concatenate(([True], (rgba[1:, index] != rgba[:-1, index]).any(axis=1)))
-        times = [series.at(found.time[changed])]
-        for path in paths:
-            colour = {robot.COLOURED[shapes[path]]: rgba[changed, index]}
-            columns = getattr(rr, shapes[path]).columns(**colour)
-            recording.send_columns(path, indexes=times, columns=columns)

@@ -42,23 +42,13 @@ def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: byt
         MeshError: If one of the robot's meshes cannot be read.
     """
     with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
-        tree = _tree(analysis, Path(folder))
-        recording = rr.RecordingStream(APPLICATION, recording_id=analysis.sha256[:32])
+        tree = robot.of_run(inspection.run, Path(folder)) if inspection.has_robot else None
+        recording = rr.RecordingStream(APPLICATION, recording_id=inspection.sha256[:32])
         recording.save(temporary)
         contents = _log(recording, analysis, tree, sound)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
         recording.flush()
         recording.disconnect()
-
-
-def _tree(analysis: Analysis, folder: Path) -> UrdfTree | None:
-    run = analysis.run
-    if analysis.links is None:
-        return None
-    assert run.robot is not None
-    tree = robot.load(run.robot, folder)
-    robot.check_joints(tree, run)
-    return tree
 
 
 def _log(
@@ -79,7 +69,7 @@ def _log(
     return Contents(
         joints=limb_plots,
         details=closeups,
-        root=None if tree is None else robot.root(tree, run),
+        root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         links=links is not None,
         terms=links is not None and bool(links.terms),
         lanes=(analysis.labels is not None) + bool(run.blocks),

@@ -2,7 +2,7 @@
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -17,6 +17,7 @@ from inspector.recording import series, unstable
 from noisemodel import meshfile, meshpath, robot, urdf
 from noisemodel.errors import UnknownJointError
 from noisemodel.run import Run
+from noisemodel.types import Array
 
 FRAMES_PER_SECOND = 50.0
 MAX_FRAMES = 2000
@@ -31,13 +32,14 @@ COLOURED = {
 """The shapes that a URDF becomes, and what colours each."""
 
 
-def load(name: str, folder: Path) -> UrdfTree:
+def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
     """Read the robot that a run names, for drawing.
 
     Args:
         name: A listed robot, or the path of a URDF.
         folder: Takes what rerun reads in place of the robot's own files, as late as when the tree
             is logged: it has to stay until then.
+        joint_names: Joints that the robot has to have.
 
     Returns:
         Rerun's tree of its links and joints.
@@ -45,32 +47,32 @@ def load(name: str, folder: Path) -> UrdfTree:
     Raises:
         RobotError: If there is no such robot, or its URDF cannot be read.
         MeshError: If one of its meshes cannot be read.
+        UnknownJointError: If the robot lacks one of the joints, naming the first.
     """
     path = robot.locate(name)
     urdf.read(path)
     roots = robot.package_roots(name)
     copy = folder / path.name
     copy.write_text(drawable(path, roots, folder), encoding="utf-8")
-    return UrdfTree.from_file_path(
+    tree = UrdfTree.from_file_path(
         copy, entity_path_prefix="robot", static_transform_entity_path="/robot/fixed"
     )
-
-
-def check_joints(tree: UrdfTree, run: Run) -> None:
-    """Refuse a run that names joints which the robot does not have.
-
-    Raises:
-        UnknownJointError: Naming the first such joint.
-    """
     known = [joint.name for joint in tree.joints() if joint.joint_type != "fixed"]
-    for name in (*run.joint_names, *run.desired_joint_names):
-        if name not in known:
-            raise UnknownJointError(name, tree.name, known)
+    for joint in joint_names:
+        if joint not in known:
+            raise UnknownJointError(joint, tree.name, known)
+    return tree
 
 
-def root(tree: UrdfTree, run: Run) -> str:
-    """Name the frame that a robot is seen from: its base, or the world if that moves."""
-    return WORLD if run.base_pose is not None else str(tree.root_link().name)
+def of_run(run: Run, folder: Path) -> UrdfTree:
+    """Read the robot of a run that names one; `load` says more."""
+    assert run.robot is not None
+    return load(run.robot, folder, (*run.joint_names, *run.desired_joint_names))
+
+
+def root(tree: UrdfTree, *, floating: bool) -> str:
+    """Name the frame that a robot is seen from: its base, or the world if that floats."""
+    return WORLD if floating else str(tree.root_link().name)
 
 
 def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
@@ -119,14 +121,9 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
         recording: Where to.
         tree: The robot.
         run: A run with positions; joints that it does not name rest.
-        coloured: Whether colours over time will follow: the URDF's own, which are static and
-            would hide them, are left out then.
+        coloured: Whether colours over time will follow, see `log_shapes`.
     """
-    unstable.log_up(recording)
-    drawn = tree.stream()
-    if coloured:
-        drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])
-    rr.send_chunks(drawn, recording=recording)
+    log_shapes(recording, tree, coloured=coloured)
     assert run.position is not None
     step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
     shown = np.arange(0, len(run.time), step)
@@ -147,6 +144,54 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
         )
     if run.base_pose is not None:
         _log_base(recording, tree, run, shown)
+
+
+def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool) -> None:
+    """Log a robot at rest.
+
+    Args:
+        recording: Where to.
+        tree: The robot.
+        coloured: Whether colours over time will follow: the URDF's own, which are static and
+            would hide them, are left out then.
+    """
+    unstable.log_up(recording)
+    drawn = tree.stream()
+    if coloured:
+        drawn = drawn.drop(components=[":".join(pair) for pair in COLOURED.items()])
+    rr.send_chunks(drawn, recording=recording)
+
+
+def log_colours(
+    recording: rr.RecordingStream,
+    tree: UrdfTree,
+    time: Array,
+    colours: Mapping[str, NDArray[np.uint8]],
+    *,
+    rest: NDArray[np.uint8],
+) -> None:
+    """Log the colours of links over time.
+
+    Args:
+        recording: Where to.
+        tree: The robot.
+        time: Shape (steps,), in [s].
+        colours: Of each link that moves, shape (steps, 4).
+        rest: Colour of the others, such as the base of an arm, shape (1, 4).
+    """
+    kinds = shapes(tree)
+    for link, members in moving_links(tree).items():
+        paths = [path for member in members for path in tree.get_visual_geometry_paths(member)]
+        if link not in colours:
+            for path in paths:
+                colour = {COLOURED[kinds[path]]: rest}
+                recording.log(path, getattr(rr, kinds[path]).from_fields(**colour), static=True)
+            continue
+        own = colours[link]
+        changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
+        for path in paths:
+            columns = getattr(rr, kinds[path]).columns(**{COLOURED[kinds[path]]: own[changed]})
+            recording.send_columns(path, indexes=[series.at(time[changed])], columns=columns)
 
 
 def _log_base(
