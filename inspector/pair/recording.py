@@ -19,9 +19,7 @@ from inspector.pair.sound import sounds
 from inspector.recording import robot, unstable
 from inspector.recording.limbs import limbs
 from inspector.recording.series import TIMELINE
-from noisemodel.atomic import replacing
-
-APPLICATION = "inspector"
+from inspector.recording.stream import log_report, writing
 
 
 def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
@@ -41,14 +39,10 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     """
     parts = (pair.before.sha256, pair.after.sha256, str(pair.alignment.lag))
     identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
-    with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
+    with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
         tree = None if pair.links is None else robot.of_run(pair.after.run, Path(folder))
-        recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
-        recording.save(temporary)
         contents = _log(recording, pair, tree)
         recording.send_blueprint(layout(contents))  # takes the place of an older layout
-        recording.flush()
-        recording.disconnect()
 
 
 def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Contents:
@@ -91,18 +85,13 @@ def _loudest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
 
 
 def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:
-    document = rr.TextDocument(report(pair), media_type="text/markdown")
-    recording.log("/report", document, static=True)
-    recording.send_recording_name(f"{pair.before.name} → {pair.after.name}")
-    recording.send_property(
-        "inspector",
-        rr.AnyValues(
-            before_sha256=pair.before.sha256,
-            after_sha256=pair.after.sha256,
-            aligned=str(pair.alignment.how),
-            lag_s=pair.alignment.seconds,
-            rate_hz=pair.rate,
-            duration_s=pair.before.run.duration,
-            vibration_change_db=whole(pair).change,
-        ),
-    )
+    properties = {
+        "before_sha256": pair.before.sha256,
+        "after_sha256": pair.after.sha256,
+        "aligned": str(pair.alignment.how),
+        "lag_s": pair.alignment.seconds,
+        "rate_hz": pair.rate,
+        "duration_s": pair.before.run.duration,
+        "vibration_change_db": whole(pair).change,
+    }
+    log_report(recording, f"{pair.before.name} → {pair.after.name}", report(pair), properties)

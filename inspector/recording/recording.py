@@ -16,12 +16,11 @@ from inspector.recording import links as link_lanes
 from inspector.recording.blueprint import Contents, layout
 from inspector.recording.limbs import limbs
 from inspector.recording.spectrogram import log_bands, log_bars, log_tensor
+from inspector.recording.stream import log_report, writing
 from inspector.report.markdown import report
 from inspector.spectrogram import spectrogram
 from inspector.thinning import extremes
-from noisemodel.atomic import replacing
 
-APPLICATION = "inspector"
 NOISE_POINTS = 100_000
 
 
@@ -41,14 +40,11 @@ def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: byt
         RobotError: If the run's URDF cannot be read, or lacks one of the run's joints.
         MeshError: If one of the robot's meshes cannot be read.
     """
-    with TemporaryDirectory() as folder, replacing(path, overwrite=overwrite) as temporary:
+    identity = inspection.sha256
+    with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
         tree = robot.of_run(inspection.run, Path(folder)) if inspection.has_robot else None
-        recording = rr.RecordingStream(APPLICATION, recording_id=inspection.sha256[:32])
-        recording.save(temporary)
-        contents = _log(recording, analysis, tree, sound)
+        contents = _log(recording, inspection, tree, sound)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
-        recording.flush()
-        recording.disconnect()
 
 
 def _log(
@@ -101,24 +97,19 @@ def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> None:
 def _log_text(
     recording: rr.RecordingStream, analysis: Analysis, entities: Mapping[str, str]
 ) -> None:
-    run, links = analysis.run, analysis.links
-    text = linked(report(analysis), entities)
-    recording.log("/report", rr.TextDocument(text, media_type="text/markdown"), static=True)
-    recording.send_recording_name(analysis.name)
-    recording.send_property(
-        "inspector",
-        rr.AnyValues(
-            input_sha256=analysis.sha256,
-            robot=run.robot or "",
-            rate_hz=run.rate,
-            duration_s=run.duration,
-            joints=len(run.joint_names),
-            samples_in_gaps=int((~run.mask).sum()),
-            model=analysis.model,
-            link_noise="" if links is None else links.kind,
-            findings=len(analysis.findings),
-        ),
-    )
+    run, links = inspection.run, inspection.links
+    properties = {
+        "input_sha256": inspection.sha256,
+        "robot": run.robot or "",
+        "rate_hz": run.rate,
+        "duration_s": run.duration,
+        "joints": len(run.joint_names),
+        "samples_in_gaps": int((~run.mask).sum()),
+        "model": inspection.model,
+        "link_noise": "" if links is None else links.kind,
+        "findings": len(inspection.events),
+    }
+    log_report(recording, inspection.name, linked(report(inspection), entities), properties)
 
 
 def linked(markdown: str, entities: Mapping[str, str]) -> str:

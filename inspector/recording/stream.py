@@ -1,0 +1,45 @@
+"""A recording in a file, whole or not at all, with its report."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import rerun as rr
+
+from noisemodel.atomic import replacing
+
+APPLICATION = "inspector"
+
+
+@contextmanager
+def writing(path: Path, identity: str, *, overwrite: bool = False) -> Iterator[rr.RecordingStream]:
+    """Write a recording for as long as the block lasts.
+
+    Args:
+        path: The file to write, by convention ``*.rrd``.
+        identity: Hexadecimal, at least 32 digits. Opened again, a recording replaces the one of
+            the same identity.
+        overwrite: Whether a file that exists may be replaced.
+
+    Yields:
+        What to log into.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    with replacing(path, overwrite=overwrite) as temporary:
+        recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
+        recording.save(temporary)
+        yield recording
+        recording.flush()
+        recording.disconnect()
+
+
+def log_report(
+    recording: rr.RecordingStream, name: str, markdown: str, properties: dict[str, Any]
+) -> None:
+    """Log what a recording is called, its report and its properties."""
+    recording.log("/report", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
+    recording.send_recording_name(name)
+    recording.send_property("inspector", rr.AnyValues(**properties))
