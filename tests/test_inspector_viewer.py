@@ -88,7 +88,7 @@ def test_a_recording_is_served_on_loopback_only_and_no_longer_than_asked(recordi
         with urllib.request.urlopen(page) as answer:
             assert b"rerun" in answer.read().lower()
         if shutil.which("ss") and shutil.which("pgrep"):
-            addresses = listening_on(served.process.pid)
+            addresses = listening_on(served.server.process.pid)
             assert len(addresses) == 2
             assert all(address.startswith("127.0.0.1:") for address in addresses)
     port = int(page.rpartition(":")[2])
@@ -118,7 +118,7 @@ def test_a_server_that_dies_at_once_says_why(monkeypatch, recording):
 
 def test_a_server_that_dies_later_says_so(recording):
     with web.serving(recording) as served:
-        os.killpg(served.process.pid, signal.SIGKILL)
+        os.killpg(served.server.process.pid, signal.SIGKILL)
         with pytest.raises(ViewerError, match="the viewer ended with status -9"):
             served.wait()
 

@@ -2,7 +2,6 @@ import http.server
 import os
 import socket
 import subprocess
-import sys
 import threading
 import time
 from contextlib import closing, contextmanager
@@ -27,23 +26,16 @@ def free_port():
 def receiver(home):
     """What receives recordings as a viewer does, without a window."""
     port = free_port()
-    command = [sys.executable, "-m", "rerun", "--serve-grpc", "--bind", "127.0.0.1"]
-    process = subprocess.Popen(
-        [*command, "--port", str(port)],
-        env=os.environ | {"HOME": str(home)},
-        start_new_session=True,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-
-    try:
-        for _ in range(300):
-            if module._listens("127.0.0.1", port):
-                break
-            time.sleep(0.1)
-        yield port, lambda: viewer.end(process)
-    finally:
-        viewer.end(process)
+    env = os.environ | {"HOME": str(home)}
+    with viewer.started("--serve-grpc", "--port", str(port), env=env) as process:
+        try:
+            for _ in range(300):
+                if module._listens("127.0.0.1", port):
+                    break
+                time.sleep(0.1)
+            yield port, process.kill
+        finally:
+            process.kill()
 
 
 def second(first):
@@ -140,7 +132,7 @@ def test_a_viewer_is_opened_on_loopback_and_on_another_port_if_its_own_is_taken(
         monkeypatch.setattr(module, "PORT", port)
         monkeypatch.setattr(module, "ANSWER", 0.2)
         monkeypatch.setattr(module.viewer, "has_display", lambda: True)
-        monkeypatch.setattr(module.subprocess, "Popen", Viewer)
+        monkeypatch.setattr(subprocess, "Popen", Viewer)
         with pytest.raises(SinkError, match="the viewer ended with status 1; use --save"):
             Sink()
     (command,) = commands

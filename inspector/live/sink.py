@@ -3,8 +3,6 @@
 import os
 import re
 import socket
-import subprocess
-import tempfile
 import time
 from contextlib import ExitStack, suppress
 from http.client import HTTPConnection, HTTPException
@@ -16,13 +14,14 @@ import rerun as rr
 from inspector.live.errors import SinkError
 from inspector.recording import viewer
 from inspector.recording.viewer import HOST
+from inspector.recording.web import free_port
 from noisemodel.atomic import replacing
 
 APPLICATION = "inspector-live"
 """Not that of recordings of whole runs: the viewer keeps a layout for each application."""
 PORT = int(viewer.PORT)
 ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5})(?:/proxy)?")
-PATIENCE = 20.0
+TIMEOUT = 20.0
 """How long a viewer may take to start, in [s]."""
 ANSWER = 2.0
 """How long a viewer may take to answer, in [s]."""
@@ -139,7 +138,7 @@ def _viewer(connect: str | None) -> tuple[str, int]:
             f"no viewer runs at {host}:{port}, and there is no display to open one on;"
             " use --connect HOST:PORT or --save FILE.rrd"
         )
-    return HOST, _opened(_free_port() if taken else PORT)
+    return HOST, _opened(free_port() if taken else PORT)
 
 
 def _parsed(address: str) -> tuple[str, int]:
@@ -175,32 +174,17 @@ def _is_viewer(host: str, port: int) -> bool:
         connection.close()
 
 
-def _free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind((HOST, 0))
-        return int(probe.getsockname()[1])
-
-
 def _opened(port: int) -> int:
     """Open a viewer on loopback."""
-    start = viewer.command("--port", str(port), "--hide-welcome-screen", "--expect-data-soon")
-    start += ["--memory-limit", MEMORY]
-    with tempfile.TemporaryFile() as complaints:
-        process = subprocess.Popen(
-            start,
-            env=os.environ | {"RUST_LOG": "error"},
-            start_new_session=True,  # Ctrl-C ends the session, and leaves the viewer open
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=complaints,
-        )
-        until = time.monotonic() + PATIENCE
+    start = ("--port", str(port), "--hide-welcome-screen", "--expect-data-soon")
+    env = os.environ | {"RUST_LOG": "error"}
+    with viewer.started(*start, "--memory-limit", MEMORY, env=env) as process:
+        until = time.monotonic() + TIMEOUT
         while time.monotonic() < until:
-            if (code := process.poll()) is not None:
-                complaints.seek(0)
-                raise SinkError(f"{viewer.ended(code, complaints.read())}; use --save FILE.rrd")
+            if problem := process.ended():
+                raise SinkError(f"{problem}; use --save FILE.rrd")
             if _listens(HOST, port):
                 return port
             time.sleep(0.1)
-    viewer.end(process)
-    raise SinkError(f"the viewer did not start within {PATIENCE:g} s; use --save FILE.rrd")
+        process.kill()
+    raise SinkError(f"the viewer did not start within {TIMEOUT:g} s; use --save FILE.rrd")

@@ -2,7 +2,6 @@
 
 import os
 import re
-import subprocess
 import sys
 import tempfile
 import time
@@ -26,7 +25,7 @@ SIZE = (1440, 900)
 """Of the picture, in points; beyond, a software driver takes minutes."""
 MAGIC = b"RRF2"
 """What rerun's recordings begin with."""
-PATIENCE = 120.0
+TIMEOUT = 120.0
 """How long the viewer may take to draw everything, in [s]."""
 REPORTS_PASS = 20.0
 """After this, reports of views are no longer those of data that is still arriving, in [s]."""
@@ -72,7 +71,7 @@ def shoot(
         overwrite: Whether a file that exists may be replaced.
 
     Returns:
-        What the viewer complains of, a line each.
+        What the views report, a line each.
 
     Raises:
         InspectorError: If the recording cannot be read.
@@ -128,7 +127,7 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
         size: Width and height, in points.
 
     Yields:
-        What the viewer is asked through.
+        A client of the viewer.
 
     Raises:
         ViewerError: If the viewer is not installed, ends, or does not answer.
@@ -136,23 +135,17 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
     from inspector.recording import unstable
 
     port = free_port()
-    start = viewer.command("--headless", "--port", str(port), "--hide-welcome-screen")
-    start += ["--window-size", f"{size[0]}x{size[1]}"]
-    with tempfile.TemporaryDirectory() as home, tempfile.TemporaryFile() as complaints:
-        process = subprocess.Popen(
-            start,
-            env=_environment(home),
-            start_new_session=True,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=complaints,
-        )
+    start = ("--headless", "--port", str(port), "--hide-welcome-screen")
+    window = ("--window-size", f"{size[0]}x{size[1]}")
+    with (
+        tempfile.TemporaryDirectory() as home,
+        viewer.started(*start, *window, env=_environment(home)) as process,
+    ):
         try:
-            until = time.monotonic() + PATIENCE
+            until = time.monotonic() + TIMEOUT
             while True:
-                if (code := process.poll()) is not None:
-                    complaints.seek(0)
-                    raise ViewerError(viewer.ended(code, complaints.read()))
+                if problem := process.ended():
+                    raise ViewerError(problem)
                 try:
                     client = unstable.client(f"rerun+http://{HOST}:{port}/proxy")
                     client.get_state()
@@ -163,7 +156,7 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
                     time.sleep(0.1)
             yield client
         finally:
-            viewer.end(process)
+            process.kill()
 
 
 def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
@@ -181,7 +174,7 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
         ViewerError: If the viewer draws nothing.
     """
     client.open(str(recording.resolve()))
-    until = time.monotonic() + PATIENCE
+    until = time.monotonic() + TIMEOUT
     while client.get_state().loading and time.monotonic() < until:
         time.sleep(0.1)
     client.set_time("time", duration=seconds)
@@ -195,7 +188,7 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
         except Exception as error:  # a viewer under load misses its own deadlines: ask again
             problem = str(error).partition("\n")[0]
     if not frames:
-        raise ViewerError(f"the viewer draws nothing within {PATIENCE:g} s ({problem})")
+        raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s ({problem})")
     return frames[-1]
 
 

@@ -9,9 +9,12 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
+from typing import IO
 
 from inspector.errors import InspectorError
 
@@ -72,7 +75,7 @@ def command(*arguments: str) -> list[str]:
     """Write the command line of rerun's viewer; it listens on loopback only.
 
     Args:
-        arguments: What it is told beyond that.
+        arguments: Options beyond that.
 
     Raises:
         ViewerError: If the viewer is not installed.
@@ -80,6 +83,71 @@ def command(*arguments: str) -> list[str]:
     if find_spec("rerun_cli") is None:
         raise ViewerError("rerun's viewer is missing; `pip install rerun-sdk` brings it")
     return [sys.executable, "-m", "rerun", "--bind", HOST, *arguments]
+
+
+@dataclass(frozen=True)
+class Process:
+    """A viewer that was started.
+
+    Attributes:
+        process: In a session of its own.
+        stderr: What it writes there.
+    """
+
+    process: "subprocess.Popen[bytes]"
+    stderr: IO[bytes]
+
+    def ended(self) -> str:
+        """How it ended, in a line; nothing while it runs."""
+        code = self.process.poll()
+        if code is None:
+            return ""
+        self.stderr.seek(0)
+        text = re.sub(r"\x1b\[[0-9;]*m", "", self.stderr.read().decode(errors="replace"))
+        errors = [line for line in text.splitlines() if re.search(r"\b(Error|ERROR|WARN)\b", line)]
+        reason = re.sub(r"^.*?(Error|ERROR|WARN)[: ]+", "", errors[-1]).strip() if errors else ""
+        return f"the viewer ended with status {code}{reason and f' ({reason})'}"
+
+    def kill(self) -> None:
+        """End it with all its children."""
+        # `rerun` is a script that starts the viewer: ending it alone leaves that, and its port.
+        with suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()
+        # The viewer itself is no child of ours to wait for; its ports are free once it is gone.
+        until = time.monotonic() + SETTLE
+        with suppress(ProcessLookupError):
+            while time.monotonic() < until:
+                os.killpg(self.process.pid, 0)
+                time.sleep(0.02)
+
+
+@contextmanager
+def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[Process]:
+    """Start a viewer, whose stderr can be read for as long as the block lasts.
+
+    It does not end with the block, nor by Ctrl-C.
+
+    Args:
+        arguments: Options.
+        env: Environment; by default that of this process.
+
+    Yields:
+        The viewer.
+
+    Raises:
+        ViewerError: If the viewer is not installed.
+    """
+    with tempfile.TemporaryFile() as stderr:
+        process = subprocess.Popen(
+            command(*arguments),
+            env=env,
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=stderr,
+        )
+        yield Process(process, stderr)
 
 
 def open_window(recording: Path) -> str:
@@ -100,48 +168,12 @@ def open_window(recording: Path) -> str:
 
 
 def _started(recording: Path, port: str) -> str:
-    start = command("--port", port, "--hide-welcome-screen", str(recording))
-    with tempfile.TemporaryFile() as complaints:
-        viewer = subprocess.Popen(
-            start,
-            start_new_session=True,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=complaints,
-        )
+    with started("--port", port, "--hide-welcome-screen", str(recording)) as viewer:
         try:
-            code = viewer.wait(timeout=SETTLE)
+            code = viewer.process.wait(timeout=SETTLE)
         except subprocess.TimeoutExpired:
             return ""
-        complaints.seek(0)
-        return "" if code == 0 else ended(code, complaints.read())
-
-
-def ended(code: int, complaints: bytes) -> str:
-    """Say how a viewer ended, in a line.
-
-    Args:
-        code: Its exit status.
-        complaints: What it wrote to stderr.
-    """
-    plain = re.sub(r"\x1b\[[0-9;]*m", "", complaints.decode(errors="replace"))
-    errors = [line for line in plain.splitlines() if re.search(r"\b(Error|ERROR|WARN)\b", line)]
-    reason = re.sub(r"^.*?(Error|ERROR|WARN)[: ]+", "", errors[-1]).strip() if errors else ""
-    return f"the viewer ended with status {code}{reason and f' ({reason})'}"
-
-
-def end(process: "subprocess.Popen[bytes]") -> None:
-    """End a viewer that was started in a session of its own, with all its children."""
-    # `rerun` is a script that starts the viewer: ending it alone would leave that, and its port.
-    with suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
-    # The viewer itself is no child of ours to wait for; its ports are free once it is gone.
-    until = time.monotonic() + SETTLE
-    with suppress(ProcessLookupError):
-        while time.monotonic() < until:
-            os.killpg(process.pid, 0)
-            time.sleep(0.02)
+        return "" if code == 0 else viewer.ended()
 
 
 def how_to_open(recording: Path) -> str:

@@ -2,21 +2,18 @@
 
 import signal
 import socket
-import subprocess
-import tempfile
 import time
 import webbrowser
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO
 from urllib.parse import quote
 
 from inspector.recording import viewer
 from inspector.recording.viewer import HOST, ViewerError
 
-PATIENCE = 30.0
+TIMEOUT = 30.0
 """How long a server may take to answer, in [s]."""
 
 
@@ -26,13 +23,11 @@ class Served:
 
     Attributes:
         url: Its address.
-        process: The server.
-        complaints: What the server writes to stderr.
+        server: The viewer that serves it.
     """
 
     url: str
-    process: "subprocess.Popen[bytes]"
-    complaints: IO[bytes]
+    server: viewer.Process
 
     def wait(self) -> None:
         """Wait until the server ends, which it does not do by itself.
@@ -40,12 +35,8 @@ class Served:
         Raises:
             ViewerError: If it ended all the same.
         """
-        raise self.ended(self.process.wait())
-
-    def ended(self, code: int) -> ViewerError:
-        """Say that, and why, the server ended."""
-        self.complaints.seek(0)
-        return ViewerError(viewer.ended(code, self.complaints.read()))
+        self.server.process.wait()
+        raise ViewerError(self.server.ended())
 
 
 def serve(recording: Path, announce: Callable[[str], None], *, port: int = 0) -> None:
@@ -53,7 +44,7 @@ def serve(recording: Path, announce: Callable[[str], None], *, port: int = 0) ->
 
     Args:
         recording: A ``*.rrd`` file.
-        announce: Is told the address once it can be opened.
+        announce: Called with the address once it can be opened.
         port: Where browsers find it; 0 takes a free port.
 
     Raises:
@@ -84,26 +75,15 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
     """
     data_port = free_port()
     page_port = free_port(port, other=data_port)
-    start = viewer.command(
-        *("--serve-web", "--port", str(data_port), "--web-viewer-port", str(page_port)),
-        str(recording),
-    )
-    with tempfile.TemporaryFile() as complaints:
-        server = subprocess.Popen(
-            start,
-            start_new_session=True,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=complaints,
-        )
-        data = quote(f"rerun+http://{HOST}:{data_port}/proxy", safe="")
-        served = Served(f"http://{HOST}:{page_port}/?url={data}", server, complaints)
+    ports = ("--port", str(data_port), "--web-viewer-port", str(page_port))
+    with viewer.started("--serve-web", *ports, str(recording)) as server:
         try:
             for needed in (data_port, page_port):
-                _wait_for(needed, served)
-            yield served
+                _wait_for(needed, server)
+            data = quote(f"rerun+http://{HOST}:{data_port}/proxy", safe="")
+            yield Served(f"http://{HOST}:{page_port}/?url={data}", server)
         finally:
-            viewer.end(server)
+            server.kill()
 
 
 def free_port(wanted: int = 0, *, other: int = 0) -> int:
@@ -130,16 +110,15 @@ def free_port(wanted: int = 0, *, other: int = 0) -> int:
     return free_port(other=other) if found == other and not wanted else found
 
 
-def _wait_for(port: int, served: Served) -> None:
-    until = time.monotonic() + PATIENCE
+def _wait_for(port: int, server: viewer.Process) -> None:
+    until = time.monotonic() + TIMEOUT
     while time.monotonic() < until:
-        code = served.process.poll()
-        if code is not None:
-            raise served.ended(code)
+        if problem := server.ended():
+            raise ViewerError(problem)
         try:
             socket.create_connection((HOST, port), 0.2).close()
         except OSError:
             time.sleep(0.05)
         else:
             return
-    raise ViewerError(f"the viewer does not answer on port {port}, {PATIENCE:g} s after its start")
+    raise ViewerError(f"the viewer does not answer on port {port}, {TIMEOUT:g} s after its start")
