@@ -4,14 +4,14 @@ import sys
 from pathlib import Path
 
 from inspector.recording.screenshot import (
+    final_state,
     headless_viewer,
     missing_packages,
     picture,
-    settled,
     shoot,
 )
 
-__all__ = ["DRIVERS", "MISSING", "headless_viewer", "picture", "settled"]
+__all__ = ["DRIVERS", "MISSING", "final_state", "headless_viewer", "picture"]
 
 DRIVERS = not missing_packages()
 MISSING = f"needs Debian's {' and '.join(missing_packages())} (rerun draws on software Vulkan)"

@@ -419,7 +419,7 @@ def test_the_viewer_draws_a_comparison_and_reports_no_error(whole):
     path, _ = whole
     with picture.headless_viewer() as client:
         png = picture.picture(client, path, 0.7)
-        state = picture.settled(client)
+        state = picture.final_state(client)
         errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
     assert png.startswith(b"\x89PNG")
     shown = {view.name for view in state.views}

@@ -17,7 +17,7 @@ def test_the_viewer_draws_the_demo_and_reports_no_error(tmp_path):
     for _ in range(2):  # a busy machine may draw too late for the first viewer
         with picture.headless_viewer() as client:
             png = picture.picture(client, path, 2.0)
-            state = picture.settled(client)
+            state = picture.final_state(client)
             errors = [entry for entry in client.get_logs() if entry.level == "ERROR"]
         if not any("timed out" in entry.message for entry in errors):
             break

@@ -9,66 +9,65 @@ import noisemodel as nm
 from inspector import assets
 from inspector.library import load_library
 from inspector.live.clock import Clock
-from inspector.live.decimator import Slower
-from inspector.live.labeller import Ear
+from inspector.live.decimator import Decimator
+from inspector.live.labeller import NOISY, Labeller, NoiseSignals
 from inspector.live.lane import Lane
-from inspector.live.norms import NOISY, Norms
-from inspector.live.robot import Moving
-from inspector.live.spectrogram import QUIETEST_DB, Strip
-from inspector.live.warnings import Troubles
+from inspector.live.robot import LiveRobot
+from inspector.live.spectrogram import FLOOR_DB, SpectrogramStream
+from inspector.live.warnings import Warnings
 from inspector.recording import robot as scene
 
 CLASSES = ("ok", "impact")
 
 
-def troubles():
-    said = []
-    return Troubles(said.append), said
+def warnings():
+    lines = []
+    return Warnings(lines.append), lines
 
 
 # The clock.
 
 
 def test_even_stamps_lose_nothing_and_jitter_is_no_gap():
-    noted, said = troubles()
-    clock, random = Clock(1000.0, noted), np.random.default_rng(0)
+    counted, lines = warnings()
+    clock, random = Clock(1000.0, counted), np.random.default_rng(0)
     stamps = np.arange(500) / 1000 + random.uniform(-2e-4, 2e-4, 500)
     for block in np.split(stamps, 10):
         kept, lost = clock.take(block)
         assert kept.all()
         assert not lost.any()
-    assert said == []
+    assert lines == []
 
 
 def test_missing_samples_are_counted_where_they_are_missing():
-    noted, said = troubles()
-    clock = Clock(1000.0, noted)
+    counted, lines = warnings()
+    clock = Clock(1000.0, counted)
     clock.take(np.array([5.0, 5.001]))
     kept, lost = clock.take(np.array([5.012, 5.013, 5.016]))
     assert kept.all()
     assert lost.tolist() == [10, 0, 2]
-    assert said == ["gap at 5.012 s: 10 samples are missing"]
-    assert noted.counts == {"missing samples": 12}
+    assert lines == ["gap at 5.012 s: 10 samples are missing"]
+    assert counted.counts == {"missing samples": 12}
 
 
 def test_time_that_stands_still_runs_backwards_or_is_unknown_is_left_out():
-    noted, said = troubles()
-    clock = Clock(1000.0, noted)
+    counted, lines = warnings()
+    clock = Clock(1000.0, counted)
     stamps = np.array([1.0, 1.001, 1.001, 0.5, np.nan, 1.002])
     kept, lost = clock.take(stamps)
     assert kept.tolist() == [True, True, False, False, False, True]
     assert not lost.any()
     assert clock.take(np.array([0.7]))[0].tolist() == [False]
-    assert noted.counts == {"samples out of order": 3, "samples without time": 1}
-    assert said[0] == "time stands still or runs backwards at 1.001 s: left out"
+    assert counted.counts == {"samples out of order": 3, "samples without time": 1}
+    assert lines[0] == "time stands still or runs backwards at 1.001 s: left out"
 
 
 def test_another_rate_than_was_said_is_noticed():
-    noted, said = troubles()
-    Clock(1000.0, noted).take(np.arange(50) / 800)
-    assert said == [
-        "stamps come at 800 Hz, the rate was said to be 1000 Hz: labels and spectrogram are wrong,"
-        " say the right --rate"
+    counted, lines = warnings()
+    Clock(1000.0, counted).take(np.arange(50) / 800)
+    assert lines == [
+        "timestamps have 800 Hz, the nominal rate is 1000 Hz: labels and spectrogram are wrong,"
+        " set --rate"
     ]
 
 
@@ -89,10 +88,10 @@ def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
     run = nm.Run(
         time=np.arange(samples) / (1000.0 * ratio), velocity=velocity, joint_names=("a", "b", "c")
     )
-    slower = Slower(ratio, 3)
+    decimator = Decimator(ratio, 3)
     cuts = sorted(data.draw(st.lists(st.integers(0, samples), max_size=8)))
     pieces = np.split(velocity, cuts)
-    parts = [slower.push(piece, np.ones(len(piece), dtype=bool)) for piece in pieces]
+    parts = [decimator.push(piece, np.ones(len(piece), dtype=bool)) for piece in pieces]
     lower = np.concatenate([values for values, _ in parts])
     valid = np.concatenate([valid for _, valid in parts])
     whole = nm.decimated(run, 1000.0).velocity[: len(lower)]
@@ -105,19 +104,20 @@ def test_a_lower_rate_is_that_of_the_whole_run_but_at_its_ends(ratio, data):
 def test_what_is_too_fast_for_the_lower_rate_is_gone():
     time = np.arange(10_000)[:, None] / 10_000
     ones = np.ones(10_000, dtype=bool)
-    lower, valid = Slower(10, 1).push(np.sin(2 * np.pi * 1000 * time), ones)
+    lower, valid = Decimator(10, 1).push(np.sin(2 * np.pi * 1000 * time), ones)
     assert np.abs(lower[valid]).max() < 1e-3
-    steady, valid = Slower(10, 1).push(np.full((10_000, 1), 0.7), ones)
+    steady, valid = Decimator(10, 1).push(np.full((10_000, 1), 0.7), ones)
     np.testing.assert_allclose(steady[valid], 0.7, rtol=1e-12)
 
 
 # Labels.
 
 
-def heard(ear, motion, valid=None, size=77):
+def labelled(labeller, motion, valid=None, size=77):
     valid = np.ones(len(motion), dtype=bool) if valid is None else valid
     parts = [
-        ear.hear(motion[i : i + size], valid[i : i + size]) for i in range(0, len(motion), size)
+        labeller.push(motion[i : i + size], valid[i : i + size])
+        for i in range(0, len(motion), size)
     ]
     fields = ("start", "stop", "label", "scores")
     joined = (np.concatenate([getattr(part, name) for part in parts]) for name in fields)
@@ -138,9 +138,9 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
     lower = nm.decimated(run, 1000.0)
     (model,) = (each for each in library.values() if each.rate == 1000.0)
     batch = model.classify(nm.simplified(lower.velocity), 1000.0)
-    ear = Ear(library, 2000.0, Norms({"velocity": 3}))
-    labels = heard(ear, velocity)
-    assert ear.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
+    labeller = Labeller(library, 2000.0, {"velocity": 3})
+    labels = labelled(labeller, velocity)
+    assert labeller.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
     # The first frame and the last ones touch ends beyond which the whole run was guessed.
     np.testing.assert_allclose(labels.start, batch.start[1:-1], atol=1e-9)
     assert np.array_equal(labels.label, batch.label[1:-1])
@@ -150,11 +150,11 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
 @pytest.mark.parametrize("rate", [1000.0, 2000.0])
 def test_after_a_gap_labels_know_what_time_it_is(library, rate):
     second = round(rate)
-    ear = Ear(library, rate, Norms({"velocity": 3}))
-    heard(ear, walk(second, rate))
-    ear.skip(10 * second + 1)
-    labels = heard(ear, walk(second, rate))
-    assert ear.elapsed == pytest.approx(12 + 1 / rate)
+    labeller = Labeller(library, rate, {"velocity": 3})
+    labelled(labeller, walk(second, rate))
+    labeller.skip(10 * second + 1)
+    labels = labelled(labeller, walk(second, rate))
+    assert labeller.elapsed == pytest.approx(12 + 1 / rate)
     assert len(labels) > 0
     assert (labels.start >= 11.0).all()
     assert (labels.stop <= 12.0 + 1 / rate).all()
@@ -168,12 +168,12 @@ def test_after_a_gap_labels_know_what_time_it_is(library, rate):
     ],
 )
 def test_rates_that_no_model_can_follow_have_no_labels_and_it_is_said(library, rate, remark):
-    ear = Ear(library, rate, Norms({"velocity": 3}))
-    assert ear.remark.startswith(remark)
-    assert ear.hear(walk(900, rate), np.ones(900, dtype=bool)) is None
-    ear.skip(100)
-    assert ear.classes == ()
-    assert ear.elapsed == 1000 / rate
+    labeller = Labeller(library, rate, {"velocity": 3})
+    assert labeller.remark.startswith(remark)
+    assert labeller.push(walk(900, rate), np.ones(900, dtype=bool)) is None
+    labeller.skip(100)
+    assert labeller.classes == ()
+    assert labeller.elapsed == 1000 / rate
 
 
 # The lane of classes.
@@ -198,13 +198,13 @@ def test_a_lane_changes_halfway_between_frames_and_only_where_the_class_does():
 def test_a_lane_ends_where_labels_are_missing():
     lane = Lane(0.1, 0.4)
     lane.take(labels_at((0.0, "ok")))
-    assert lane.silent(0.5) == []
+    assert lane.expire(0.5) == []
     changes = lane.take(labels_at((3.0, "ok")))
     assert [(change.time, change.state) for change in changes] == [
         (pytest.approx(0.25), ""),
         (pytest.approx(3.15), "ok"),
     ]
-    assert [change.state for change in lane.silent(4.0)] == [""]
+    assert [change.state for change in lane.expire(4.0)] == [""]
 
 
 # The spectrogram.
@@ -215,27 +215,27 @@ def test_a_hum_is_bright_in_its_band_whatever_the_blocks(size):
     rate, hertz = 5000.0, 440.0
     time = np.arange(5000) / rate
     noise = 2.0 + 0.1 * np.sin(2 * np.pi * hertz * time)
-    strip, parts = Strip(rate), []
+    stream, parts = SpectrogramStream(rate), []
     for first in range(0, len(noise), size):
         piece = noise[first : first + size]
         end = (first + len(piece)) / rate
-        parts.append(strip.push(piece, np.ones(len(piece), dtype=bool), end))
-    parts = [part for part in (*parts, strip.flush()) if part is not None]
+        parts.append(stream.push(piece, np.ones(len(piece), dtype=bool), end))
+    parts = [part for part in (*parts, stream.flush()) if part is not None]
     level = np.concatenate([part.level for part in parts], axis=1)
     centres = np.concatenate([part.time for part in parts])
-    assert (np.abs(strip.hertz[level.argmax(axis=0)] - hertz) < 25.0).all()
-    assert level.max() == pytest.approx(1.0 - 20.0 * np.log10(0.1) / QUIETEST_DB, abs=0.02)
+    assert (np.abs(stream.centres[level.argmax(axis=0)] - hertz) < 25.0).all()
+    assert level.max() == pytest.approx(1.0 - 20.0 * np.log10(0.1) / FLOOR_DB, abs=0.02)
     np.testing.assert_allclose(centres, 0.0512 + 0.0256 * np.arange(len(centres)), atol=1e-9)
     assert len(centres) == 1 + (5000 - 512) // 128
 
 
 def test_silence_and_gaps_are_dark():
-    strip, noise = Strip(1000.0), np.random.default_rng(0).standard_normal(500)
-    assert strip.push(np.zeros(500), np.ones(500, dtype=bool), 0.5).level.max() == 0.0
-    broken = strip.push(noise, np.arange(500) != 100, 1.0)
+    stream, noise = SpectrogramStream(1000.0), np.random.default_rng(0).standard_normal(500)
+    assert stream.push(np.zeros(500), np.ones(500, dtype=bool), 0.5).level.max() == 0.0
+    broken = stream.push(noise, np.arange(500) != 100, 1.0)
     assert (broken.level.max(axis=0) == 0.0).sum() >= 4  # the windows that touch the gap
-    strip.skip()
-    columns = strip.push(noise, np.ones(500, dtype=bool), 9.0)
+    stream.skip()
+    columns = stream.push(noise, np.ones(500, dtype=bool), 9.0)
     assert columns.level[:, 0].max() == 0.0  # what a viewer draws between before and after the gap
     assert columns.level[:, 1:].max(axis=0).min() > 0.5
     assert 8.5 < columns.time[0] < columns.time[1] < 8.56
@@ -248,12 +248,12 @@ def test_silence_and_gaps_are_dark():
 def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
     recording = rr.RecordingStream("test")
     names = nm.Robot.load(robot).joint_names
-    moving = Moving(recording, robot, names, floating=False)
+    drawn = LiveRobot(recording, robot, names, floating=False)
     position = np.random.default_rng(1).uniform(-1.0, 1.0, len(names))
-    places, turns = moving.transforms(position)
+    places, turns = drawn.transforms(position)
     joints = {joint.child_link: joint for joint in scene.load(robot, tmp_path).joints()}
     checked = 0
-    for place, turn, child in zip(places, turns, moving.children, strict=True):
+    for place, turn, child in zip(places, turns, drawn.children, strict=True):
         joint = joints[child]
         leader = joint.mimic.joint if joint.mimic else joint.name
         angle = position[names.index(leader)]
@@ -279,10 +279,12 @@ def test_columns_make_the_norms_and_joints_that_a_run_makes(missing):
         if name not in missing
     }
     run = nm.Run(time=np.arange(50) / 1000, joint_names=("a", "b", "c", "d"), **columns)
-    norms = Norms({name: width for name, width in widths.items() if name not in missing})
-    found = norms.of(np.hstack([columns[name] for name in NOISY if name in columns]), norms.names)
+    signals = NoiseSignals({name: width for name, width in widths.items() if name not in missing})
+    found = signals.of(
+        np.hstack([columns[name] for name in NOISY if name in columns]), signals.names
+    )
     wanted = {**nm.norms(run), **nm.by_joint(run)}
     assert found.keys() == wanted.keys()
-    assert norms.joints == 4
+    assert signals.joints == 4
     for name, signal in wanted.items():
         np.testing.assert_allclose(found[name], signal, rtol=1e-12)

@@ -13,7 +13,7 @@ from inspector.live import LiveError
 from inspector.live.csvrows import CsvReader
 from inspector.live.feeding import follow, reader_of
 from inspector.live.jsonrows import JsonReader
-from inspector.live.rows import AT_ONCE, FEW, LONGEST, blocks, widen
+from inspector.live.rows import CHUNK_BYTES, MAX_LINE_BYTES, SMALL_CHUNK_BYTES, chunks, widen
 
 HEAD = b"time,elbow.velocity,wrist.velocity,elbow.position,wrist.position,load"
 
@@ -85,13 +85,13 @@ def test_all_ways_of_reading_agree():
     table[random.uniform(size=table.shape) < 0.1] = np.nan
     lines = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
     padded = lines.replace(b",", b" ,", 1)
-    (bare,), said = read(CsvReader(HEAD, ()), lines)
+    (numbers,), said = read(CsvReader(HEAD, ()), lines)
     (fast,), _ = read(CsvReader(HEAD, ()), padded)
     (careful,), _ = read(CsvReader(HEAD, ()), lines + b"broken\n")
     assert said == []
-    assert CsvReader(HEAD, ())._bare(lines) is not None
-    assert CsvReader(HEAD, ())._bare(padded) is None
-    for rows in (bare, fast, careful):
+    assert CsvReader(HEAD, ())._read_numbers(lines) is not None
+    assert CsvReader(HEAD, ())._read_numbers(padded) is None
+    for rows in (numbers, fast, careful):
         np.testing.assert_array_equal(rows.signals["velocity"], table[:, 1:3])
         np.testing.assert_array_equal(rows.time, table[:, 0])
 
@@ -163,7 +163,7 @@ class Trickle(io.RawIOBase):
 @pytest.mark.parametrize("size", [1, 3, 7, 1000])
 def test_lines_come_whole_and_know_their_number(size):
     content = b"".join(b"line %d\n" % number for number in range(1, 30)) + b"line 30"
-    for lines, number, _ in blocks(Trickle(content, size)):
+    for lines, number, _ in chunks(Trickle(content, size)):
         for offset, line in enumerate(lines.splitlines()):
             assert line == b"line %d" % (number + offset)
     assert number + offset == 30
@@ -173,11 +173,17 @@ def test_little_waits_for_more_and_much_is_read_at_once(monkeypatch):
     naps = []
     monkeypatch.setattr("inspector.live.rows.sleep", naps.append)
     monkeypatch.setattr("inspector.live.rows.perf_counter", lambda: 7.0)
-    content = b"1\n" * FEW
-    assert [came for *_, came in blocks(Trickle(content, FEW), gather=0.5)] == [7.0, 7.0]
+    content = b"1\n" * SMALL_CHUNK_BYTES
+    assert [
+        received for *_, received in chunks(Trickle(content, SMALL_CHUNK_BYTES), gather=0.5)
+    ] == [7.0, 7.0]
     assert naps == [0.0, 0.0]
-    # What came while it waited may have come at its beginning.
-    assert [came for *_, came in blocks(Trickle(b"1\n2\n3\n", 2), gather=0.5)] == [7.0, 6.5, 6.5]
+    # What arrived while it waited may have done so at its beginning.
+    assert [received for *_, received in chunks(Trickle(b"1\n2\n3\n", 2), gather=0.5)] == [
+        7.0,
+        6.5,
+        6.5,
+    ]
     assert naps[2:] == [0.5, 0.5, 0.5]
 
 
@@ -188,13 +194,13 @@ def test_a_pipe_is_widened_and_what_is_none_is_left_alone():
     reading, writing = os.pipe()
     with os.fdopen(reading, "rb") as stream, os.fdopen(writing, "wb"):
         widen(stream)
-        assert fcntl.fcntl(stream.fileno(), fcntl.F_GETPIPE_SZ) >= AT_ONCE
+        assert fcntl.fcntl(stream.fileno(), fcntl.F_GETPIPE_SZ) >= CHUNK_BYTES
     widen(io.BytesIO(b"rows"))
 
 
 def test_a_line_that_never_ends_is_refused():
-    with pytest.raises(LiveError, match=f"line 1 is longer than {LONGEST} bytes"):
-        list(blocks(Trickle(b"x" * (LONGEST + 2), 1 << 20)))
+    with pytest.raises(LiveError, match=f"line 1 is longer than {MAX_LINE_BYTES} bytes"):
+        list(chunks(Trickle(b"x" * (MAX_LINE_BYTES + 2), 1 << 20)))
 
 
 # The command.

@@ -16,7 +16,7 @@ import noisemodel as nm
 from inspector import assets
 from inspector.library import load_library
 from inspector.live import LiveError
-from inspector.live.session import BLOCK
+from inspector.live.session import BATCH
 from noisemodel import OutputError, UnknownJointError
 
 RATE = 1000.0
@@ -55,9 +55,11 @@ def part(signals, piece):
 
 
 def shown(tmp_path, signals, cuts=(), **options):
-    """Push a motion in pieces; the recording, what was told, and the summary."""
+    """Push a motion in pieces; the recording, the warnings, and the summary."""
     path, said = tmp_path / "live.rrd", []
-    session = inspector.LiveSession(RATE, save=path, tell=said.append, overwrite=True, **options)
+    session = inspector.LiveSession(
+        RATE, save=path, on_warning=said.append, overwrite=True, **options
+    )
     edges = [0, *sorted(cuts), len(signals["time"])]
     with session:
         for first, stop in pairwise(edges):
@@ -102,7 +104,7 @@ def test_a_session_shows_everything(tmp_path, library):
     assert summary.samples == 3000
     assert summary.model == "scalar-1khz"
     assert sum(summary.labels.values()) == 27
-    assert summary.troubles == {}
+    assert summary.warnings == {}
     assert "delay from a sample to its label: median" in str(summary)
     assert all(0.0 < delay < 10.0 for delay in summary.delays)
 
@@ -169,7 +171,7 @@ def test_the_robot_stands_as_its_joints_say(tmp_path, library):
     time, turns = read(path, "/robot/motion", "Transform3D:quaternion")
     _, frames = read(path, "/robot/motion", "Transform3D:child_frame")
     first = np.array([frame[0] == "panda_link1" for frame in frames])
-    assert first.sum() == round(1.0 / BLOCK)
+    assert first.sum() == round(1.0 / BATCH)
     angle = np.interp(time[first], signals["time"], signals["position"][:, 0])
     turned = [turn[0][2] for turn, own in zip(turns, first, strict=True) if own]
     np.testing.assert_allclose(turned, np.sin(angle / 2), atol=1e-5)
@@ -194,7 +196,7 @@ def test_missing_samples_end_the_lane_and_labels_go_on_after_them(tmp_path, libr
     kept[1000:2500] = False
     path, said, summary = shown(tmp_path, part(signals, kept), [777, 1900], library=library)
     assert said == ["gap at 2.500 s: 1500 samples are missing"]
-    assert summary.troubles == {"missing samples": 1500}
+    assert summary.warnings == {"missing samples": 1500}
     time, states = read(path, "/class/found", "StateChange:state")
     assert [state[0] for state in states] == ["ok", "", "ok", ""]
     np.testing.assert_allclose(time, [0.15, 0.85, 2.65, 3.85], atol=0.051)
@@ -221,7 +223,7 @@ def test_values_that_are_not_known_make_no_noise_and_no_label(tmp_path, library)
         "velocity or velocity_desired is not known at 1.000 s: such samples make no noise, frames"
         " with one have no label"
     ]
-    assert summary.troubles == {"samples without noise": 4}
+    assert summary.warnings == {"samples without noise": 4}
     _, noise = read(path, "/noise/simplified", "Scalars:scalars")
     assert np.isfinite(noise).all()
     centres, _ = read(path, "/score", "Scalars:scalars")
@@ -239,7 +241,7 @@ def test_positions_that_are_not_known_only_stop_the_robot(tmp_path, library):
 def test_another_number_of_joints_is_told_once_counted_and_not_labelled(tmp_path, library):
     whole, said = motion(3.0), []
     with inspector.LiveSession(
-        RATE, save=tmp_path / "live.rrd", library=library, tell=said.append
+        RATE, save=tmp_path / "live.rrd", library=library, on_warning=said.append
     ) as session:
         session.push(**part(whole, slice(0, 1000)))
         for first in range(1000, 2000, 100):
@@ -247,8 +249,8 @@ def test_another_number_of_joints_is_told_once_counted_and_not_labelled(tmp_path
             session.push(**narrow | {"velocity": narrow["velocity"][:, :2]})
         session.push(**part(whole, slice(2000, 3000)))
     assert said[0].startswith("velocity of 2 columns from 1.000 s on, where it had 3: not shown")
-    assert session.summary.troubles["samples with another width of velocity"] == 1000
-    assert session.summary.troubles["samples without noise"] == 1000
+    assert session.summary.warnings["samples with another width of velocity"] == 1000
+    assert session.summary.warnings["samples without noise"] == 1000
     assert sum(session.summary.labels.values()) == 14
     time, _ = read(tmp_path / "live.rrd", "/noise/simplified", "Scalars:scalars")
     assert not ((time >= 1.0) & (time < 2.0)).any()
@@ -257,7 +259,7 @@ def test_another_number_of_joints_is_told_once_counted_and_not_labelled(tmp_path
 def test_signals_that_cease_or_appear_are_told(tmp_path, library):
     whole, said = motion(1.0), []
     with inspector.LiveSession(
-        RATE, save=tmp_path / "live.rrd", library=library, tell=said.append
+        RATE, save=tmp_path / "live.rrd", library=library, on_warning=said.append
     ) as session:
         session.push(velocity=whole["velocity"][:500], position=whole["position"][:500])
         session.push(velocity=whole["velocity"][500:], base_pose=np.zeros((500, 7)))
@@ -280,7 +282,7 @@ def test_without_stamps_samples_follow_each_other(tmp_path, library):
 def test_a_rate_without_a_model_shows_noise_and_says_that_there_are_no_labels(tmp_path, library):
     said = []
     with inspector.LiveSession(
-        250.0, save=tmp_path / "live.rrd", library=library, tell=said.append
+        250.0, save=tmp_path / "live.rrd", library=library, on_warning=said.append
     ) as session:
         session.push(velocity=np.ones((500, 2)))
     assert said == [
@@ -297,7 +299,7 @@ def test_a_robot_without_positions_is_not_drawn_and_that_is_said(tmp_path, libra
     said = []
     with inspector.LiveSession(
         RATE, robot="panda", joint_names=PANDA, save=tmp_path / "a.rrd", library=library,
-        tell=said.append,
+        on_warning=said.append,
     ) as session:  # fmt: skip
         session.push(velocity=np.zeros((100, 7)))
     assert said == ["no positions: the robot is not drawn"]

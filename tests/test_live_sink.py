@@ -43,10 +43,10 @@ def second(first):
 
 
 def test_a_viewer_that_dies_is_told_once_and_labels_go_on(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "KNOCK", 0.0)
+    monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
     said = []
     with receiver(tmp_path) as (port, end):
-        session = inspector.LiveSession(1000.0, connect=f"127.0.0.1:{port}", tell=said.append)
+        session = inspector.LiveSession(1000.0, connect=f"127.0.0.1:{port}", on_warning=said.append)
         session.push(**second(0.0))
         assert said == []
         assert len(session.summary.delays) == 7
@@ -59,21 +59,23 @@ def test_a_viewer_that_dies_is_told_once_and_labels_go_on(tmp_path, monkeypatch)
     (line,) = said
     assert line.startswith("the viewer is gone or hangs, noticed at 1.")
     assert line.endswith("s: samples are only labelled and counted")
-    assert summary.troubles == {"samples that the viewer may not have shown": 3000}
+    assert summary.warnings == {"samples that the viewer may not have shown": 3000}
     assert sum(summary.labels.values()) == 37
     assert f"shown by the viewer at 127.0.0.1:{port}" in str(summary)
 
 
 def test_a_file_goes_on_when_the_viewer_beside_it_dies(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "KNOCK", 0.0)
+    monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
     path, said = tmp_path / "live.rrd", []
     with receiver(tmp_path) as (port, end):
-        session = inspector.LiveSession(1000.0, connect=str(port), save=path, tell=said.append)
+        session = inspector.LiveSession(
+            1000.0, connect=str(port), save=path, on_warning=said.append
+        )
         session.push(**second(0.0))
         end()
         session.push(**second(1.0))
         summary = session.close()
-    assert summary.troubles == {"samples that the viewer may not have shown": 1000}
+    assert summary.warnings == {"samples that the viewer may not have shown": 1000}
     assert said[0].endswith("s: the file goes on")
     assert len(summary.delays) == 17
     assert path.stat().st_size > 10_000
@@ -130,7 +132,7 @@ def test_a_viewer_is_opened_on_loopback_and_on_another_port_if_its_own_is_taken(
         taken.listen()
         port = taken.getsockname()[1]
         monkeypatch.setattr(module, "PORT", port)
-        monkeypatch.setattr(module, "ANSWER", 0.2)
+        monkeypatch.setattr(module, "CONNECT_TIMEOUT", 0.2)
         monkeypatch.setattr(module.viewer, "has_display", lambda: True)
         monkeypatch.setattr(subprocess, "Popen", Viewer)
         with pytest.raises(SinkError, match="the viewer ended with status 1; use --save"):

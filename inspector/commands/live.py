@@ -53,7 +53,7 @@ def live(
         save=save,
         connect=connect,
         overwrite=overwrite,
-        tell=partial(typer.echo, err=True),
+        on_warning=partial(typer.echo, err=True),
     )
     given = tuple(name.strip() for name in names.split(",") if name.strip())
     summary = follow(sys.stdin.buffer, given, lambda found: session(joint_names=found))

@@ -1,15 +1,14 @@
 """Noise, labels and the robot while it moves: samples in, a viewer that follows.
 
-    push -> block -> clock -> noise -> ear (labels)
-                                    -> drawing (lines, spectrogram, lanes, robot) -> a sink
+    push -> buffer -> clock -> noise -> labeller
+                                     -> drawing (lines, spectrogram, lanes, robot) -> a sink
 
-A `LiveSession` takes samples one by one or in chunks and works on them in blocks of 50 ms, so that
+A `LiveSession` takes samples one by one or in chunks and works on them in batches of 50 ms, so that
 what is drawn comes in columns. Nothing is dropped silently: what cannot be shown is counted, and
-said once per kind.
+warned of once per kind.
 """
 
 from inspector.live.errors import LiveError, SinkError
-from inspector.live.session import LiveSession
-from inspector.live.summary import Summary
+from inspector.live.session import LiveSession, Summary
 
 __all__ = ["LiveError", "LiveSession", "SinkError", "Summary"]

@@ -1,22 +1,22 @@
-"""The stamps of samples: which are taken, and how many were lost before each."""
+"""Timestamps of samples: which are taken, and how many were lost before each."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from inspector.live.warnings import Troubles
+from inspector.live.warnings import Warnings
 from noisemodel.types import Array, Mask
 
-LATE = 1.5
-"""Steps after which a sample is taken to be missing; stamps may jitter by less."""
-WRONG = 0.05
-"""Share by which the stamps' rate may differ from what was said."""
-ENOUGH = 20
-"""Steps that tell a rate."""
+GAP_STEPS = 1.5
+"""Steps after which a sample is taken to be missing; timestamps may jitter by less."""
+RATE_TOLERANCE = 0.05
+"""Share by which the rate of the timestamps may differ from the nominal one."""
+RATE_STEPS = 20
+"""Steps from which a rate is estimated."""
 
 
 class Taken(NamedTuple):
-    """What a clock says of samples."""
+    """Which samples a clock takes."""
 
     kept: Mask
     """False where time stands still or runs backwards, shape (samples,)."""
@@ -25,23 +25,23 @@ class Taken(NamedTuple):
 
 
 class Clock:
-    """Tells gaps by stamps.
+    """Finds gaps in timestamps.
 
     Args:
         rate: Nominal samples per second, in [Hz].
-        troubles: Where gaps are noted.
+        warnings: Where gaps are counted.
     """
 
-    def __init__(self, rate: float, troubles: Troubles) -> None:
-        self._rate, self._troubles = rate, troubles
+    def __init__(self, rate: float, warnings: Warnings) -> None:
+        self._rate, self._warnings = rate, warnings
         self._last: float | None = None
-        self._judged = False
+        self._checked = False
 
     def take(self, stamps: Array) -> Taken:
-        """Look at the stamps of a block.
+        """Check the timestamps of some samples.
 
         Args:
-            stamps: Shape (samples,), in [s].
+            stamps: Timestamps, shape (samples,), in [s].
         """
         finite = np.isfinite(stamps)
         before = -np.inf if self._last is None else self._last
@@ -50,12 +50,12 @@ class Clock:
         self._note_dropped(stamps[finite & ~kept], int((~finite).sum()))
         times = stamps[kept]
         steps = self._rate * np.diff(times, prepend=times[:1] if self._last is None else before)
-        lost = np.where(steps >= LATE, np.round(steps) - 1.0, 0.0)
+        lost = np.where(steps >= GAP_STEPS, np.round(steps) - 1.0, 0.0)
         if lost.any():
             first = int(np.argmax(lost > 0))
             line = f"gap at {times[first]:.3f} s: {lost[first]:.0f} samples are missing"
-            self._troubles.note("missing samples", line, int(lost.sum()))
-        self._judge_rate(steps)
+            self._warnings.note("missing samples", line, int(lost.sum()))
+        self._check_rate(steps)
         if len(times):
             self._last = float(times[-1])
         return Taken(kept, lost)
@@ -63,17 +63,17 @@ class Clock:
     def _note_dropped(self, backwards: Array, unknown: int) -> None:
         if len(backwards):
             line = f"time stands still or runs backwards at {backwards[0]:.6g} s: left out"
-            self._troubles.note("samples out of order", line, len(backwards))
-        self._troubles.note("samples without time", "a time is no number: left out", unknown)
+            self._warnings.note("samples out of order", line, len(backwards))
+        self._warnings.note("samples without time", "a time is no number: left out", unknown)
 
-    def _judge_rate(self, steps: Array) -> None:
-        if self._judged or len(steps) <= ENOUGH:
+    def _check_rate(self, steps: Array) -> None:
+        if self._checked or len(steps) <= RATE_STEPS:
             return
-        self._judged = True
+        self._checked = True
         step = float(np.median(steps))
-        if abs(step - 1.0) > WRONG:
+        if abs(step - 1.0) > RATE_TOLERANCE:
             line = (
-                f"stamps come at {self._rate / step:.4g} Hz, the rate was said to be"
-                f" {self._rate:g} Hz: labels and spectrogram are wrong, say the right --rate"
+                f"timestamps have {self._rate / step:.4g} Hz, the nominal rate is"
+                f" {self._rate:g} Hz: labels and spectrogram are wrong, set --rate"
             )
-            self._troubles.note("wrong rate", line)
+            self._warnings.note("wrong rate", line)

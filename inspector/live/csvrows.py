@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from inspector.live.block import SIGNALS
+from inspector.live.buffer import SIGNALS
 from inspector.live.errors import LiveError
 from inspector.live.rows import Note, Rows
 from inspector.logs.signals import TIMES, column_signal, listed
@@ -54,27 +54,27 @@ class CsvReader:
         self._options = self._arrow_options()
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
-        """Read whole lines; those that are no rows are told and counted.
+        """Read whole lines; the others are counted.
 
         Args:
             lines: The lines.
             first: Number of the first, for people.
-            note: Is told of rows that cannot be read.
+            note: Called with each row that cannot be read.
 
         Yields:
             The rows at once.
         """
-        table = self._bare(lines)
+        table = self._read_numbers(lines)
         if table is None:
-            table = self._fast(lines)
+            table = self._read_table(lines)
         if table is None:
-            table = self._careful(lines, first, note)
+            table = self._read_lines(lines, first, note)
         if len(table):
             signals = {name: table[:, places] for name, places in self._places.items()}
             yield Rows(signals, None if self._time is None else table[:, self._time])
 
-    def _bare(self, lines: bytes) -> Array | None:
-        """Read rows of bare numbers, in half of the time; None if a cell is anything else.
+    def _read_numbers(self, lines: bytes) -> Array | None:
+        """Read rows of plain numbers, in half of the time; None if a cell is anything else.
 
         Cells are converted as one array: beginning a hundred small columns costs as much again.
         """
@@ -102,8 +102,8 @@ class CsvReader:
         table: Array = numbers.to_numpy().reshape(rows, len(self._header))
         return table
 
-    def _fast(self, lines: bytes) -> Array | None:
-        """Read rows that are all as they should be; None if one is not."""
+    def _read_table(self, lines: bytes) -> Array | None:
+        """Read rows that are all well formed; None if one is not."""
         import pyarrow as pa
         from pyarrow import csv
 
@@ -115,7 +115,7 @@ class CsvReader:
         return np.array([column.to_numpy() for column in table.columns]).T
 
     def _arrow_options(self) -> dict[str, Any]:
-        """Say what rows are like: once, for with each chunk it would take a quarter of reading."""
+        """Options of Arrow's reader: making them for each chunk takes a quarter of reading."""
         import pyarrow as pa
         from pyarrow import csv
 
@@ -128,7 +128,7 @@ class CsvReader:
             ),
         }
 
-    def _careful(self, lines: bytes, first: int, note: Note) -> Array:
+    def _read_lines(self, lines: bytes, first: int, note: Note) -> Array:
         rows = []
         for number, line in enumerate(lines.splitlines(), start=first):
             if not line.strip():

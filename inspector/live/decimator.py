@@ -1,4 +1,4 @@
-"""A lower sample rate while samples come in: `noisemodel.lowered`, as far as that can be."""
+"""A lower sample rate while samples come in: `noisemodel.decimated`, as far as that can be."""
 
 import numpy as np
 
@@ -9,12 +9,12 @@ BETA = 5.0
 """Of the Kaiser window, as that of SciPy's polyphase resampling."""
 
 
-class Slower:
-    """Low-passes and decimates signals, and knows which samples it could not.
+class Decimator:
+    """Low-passes and decimates signals, and marks the samples for which it cannot.
 
-    In the middle of a signal its answers are those of `noisemodel.lowered`. That one guesses
-    beyond the ends, which nobody can while samples come in: here the first ten samples are not
-    valid, and the last ten never come.
+    In the middle of a signal it returns what `noisemodel.decimated` does. That one extrapolates
+    beyond the ends, which is impossible while samples come in: here the first ten samples are not
+    valid, and the last ten are missing.
 
     Args:
         ratio: How many samples become one.

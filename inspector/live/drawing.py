@@ -19,7 +19,7 @@ from noisemodel.types import Array
 JOINT_POINTS = 400.0
 """Points of a joint's line in a second, as a recording of ten seconds has."""
 NOISE_POINTS = 4000.0
-TOGETHER = 0.1
+SEND_INTERVAL = 0.1
 """Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
 NOISE = "noise"
 
@@ -31,8 +31,8 @@ class Drawing:
         recording: Where to.
         joint_names: Names of the joints.
         signals: Which of velocity, velocity_desired and position there are.
-        classes: What can be heard; empty without a model.
-        hertz: Centres of the spectrogram's bands, shape (bands,).
+        classes: What can be predicted; empty without a model.
+        centres: Of the spectrogram's bands, shape (bands,), in [Hz].
     """
 
     def __init__(
@@ -41,9 +41,9 @@ class Drawing:
         joint_names: Sequence[str],
         signals: Sequence[str],
         classes: tuple[str, ...],
-        hertz: Array,
+        centres: Array,
     ) -> None:
-        self._recording, self._hertz = recording, hertz
+        self._recording, self._centres = recording, centres
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
         self._slices = [
@@ -64,7 +64,7 @@ class Drawing:
             recording, "/noise/simplified", names=["simplified [rad/s]"], colours=[colors.NOISE]
         )
         # A line of one entity each: an entity each would cost a message each.
-        style_bands(recording, "/spectrogram/bands", hertz.tolist())
+        style_bands(recording, "/spectrogram/bands", centres.tolist())
         if classes:
             shown = [self._colours[name] for name in classes]
             style_lines(recording, "/score", names=classes, colours=shown)
@@ -102,7 +102,7 @@ class Drawing:
             rows = slice(None) if finite.all() else finite
             self._keep(kind, time[rows], signals[kind][rows], seconds * JOINT_POINTS)
         self._held += seconds
-        if self._held >= TOGETHER:
+        if self._held >= SEND_INTERVAL:
             self.flush()
 
     def flush(self) -> None:
@@ -122,7 +122,7 @@ class Drawing:
             "/spectrogram/bands",
             indexes=[at(columns.time)],
             columns=[
-                *scalars(np.tile(self._hertz, (count, 1))),
+                *scalars(np.tile(self._centres, (count, 1))),
                 *rr.SeriesLines.columns(colors=rgba).partition([bands] * count),
             ],
         )

@@ -9,13 +9,12 @@ from typing import Any, BinaryIO, Self, TypeVar
 from inspector.live.csvrows import CsvReader
 from inspector.live.errors import LiveError
 from inspector.live.jsonrows import JsonReader
-from inspector.live.rows import Reader, blocks, widen
-from inspector.live.session import LiveSession
-from inspector.live.summary import Summary
+from inspector.live.rows import Reader, chunks, widen
+from inspector.live.session import LiveSession, Summary
 
 GATHER = 0.02
-"""How long rows wait for more, in [s]: less than half of a session's block."""
-WANTED = "expected a CSV header and rows, or a JSON object per line"
+"""How long rows wait for more, in [s]: less than half of a session's batch."""
+EXPECTED = "expected a CSV header and rows, or a JSON object per line"
 
 
 def follow(
@@ -25,30 +24,30 @@ def follow(
 
     Args:
         stream: The rows, such as standard input.
-        names: Names of the joints, as a person gave them.
+        names: Names of the joints, as the user gave them.
         session_of: Begins a session, given the names of the joints.
 
     Returns:
-        What became of the samples.
+        What bereceived of the samples.
 
     Raises:
         LiveError: If there are no rows, or the first line cannot be understood.
     """
     widen(stream)
     with Interrupt() as interrupt:
-        incoming = interrupt.until(blocks(stream, gather=GATHER))
-        lines, number, came = next(incoming, (b"", 1, 0.0))
+        incoming = interrupt.until(chunks(stream, gather=GATHER))
+        lines, number, received = next(incoming, (b"", 1, 0.0))
         head, _, rest = lines.partition(b"\n")
         if not head.strip():
-            raise LiveError(f"the input is empty; {WANTED}")
+            raise LiveError(f"the input is empty; {EXPECTED}")
         reader, is_header = reader_of(head, names)
-        start = (rest, number + 1, came) if is_header else (lines, number, came)
+        start = (rest, number + 1, received) if is_header else (lines, number, received)
         with session_of(reader.names) as session:
-            for lines, number, came in chain([start], incoming):
+            for lines, number, received in chain([start], incoming):
                 for rows in reader.read(lines, number, session.note):
-                    session.push(**rows.signals, time=rows.time, came=came)
+                    session.push(**rows.signals, time=rows.time, received=received)
     if not session.summary.samples:
-        raise LiveError(f"the input has no samples; {WANTED}")
+        raise LiveError(f"the input has no samples; {EXPECTED}")
     return session.summary
 
 
@@ -58,7 +57,7 @@ Item = TypeVar("Item")
 class Interrupt:
     """While it is entered, the first Ctrl-C ends what `until` hands out, and nothing else.
 
-    The second one is as usual.
+    The second one raises KeyboardInterrupt.
     """
 
     def __init__(self) -> None:
@@ -102,7 +101,7 @@ def reader_of(head: bytes, names: tuple[str, ...]) -> tuple[Reader, bool]:
 
     Args:
         head: The line.
-        names: Names of the joints, as a person gave them.
+        names: Names of the joints, as the user gave them.
 
     Returns:
         The reader, and whether the line was a header and no sample.

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from inspector.live.block import SIGNALS
+from inspector.live.buffer import SIGNALS
 from inspector.live.rows import Note, Rows
 
 
@@ -23,12 +23,12 @@ class JsonReader:
         self.names = names
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
-        """Read whole lines; those that are no samples are told and counted.
+        """Read whole lines; the others are counted.
 
         Args:
             lines: The lines.
             first: Number of the first, for people.
-            note: Is told of rows that cannot be read.
+            note: Called with each row that cannot be read.
 
         Yields:
             Stretches of rows that have the same signals, of the same widths.

@@ -1,37 +1,88 @@
 """Labels of motion while it comes in, by the model that fits its rate."""
 
+from collections.abc import Callable, Mapping, Sequence
+
 import numpy as np
 
 import models
+import noisemodel as nm
 from inspector.library import Library
-from inspector.live.decimator import Slower
-from inspector.live.norms import Norms
+from inspector.live.decimator import Decimator
 from models.profile import TOLERANCE
+from models.signals import JOINTS, MOTION, NOISE
 from noisemodel.decimation import EDGE
 from noisemodel.types import Array, Mask
 
+NOISY = ("base_velocity", "velocity", "velocity_desired")
+"""The signals that make noise: where one of them is unknown there is none."""
 
-class Ear:
-    """Hears what a classifier hears, and says so when it hears nothing.
+
+class NoiseSignals:
+    """Noise signals of motion that comes in columns: `noisemodel.norms` and joints, without a run.
+
+    Args:
+        widths: Columns of each signal that comes in.
+
+    Attributes:
+        columns: How many columns make noise: those of ``NOISY``, in that order.
+        names: Noise signals that there are.
+        joints: How many joints there are.
+    """
+
+    def __init__(self, widths: Mapping[str, int]) -> None:
+        base, joints, desired = (widths.get(name, 0) for name in NOISY)
+        self.columns, self.joints = base + joints + desired, joints
+        moved = base + joints
+        of_desired, of_measured, of_error = MOTION
+        desired_joints, measured_joints, error_joints = JOINTS
+        self._ways: dict[str, Callable[[Array], Array]] = {
+            NOISE: nm.simplified,  # of measured and desired velocities side by side
+            of_measured: lambda motion: nm.simplified(motion[:, :moved]),
+        }
+        if desired:
+            self._ways |= {
+                of_desired: lambda motion: nm.simplified(motion[:, moved:]),
+                of_error: lambda motion: nm.simplified(motion[:, moved:] - motion[:, base:moved]),
+                desired_joints: lambda motion: motion[:, moved:].T,
+                measured_joints: lambda motion: motion[:, base:moved].T,
+                error_joints: lambda motion: (motion[:, moved:] - motion[:, base:moved]).T,
+            }
+        self.names = tuple(self._ways)
+
+    def of(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:
+        """Compute noise signals.
+
+        Args:
+            motion: Velocities, shape (samples, columns), in [rad/s] and [m/s].
+            names: Which.
+
+        Returns:
+            Signals by name, norms of shape (samples,), joints of (joints, samples), in [rad/s].
+        """
+        return {name: self._ways[name](motion) for name in names}
+
+
+class Labeller:
+    """Labels frames as they become complete, or says why it does not.
 
     Args:
         library: Models to choose from.
         rate: Samples per second, in [Hz].
-        norms: What makes which noise signal.
+        widths: Columns of each signal that comes in.
 
     Attributes:
-        model: Name of the model that hears; empty without one.
-        remark: Why nothing is heard, or at which other rate; empty if there is nothing to say.
+        model: Name of the model that labels; empty without one.
+        remark: Why there are no labels, or at which other rate; empty if there is nothing to say.
     """
 
-    def __init__(self, library: Library, rate: float, norms: Norms) -> None:
+    def __init__(self, library: Library, rate: float, widths: Mapping[str, int]) -> None:
         self.rate, self.remark, self.model = rate, "", ""
         self._stream: models.Stream | None = None
-        self._slower: Slower | None = None
-        self._norms, self._names = norms, tuple[str, ...]()
-        self._ratio, self._heard = 1, 0
+        self._decimator: Decimator | None = None
+        self._signals, self._names = NoiseSignals(widths), tuple[str, ...]()
+        self._ratio, self._samples = 1, 0
         try:
-            chosen = models.nearest(tuple(library.values()), rate, norms.names)
+            chosen = models.nearest(tuple(library.values()), rate, self._signals.names)
         except models.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
@@ -44,9 +95,9 @@ class Ear:
             return
         self.model = next(name for name, model in library.items() if model is chosen)
         self._ratio, self._names = ratio, chosen.profile.signals
-        self._stream = models.Stream(chosen, rate=rate / ratio, joints=norms.joints)
+        self._stream = models.Stream(chosen, rate=rate / ratio, joints=self._signals.joints)
         if ratio > 1:
-            self._slower = Slower(ratio, norms.columns)
+            self._decimator = Decimator(ratio, self._signals.columns)
             self.remark = f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}."
 
     @property
@@ -57,23 +108,21 @@ class Ear:
     @property
     def hop(self) -> float:
         """Time from one frame to the next, in [s]."""
-        return (
-            0.0
-            if self._stream is None
-            else self._stream.classifier.profile.hop / self.rate * self._ratio
-        )
+        if self._stream is None:
+            return 0.0
+        return self._stream.classifier.profile.hop / self.rate * self._ratio
 
     @property
     def classes(self) -> tuple[str, ...]:
-        """What can be heard; nothing without a model."""
+        """What can be predicted; nothing without a model."""
         return () if self._stream is None else self._stream.classifier.classes
 
     @property
     def elapsed(self) -> float:
         """Time since the first sample, lost ones counted, in [s]: the clock of the labels."""
-        return self._heard / self.rate
+        return self._samples / self.rate
 
-    def hear(self, motion: Array, valid: Mask) -> models.Labels | None:
+    def push(self, motion: Array, valid: Mask) -> models.Labels | None:
         """Take samples.
 
         Args:
@@ -84,26 +133,26 @@ class Ear:
             Labels that are complete now, on the clock that starts with the first sample; None
             without a model.
         """
-        self._heard += len(motion)
+        self._samples += len(motion)
         if self._stream is None:
             return None
-        if self._slower is not None:
-            motion, valid = self._slower.push(motion, valid)
-        return self._stream.push(self._norms.of(motion, self._names), valid)
+        if self._decimator is not None:
+            motion, valid = self._decimator.push(motion, valid)
+        return self._stream.push(self._signals.of(motion, self._names), valid)
 
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
-        self._heard += samples
+        self._samples += samples
         if self._stream is None:
             return
-        if self._slower is None:
+        if self._decimator is None:
             self._stream.skip(samples)
             return
         # Samples in a gap are all alike: enough of them to fill the filter are looked at.
         whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
         self._stream.skip(whole)
         rest = samples - whole * self._ratio
-        lower, valid = self._slower.push(
-            np.zeros((rest, self._slower.columns)), np.zeros(rest, dtype=bool)
+        lower, valid = self._decimator.push(
+            np.zeros((rest, self._decimator.columns)), np.zeros(rest, dtype=bool)
         )
-        self._stream.push(self._norms.of(lower, self._names), valid)
+        self._stream.push(self._signals.of(lower, self._names), valid)

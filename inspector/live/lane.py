@@ -29,7 +29,7 @@ class Lane:
         self._state, self._end = "", 0.0
 
     def take(self, labels: Labels) -> list[Change]:
-        """Say where the class changes.
+        """Where the class changes.
 
         Args:
             labels: The next ones, in order of time.
@@ -44,7 +44,7 @@ class Lane:
             self._state, self._end = label, begin + self._hop
         return changes
 
-    def silent(self, now: float) -> list[Change]:
+    def expire(self, now: float) -> list[Change]:
         """End the lane if its next frame is overdue.
 
         Args:

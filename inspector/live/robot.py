@@ -1,4 +1,4 @@
-"""The robot that moves along: one message for all of its joints."""
+"""The robot in a live recording: one message for all of its joints."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,7 +15,7 @@ from noisemodel.types import Array
 SLIDING = "prismatic"
 
 
-class Moving:
+class LiveRobot:
     """A robot in a live recording.
 
     Args:

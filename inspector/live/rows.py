@@ -8,12 +8,11 @@ from typing import BinaryIO, NamedTuple, Protocol
 from inspector.live.errors import LiveError
 from noisemodel.types import Array
 
-AT_ONCE = 1 << 18
+CHUNK_BYTES = 1 << 18
 """Bytes that are read at once, if there are so many."""
-LONGEST = 1 << 24
-"""Bytes that a line may have."""
-FEW = 1 << 15
-"""Bytes below which what is read at once is little: half of what a pipe holds by default."""
+MAX_LINE_BYTES = 1 << 24
+SMALL_CHUNK_BYTES = 1 << 15
+"""Below this, reading waits for more: half of what a pipe holds by default."""
 
 
 class Rows(NamedTuple):
@@ -26,10 +25,10 @@ class Rows(NamedTuple):
 
 
 class Note(Protocol):
-    """What is told of rows that cannot be read."""
+    """Called with each row that cannot be read."""
 
     def __call__(self, kind: str, line: str, count: int = 1) -> None:
-        """Count ``count`` things of a kind, and say the line if they are the first."""
+        """Count ``count`` rows of a kind, and warn by the line if they are the first."""
 
 
 class Reader(Protocol):
@@ -47,34 +46,36 @@ def widen(stream: BinaryIO) -> None:
     import fcntl
 
     with suppress(AttributeError, OSError):  # another system; no pipe
-        fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, AT_ONCE)
+        fcntl.fcntl(stream.fileno(), fcntl.F_SETPIPE_SZ, CHUNK_BYTES)
 
 
-def blocks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int, float]]:
-    """Go through what a stream brings, as it comes.
+def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, int, float]]:
+    """Whole lines of a stream as they come.
 
     Args:
         stream: Text in lines.
-        gather: How long little may wait for more, in [s]: to read row by row costs most.
+        gather: How long a small chunk waits for more, in [s]: to read row by row costs most.
 
     Yields:
         Whole lines that are not blank at their beginning, the number of the first, and the reading
-        of ``time.perf_counter()`` when they came, at the earliest.
+        of ``time.perf_counter()`` when they were received, at the earliest.
 
     Raises:
         LiveError: If a line does not end.
     """
     read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
     rest, number, waited = b"", 1, 0.0
-    while chunk := read(AT_ONCE):
-        came = perf_counter() - waited
+    while chunk := read(CHUNK_BYTES):
+        received = perf_counter() - waited
         lines, end, rest = (rest + chunk).rpartition(b"\n")
         if end:
-            yield lines + end, number, came
+            yield lines + end, number, received
             number += lines.count(b"\n") + 1
-        elif len(rest) > LONGEST:
-            raise LiveError(f"line {number} is longer than {LONGEST} bytes: this is no CSV or JSON")
-        waited = gather if len(chunk) < FEW else 0.0
+        elif len(rest) > MAX_LINE_BYTES:
+            raise LiveError(
+                f"line {number} is longer than {MAX_LINE_BYTES} bytes: this is no CSV or JSON"
+            )
+        waited = gather if len(chunk) < SMALL_CHUNK_BYTES else 0.0
         sleep(waited)
     if rest.strip():
         yield rest + b"\n", number, perf_counter()

@@ -2,6 +2,7 @@
 
 import time as clocks
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -10,24 +11,63 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector.library import Library, for_robot, load_library
-from inspector.live.block import Block, rows_of, widths_of
+from inspector.live.buffer import SampleBuffer, rows_of, widths_of
 from inspector.live.errors import LiveError
 from inspector.live.sink import Sink
-from inspector.live.summary import Summary
-from inspector.live.warnings import Troubles
+from inspector.live.warnings import Warnings
 from inspector.live.worker import Worker
 from noisemodel import Robot
 from noisemodel.types import Array
 
-BLOCK = 0.05
-"""Samples are worked on in blocks of this duration, in [s]."""
+BATCH = 0.05
+"""Samples are worked on in batches of this duration, in [s]."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """What became of the samples of a session.
+
+    Attributes:
+        samples: That were received.
+        rate: Nominal samples per second, in [Hz].
+        model: Name of the model that labelled, empty without.
+        labels: Frames that were labelled, by class.
+        warnings: What could not be shown, by kind.
+        delays: From a frame's last sample to its label in the recording, of the latest labels,
+            in [s].
+        where: Where it was shown.
+    """
+
+    samples: int
+    rate: float
+    model: str
+    labels: Mapping[str, int]
+    warnings: Mapping[str, int]
+    delays: Sequence[float]
+    where: str
+
+    def __str__(self) -> str:
+        counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
+        lines = [
+            f"{self.samples} samples, {self.samples / self.rate:.2f} s at {self.rate:g} Hz,"
+            f" {self.where}",
+            f"labels by {self.model}: {counts}" if counts else "no labels",
+        ]
+        if self.delays:
+            median, late = (1e3 * delay for delay in np.percentile(self.delays, [50, 99]))
+            lines.append(
+                f"delay from a sample to its label: median {median:.1f} ms,"
+                f" 99 % within {late:.1f} ms"
+            )
+        lines += [f"{count} {kind}" for kind, count in self.warnings.items()]
+        return "\n".join(lines)
 
 
 class LiveSession:
     """Takes samples while they are made, and shows them with noise and labels.
 
-    Samples are worked on in blocks of 50 ms: `push` returns at once for most, and takes some
-    milliseconds for one that completes a block. A viewer that cannot keep up makes it wait.
+    Samples are worked on in batches of 50 ms: `push` returns at once for most, and takes some
+    milliseconds for one that completes a batch. A viewer that cannot keep up makes it wait.
 
     Args:
         rate: Nominal samples per second, in [Hz].
@@ -39,7 +79,7 @@ class LiveSession:
         connect: Address of a viewer that runs. Unless given, and without a file, the viewer on
             this machine is used, and one is opened if none runs.
         overwrite: Whether a file that exists may be replaced.
-        tell: Is given what cannot be shown, a line each, once per kind.
+        on_warning: Called with a line for what cannot be shown, once per kind.
 
     Raises:
         LiveError: If the rate is none.
@@ -57,15 +97,15 @@ class LiveSession:
         save: str | Path | None = None,
         connect: str | None = None,
         overwrite: bool = False,
-        tell: Callable[[str], None] = lambda line: None,
+        on_warning: Callable[[str], None] = lambda line: None,
     ) -> None:
         if not 1.0 <= rate < np.inf:
             raise LiveError(f"a rate of {rate:g} Hz; expected 1 or more")
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
-        self._library = load_library() if library is None else library
-        self._tell, self._troubles = tell, Troubles(self._say)
+        self._library = load_library(assets.model_files()) if library is None else library
+        self._on_warning, self._warnings = on_warning, Warnings(self._emit)
         self._latest = -1.0 / rate
-        self._block: Block | None = None
+        self._buffer: SampleBuffer | None = None
         self._worker: Worker | None = None
         self._closed = False
         self._sink = Sink(Path(save) if save else None, connect, overwrite=overwrite)
@@ -79,7 +119,7 @@ class LiveSession:
         base_velocity: ArrayLike | None = None,
         base_pose: ArrayLike | None = None,
         time: ArrayLike | None = None,
-        came: float | None = None,
+        received: float | None = None,
     ) -> None:
         """Take one sample, or a chunk of them.
 
@@ -93,15 +133,15 @@ class LiveSession:
             base_velocity: Linear, then angular velocity of a floating base in its own axes, shape
                 (6,) or (samples, 6), in [m/s] and [rad/s].
             base_pose: x, y, z and quaternion x, y, z, w of it, shape (7,) or (samples, 7).
-            time: Stamps, shape () or (samples,), in [s]; by default samples follow each other.
-            came: Reading of ``time.perf_counter()`` when they came, by which the delay of labels
-                is measured; by default now.
+            time: Timestamps, shape () or (samples,), in [s]; by default samples follow each other.
+            received: Reading of ``time.perf_counter()`` when they were, by which the delay of
+                labels is measured; by default now.
 
         Raises:
             LiveError: If shapes do not fit together, or the session is closed.
             UnknownJointError: If the robot lacks a joint.
         """
-        came = clocks.perf_counter() if came is None else came
+        received = clocks.perf_counter() if received is None else received
         if self._closed:
             raise LiveError("the session is closed; begin another one")
         given = {
@@ -115,35 +155,35 @@ class LiveSession:
         stamps = self._stamps(time, len(rows["velocity"]))
         if not len(stamps):
             return
-        if self._block is None or self._worker is None:
-            self._block, self._worker = self._begin(rows)
+        if self._buffer is None or self._worker is None:
+            self._buffer, self._worker = self._begin(rows)
         taken = 0
         while taken < len(stamps):
             rest = {name: array[taken:] for name, array in rows.items()} if taken else rows
-            taken += self._block.put(rest, stamps[taken:], came)
-            if self._block.full:
-                self._worker.work(self._block)
+            taken += self._buffer.put(rest, stamps[taken:], received)
+            if self._buffer.full:
+                self._worker.work(self._buffer)
 
     def note(self, kind: str, line: str, count: int = 1) -> None:
-        """Count something that could not be pushed, and say it if it is the first of its kind.
+        """Count what could not be pushed, and warn if it is the first of its kind.
 
         Args:
             kind: What the summary calls it.
             line: What happened.
             count: How often.
         """
-        self._troubles.note(kind, line, count)
+        self._warnings.note(kind, line, count)
 
     @property
     def summary(self) -> Summary:
         """What became of the samples so far."""
-        worker, block = self._worker, self._block
+        worker, buffer = self._worker, self._buffer
         return Summary(
-            samples=worker.samples + block.held if worker and block else 0,
+            samples=worker.samples + buffer.held if worker and buffer else 0,
             rate=self._rate,
             model=worker.model if worker else "",
             labels=worker.labels if worker else {},
-            troubles=self._troubles.counts,
+            warnings=self._warnings.counts,
             delays=worker.delays if worker else (),
             where=self._sink.where,
         )
@@ -157,11 +197,11 @@ class LiveSession:
         if self._closed:
             return self.summary
         self._closed = True
-        if self._worker is None or self._block is None:
+        if self._worker is None or self._buffer is None:
             self._sink.discard()
             return self.summary
         try:
-            self._worker.work(self._block)
+            self._worker.work(self._buffer)
             self._worker.finish()
         finally:
             if not self._sink.close():
@@ -179,17 +219,17 @@ class LiveSession:
     ) -> None:
         self.close()
 
-    def _say(self, line: str) -> None:
-        """Tell whoever began the session, and whoever looks at it."""
-        self._tell(line)
+    def _emit(self, line: str) -> None:
+        """Warn the program that began the session, and among the events of the recording."""
+        self._on_warning(line)
         if self._worker is not None:
             self._worker.remark(line)
 
-    def _begin(self, rows: Mapping[str, Array]) -> tuple[Block, Worker]:
+    def _begin(self, rows: Mapping[str, Array]) -> tuple[SampleBuffer, Worker]:
         """Fix signals and names by the first samples."""
         widths = widths_of(rows, self._names)
         names = _names(self._names, self._robot, widths["velocity"])
-        size = max(1, round(BLOCK * self._rate))
+        size = max(1, round(BATCH * self._rate))
         worker = Worker(
             self._sink,
             rate=self._rate,
@@ -197,11 +237,11 @@ class LiveSession:
             joint_names=names,
             widths=widths,
             library=for_robot(self._library, self._robot),
-            troubles=self._troubles,
+            warnings=self._warnings,
         )
         if self._robot and "position" not in widths:
             self.note("missing signals", "no positions: the robot is not drawn")
-        return Block(size, widths, self._troubles), worker
+        return SampleBuffer(size, widths, self._warnings), worker
 
     def _stamps(self, time: ArrayLike | None, samples: int) -> Array:
         if time is None:

@@ -21,14 +21,14 @@ APPLICATION = "inspector-live"
 """Not that of recordings of whole runs: the viewer keeps a layout for each application."""
 PORT = int(viewer.PORT)
 ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5})(?:/proxy)?")
-TIMEOUT = 20.0
+START_TIMEOUT = 20.0
 """How long a viewer may take to start, in [s]."""
-ANSWER = 2.0
+CONNECT_TIMEOUT = 2.0
 """How long a viewer may take to answer, in [s]."""
 SERVICE = "/rerun.sdk_comms.v1alpha1.MessageProxyService/Knock"
-KNOCK = 1.0
-"""How often it is asked whether the viewer is still there, in [s]."""
-FLUSH = 5.0
+CHECK_INTERVAL = 1.0
+"""Time between checks that the viewer is still there, in [s]."""
+FLUSH_TIMEOUT = 5.0
 """How long the last messages may take, in [s]."""
 MEMORY = "2GB"
 """What a viewer that is opened here may keep; then it drops the oldest."""
@@ -45,7 +45,7 @@ class Sink:
 
     Attributes:
         recording: What to log into.
-        where: Says where it goes.
+        where: Where it goes, in words.
         gone: Whether there was a viewer that is there no more.
 
     Raises:
@@ -58,7 +58,7 @@ class Sink:
     ) -> None:
         self._address: tuple[str, int] | None = None
         self.gone = False
-        self._file, self._knocked = save is not None, time.monotonic()
+        self._file, self._checked = save is not None, time.monotonic()
         sinks: list[rr.GrpcSink | rr.FileSink] = []
         places = []
         with ExitStack() as stack:
@@ -79,15 +79,15 @@ class Sink:
         """Whether somebody takes what is logged: a file does when its viewer is gone."""
         return self._file or not self.gone
 
-    def knock(self) -> bool:
-        """Ask once in a second whether the viewer is there, and remember that it is gone.
+    def check_viewer(self) -> bool:
+        """Check once in a second that the viewer is there.
 
         Returns:
             Whether it answered now.
         """
-        if self._address is None or self.gone or time.monotonic() - self._knocked < KNOCK:
+        if self._address is None or self.gone or time.monotonic() - self._checked < CHECK_INTERVAL:
             return False
-        self._knocked = time.monotonic()
+        self._checked = time.monotonic()
         self.gone = not _listens(*self._address)
         return not self.gone
 
@@ -107,13 +107,13 @@ class Sink:
         with self._stack:
             try:
                 if self.alive:
-                    self.recording.flush(timeout_sec=FLUSH)
+                    self.recording.flush(timeout_sec=FLUSH_TIMEOUT)
             except RuntimeError:  # it is gone, or hangs
                 taken = False
             # Rerun waits for a viewer that hangs, for good; we do not.
             ending = Thread(target=self.recording.disconnect, daemon=True)
             ending.start()
-            ending.join(FLUSH)
+            ending.join(FLUSH_TIMEOUT)
         return taken
 
 
@@ -153,7 +153,7 @@ def _parsed(address: str) -> tuple[str, int]:
 
 def _listens(host: str, port: int) -> bool:
     try:
-        socket.create_connection((host, port), timeout=ANSWER).close()
+        socket.create_connection((host, port), timeout=CONNECT_TIMEOUT).close()
     except OSError:
         return False
     return True
@@ -164,7 +164,7 @@ def _is_viewer(host: str, port: int) -> bool:
 
     Rerun's client itself would wait for good for somebody else's server.
     """
-    connection = HTTPConnection(host, port, timeout=ANSWER)
+    connection = HTTPConnection(host, port, timeout=CONNECT_TIMEOUT)
     try:
         connection.request("POST", SERVICE, headers={"content-type": "application/grpc-web+proto"})
         return connection.getresponse().getheader("grpc-status") is not None
@@ -179,7 +179,7 @@ def _opened(port: int) -> int:
     start = ("--port", str(port), "--hide-welcome-screen", "--expect-data-soon")
     env = os.environ | {"RUST_LOG": "error"}
     with viewer.started(*start, "--memory-limit", MEMORY, env=env) as process:
-        until = time.monotonic() + TIMEOUT
+        until = time.monotonic() + START_TIMEOUT
         while time.monotonic() < until:
             if problem := process.ended():
                 raise SinkError(f"{problem}; use --save FILE.rrd")
@@ -187,4 +187,4 @@ def _opened(port: int) -> int:
                 return port
             time.sleep(0.1)
         process.kill()
-    raise SinkError(f"the viewer did not start within {TIMEOUT:g} s; use --save FILE.rrd")
+    raise SinkError(f"the viewer did not start within {START_TIMEOUT:g} s; use --save FILE.rrd")

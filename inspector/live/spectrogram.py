@@ -8,9 +8,9 @@ from inspector.recording.spectrogram import BANDS, TOP_HZ
 from inspector.spectrogram import amplitudes, window_length
 from noisemodel.types import Array, Mask
 
-QUIETEST_DB = -90.0
+FLOOR_DB = -90.0
 """What is darkest: 3e-5 rad/s, the best encoders' noise. Brightest is 1 rad/s, 0 dB."""
-TOGETHER = 4
+COLUMNS_AT_ONCE = 4
 """Columns that are handed out at once, every tenth of a second."""
 
 
@@ -23,11 +23,14 @@ class Columns(NamedTuple):
     """From 0 to 1, shape (bands, columns)."""
 
 
-class Strip:
+class SpectrogramStream:
     """Levels of frequency bands, on one scale at all times.
 
     Args:
         rate: Samples per second, in [Hz].
+
+    Attributes:
+        centres: Of the bands, shape (bands,), in [Hz].
     """
 
     def __init__(self, rate: float) -> None:
@@ -38,10 +41,10 @@ class Strip:
         shown = int((frequency <= TOP_HZ).sum())
         edges = np.linspace(0, shown, min(BANDS, shown) + 1).astype(int)
         self._firsts, self._shown = edges[:-1], shown
-        self.hertz = np.add.reduceat(frequency[:shown], self._firsts) / np.diff(edges)
+        self.centres = np.add.reduceat(frequency[:shown], self._firsts) / np.diff(edges)
         self._samples = np.empty(0)
         self._valid = np.empty(0, dtype=bool)
-        self._dark = False
+        self._gap = False
         self._waiting: list[Columns] = []
 
     def push(self, noise: Array, valid: Mask, end: float) -> Columns | None:
@@ -60,23 +63,23 @@ class Strip:
         count = max(0, (len(samples) - self._length) // self._hop + 1)
         used = count * self._hop
         if count:
-            if self._dark:
+            if self._gap:
                 before = end - (len(samples) - self._length / 2 + self._hop) / self._rate
-                dark = np.zeros((len(self.hertz), 1))
+                dark = np.zeros((len(self.centres), 1))
                 self._waiting.append(Columns(np.array([before]), dark))
-                self._dark = False
+                self._gap = False
             starts = self._hop * np.arange(count)
             times = np.asarray(end - (len(samples) - starts - self._length / 2) / self._rate)
             self._waiting.append(Columns(times, self._levels(samples, valid, count)))
         self._samples, self._valid = samples[used:], valid[used:]
-        if sum(len(columns.time) for columns in self._waiting) < TOGETHER:
+        if sum(len(columns.time) for columns in self._waiting) < COLUMNS_AT_ONCE:
             return None
         return self.flush()
 
     def skip(self) -> None:
         """Begin anew after a gap, and leave it dark."""
         self._samples, self._valid = self._samples[:0], self._valid[:0]
-        self._dark = True
+        self._gap = True
 
     def flush(self) -> Columns | None:
         """Hand out what waits."""
@@ -93,5 +96,5 @@ class Strip:
         whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
         amplitude = amplitudes(windows)[:, : self._shown] * whole[:, None]
         loudest = np.maximum.reduceat(amplitude, self._firsts, axis=1).T
-        decibel = 20.0 * np.log10(np.maximum(loudest, 10.0 ** (QUIETEST_DB / 20.0)))
-        return np.asarray(1.0 - decibel / QUIETEST_DB)
+        decibel = 20.0 * np.log10(np.maximum(loudest, 10.0 ** (FLOOR_DB / 20.0)))
+        return np.asarray(1.0 - decibel / FLOOR_DB)

@@ -1,22 +1,22 @@
-"""What could not be shown: counted, and said once per kind."""
+"""Warnings of what cannot be shown: counted, and emitted once per kind."""
 
 from collections import Counter
 from collections.abc import Callable
 
 
-class Troubles:
-    """Counts by kind.
+class Warnings:
+    """Warnings by kind.
 
     Args:
-        tell: Is given a line when the first of a kind turns up.
+        emit: Called with a line at the first of each kind.
     """
 
-    def __init__(self, tell: Callable[[str], None]) -> None:
-        self.tell = tell
+    def __init__(self, emit: Callable[[str], None]) -> None:
+        self.emit = emit
         self._counts: Counter[str] = Counter()
 
     def note(self, kind: str, line: str, count: int = 1) -> None:
-        """Count something, and say it if it is the first of its kind.
+        """Count a warning, and emit it if it is the first of its kind.
 
         Args:
             kind: What the summary calls it.
@@ -26,7 +26,7 @@ class Troubles:
         if count <= 0:
             return
         if kind not in self._counts:
-            self.tell(line)
+            self.emit(line)
         self._counts[kind] += count
 
     @property

@@ -10,8 +10,8 @@ import rerun as rr
 from rerun.urdf import UrdfTree
 
 from inspector.pair import classes, joints, links, noise
+from inspector.pair.blueprint import Contents, layout
 from inspector.pair.changes import CAME, Change, changes
-from inspector.pair.layout import Contents, layout
 from inspector.pair.levels import STEP, steps, whole
 from inspector.pair.pair import Pair
 from inspector.pair.report import report

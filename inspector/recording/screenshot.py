@@ -27,7 +27,7 @@ MAGIC = b"RRF2"
 """What rerun's recordings begin with."""
 TIMEOUT = 120.0
 """How long the viewer may take to draw everything, in [s]."""
-REPORTS_PASS = 20.0
+REPORTS_TIMEOUT = 20.0
 """After this, reports of views are no longer those of data that is still arriving, in [s]."""
 
 
@@ -83,7 +83,7 @@ def shoot(
     refuse_existing(output, overwrite=overwrite)
     with headless_viewer(size) as client:
         png = picture(client, recording, seconds)
-        state = settled(client)
+        state = final_state(client)
     with replacing(output, overwrite=overwrite) as temporary:
         temporary.write_bytes(png)
     return tuple(str(report) for view in state.views for report in view.reports)
@@ -192,9 +192,9 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
     return frames[-1]
 
 
-def settled(client: "ViewerClient") -> Any:
+def final_state(client: "ViewerClient") -> Any:
     """Ask for the viewer's state; reports that go away while data arrives are no reports."""
-    until = time.monotonic() + REPORTS_PASS
+    until = time.monotonic() + REPORTS_TIMEOUT
     while True:
         state = client.get_state()
         if time.monotonic() > until or not any(view.reports for view in state.views):

@@ -13,7 +13,7 @@ from urllib.parse import quote
 from inspector.recording import viewer
 from inspector.recording.viewer import HOST, ViewerError
 
-TIMEOUT = 30.0
+START_TIMEOUT = 30.0
 """How long a server may take to answer, in [s]."""
 
 
@@ -111,7 +111,7 @@ def free_port(wanted: int = 0, *, other: int = 0) -> int:
 
 
 def _wait_for(port: int, server: viewer.Process) -> None:
-    until = time.monotonic() + TIMEOUT
+    until = time.monotonic() + START_TIMEOUT
     while time.monotonic() < until:
         if problem := server.ended():
             raise ViewerError(problem)
@@ -121,4 +121,6 @@ def _wait_for(port: int, server: viewer.Process) -> None:
             time.sleep(0.05)
         else:
             return
-    raise ViewerError(f"the viewer does not answer on port {port}, {TIMEOUT:g} s after its start")
+    raise ViewerError(
+        f"the viewer does not answer on port {port}, {START_TIMEOUT:g} s after its start"
+    )

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector.live.spectrogram import QUIETEST_DB
+from inspector.live.spectrogram import FLOOR_DB
 from inspector.recording import unstable
 from inspector.recording.series import TIMELINE
 from inspector.recording.spectrogram import TOP_HZ
@@ -39,7 +39,7 @@ def layout(contents: Contents) -> Blueprint:
         contents: What there is to show.
     """
     top = min(TOP_HZ, contents.rate / 2)
-    strip = f"Spectrogram of the noise, 0-{top:.0f} Hz, {QUIETEST_DB:.0f}-0 dB re 1 rad/s"
+    strip = f"Spectrogram of the noise, 0-{top:.0f} Hz, {FLOOR_DB:.0f}-0 dB re 1 rad/s"
     right = [
         (_plot("/noise", "Noise, simplified estimate [rad/s]"), 2.2),
         (_plot("/spectrogram", strip, between=(0.0, top)), 2.8),

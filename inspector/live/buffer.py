@@ -1,4 +1,4 @@
-"""The block that samples are collected in: named signals of fixed widths."""
+"""A buffer that samples are collected in: named signals of fixed widths."""
 
 from collections.abc import Mapping, Sequence
 
@@ -6,26 +6,26 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector.live.errors import LiveError
-from inspector.live.warnings import Troubles
+from inspector.live.warnings import Warnings
 from noisemodel.types import Array
 
 SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_pose")
 """What a session takes, besides the time; as the run file names it."""
 
 
-class Block:
+class SampleBuffer:
     """Room for some samples.
 
     Args:
         size: Samples that it holds.
         widths: Columns of each signal that there is.
-        troubles: Where signals that do not fit are noted.
+        warnings: Where signals that do not fit are counted.
     """
 
-    def __init__(self, size: int, widths: Mapping[str, int], troubles: Troubles) -> None:
-        self._size, self._troubles = size, troubles
+    def __init__(self, size: int, widths: Mapping[str, int], warnings: Warnings) -> None:
+        self._size, self._warnings = size, warnings
         self.signals = {name: np.empty((size, width)) for name, width in widths.items()}
-        self.time, self.came = np.empty(size), np.empty(size)
+        self.time, self.received = np.empty(size), np.empty(size)
         self.held = 0
 
     @property
@@ -33,44 +33,44 @@ class Block:
         """Whether no sample fits in."""
         return self.held == self._size
 
-    def put(self, rows: Mapping[str, Array], time: Array, came: float) -> int:
+    def put(self, rows: Mapping[str, Array], time: Array, received: float) -> int:
         """Take as many samples as fit in.
 
         Args:
             rows: Signals, each of shape (samples, columns); those that are missing or of another
                 width are unknown in these samples.
             time: Shape (samples,), in [s].
-            came: When they came, in [s] on the clock that delays are measured by.
+            received: When they were, in [s] on the clock that delays are measured by.
 
         Returns:
             How many samples were taken.
         """
         count = min(len(time), self._size - self.held)
         place = slice(self.held, self.held + count)
-        self.time[place], self.came[place] = time[:count], came
-        for name, buffer in self.signals.items():
+        self.time[place], self.received[place] = time[:count], received
+        for name, values in self.signals.items():
             given = rows.get(name)
-            fits = given is not None and given.shape[1] == buffer.shape[1]
-            buffer[place] = given[:count] if given is not None and fits else np.nan
+            fits = given is not None and given.shape[1] == values.shape[1]
+            values[place] = given[:count] if given is not None and fits else np.nan
             if not fits:
-                self._note(name, given, buffer.shape[1], time[0], count)
+                self._note(name, given, values.shape[1], time[0], count)
         for name in rows:
             if name not in self.signals:
                 line = f"{name} from {time[0]:.3f} s on was not there at first: not shown"
-                self._troubles.note(f"samples with a new {name}", line, count)
+                self._warnings.note(f"samples with a new {name}", line, count)
         self.held += count
         return count
 
     def _note(self, name: str, given: Array | None, width: int, time: float, count: int) -> None:
         if given is None:
             line = f"no {name} from {time:.3f} s on: it was there at first"
-            self._troubles.note(f"samples without {name}", line, count)
+            self._warnings.note(f"samples without {name}", line, count)
         else:
             line = (
                 f"{name} of {given.shape[1]} columns from {time:.3f} s on, where it had {width}:"
                 " not shown, and not labelled where it makes noise"
             )
-            self._troubles.note(f"samples with another width of {name}", line, count)
+            self._warnings.note(f"samples with another width of {name}", line, count)
 
 
 def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
