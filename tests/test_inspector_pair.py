@@ -76,11 +76,13 @@ def test_a_run_and_itself_differ_by_nothing(itself):
     assert {level.change for level in every} == {0.0}
 
 
-def test_what_a_run_and_itself_have_in_common_stayed(itself):
+def test_failures_of_a_run_and_itself_are_unchanged(itself):
     found = changes(itself)
-    assert len(found) == len(itself.before.findings) > 0
-    assert {change.kind for change in found} == {"stayed"}
-    assert f"findings: 0 came, 0 went, {len(found)} stayed; vibration +0.0 dB" in summary(itself)
+    assert len(found) == len(itself.before.events) > 0
+    assert {change.kind for change in found} == {"unchanged"}
+    assert f"findings: 0 new, 0 resolved, {len(found)} unchanged; vibration +0.0 dB" in summary(
+        itself
+    )
 
 
 def test_a_run_that_starts_later_is_found_to_and_differs_by_nothing(tmp_path, library):
@@ -109,14 +111,14 @@ def test_a_run_twice_as_loud_is_6_db_louder_everywhere(tmp_path):
     np.testing.assert_allclose(change[rattling], LOUDER)
 
 
-def test_what_comes_back_is_what_went(tmp_path):
+def test_a_pair_the_other_way_round_has_the_opposite_change(tmp_path):
     there = compared(tmp_path, panda(), panda(2.0))
     back = compared(tmp_path, panda(2.0), panda())
     assert whole(back).change == -whole(there).change
     assert summary(back).endswith("vibration -6.0 dB")
 
 
-def test_events_of_one_class_that_overlap_stayed_and_the_others_came_or_went(itself):
+def test_events_of_one_class_that_overlap_are_unchanged_and_the_others_new_or_resolved(itself):
     def events(*found):
         return tuple(Event(label, start, stop, 1.0) for label, start, stop in found)
 
@@ -128,9 +130,9 @@ def test_events_of_one_class_that_overlap_stayed_and_the_others_came_or_went(its
         after=dataclasses.replace(itself.after, findings=after, spans=after),
     )
     assert [(c.kind, c.label, c.start, c.stop) for c in changes(pair)] == [
-        ("went", "impact", 0.2, 0.6),
-        ("came", "impact", 0.8, 1.2),
-        ("stayed", "oscillations", 1.0, 1.8),
+        ("resolved", "impact", 0.2, 0.6),
+        ("new", "impact", 0.8, 1.2),
+        ("unchanged", "oscillations", 1.0, 1.8),
     ]
 
 
@@ -138,8 +140,8 @@ def test_annotated_failures_are_matched_where_no_model_can_tell(tmp_path):
     blocks = (Block(0.5, 1.0, "oscillations"), Block(1.0, 1.5, "ok"))
     pair = compared(tmp_path, panda(), panda(blocks=blocks), robot=False)
     (change,) = changes(pair)
-    assert (change.kind, change.label, change.start) == ("came", "oscillations", 0.5)
-    assert "annotated failures: 1 came, 0 went, 0 stayed" in summary(pair)
+    assert (change.kind, change.label, change.start) == ("new", "oscillations", 0.5)
+    assert "annotated failures: 1 new, 0 resolved, 0 unchanged" in summary(pair)
     assert "## Annotated events" in report(pair)
     assert any(remark.startswith("Both: No labels: rate of 5000 Hz") for remark in pair.remarks)
 
@@ -165,7 +167,7 @@ def test_motions_that_have_nothing_in_common_are_laid_start_to_start():
     found = align(moving(seed=1), moving(seed=2))
     assert found.refused
     assert (found.lag, found.how) == (0, Align.START)
-    assert str(found).startswith("from the start: the motions do not tell how they lie (corr")
+    assert str(found).startswith("from the start: the motions do not determine the lag (corr")
 
 
 @pytest.mark.parametrize("velocity", [0.0, 0.3])
@@ -229,12 +231,14 @@ def test_runs_that_share_no_time_are_refused(tmp_path):
         compared(tmp_path, run, later, how=Align.NONE)
 
 
-def test_the_faster_run_is_lowered_and_both_sound_alike(tmp_path):
+def test_the_faster_run_is_decimated_and_both_have_one_level(tmp_path):
     pair = compared(tmp_path, moving(rate=4000), moving(rate=1000))
     assert pair.rate == 1000.0
     assert whole(pair).change == pytest.approx(0.0, abs=0.1)
-    (remark,) = [r for r in pair.remarks if "lowered" in r]
-    assert remark.startswith("The run before has 4000 Hz: lowered to the 1000 Hz of the other one")
+    (remark,) = [r for r in pair.remarks if "decimated" in r]
+    assert remark.startswith(
+        "The run before has 4000 Hz: decimated to the 1000 Hz of the other one"
+    )
 
 
 def test_a_lowered_run_keeps_the_positions_of_its_links(tmp_path):
@@ -301,14 +305,14 @@ def test_silence_in_both_is_no_change(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_limit_cycle_is_what_came(tmp_path, library):
+def test_a_limit_cycle_is_new(tmp_path, library):
     pytest.importorskip("mujoco")
     scenarios = pytest.importorskip("scenarios")
     runs = [scenarios.simulate("panda", scenario, 3) for scenario in ("straight", "limit-cycle")]
     pair = compared(tmp_path, *runs, library)
     assert abs(pair.alignment.seconds) < 0.01
-    came = [change for change in changes(pair) if change.kind == "came"]
+    new = [change for change in changes(pair) if change.kind == "new"]
     blocks = [block for block in runs[1].blocks if block.label == "oscillations"]
     for block in blocks:
-        assert any(c.start < block.stop and block.start < c.stop for c in came)
+        assert any(c.start < block.stop and block.start < c.stop for c in new)
     assert whole(pair).change > 1.0

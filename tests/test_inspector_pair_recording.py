@@ -176,7 +176,7 @@ def test_a_links_power_before_and_after_is_that_of_its_vibration(whole):
     np.testing.assert_allclose(time, noise.time, atol=1e-9)
 
 
-def test_joints_differ_by_what_came_on_top(whole):
+def test_joints_differ_by_the_added_motion(whole):
     path, pair = whole
     _, change = scalars(path, "/joints/position/change/0")
     assert not change.any()
@@ -200,15 +200,15 @@ def test_lanes_show_the_classes_of_both_and_what_changed(whole):
     time, states = read(path, "/class/after/annotated", "StateChange:state")
     assert [state[0] for state in states] == ["ok", "oscillations", ""]
     time, states = read(path, "/class/change", "StateChange:state")
-    assert [state[0] for state in states] == ["came", ""]
+    assert [state[0] for state in states] == ["new", ""]
     np.testing.assert_allclose(time, [0.5, 1.0], atol=1e-9)
 
 
-def test_changes_are_listed_and_the_one_that_came_is_looped(whole):
+def test_changes_are_listed_and_the_new_one_is_looped(whole):
     path, _ = whole
     time, text = read(path, "/events", "TextLog:text")
     assert time.tolist() == [0.5]
-    assert text == [["came: impact, 0.50 s to 1.00 s, +6.0 dB"]]
+    assert text == [["new: impact, 0.50 s to 1.00 s, +6.0 dB"]]
     assert read(path, "/events", "TextLog:level")[1] == [["WARN"]]
     reader = RrdReader(path)
     (blueprint,) = reader.blueprints()
@@ -260,23 +260,23 @@ def test_colours_tell_louder_from_quieter_and_grow_with_the_change():
 
 def test_both_sound_at_one_gain(whole):
     path, _ = whole
-    heard = []
+    loudness = []
     for name in ("before", "after"):
         time, blob = read(path, f"/sound/{name}", "AssetAudio:blob")
         assert time.tolist() == [0.0]
         with wave.open(BytesIO(bytes(blob[0][0]))) as file:
             frames = np.frombuffer(file.readframes(file.getnframes()), dtype=np.int16)
-        heard.append(np.sqrt(np.mean(frames.astype(float) ** 2)))
-    assert heard[1] / heard[0] == pytest.approx(2.0, rel=0.01)
+        loudness.append(np.sqrt(np.mean(frames.astype(float) ** 2)))
+    assert loudness[1] / loudness[0] == pytest.approx(2.0, rel=0.01)
 
 
 def test_the_report_says_what_changed(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert text[0].startswith("# before → after\n")
-    assert "**findings: 1 came, 0 went, 0 stayed; vibration +6.0 dB**" in text[0]
+    assert "**findings: 1 new, 0 resolved, 0 unchanged; vibration +6.0 dB**" in text[0]
     assert re.search(
-        r"\| came \| impact \| 0.50 \| 1.00 \| -\d+\.\d \| -\d+\.\d \| \+6.0 \|", text[0]
+        r"\| new \| impact \| 0.50 \| 1.00 \| -\d+\.\d \| -\d+\.\d \| \+6.0 \|", text[0]
     )
     assert re.search(r"\| 256 Hz \| .* \| \+6.0 \|", text[0])
     assert re.search(r"\| panda_link5 \| .* \| \+6.0 \|", text[0])
@@ -308,7 +308,7 @@ def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
             assert not scalars(tmp_path / "out.rrd", line)[1].any(), line
     rgba = read(tmp_path / "out.rrd", "/spectrogram/change/**", "SeriesLines:colors")[1]
     assert {row[0] for row in rgba} == {int.from_bytes([*colors.SAME, 255], "big")}
-    assert read(tmp_path / "out.rrd", "/class/change", "StateChange:state")[1][0] == ["stayed"]
+    assert read(tmp_path / "out.rrd", "/class/change", "StateChange:state")[1][0] == ["unchanged"]
 
 
 def test_the_same_two_runs_make_the_same_recording_id_and_others_do_not(tmp_path):
@@ -385,7 +385,7 @@ def test_the_command_shows_two_runs_and_says_how_they_were_aligned(capsys, monke
     status, out, _ = inspector(
         capsys, monkeypatch, "view", *runs, *save, "--align", "start", "--overwrite"
     )
-    assert (status, "aligned from the start, as asked" in out) == (0, True)
+    assert (status, "aligned from the start, as requested" in out) == (0, True)
 
 
 def test_what_takes_two_runs_or_one_is_wrong_usage_with_the_other(capsys, monkeypatch, tmp_path):

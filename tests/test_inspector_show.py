@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import inspector
-from inspector.recording import cell, notebook, viewer
+from inspector.recording import notebook, viewer
 from inspector.recording.viewer import ViewerError
 from noisemodel import Run, RunFileError
 
@@ -99,7 +99,7 @@ def kernel(monkeypatch):
     }
     monkeypatch.setattr(notebook, "in_notebook", lambda: True)
     monkeypatch.setattr(notebook, "find_spec", lambda _: object())
-    monkeypatch.setattr(cell, "import_module", modules.get)
+    monkeypatch.setattr(notebook, "import_module", modules.get)
     monkeypatch.delenv("RERUN_NOTEBOOK_ASSET", raising=False)
     return seen
 
@@ -110,8 +110,8 @@ def test_a_notebook_gets_the_recording_and_fetches_nothing_from_outside(run, ker
     assert isinstance(widget, kernel.rerun.Viewer)
     assert widget.size == (800, 500)
     assert [data[:4] for data in kernel.sent] == [b"RRF2"]
-    assert cell.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
-    assert (widget._esm, kernel.code, widget._code) == (cell.LOADER, "// 23 MB", True)
+    assert notebook.os.environ["RERUN_NOTEBOOK_ASSET"] == "inline"
+    assert (widget._esm, kernel.code, widget._code) == (notebook.LOADER, "// 23 MB", True)
 
 
 def test_a_notebook_whose_owner_names_an_address_has_the_viewer_fetched_there(run, kernel):
@@ -140,7 +140,7 @@ def test_a_widget_is_ready_before_its_code_and_then_draws():
                 const end = await widget.render({ model, el });
                 return [ready < 2000, el.textContent, end];
             }""",
-            [quote(cell.LOADER), code],
+            [quote(notebook.LOADER), code],
         ) == [True, "drawn", "ended"]
 
 

@@ -1,4 +1,4 @@
-"""Two runs, before and after a change, on one time axis: what came, went, and how much louder.
+"""Two runs, before and after a change, on one time axis: new and resolved failures, levels.
 
     two runs -> alike (same signals, one rate) -> aligned -> the stretch that both cover
              -> two inspections, sample beside sample -> changes, levels -> recording, report

@@ -41,9 +41,9 @@ class Alignment:
             "none" where their clocks were taken as they are.
         lag: Samples that the run after starts later; negative if it starts earlier.
         seconds: The same in [s].
-        correlation: Of the envelopes of their motions, at most 1; NaN where nobody asked.
+        correlation: Of the envelopes of their motions, at most 1; NaN where it was not computed.
         rival: That at the next best lag.
-        refused: Whether "auto" was asked for, and its correlation not to be trusted.
+        refused: Whether "auto" was requested, and its correlation is too low or ambiguous.
     """
 
     how: Align
@@ -56,12 +56,12 @@ class Alignment:
     def __str__(self) -> str:
         measured = f"correlation {self.correlation:.2f}, next best {self.rival:.2f}"
         if self.refused:
-            return f"from the start: the motions do not tell how they lie ({measured})"
+            return f"from the start: the motions do not determine the lag ({measured})"
         if self.how is Align.AUTO:
             return f"by the motion: after starts {self.seconds:+.4f} s from before ({measured})"
         if self.how is Align.START:
-            return "from the start, as asked"
-        return f"by the clocks, as asked: after starts {self.seconds:+.4f} s from before"
+            return "from the start, as requested"
+        return f"by the clocks, as requested: after starts {self.seconds:+.4f} s from before"
 
 
 def align(before: Run, after: Run, how: Align = Align.AUTO) -> Alignment:

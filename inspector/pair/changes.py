@@ -1,4 +1,4 @@
-"""The failures that came, went and stayed, matched in time."""
+"""The failures that are new, resolved and unchanged, matched in time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from inspector.pair.pair import Pair
 from models import Event
 from noisemodel import Block
 
-CAME, WENT, STAYED = "came", "went", "stayed"
+NEW, RESOLVED, UNCHANGED = "new", "resolved", "unchanged"
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class Change:
     """A failure in either run, or in both at the same time.
 
     Attributes:
-        kind: "came", "went" or "stayed".
+        kind: "new", "resolved" or "unchanged".
         label: Its class.
         start: In [s], of whichever run has it first.
         stop: In [s], of whichever has it last.
@@ -40,8 +40,8 @@ class Change:
 def changes(pair: Pair) -> tuple[Change, ...]:
     """Match the failures of two runs.
 
-    Findings of one class that overlap in time, whichever run they are of, are one failure. It
-    stayed if both runs have a part in it; otherwise it came or went.
+    Findings of one class that overlap in time, whichever run they are of, are one failure. It is
+    unchanged if both runs have a part in it; otherwise it is new or resolved.
 
     Args:
         pair: The two runs.
@@ -57,13 +57,13 @@ def changes(pair: Pair) -> tuple[Change, ...]:
 
 
 def failures(pair: Pair, side: Analysis) -> Sequence[Event | Block]:
-    """List what of a run is matched: its findings, or its annotated failures."""
-    if judged(pair):
+    """The failures of a run that are matched: its findings, or its annotated blocks."""
+    if labelled(pair):
         return side.findings
     return [block for block in side.run.blocks if block.label != "ok"]
 
 
-def judged(pair: Pair) -> bool:
+def labelled(pair: Pair) -> bool:
     """Whether both runs could be labelled, so that findings are what is matched."""
     return pair.before.labels is not None and pair.after.labels is not None
 
@@ -72,7 +72,7 @@ def _matched(
     before: Sequence[Event | Block], after: Sequence[Event | Block]
 ) -> Iterator[tuple[str, str, float, float]]:
     """Merge failures of a class that overlap: kind, class, start and stop."""
-    kinds = {frozenset({True}): CAME, frozenset({False}): WENT}
+    kinds = {frozenset({True}): NEW, frozenset({False}): RESOLVED}
     every = [(f.label, f.start, f.stop, False) for f in before]
     every += [(f.label, f.start, f.stop, True) for f in after]
     for label in sorted({each[0] for each in every}):
@@ -84,5 +84,5 @@ def _matched(
             else:
                 groups.append([each])
         for group in groups:
-            kind = kinds.get(frozenset(later for *_, later in group), STAYED)
+            kind = kinds.get(frozenset(later for *_, later in group), UNCHANGED)
             yield kind, label, group[0][0], max(stop for _, stop, _ in group)

@@ -6,7 +6,7 @@ from itertools import pairwise
 import rerun as rr
 
 from inspector import colors
-from inspector.pair.changes import CAME, Change
+from inspector.pair.changes import NEW, Change
 from inspector.pair.colors import KINDS
 from inspector.pair.pair import Pair
 from inspector.recording import classes, series
@@ -43,13 +43,13 @@ def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> i
         [change.start for change in found],
         [str(change) for change in found],
         [every[change.label] for change in found],
-        warnings=[change.kind == CAME for change in found],
+        warnings=[change.kind == NEW for change in found],
     )
     return len(lanes) + 1
 
 
 def _one_at_a_time(found: Sequence[Change]) -> classes.Lane:
-    """Lay changes into one lane: what came hides what went, and that what stayed."""
+    """Changes in one lane: new failures hide resolved ones, and these unchanged ones."""
     rank = list(KINDS)
     edges = sorted({edge for change in found for edge in (change.start, change.stop)})
     lane = []

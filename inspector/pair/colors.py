@@ -1,6 +1,6 @@
 """The colours of a comparison: blue is before and quieter, orange is after and louder.
 
-Blue and orange are told apart by any eyes; what did not change is as grey as a quiet link.
+Blue and orange differ to any eyes; what did not change is as grey as a quiet link.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ RANGE_DB = 12.0
 SHADES = 25
 """An odd number, so that no change has a shade of its own."""
 
-KINDS: dict[str, Color] = {"came": AFTER, "went": BEFORE, "stayed": (190, 190, 190)}
+KINDS: dict[str, Color] = {"new": AFTER, "resolved": BEFORE, "unchanged": (190, 190, 190)}
 
 
 def diverging(change: Array) -> NDArray[np.uint8]:

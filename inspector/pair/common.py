@@ -13,12 +13,12 @@ from noisemodel.types import Array, Real
 
 SAME_RATE = 1e-3
 """Rates that differ by less are one."""
-SAID = 0.005
-"""Time that is left out and worth a word, in [s]."""
+REMARKED = 0.005
+"""Time from which on a stretch that is left out is remarked on, in [s]."""
 
 
 def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
-    """Leave out what only one of two runs has of the noise, and lower the faster one.
+    """Leave out what only one of two runs has of the noise, and decimate the faster one.
 
     Args:
         before: A run.
@@ -42,8 +42,8 @@ def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
     for which, run in (("before", before), ("after", after)):
         if run.rate > rate * (1 + SAME_RATE):
             remarks.append(
-                f"The run {which} has {run.rate:g} Hz: lowered to the {rate:g} Hz of the other one,"
-                " its efforts are left out."
+                f"The run {which} has {run.rate:g} Hz: decimated to the {rate:g} Hz of the other"
+                " one, its efforts are left out."
             )
     before, after = (_at_rate(run, rate) for run in (before, after))
     return before, after, tuple(remarks)
@@ -78,24 +78,24 @@ def together(before: Run, after: Run, alignment: Alignment) -> tuple[Run, Run, t
         f"The run {which} has {run.duration - cut.duration:.2f} s that the other one has not:"
         " they are not compared."
         for which, run, cut in (("before", before, cut_before), ("after", after, cut_after))
-        if run.duration - cut.duration >= SAID
+        if run.duration - cut.duration >= REMARKED
     ]
     return cut_before, cut_after, tuple(remarks)
 
 
 def _at_rate(run: Run, rate: float) -> Run:
-    """Lower a run, but keep the positions that its links are placed by."""
+    """Decimate a run, but keep the positions that its links are placed by."""
     if run.rate <= rate * (1 + SAME_RATE):
         return run
-    slower = decimated(run, rate)
-    nearest = np.round(np.arange(len(slower.time)) * run.rate / rate).astype(int)
+    lower = decimated(run, rate)
+    nearest = np.round(np.arange(len(lower.time)) * run.rate / rate).astype(int)
     nearest = np.minimum(nearest, len(run.time) - 1)
 
     def at(signal: Real | None) -> Real | None:
         return None if signal is None else signal[nearest]
 
     return replace(
-        slower,
+        lower,
         position=at(run.position),
         position_desired=at(run.position_desired),
         base_pose=at(run.base_pose),

@@ -47,8 +47,8 @@ class ClassLevel:
     """How long, and how loud, a class is before and after.
 
     Attributes:
-        seconds: How long it was heard before and after, in [s].
-        level: How loud it is then, in [dB re 1 rad/s]; NaN where it was not heard.
+        seconds: How long it was predicted before and after, in [s].
+        level: How loud it is then, in [dB re 1 rad/s]; NaN where it was not predicted.
     """
 
     seconds: tuple[float, float]
@@ -137,7 +137,7 @@ def by_class(pair: Pair) -> tuple[ClassLevel, ...]:
     found = []
     for name in pair.before.labels.classes:
         before, after = (
-            _heard(pair, side, fast, name)
+            _class_level(pair, side, fast, name)
             for (_, side), fast in zip(pair.sides, pair.vibration, strict=True)
         )
         level = Level(name, before[1], after[1])
@@ -211,8 +211,8 @@ def shared_links(pair: Pair) -> tuple[str, ...]:
     return tuple(name for name in pair.links[0].links if name in pair.links[1].links)
 
 
-def _heard(pair: Pair, side: Analysis, fast: Array, name: str) -> tuple[float, float]:
-    """Say how long a class was heard in a run, and how loud that was."""
+def _class_level(pair: Pair, side: Analysis, fast: Array, name: str) -> tuple[float, float]:
+    """Duration of a class in a run in [s], and its level in [dB re 1 rad/s]."""
     labels = side.labels
     assert labels is not None
     own = labels.debounced == name

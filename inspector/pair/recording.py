@@ -9,17 +9,23 @@ import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfTree
 
+from inspector.errors import InspectorError
 from inspector.pair import classes, joints, links, noise
 from inspector.pair.blueprint import Contents, layout
-from inspector.pair.changes import CAME, Change, changes
+from inspector.pair.changes import NEW, Change, changes
+from inspector.pair.common import part
 from inspector.pair.levels import STEP, steps, whole
 from inspector.pair.pair import Pair
 from inspector.pair.report import report
-from inspector.pair.sound import sounds
 from inspector.recording import robot, unstable
 from inspector.recording.limbs import limbs
 from inspector.recording.series import TIMELINE
 from inspector.recording.stream import log_report, writing
+from inspector.sound.listening import Settings, common_gain, sound_of
+from inspector.sound.sound import SMALL_RATE
+
+MAX_VALUES = 8_000_000
+"""Velocities of a run that are mixed into a sound: a second of work."""
 
 
 def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
@@ -55,9 +61,9 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
     names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
     limb_plots = joints.log(recording, pair, limbs(tuple(names), tree))
     loop = _loudest_change(pair, found)
-    heard = sounds(pair, loop[0])
+    audible = _sounds(pair, loop[0])
     start = float(pair.time[0])
-    for name, sound in heard.items():
+    for name, sound in audible.items():
         unstable.log_audio(recording, f"/sound/{name}", sound, TIMELINE, start=start)
     _log_text(recording, pair)
     return Contents(
@@ -66,22 +72,43 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
         root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         lanes=lanes,
         events=bool(found),
-        sounds=tuple(heard),
+        sounds=tuple(audible),
         rate=pair.rate,
         loop=loop,
     )
 
 
 def _loudest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
-    """Choose what is looked at first: what came, or else where the level changed most."""
-    came = [change for change in found if change.kind == CAME]
-    if came:
-        worst = max(came, key=lambda change: change.level.after)
+    """When to look first: at the loudest new failure, or else where the level changed most."""
+    new = [change for change in found if change.kind == NEW]
+    if new:
+        worst = max(new, key=lambda change: change.level.after)
         begin, end = float(pair.time[0]), float(pair.time[-1])
         return max(worst.start, begin), min(worst.stop, end)
     time, level = steps(pair)
     place = float(time[np.abs(level[:, 1] - level[:, 0]).argmax()])
     return place - STEP, place + STEP
+
+
+def _sounds(pair: Pair, around: float) -> dict[str, bytes]:
+    """A WAV file of the simplified noise of each run, both at one gain; none if all is silent.
+
+    Of runs that are too long, only a part around a time in [s] is audible.
+    """
+    widest = max(2 * side.run.motion.shape[1] for _, side in pair.sides)
+    count = min(max(2, MAX_VALUES // widest), len(pair.time))
+    middle = int(np.searchsorted(pair.time, around))
+    first = min(max(middle - count // 2, 0), len(pair.time) - count)
+    try:
+        made = {
+            name: sound_of(part(side.run, first, first + count), Settings())
+            for name, side in pair.sides
+        }
+    except InspectorError:
+        return {}
+    gain = common_gain(list(made.values()))
+    lead = first / pair.rate
+    return {name: s.file(gain, rate=SMALL_RATE, lead=lead) for name, s in made.items()}
 
 
 def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from inspector.pair.changes import CAME, STAYED, WENT, changes, judged
+from inspector.pair.changes import NEW, RESOLVED, UNCHANGED, changes, labelled
 from inspector.pair.levels import Level, by_band, by_class, by_link, whole
 from inspector.pair.pair import Pair
 
@@ -26,11 +26,11 @@ def report(pair: Pair) -> str:
 def summary(pair: Pair) -> str:
     """Say in a line what changed."""
     found = changes(pair)
-    count = {kind: sum(each.kind == kind for each in found) for kind in (CAME, WENT, STAYED)}
+    count = {kind: sum(each.kind == kind for each in found) for kind in (NEW, RESOLVED, UNCHANGED)}
     events = "nothing found in either"
     if found:
         events = ", ".join(f"{number} {kind}" for kind, number in count.items())
-        events = f"{'findings' if judged(pair) else 'annotated failures'}: {events}"
+        events = f"{'findings' if labelled(pair) else 'annotated failures'}: {events}"
     return f"{events}; vibration {whole(pair).change:+.1f} dB"
 
 
@@ -40,7 +40,7 @@ def _parts(pair: Pair) -> Iterator[str]:
     yield f"Aligned {pair.alignment}. Changes in dB; positive is louder after."
     found = changes(pair)
     if found:
-        yield "## Events" if judged(pair) else "## Annotated events"
+        yield "## Events" if labelled(pair) else "## Annotated events"
         events = [
             (c.kind, c.label, f"{c.start:.2f}", f"{c.stop:.2f}", *_numbers(c.level)) for c in found
         ]

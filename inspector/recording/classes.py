@@ -23,7 +23,7 @@ def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
         recording: Where to.
         analysis: The run with its labels and blocks.
     """
-    run, labels = inspection.run, inspection.labels
+    run, labels = analysis.run, analysis.labels
     annotations = {block.label for block in run.blocks}
     known = () if labels is None else labels.classes
     colours = colors.of_classes((*known, *sorted(annotations - set(known))))
@@ -33,7 +33,7 @@ def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
         _log_scores(recording, labels, colours)
     if run.blocks:
         series.log_lane(recording, "/class/annotated", annotated(run), colours)
-    _log_events(recording, inspection, colours)
+    _log_events(recording, analysis, colours)
 
 
 def found(labels: Labels) -> Lane:
@@ -67,14 +67,14 @@ def _log_events(
     recording: rr.RecordingStream, analysis: Analysis, colours: dict[str, colors.Color]
 ) -> None:
     """List the failures that were found and annotated, by time: findings are warnings."""
-    rows: list[tuple[str, Event | Block]] = [("found", event) for event in inspection.events]
-    rows += [("annotated", block) for block in inspection.run.blocks if block.label != "ok"]
+    rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
+    rows += [("annotated", block) for block in analysis.run.blocks if block.label != "ok"]
     rows.sort(key=lambda row: row[1].start)
     if rows:
         series.log_events(
             recording,
             [event.start for _, event in rows],
-            [f"{how}: {sentence(inspection, event)}" for how, event in rows],
+            [f"{how}: {sentence(analysis, event)}" for how, event in rows],
             [colours[event.label] for _, event in rows],
             warnings=[how == "found" for how, _ in rows],
         )

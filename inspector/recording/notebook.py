@@ -1,15 +1,34 @@
 """Show a run from Python: in a notebook's cell, else in a window."""
 
+import os
 import sys
 import tempfile
+from contextlib import redirect_stdout
+from importlib import import_module
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import noisemodel as nm
 from inspector.recording.viewer import ViewerError
 
 SIZE = ("auto", 760)
 """Width and height of a notebook's viewer, in pixels; it is as wide as its cell."""
+LOADER = """
+export default {
+  async render({ model, el }) {
+    const code = new Blob([model.get("_code")], { type: "text/javascript" });
+    const url = URL.createObjectURL(code);
+    const { default: viewer } = await import(url);
+    URL.revokeObjectURL(url);
+    return viewer.render({ model, el });
+  },
+};
+"""
+"""Begins the viewer's code, which is 23 MB long. If that were the widget's own code, and took more
+than two seconds to begin, anywidget (0.11) would forget what is sent to the widget: size, data.
+"""
 
 
 def show(
@@ -36,7 +55,7 @@ def show(
         InspectorError: If the robot's shape cannot be had.
         NoiseModelError: If the run cannot be read, or its robot.
     """
-    from inspector.recording import cell, viewer
+    from inspector.recording import viewer
 
     inside = in_notebook()
     if inside and find_spec("rerun_notebook") is None:
@@ -45,7 +64,7 @@ def show(
         )
     if inside:
         with tempfile.TemporaryDirectory() as folder:
-            cell.show(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
+            show_recording(_recorded(run, Path(folder) / "run.rrd", robot=robot, kind=kind), size)
         return
     recording = viewer.scratch_path(Path("shown.npz") if isinstance(run, nm.Run) else Path(run))
     _recorded(run, recording, robot=robot, kind=kind)
@@ -63,6 +82,36 @@ def in_notebook() -> bool:
     """Whether this runs in a kernel that shows widgets, as Jupyter's does."""
     loaded = sys.modules.get("IPython")
     return loaded is not None and hasattr(loaded.get_ipython(), "kernel")
+
+
+def show_recording(recording: Path, size: tuple[int | str, int]) -> None:
+    """Show a recording below the cell that runs.
+
+    Args:
+        recording: A ``*.rrd`` file.
+        size: Width, or ``"auto"`` for that of the cell, and height, in pixels.
+    """
+    width, height = size
+    widget = widget_class()(width=width, height=height)
+    import_module("IPython.display").display(widget)
+    widget.send_rrd(recording.read_bytes())
+
+
+def widget_class() -> Any:
+    """The class of a widget whose data all come from this machine.
+
+    Returns:
+        ``rerun_notebook.Viewer``, or a subclass of it if the viewer's code is sent along.
+    """
+    # Otherwise the widget fetches its code from app.rerun.io.
+    os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
+    with redirect_stdout(StringIO()):  # it prints that it does so
+        rerun = import_module("rerun_notebook")
+    code = str(rerun.ESM_MOD)
+    if code.startswith(("http://", "https://")):
+        return rerun.Viewer
+    sent = import_module("traitlets").Unicode(code).tag(sync=True)
+    return type("Viewer", (rerun.Viewer,), {"_esm": LOADER, "_code": sent})
 
 
 def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:

@@ -40,10 +40,10 @@ def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: byt
         RobotError: If the run's URDF cannot be read, or lacks one of the run's joints.
         MeshError: If one of the robot's meshes cannot be read.
     """
-    identity = inspection.sha256
+    identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
-        tree = robot.of_run(inspection.run, Path(folder)) if inspection.has_robot else None
-        contents = _log(recording, inspection, tree, sound)
+        tree = robot.of_run(analysis.run, Path(folder)) if analysis.has_robot else None
+        contents = _log(recording, analysis, tree, sound)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
 
 
@@ -97,19 +97,19 @@ def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> None:
 def _log_text(
     recording: rr.RecordingStream, analysis: Analysis, entities: Mapping[str, str]
 ) -> None:
-    run, links = inspection.run, inspection.links
+    run, links = analysis.run, analysis.links
     properties = {
-        "input_sha256": inspection.sha256,
+        "input_sha256": analysis.sha256,
         "robot": run.robot or "",
         "rate_hz": run.rate,
         "duration_s": run.duration,
         "joints": len(run.joint_names),
         "samples_in_gaps": int((~run.mask).sum()),
-        "model": inspection.model,
+        "model": analysis.model,
         "link_noise": "" if links is None else links.kind,
-        "findings": len(inspection.events),
+        "findings": len(analysis.findings),
     }
-    log_report(recording, inspection.name, linked(report(inspection), entities), properties)
+    log_report(recording, analysis.name, linked(report(analysis), entities), properties)
 
 
 def linked(markdown: str, entities: Mapping[str, str]) -> str:
