@@ -32,14 +32,14 @@ SERIES: tuple[Color, ...] = (
 
 
 def of_classes(classes: tuple[str, ...]) -> dict[str, Color]:
-    """Give each class its colour; classes that are not NoisyTest's own take further ones."""
+    """The colour of each class; classes that are not NoisyTest's own take further ones."""
     others = [name for name in classes if name not in CLASSES]
     extra = {name: OTHERS[i % len(OTHERS)] for i, name in enumerate(others)}
     return {name: CLASSES.get(name) or extra[name] for name in classes}
 
 
 def of_series(count: int, *, dim: bool = False) -> list[Color]:
-    """Give each of several lines its colour, paler ones for what is merely desired."""
+    """The colours of several lines, paler ones if dim."""
     shade = 0.55 if dim else 1.0
     colors = [SERIES[i % len(SERIES)] for i in range(count)]
     return [(int(r * shade), int(g * shade), int(b * shade)) for r, g, b in colors]
@@ -51,7 +51,7 @@ LOUDNESS: dict[str, Color] = {
     "high": (250, 170, 40),
     "critical": (255, 248, 180),
 }
-"""How loud a link is. The louder, the lighter: that order is seen with any eyes."""
+"""How loud a link is. The louder, the lighter: that order is visible to any eyes."""
 
 HEAT = np.array(
     [[13, 8, 45], [66, 10, 104], [147, 38, 103], [221, 81, 58], [252, 165, 10], [252, 255, 164]],

@@ -39,11 +39,11 @@ def layout(contents: Contents) -> Blueprint:
         contents: What there is to show.
     """
     top = min(TOP_HZ, contents.rate / 2)
-    strip = f"Spectrogram of the noise, 0-{top:.0f} Hz, {FLOOR_DB:.0f}-0 dB re 1 rad/s"
+    title = f"Spectrogram of the noise, 0-{top:.0f} Hz, {FLOOR_DB:.0f}-0 dB re 1 rad/s"
     right = [
         (_plot("/noise", "Noise, simplified estimate [rad/s]"), 2.2),
-        (_plot("/spectrogram", strip, between=(0.0, top)), 2.8),
-        (_details(contents), 4.2),
+        (_plot("/spectrogram", title, between=(0.0, top)), 2.8),
+        (_signals(contents), 4.2),
     ]
     if contents.classes:
         right.insert(0, (unstable.lanes("Classes", "/class", last=SHOWN), 1.6))
@@ -67,7 +67,7 @@ def _plot(
     )
 
 
-def _details(contents: Contents) -> Part:
+def _signals(contents: Contents) -> Part:
     plots = [_plot("/joints", title, paths, legend=True) for title, paths in contents.joints]
     if contents.classes:
         plots.append(_plot("/score", "Scores", legend=True))

@@ -148,7 +148,7 @@ class CsvReader:
 
 
 def _numbered(number: str | int, names: tuple[str, ...]) -> str:
-    """Name a joint that a column knows by its number."""
+    """The name of a joint that a column has by its number."""
     number = int(number)
     return names[number] if number < len(names) else f"joint{number + 1}"
 

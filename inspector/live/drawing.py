@@ -150,7 +150,7 @@ class Drawing:
         log_events(self._recording, [time], [text], [colour])
 
     def _keep(self, kind: str, time: Array, values: Array, points: float) -> None:
-        """Thin a stretch, and let it wait; the arrays that it comes in will be used again."""
+        """Thin a stretch, and let it wait; the arrays that it is in will be used again."""
         shown, thin = extremes(time, values, points=max(2, round(points)))
         self._waiting.setdefault(kind, []).append((shown.copy(), thin.copy()))
 

@@ -20,7 +20,7 @@ EXPECTED = "expected a CSV header and rows, or a JSON object per line"
 def follow(
     stream: BinaryIO, names: tuple[str, ...], session_of: Callable[[tuple[str, ...]], LiveSession]
 ) -> Summary:
-    """Show rows as they come, until they end or somebody presses Ctrl-C.
+    """Show rows as they arrive, until they end or Ctrl-C is pressed.
 
     Args:
         stream: The rows, such as standard input.

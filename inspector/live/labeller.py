@@ -1,4 +1,4 @@
-"""Labels of motion while it comes in, by the model that fits its rate."""
+"""Labels of motion while it arrives, by the model that fits its rate."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -18,10 +18,10 @@ NOISY = ("base_velocity", "velocity", "velocity_desired")
 
 
 class NoiseSignals:
-    """Noise signals of motion that comes in columns: `noisemodel.norms` and joints, without a run.
+    """Noise signals of motion in columns: `noisemodel.norms` and `by_joint`, without a run.
 
     Args:
-        widths: Columns of each signal that comes in.
+        widths: Columns of each signal that arrives.
 
     Attributes:
         columns: How many columns make noise: those of ``NOISY``, in that order.
@@ -63,16 +63,16 @@ class NoiseSignals:
 
 
 class Labeller:
-    """Labels frames as they become complete, or says why it does not.
+    """Labels frames as they become complete, or gives the reason why it does not.
 
     Args:
         library: Models to choose from.
         rate: Samples per second, in [Hz].
-        widths: Columns of each signal that comes in.
+        widths: Columns of each signal that arrives.
 
     Attributes:
         model: Name of the model that labels; empty without one.
-        remark: Why there are no labels, or at which other rate; empty if there is nothing to say.
+        remark: Why there are no labels, or at which other rate; empty if neither.
     """
 
     def __init__(self, library: Library, rate: float, widths: Mapping[str, int]) -> None:
@@ -148,7 +148,7 @@ class Labeller:
         if self._decimator is None:
             self._stream.skip(samples)
             return
-        # Samples in a gap are all alike: enough of them to fill the filter are looked at.
+        # Samples in a gap are all alike: enough of them to fill the filter are processed.
         whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
         self._stream.skip(whole)
         rest = samples - whole * self._ratio

@@ -94,7 +94,7 @@ class LiveRobot:
         )
 
     def transforms(self, position: Array) -> tuple[Array, Array]:
-        """Say where each joint's link is, as seen from the link that carries it.
+        """The pose of each joint's link relative to the link that carries it.
 
         Args:
             position: Of the named joints, shape (joints,), in [rad] or [m].

@@ -42,7 +42,7 @@ class Reader(Protocol):
 
 
 def widen(stream: BinaryIO) -> None:
-    """Let a pipe hold as much as is read at once: whoever writes into it need not wait for us."""
+    """Let a pipe hold as much as is read at once: its writer need not wait for us."""
     import fcntl
 
     with suppress(AttributeError, OSError):  # another system; no pipe

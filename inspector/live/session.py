@@ -64,7 +64,7 @@ class Summary:
 
 
 class LiveSession:
-    """Takes samples while they are made, and shows them with noise and labels.
+    """Takes samples while they are measured, and shows them with noise and labels.
 
     Samples are worked on in batches of 50 ms: `push` returns at once for most, and takes some
     milliseconds for one that completes a batch. A viewer that cannot keep up makes it wait.

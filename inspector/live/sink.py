@@ -1,4 +1,4 @@
-"""Where a live recording goes: a file, a viewer that runs, or one that is opened for it."""
+"""The sinks of a live recording: a file, a viewer that runs, or one that is opened for it."""
 
 import os
 import re
@@ -35,7 +35,7 @@ MEMORY = "2GB"
 
 
 class Sink:
-    """A recording that goes somewhere.
+    """A recording with its sinks.
 
     Args:
         save: File to write, whole when it is closed; None writes none.
@@ -45,7 +45,7 @@ class Sink:
 
     Attributes:
         recording: What to log into.
-        where: Where it goes, in words.
+        where: Its sinks, in words.
         gone: Whether there was a viewer that is there no more.
 
     Raises:
@@ -76,7 +76,7 @@ class Sink:
 
     @property
     def alive(self) -> bool:
-        """Whether somebody takes what is logged: a file does when its viewer is gone."""
+        """Whether any sink takes what is logged: a file does when its viewer is gone."""
         return self._file or not self.gone
 
     def check_viewer(self) -> bool:
@@ -160,9 +160,9 @@ def _listens(host: str, port: int) -> bool:
 
 
 def _is_viewer(host: str, port: int) -> bool:
-    """Ask for what no gRPC server has: one answers with a status, and others do not.
+    """Request what no gRPC server has: one answers with a status, and others do not.
 
-    Rerun's client itself would wait for good for somebody else's server.
+    Rerun's client itself would wait for ever for another server.
     """
     connection = HTTPConnection(host, port, timeout=CONNECT_TIMEOUT)
     try:

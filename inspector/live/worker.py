@@ -119,7 +119,7 @@ class Worker:
         motion = np.where(valid[:, None], motion, 0.0)
         noise = nm.simplified(motion)  # of measured and desired velocities side by side
         edges = [0, *np.flatnonzero(lost[1:] > 0) + 1, len(time)]
-        for first, stop in pairwise(edges):  # labels first: somebody waits for them
+        for first, stop in pairwise(edges):  # labels first: their latency counts
             piece = slice(first, stop)
             self._skip(int(lost[first]))
             self._label(time[piece], received[piece], motion[piece], noise[piece], valid[piece])

@@ -1,7 +1,7 @@
 """Where one run lies on the time axis of another, from the motion that both made.
 
 What is laid over each other is the envelope of the motion, the speed of all joints together: it
-is there in every run, and does not ask for joints of the same names.
+is there in every run, and does not need joints of the same names.
 """
 
 from dataclasses import dataclass
@@ -126,7 +126,7 @@ def _search(before: Run, after: Run) -> tuple[int, float, float]:
     left = below[below < best].max(initial=-1)
     right = below[below > best].min(initial=len(correlation))
     beyond = np.concatenate((correlation[: left + 1], correlation[right:]))
-    # A peak without an end is as high elsewhere: a motion that only speeds up tells no time.
+    # A peak without an end is as high elsewhere: a motion that only speeds up determines no lag.
     rival = beyond.max(initial=-1.0) if len(beyond) else correlation[best]
     return int(lags[best]), float(correlation[best]), float(rival)
 

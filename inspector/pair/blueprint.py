@@ -16,7 +16,7 @@ from inspector.recording.unstable import Part
 
 @dataclass(frozen=True)
 class Contents:
-    """What a recording of two runs holds, as far as the layout goes.
+    """What a recording of two runs holds, that the layout depends on.
 
     Attributes:
         joints: Plots of joint signals.
@@ -24,7 +24,7 @@ class Contents:
         root: Frame that the robot is seen from; None without a robot.
         lanes: How many lanes of classes there are.
         events: Whether any change is listed.
-        sounds: What there is to listen to.
+        sounds: Names of the sounds.
         rate: Samples per second, in [Hz].
         loop: Stretch of time that playing repeats, in [s].
     """

@@ -101,7 +101,7 @@ def spectra(pair: Pair) -> Spectra:
 
 
 def steps(pair: Pair) -> tuple[Array, Array]:
-    """Take the level of both noises, above 10 Hz, every 50 ms.
+    """The level of both noises, above 10 Hz, every 50 ms.
 
     Returns:
         Centres of the steps, shape (steps,), in [s], and levels, shape (steps, 2),
@@ -117,7 +117,7 @@ def steps(pair: Pair) -> tuple[Array, Array]:
 
 
 def within(pair: Pair, start: float, stop: float, name: str = "") -> Level:
-    """Take the level of both noises, above 10 Hz, in a stretch of time, in [dB re 1 rad/s]."""
+    """The level of both noises, above 10 Hz, in a stretch of time, in [dB re 1 rad/s]."""
     first, last = _samples(pair, np.array([start, stop])).tolist()
     inside = slice(first, last)
     count = max(int(pair.valid[inside].sum()), 1)
@@ -126,12 +126,12 @@ def within(pair: Pair, start: float, stop: float, name: str = "") -> Level:
 
 
 def whole(pair: Pair) -> Level:
-    """Take the level of both noises, above 10 Hz, in all of the time that they share."""
+    """The level of both noises, above 10 Hz, in all of the time that they share."""
     return within(pair, float(pair.time[0]), float(pair.time[-1]) + 1 / pair.rate, "whole")
 
 
 def by_class(pair: Pair) -> tuple[ClassLevel, ...]:
-    """Take how long and how loud each class is; nothing unless both runs were labelled."""
+    """How long and how loud each class is; nothing unless both runs were labelled."""
     if pair.before.labels is None or pair.after.labels is None:
         return ()
     found = []
@@ -146,7 +146,7 @@ def by_class(pair: Pair) -> tuple[ClassLevel, ...]:
 
 
 def by_band(pair: Pair) -> tuple[Level, ...]:
-    """Take the level of both noises in octaves from 16 Hz, in [dB re 1 rad/s]."""
+    """The level of both noises in octaves from 16 Hz, in [dB re 1 rad/s]."""
     both, found = spectra(pair), []
     centre = LOWEST_BAND
     while centre < pair.rate / 2:
@@ -161,7 +161,7 @@ def by_band(pair: Pair) -> tuple[Level, ...]:
 
 
 def by_link(pair: Pair) -> tuple[Level, ...]:
-    """Take the power of each link's vibration, that which changed most first.
+    """The power of each link's vibration, that which changed most first.
 
     Returns:
         Levels in [dB re 1 pW]; nothing where links are not compared.
@@ -180,7 +180,7 @@ def by_link(pair: Pair) -> tuple[Level, ...]:
 
 
 def link_steps(pair: Pair, names: Sequence[str]) -> tuple[Array, Array]:
-    """Take by how much links became louder, every 50 ms.
+    """Change of the level of links, every 50 ms.
 
     Args:
         pair: Two runs of one robot.
@@ -206,7 +206,7 @@ def link_steps(pair: Pair, names: Sequence[str]) -> tuple[Array, Array]:
 
 
 def shared_links(pair: Pair) -> tuple[str, ...]:
-    """Name the links that both have."""
+    """The links that both have."""
     assert pair.links is not None
     return tuple(name for name in pair.links[0].links if name in pair.links[1].links)
 
@@ -225,7 +225,7 @@ def _class_level(pair: Pair, side: Analysis, fast: Array, name: str) -> tuple[fl
 
 
 def _samples(pair: Pair, time: Array) -> NDArray[np.intp]:
-    """Name the samples nearest to times; the end is one too."""
+    """The samples nearest to times; the end is one too."""
     nearest = np.round((time - pair.time[0]) * pair.rate).astype(np.intp)
     clipped: NDArray[np.intp] = np.clip(nearest, 0, len(pair.time))
     return clipped

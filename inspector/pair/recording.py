@@ -52,10 +52,10 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
 
 
 def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Contents:
-    run, found, loud = pair.after.run, changes(pair), list[str]()
+    run, found, shown = pair.after.run, changes(pair), list[str]()
     if tree is not None:
         robot.log(recording, tree, run, coloured=True)
-        loud = links.log(recording, tree, pair)
+        shown = links.log(recording, tree, pair)
     lanes = classes.log(recording, pair, found)
     noise.log(recording, pair)
     names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
@@ -68,7 +68,7 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
     _log_text(recording, pair)
     return Contents(
         joints=limb_plots,
-        links=loud,
+        links=shown,
         root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         lanes=lanes,
         events=bool(found),

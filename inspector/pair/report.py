@@ -24,7 +24,7 @@ def report(pair: Pair) -> str:
 
 
 def summary(pair: Pair) -> str:
-    """Say in a line what changed."""
+    """What changed, in a line."""
     found = changes(pair)
     count = {kind: sum(each.kind == kind for each in found) for kind in (NEW, RESOLVED, UNCHANGED)}
     events = "nothing found in either"

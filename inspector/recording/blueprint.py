@@ -15,7 +15,7 @@ from inspector.recording.unstable import Part
 
 @dataclass(frozen=True)
 class Contents:
-    """What a recording holds, as far as the layout goes.
+    """What a recording holds that the layout depends on.
 
     Attributes:
         joints: Plots of joint signals.
@@ -26,7 +26,7 @@ class Contents:
         lanes: How many lanes of classes there are, found and annotated.
         events: Whether any of them is listed.
         scores: Whether there are scores.
-        sound: Whether there is a sound to listen to.
+        sound: Whether there is a sound.
         rate: Samples per second, in [Hz].
         loop: Stretch of time that playing repeats, in [s].
     """
@@ -91,7 +91,7 @@ def _noise(contents: Contents) -> Part:
 
 def _spectrogram(contents: Contents) -> Part:
     top = min(TOP_HZ, contents.rate / 2)
-    strip = unstable.plot(
+    bands = unstable.plot(
         f"Spectrogram of the noise, 0-{top:.0f} Hz",
         "/spectrogram/bands",
         between=(0.0, top),
@@ -99,7 +99,7 @@ def _spectrogram(contents: Contents) -> Part:
     )
     whole = unstable.tensor(f"to {contents.rate / 2:.0f} Hz [dB]", "/spectrogram/levels")
     now = unstable.bars(f"Spectrum at the cursor, 0-{top:.0f} Hz [dB]", "/spectrogram/now")
-    return unstable.tabs(strip, whole, now)
+    return unstable.tabs(bands, whole, now)
 
 
 def _links() -> Part:

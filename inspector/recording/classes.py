@@ -16,8 +16,8 @@ Lane: TypeAlias = list[tuple[float, float, str]]
 """Start and stop in [s] and class of stretches in order of time."""
 
 
-def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
-    """Log what a model found, and what somebody annotated.
+def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
+    """Log the classes that a model found, and those that are annotated.
 
     Args:
         recording: Where to.

@@ -1,4 +1,4 @@
-"""Raw samples in a recording, around the moments that are worth it."""
+"""Details in a recording: raw samples around the worst moments."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from inspector.thinning import extremes
 from noisemodel.links import vibrating
 
 SPAN = 0.5
-"""What is shown of a moment, in [s]."""
+"""Duration of a detail, in [s]."""
 JOINTS = 5
 POINTS = 10_000
 """Samples of a line; a run at 20 kHz or less is shown whole."""

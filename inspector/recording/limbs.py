@@ -1,4 +1,4 @@
-"""The limbs of a robot: joints that follow each other, so that they can be looked at together."""
+"""The limbs of a robot: joints that follow each other, to be shown in one plot."""
 
 from collections import Counter
 from collections.abc import Sequence

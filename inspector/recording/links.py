@@ -38,7 +38,7 @@ class Levels:
 
 
 def levels(noise: LinkNoise) -> Levels:
-    """Take the levels of the links' vibration every 50 ms (or bin, if that is longer).
+    """Levels of the links' vibration every 50 ms (or bin, if that is longer).
 
     The whole motion would not do: a link that moves fast and smoothly would be the loudest.
 
@@ -59,7 +59,7 @@ def levels(noise: LinkNoise) -> Levels:
 
 
 def states(level: Array) -> list[str]:
-    """Tell states apart so that they do not flicker.
+    """States of a link, with hysteresis so that they do not flicker.
 
     A state is entered at its threshold and left 3 dB below.
 

@@ -40,8 +40,8 @@ def show(
 ) -> None:
     """Show a run in rerun's viewer: joints, noise, spectrogram, classes, the moving robot.
 
-    In a notebook the viewer appears below the cell, after some seconds: all of it, 23 MB, comes
-    from the kernel's machine, unless ``RERUN_NOTEBOOK_ASSET`` is set, which is rerun's. From plain
+    In a notebook the viewer appears below the cell, after some seconds: all of it, 23 MB, is sent
+    by the kernel's machine, unless ``RERUN_NOTEBOOK_ASSET`` is set, which is rerun's. From plain
     Python a window opens, which stays when the program ends.
 
     Args:
@@ -51,7 +51,7 @@ def show(
         size: Width and height of a notebook's viewer, in pixels; ``"auto"`` is as wide as the cell.
 
     Raises:
-        ViewerError: If there is neither a notebook nor a display, or something is not installed.
+        ViewerError: If there is neither a notebook nor a display, or the viewer is not installed.
         InspectorError: If the robot's shape cannot be had.
         NoiseModelError: If the run cannot be read, or its robot.
     """

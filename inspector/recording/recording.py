@@ -59,12 +59,12 @@ def _log(
     if sound:
         unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
     limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
-    closeups = details.log(recording, analysis, moments)
-    _log_text(recording, analysis, {} if tree is None else robot.entities(tree))
+    shown = details.log(recording, inspection, moments)
+    _log_text(recording, inspection, {} if tree is None else robot.entities(tree))
     failures = [moment for moment in moments if moment.failure]
     return Contents(
         joints=limb_plots,
-        details=closeups,
+        details=shown,
         root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         links=links is not None,
         terms=links is not None and bool(links.terms),

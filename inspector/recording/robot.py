@@ -1,4 +1,4 @@
-"""The moving robot in a recording, from its URDF."""
+"""The robot in a recording, from its URDF, and its motion."""
 
 import hashlib
 import re
@@ -71,12 +71,12 @@ def of_run(run: Run, folder: Path) -> UrdfTree:
 
 
 def root(tree: UrdfTree, *, floating: bool) -> str:
-    """Name the frame that a robot is seen from: its base, or the world if that floats."""
+    """The frame that a robot is seen from: its base, or the world if that floats."""
     return WORLD if floating else str(tree.root_link().name)
 
 
 def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
-    """List, for each link that moves, the URDF's links that are fixed to it, itself first.
+    """For each link that moves, the URDF's links that are fixed to it, itself first.
 
     What is fixed to the root belongs to the root.
     """
@@ -94,7 +94,7 @@ def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
 
 
 def entities(tree: UrdfTree) -> dict[str, str]:
-    """Name, for each link that moves and is drawn, the entity to select."""
+    """The entity to select of each link that moves and is drawn."""
     found = {}
     for link, members in moving_links(tree).items():
         drawn = [path for member in members for path in tree.get_visual_geometry_paths(member)]
@@ -104,7 +104,7 @@ def entities(tree: UrdfTree) -> dict[str, str]:
 
 
 def shapes(tree: UrdfTree) -> dict[str, str]:
-    """Tell the shape of each entity that is drawn, a key of ``COLOURED``."""
+    """The shape of each entity that is drawn, a key of ``COLOURED``."""
     found = {}
     for chunk in tree.stream().to_chunks():
         for name in chunk.to_record_batch().schema.names:
@@ -231,7 +231,7 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
 
     Args:
         urdf: A URDF that has been checked.
-        roots: Folders in which ``package://`` addresses are looked up and meshes may lie.
+        roots: Folders in which ``package://`` addresses are searched for and meshes may lie.
         folder: Takes the meshes that rerun cannot read, written anew as STL.
 
     Returns:
@@ -243,8 +243,8 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     tree = ET.parse(urdf).getroot()  # noqa: S314
     for parent in list(tree.iter()):
         for child in list(parent):
-            bare = child.tag == "texture" and not child.get("filename")
-            if bare or child.tag in ("collision", "gazebo", "transmission", "sensor"):
+            empty = child.tag == "texture" and not child.get("filename")
+            if empty or child.tag in ("collision", "gazebo", "transmission", "sensor"):
                 parent.remove(child)
     for mesh in tree.iter("mesh"):
         mesh.set("filename", f"file://{_checked(mesh.get('filename', ''), urdf, roots, folder)}")
@@ -257,7 +257,7 @@ def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> P
         if path.suffix.lower() not in DRAWN:
             known = ", ".join(sorted(DRAWN))
             raise MeshError(address, f"of kind {path.suffix!r}, expected {known}")
-        meshfile.check_whole(path)  # the viewer would draw nothing, and say nothing
+        meshfile.check_whole(path)  # the viewer draws nothing of others, without a warning
         if path.suffix.lower() == ".dae" and not _read_by_rerun(path):
             return _as_stl(path, folder)
     except noisemodel.MeshError as error:

@@ -28,11 +28,11 @@ MAGIC = b"RRF2"
 TIMEOUT = 120.0
 """How long the viewer may take to draw everything, in [s]."""
 REPORTS_TIMEOUT = 20.0
-"""After this, reports of views are no longer those of data that is still arriving, in [s]."""
+"""Time after which a view's report is not due to data that is still arriving, in [s]."""
 
 
 def missing_packages() -> tuple[str, ...]:
-    """Name the system packages, as Debian calls them, that pictures take and that are not there."""
+    """The system packages that pictures need and that are missing, by their names in Debian."""
     if not sys.platform.startswith("linux"):
         return ()  # others draw without Vulkan
     packages = [] if find_library("vulkan") else ["libvulkan1"]
@@ -185,7 +185,7 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
         time.sleep(0.3)
         try:
             frames.append(client.take_screenshot())
-        except Exception as error:  # a viewer under load misses its own deadlines: ask again
+        except Exception as error:  # a viewer under load misses its own deadlines: try again
             problem = str(error).partition("\n")[0]
     if not frames:
         raise ViewerError(f"the viewer draws nothing within {TIMEOUT:g} s ({problem})")
@@ -193,7 +193,7 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
 
 
 def final_state(client: "ViewerClient") -> Any:
-    """Ask for the viewer's state; reports that go away while data arrives are no reports."""
+    """The viewer's state once its views report nothing, or after 20 s what they report then."""
     until = time.monotonic() + REPORTS_TIMEOUT
     while True:
         state = client.get_state()

@@ -54,7 +54,7 @@ def log_lines(
 def style_lines(
     recording: rr.RecordingStream, path: str, *, names: Sequence[str], colours: Sequence[Color]
 ) -> None:
-    """Log how the lines of one entity are drawn; `log_lines` says what is what."""
+    """Log how the lines of one entity are drawn; see `log_lines`."""
     # Rerun's default aggregation draws the mean of a pixel's extremes, which hides vibration.
     style = rr.SeriesLines(
         names=list(names),

@@ -3,11 +3,11 @@
 What churns, as seen from 0.41:
 
 - ``rerun.blueprint`` as a whole: names and arguments of views and axes change between minor
-  versions, and what a view does by default does too, hence everything here is said outright;
+  versions, and so do the defaults of views, hence everything here is explicit;
 - ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
   time that it is logged at; a static asset stays silent;
 - ``ViewCoordinates``;
-- ``rerun.experimental``, by which a viewer is asked for pictures and for what its views report;
+- ``rerun.experimental``, by which a viewer returns pictures and what its views report;
 - columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
 
 Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
@@ -58,7 +58,9 @@ def plot(
         during: Stretch of time that is shown, in [s]; unless given, that of all other views.
         last: Time up to the cursor that is shown in place of that, in [s].
     """
-    corner = rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop  # news is at the right
+    corner = (
+        rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop
+    )  # the newest is at the right
     return rrb.TimeSeriesView(
         origin=origin,
         contents=list(paths),
@@ -70,7 +72,7 @@ def plot(
 
 
 def lanes(name: str, origin: str, *, last: float | None = None) -> Part:
-    """Draw states over time, a lane for each entity under ``origin``; `plot` says what is shown."""
+    """Draw states over time, a lane for each entity under ``origin``; see `plot`."""
     return rrb.StateTimelineView(origin=origin, name=name, time_view=_over(last))
 
 
@@ -146,7 +148,7 @@ def blueprint(
         content: What to show.
         timeline: Along which time runs.
         loop: Stretch of time that is selected, and that playing repeats, in [s].
-        following: Whether time goes on with what comes in; it stands unless said.
+        following: Whether the time cursor follows the latest data.
     """
     playing: Literal["following", "paused"] = "following" if following else "paused"
     time = rrb.TimePanel(state="collapsed", timeline=timeline, play_state=playing)
@@ -233,12 +235,12 @@ def log_tensor(
 
 
 def log_up(recording: rr.RecordingStream) -> None:
-    """Say that z points upwards, in right-handed axes."""
+    """Log that z points upwards, in right-handed axes."""
     recording.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
 
 def client(address: str) -> "ViewerClient":
-    """Reach a viewer that runs, to ask it for its state and for pictures; raises what it likes."""
+    """Client of a viewer that runs, for its state and for pictures; may raise any exception."""
     from rerun.experimental import ViewerClient
 
     return ViewerClient.connect(address)

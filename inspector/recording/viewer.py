@@ -1,4 +1,4 @@
-"""Open a recording in rerun's viewer, or say how to."""
+"""Rerun's viewer: start it, open a recording in it, or explain how to."""
 
 import hashlib
 import os
@@ -19,14 +19,14 @@ from typing import IO
 from inspector.errors import InspectorError
 
 SETTLE = 2.0
-"""How long a viewer that cannot start takes to say so, in [s]."""
+"""Time within which a viewer that cannot start ends, in [s]."""
 PORT = "9876"
 """Where rerun's viewer listens; one that does already takes the recording over."""
 HOST = "127.0.0.1"
-KEPT = 20
-"""Recordings that nobody named, of which the newest are kept."""
-ROOM = 1_000_000_000
-"""What they may take together, in bytes."""
+MAX_SCRATCH_FILES = 20
+"""Recordings without a name that are kept, the newest."""
+MAX_SCRATCH_BYTES = 1_000_000_000
+"""What they may take together."""
 
 
 class ViewerError(InspectorError):
@@ -41,9 +41,9 @@ def has_display() -> bool:
 
 
 def scratch_path(run: Path) -> Path:
-    """Name the file for a recording that nobody named: the same run replaces its own.
+    """The file for a recording without a name: the same run replaces its own.
 
-    The oldest of those that were named before are deleted where there are too many.
+    The oldest of such files are deleted where there are too many.
 
     Args:
         run: The run file that is viewed.
@@ -66,13 +66,13 @@ def _make_room(folder: Path) -> None:
     taken = 0
     for place, path in enumerate(newest, start=1):
         taken += found[path].st_size
-        if place >= KEPT or taken > ROOM:
+        if place >= MAX_SCRATCH_FILES or taken > MAX_SCRATCH_BYTES:
             with suppress(OSError):
                 path.unlink()
 
 
 def command(*arguments: str) -> list[str]:
-    """Write the command line of rerun's viewer; it listens on loopback only.
+    """The command line of rerun's viewer; it listens on loopback only.
 
     Args:
         arguments: Options beyond that.
@@ -157,7 +157,7 @@ def open_window(recording: Path) -> str:
         recording: A ``*.rrd`` file.
 
     Returns:
-        What went wrong, or nothing.
+        The error, empty if there is none.
 
     Raises:
         ViewerError: If the viewer is not installed.
@@ -177,7 +177,7 @@ def _started(recording: Path, port: str) -> str:
 
 
 def how_to_open(recording: Path) -> str:
-    """Say how a recording is opened, in the viewer and in a browser."""
+    """How a recording is opened, in the viewer and in a browser."""
     path = shlex.quote(str(recording))
     rerun = shlex.quote(str(Path(sys.executable).with_name("rerun")))
     return (

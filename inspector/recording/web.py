@@ -14,7 +14,7 @@ from inspector.recording import viewer
 from inspector.recording.viewer import HOST, ViewerError
 
 START_TIMEOUT = 30.0
-"""How long a server may take to answer, in [s]."""
+"""Time within which a server has to answer, in [s]."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Served:
 
 
 def serve(recording: Path, announce: Callable[[str], None], *, port: int = 0) -> None:
-    """Serve a recording on loopback, and open it, until somebody stops the program.
+    """Serve a recording on loopback, and open it, until the program is stopped.
 
     Args:
         recording: A ``*.rrd`` file.
@@ -87,11 +87,11 @@ def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
 
 
 def free_port(wanted: int = 0, *, other: int = 0) -> int:
-    """Find a port of loopback that nobody listens on.
+    """A port of loopback that no program listens on.
 
     Args:
         wanted: The port to take; any if 0.
-        other: A port that is spoken for.
+        other: A port that is not to be returned.
 
     Raises:
         ViewerError: If ``wanted`` cannot be had.

@@ -157,3 +157,42 @@ def test_a_browser_draws_the_recording(recording, tmp_path):
             page.wait_for_timeout(3000)
             sizes.append(len(page.screenshot(path=tmp_path / "web.png", timeout=60_000)))
     assert sizes[-1] > 40_000
+
+
+# Recordings without a name: few are kept.
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    return viewer.scratch_path(Path("first.npz")).parent
+
+
+def recorded(folder, count, *, size=1):
+    """Write recordings, each younger than the one before."""
+    paths = [folder / f"run{number}.rrd" for number in range(count)]
+    for age, path in enumerate(reversed(paths)):
+        path.write_bytes(bytes(size))
+        os.utime(path, (1e9 - age, 1e9 - age))
+    return paths
+
+
+def test_only_the_newest_recordings_stay(folder):
+    paths = recorded(folder, 30)
+    viewer.scratch_path(Path("next.npz"))
+    newest = viewer.MAX_SCRATCH_FILES - 1  # and one to come
+    assert sorted(folder.iterdir()) == sorted(paths[-newest:])
+
+
+def test_recordings_take_no_more_than_their_limit(folder, monkeypatch):
+    monkeypatch.setattr(viewer, "MAX_SCRATCH_BYTES", 1000)
+    paths = recorded(folder, 5, size=400)
+    viewer.scratch_path(Path("next.npz"))
+    assert sorted(folder.iterdir()) == sorted(paths[-2:])
+
+
+def test_what_is_no_recording_is_left_alone(folder):
+    (folder / "notes.txt").write_text("mine")
+    recorded(folder, 30)
+    viewer.scratch_path(Path("next.npz"))
+    assert (folder / "notes.txt").exists()

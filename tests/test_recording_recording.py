@@ -12,7 +12,7 @@ from rerun.chunk import RrdReader
 from inspector.analysis.analyse import Analysis, Status, analyse_file
 from inspector.colors import LOUDNESS
 from inspector.errors import InspectorError
-from inspector.recording.recording import NOISE_POINTS, write
+from inspector.recording.recording import NOISE_POINTS, linked, write
 from models import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
 
@@ -501,3 +501,17 @@ def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):
     with pytest.raises(InspectorError, match="broken off"):
         write(found, tmp_path / "out.rrd")
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz"}
+
+
+ENTITIES = {"arm_2_link": "/robot/arm/visual_geometries/arm_2_link"}
+
+
+def test_links_before_their_share_point_to_the_robot():
+    row = "| impact | 1.00 | 2.00 | arm_2_link 60%, hand 40% |"
+    there = "[arm_2_link](recording://robot/arm/visual_geometries/arm_2_link)"
+    assert linked(row, ENTITIES) == f"| impact | 1.00 | 2.00 | {there} 60%, hand 40% |"
+
+
+def test_names_elsewhere_are_left_alone():
+    text = "- Links without geometry make no noise: arm_2_link.\n- 60% of arm_2_link"
+    assert linked(text, ENTITIES) == text

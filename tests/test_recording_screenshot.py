@@ -21,7 +21,7 @@ def recording(folder: Path) -> Path:
     return folder / "run.rrd"
 
 
-@pytest.mark.slow  # test_inspector_picture takes one of the demo
+@pytest.mark.slow  # test_recording_picture takes one of the demo
 def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp_path):
     if screenshot.missing_packages():
         pytest.skip(f"needs {' and '.join(screenshot.missing_packages())}")
