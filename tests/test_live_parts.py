@@ -50,7 +50,7 @@ def test_missing_samples_are_counted_where_they_are_missing():
     assert counted.counts == {"missing samples": 12}
 
 
-def test_time_that_stands_still_runs_backwards_or_is_unknown_is_left_out():
+def test_times_that_do_not_increase_or_are_unknown_are_left_out():
     counted, lines = warnings()
     clock = Clock(1000.0, counted)
     stamps = np.array([1.0, 1.001, 1.001, 0.5, np.nan, 1.002])
@@ -62,7 +62,7 @@ def test_time_that_stands_still_runs_backwards_or_is_unknown_is_left_out():
     assert lines[0] == "time stands still or runs backwards at 1.001 s: left out"
 
 
-def test_another_rate_than_was_said_is_noticed():
+def test_another_rate_than_the_nominal_one_is_a_warning():
     counted, lines = warnings()
     Clock(1000.0, counted).take(np.arange(50) / 800)
     assert lines == [
@@ -148,7 +148,7 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
 
 
 @pytest.mark.parametrize("rate", [1000.0, 2000.0])
-def test_after_a_gap_labels_know_what_time_it_is(library, rate):
+def test_labels_after_a_gap_have_the_right_times(library, rate):
     second = round(rate)
     labeller = Labeller(library, rate, {"velocity": 3})
     labelled(labeller, walk(second, rate))
@@ -167,7 +167,7 @@ def test_after_a_gap_labels_know_what_time_it_is(library, rate):
         (1500.0, "No labels: 1500 Hz is no multiple of the 1000 Hz of the nearest model"),
     ],
 )
-def test_rates_that_no_model_can_follow_have_no_labels_and_it_is_said(library, rate, remark):
+def test_rates_that_no_model_fits_have_no_labels_and_a_remark(library, rate, remark):
     labeller = Labeller(library, rate, {"velocity": 3})
     assert labeller.remark.startswith(remark)
     assert labeller.push(walk(900, rate), np.ones(900, dtype=bool)) is None

@@ -45,7 +45,7 @@ def test_columns_are_found_by_their_names():
     assert said == []
 
 
-def test_a_person_says_which_joints_come_in_which_order():
+def test_names_select_joints_and_their_order():
     (rows,), _ = read(CsvReader(HEAD, ("wrist",)), b"0,1,2,3,4,9\n")
     assert rows.signals["velocity"].tolist() == [[2.0]]
     head = b"t;actual_qd_0;actual_qd_1;target_qd_0;target_qd_1"
@@ -55,13 +55,13 @@ def test_a_person_says_which_joints_come_in_which_order():
     assert CsvReader(head, ()).names == ("joint1", "joint2")
 
 
-def test_empty_cells_and_nan_are_not_known():
+def test_empty_cells_and_nan_are_unknown():
     (rows,), said = read(CsvReader(HEAD, ()), b"0,,nan,1,2,3\n")
     assert np.isnan(rows.signals["velocity"]).all()
     assert said == []
 
 
-def test_malformed_rows_are_told_by_their_line_and_left_out():
+def test_malformed_rows_are_reported_by_their_line_and_left_out():
     lines = b"0,1,2,3,4,9\n1,2,3\n\nx,1,2,3,4,9\n2,1,2,3,4,9\n"
     (rows,), said = read(CsvReader(HEAD, ()), lines, first=100)
     assert rows.time.tolist() == [0.0, 2.0]
@@ -102,7 +102,7 @@ def test_lines_may_end_as_on_windows():
     assert said == []
 
 
-def test_rows_of_wrong_lengths_that_add_up_are_told_all_the_same():
+def test_rows_of_wrong_lengths_that_add_up_are_reported_too():
     (rows,), said = read(CsvReader(HEAD, ()), b"0,1,2,3,4\n1,1,2,3,4,9,9\n2,1,2,3,4,9\n")
     assert rows.time.tolist() == [2.0]
     assert [line.split(":")[0] for _, line in said] == ["line 2", "line 3"]
@@ -136,7 +136,7 @@ def test_objects_hold_arrays_as_a_run_file_names_them():
     assert set(rows.signals) == {"velocity", "position"}
 
 
-def test_objects_of_other_widths_come_apart_and_bad_ones_are_told():
+def test_objects_of_other_widths_are_kept_apart_and_malformed_ones_reported():
     lines = b'{"velocity":[1,2]}\n{"velocity":[1]}\n{"velocity":[1\n[3]\n{"velocity":["a"]}\n'
     lines += b'{"velocity":{}}\n'
     parts, said = read(JsonReader(()), lines, first=1)
@@ -161,7 +161,7 @@ class Trickle(io.RawIOBase):
 
 
 @pytest.mark.parametrize("size", [1, 3, 7, 1000])
-def test_lines_come_whole_and_know_their_number(size):
+def test_lines_are_whole_and_numbered(size):
     content = b"".join(b"line %d\n" % number for number in range(1, 30)) + b"line 30"
     for lines, number, _ in chunks(Trickle(content, size)):
         for offset, line in enumerate(lines.splitlines()):

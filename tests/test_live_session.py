@@ -2,13 +2,12 @@ import gc
 import sys
 from collections import Counter
 from itertools import pairwise
-from pathlib import Path
 from types import FunctionType, ModuleType
 
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
+from recordings import entities, read
 from rerun.chunk import RrdReader
 
 import inspector
@@ -67,22 +66,6 @@ def shown(tmp_path, signals, cuts=(), **options):
     return path, said, session.summary
 
 
-def read(path: Path, entity: str, component: str):
-    """Read a component back in order of time: times in [s], values."""
-    rows = []
-    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
-        batch = chunk.to_record_batch()
-        if component in batch.schema.names and not chunk.is_static:
-            times = batch.column("time").cast(pa.int64()).to_pylist()
-            rows += zip(times, batch.column(component).to_pylist(), strict=True)
-    rows.sort(key=lambda row: row[0])
-    return np.array([time for time, _ in rows]) / 1e9, [value for _, value in rows]
-
-
-def entities(path: Path):
-    return set(RrdReader(path).store().schema().entity_paths())
-
-
 def test_a_session_shows_everything(tmp_path, library):
     path, said, summary = shown(
         tmp_path, motion(3.0, 7), robot="panda", joint_names=PANDA, library=library
@@ -120,14 +103,14 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
     assert "oscillations" in batch.label
     _, states = read(path, "/class/found", "StateChange:state")
-    told = batch.raw
-    changes = [label for i, label in enumerate(told) if i == 0 or label != told[i - 1]]
+    raw = batch.raw
+    changes = [label for i, label in enumerate(raw) if i == 0 or label != raw[i - 1]]
     assert [state[0] for state in states] == [*changes, ""]
 
 
 @pytest.mark.parametrize("size", [7, 1301])
 @pytest.mark.parametrize("name", ["general-1khz", "joints-1khz"])
-def test_several_signals_are_heard_as_in_the_whole_run(tmp_path, size, name):
+def test_models_of_several_signals_label_as_in_the_whole_run(tmp_path, size, name):
     signals = motion(2.5)
     every = load_library(assets.model_files())
     library = {name: every[name]}
@@ -214,7 +197,7 @@ def test_missing_samples_end_the_lane_and_labels_go_on_after_them(tmp_path, libr
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
 
 
-def test_values_that_are_not_known_make_no_noise_and_no_label(tmp_path, library):
+def test_unknown_values_make_no_noise_and_no_label(tmp_path, library):
     signals = motion(2.0, hum=(9.0, 9.0))
     signals["velocity"][1000:1003, 1] = np.nan
     signals["velocity"][1500, 0] = np.inf
@@ -230,7 +213,7 @@ def test_values_that_are_not_known_make_no_noise_and_no_label(tmp_path, library)
     np.testing.assert_allclose(centres, [0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 1.3, 1.8], atol=1e-6)
 
 
-def test_positions_that_are_not_known_only_stop_the_robot(tmp_path, library):
+def test_unknown_positions_only_stop_the_robot(tmp_path, library):
     signals = motion(1.0, 7)
     signals["position"][:] = np.nan
     path, _, summary = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
@@ -238,7 +221,7 @@ def test_positions_that_are_not_known_only_stop_the_robot(tmp_path, library):
     assert sum(summary.labels.values()) == 7
 
 
-def test_another_number_of_joints_is_told_once_counted_and_not_labelled(tmp_path, library):
+def test_another_number_of_joints_is_warned_of_once_counted_and_not_labelled(tmp_path, library):
     whole, said = motion(3.0), []
     with inspector.LiveSession(
         RATE, save=tmp_path / "live.rrd", library=library, on_warning=said.append
@@ -256,7 +239,7 @@ def test_another_number_of_joints_is_told_once_counted_and_not_labelled(tmp_path
     assert not ((time >= 1.0) & (time < 2.0)).any()
 
 
-def test_signals_that_cease_or_appear_are_told(tmp_path, library):
+def test_signals_that_cease_or_appear_are_warned_of(tmp_path, library):
     whole, said = motion(1.0), []
     with inspector.LiveSession(
         RATE, save=tmp_path / "live.rrd", library=library, on_warning=said.append
@@ -279,7 +262,7 @@ def test_without_stamps_samples_follow_each_other(tmp_path, library):
     np.testing.assert_allclose(time, np.arange(1000) / RATE, atol=1e-9)
 
 
-def test_a_rate_without_a_model_shows_noise_and_says_that_there_are_no_labels(tmp_path, library):
+def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(tmp_path, library):
     said = []
     with inspector.LiveSession(
         250.0, save=tmp_path / "live.rrd", library=library, on_warning=said.append
@@ -295,7 +278,7 @@ def test_a_rate_without_a_model_shows_noise_and_says_that_there_are_no_labels(tm
     assert not any(path.startswith(("/class", "/score")) for path in found)
 
 
-def test_a_robot_without_positions_is_not_drawn_and_that_is_said(tmp_path, library):
+def test_a_robot_without_positions_is_not_drawn_and_that_is_warned_of(tmp_path, library):
     said = []
     with inspector.LiveSession(
         RATE, robot="panda", joint_names=PANDA, save=tmp_path / "a.rrd", library=library,

@@ -42,7 +42,7 @@ def second(first):
     return {"velocity": np.ones((1000, 2)), "time": first + np.arange(1000) / 1000}
 
 
-def test_a_viewer_that_dies_is_told_once_and_labels_go_on(tmp_path, monkeypatch):
+def test_a_viewer_that_dies_is_warned_of_once_and_labels_go_on(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
     said = []
     with receiver(tmp_path) as (port, end):
@@ -81,7 +81,7 @@ def test_a_file_goes_on_when_the_viewer_beside_it_dies(tmp_path, monkeypatch):
     assert path.stat().st_size > 10_000
 
 
-def test_what_is_no_viewer_is_told_from_one(tmp_path):
+def test_a_server_that_is_no_viewer_is_refused(tmp_path):
     server = http.server.HTTPServer(("127.0.0.1", 0), http.server.BaseHTTPRequestHandler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     try:
@@ -92,7 +92,7 @@ def test_what_is_no_viewer_is_told_from_one(tmp_path):
         server.server_close()
 
 
-def test_a_viewer_that_is_missing_is_told_with_what_to_do(tmp_path, monkeypatch):
+def test_a_missing_viewer_is_an_error_with_a_remedy(tmp_path, monkeypatch):
     port = free_port()
     with pytest.raises(SinkError, match=f"no viewer at 127.0.0.1:{port}, nothing listens there"):
         Sink(tmp_path / "live.rrd", str(port))

@@ -136,7 +136,7 @@ def test_events_of_one_class_that_overlap_are_unchanged_and_the_others_new_or_re
     ]
 
 
-def test_annotated_failures_are_matched_where_no_model_can_tell(tmp_path):
+def test_annotated_failures_are_matched_where_no_model_fits(tmp_path):
     blocks = (Block(0.5, 1.0, "oscillations"), Block(1.0, 1.5, "ok"))
     pair = compared(tmp_path, panda(), panda(blocks=blocks), robot=False)
     (change,) = changes(pair)
@@ -171,20 +171,20 @@ def test_motions_that_have_nothing_in_common_are_laid_start_to_start():
 
 
 @pytest.mark.parametrize("velocity", [0.0, 0.3])
-def test_an_even_motion_tells_nothing(velocity):
+def test_an_even_motion_determines_no_lag(velocity):
     still = moving(velocity=np.full((4000, 2), velocity))
     assert align(still, still).refused
     assert align(still, moving()).refused
 
 
-def test_a_motion_that_repeats_itself_tells_nothing():
+def test_a_motion_that_repeats_itself_determines_no_lag():
     time = np.arange(4000) / 1000
     walk = moving(velocity=np.sin(2 * np.pi * 2 * time)[:, None] * np.ones(2))
     later = dataclasses.replace(part(walk, 250, 4000), time=time[:3750])
     assert align(walk, later).refused
 
 
-def test_a_motion_that_only_speeds_up_tells_nothing():
+def test_a_motion_that_only_speeds_up_determines_no_lag():
     ramp = moving(velocity=np.arange(4000)[:, None] * np.ones(2))
     assert align(ramp, ramp).refused
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 from io import BytesIO
 
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
+from recordings import LANE, LINE, MOTION, check_columns, entities, read
 from rerun.chunk import RrdReader
 
 from inspector.cli import main
@@ -73,33 +73,11 @@ def whole(tmp_path_factory):
     return folder / "out.rrd", pair
 
 
-def read(path, entity, component):
-    """Read a component back: times in [s] (None if static), values."""
-    times, values = [], []
-    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
-        batch = chunk.to_record_batch()
-        if component in batch.schema.names:
-            values += batch.column(component).to_pylist()
-            if not chunk.is_static:
-                times += batch.column("time").cast(pa.int64()).to_pylist()
-    return (np.array(times) / 1e9 if times else None), values
-
-
 def scalars(path, entity):
     time, values = read(path, entity, "Scalars:scalars")
     return time, np.array(values)
 
 
-def entities(path):
-    return set(RrdReader(path).store().schema().entity_paths())
-
-
-LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
-LINE |= {"SeriesLines:aggregation_policy"}
-LANE = {f"StateConfiguration:{part}" for part in ("values", "labels", "colors")}
-LANE |= {"StateChange:state"}
-MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
-MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
 SIGNALS = "velocity|desired_velocity|position|effort|stage_planned"
 COLUMNS = {
     r"/class/(before|after)/(found|annotated)": LANE,
@@ -120,20 +98,7 @@ COLUMNS = {
 
 def test_every_entity_has_its_columns_and_there_is_no_other(whole):
     path, _ = whole
-    schema = RrdReader(path).store().schema()
-    found = {}
-    for column in schema.component_columns():
-        found.setdefault(column.entity_path, set()).add(column.component)
-    seen = set()
-    for entity, components in found.items():
-        kinds = [kind for kind in COLUMNS if re.fullmatch(kind, entity)]
-        if entity.startswith(("/__properties", "/robot/panda")) or entity in ("/", "/robot/fixed"):
-            continue  # written by rerun and its URDF reader; what we add is tested below
-        assert kinds, entity
-        assert components == COLUMNS[kinds[0]], entity
-        seen.add(kinds[0])
-    assert seen == set(COLUMNS)
-    assert {column.name for column in schema.index_columns()} == {"time"}
+    check_columns(path, COLUMNS)
 
 
 def test_both_noises_lie_over_each_other_in_two_colours(whole):
@@ -250,7 +215,7 @@ def test_the_robot_is_coloured_by_what_became_louder(whole):
     assert still == [int.from_bytes([*colors.SAME, 255], "big")]
 
 
-def test_colours_tell_louder_from_quieter_and_grow_with_the_change():
+def test_colours_distinguish_louder_from_quieter_and_grow_with_the_change():
     quieter, same, louder, much = colors.diverging(np.array([-12.0, 0.0, 3.0, 40.0]))[:, :3]
     assert tuple(quieter) == colors.BEFORE
     assert tuple(same) == colors.SAME
@@ -270,7 +235,7 @@ def test_both_sound_at_one_gain(whole):
     assert loudness[1] / loudness[0] == pytest.approx(2.0, rel=0.01)
 
 
-def test_the_report_says_what_changed(whole):
+def test_the_report_states_what_changed(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert text[0].startswith("# before → after\n")
@@ -372,7 +337,7 @@ def inspector(capsys, monkeypatch, *arguments):
     return ended.value.code or 0, printed.out, printed.err
 
 
-def test_the_command_shows_two_runs_and_says_how_they_were_aligned(capsys, monkeypatch, tmp_path):
+def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(capsys, monkeypatch, tmp_path):
     panda(robot=None).save(tmp_path / "a.npz")
     panda(2.0, robot=None).save(tmp_path / "b.npz")
     save = ("--save", tmp_path / "ab.rrd")

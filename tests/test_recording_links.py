@@ -5,15 +5,82 @@ from noisemodel import Robot, Run
 from noisemodel.links import link_noise
 
 
-def rattling():
-    """A UR5 moves slowly; its last joint rattles at 100 Hz from 2 s to 2.5 s."""
-    time = np.arange(4000) / 1000
-    position = np.sin(np.outer(time, np.linspace(0.5, 1.5, 6)))
-    velocity = 0.5 * np.cos(np.outer(time, np.linspace(0.5, 1.5, 6)))
-    during = (time >= 2.0) & (time < 2.5)
-    velocity[during, 5] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
+def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):
+    """Move a UR5 slowly; one joint may rattle at 100 Hz from 2 s to 2.5 s."""
+    time = np.arange(round(rate * seconds)) / rate
     names = Robot.load("ur5").joint_names
-    return Run(time=time, velocity=velocity, position=position, joint_names=names, robot="ur5")
+    velocity = 0.5 * np.cos(np.outer(time, np.linspace(0.5, 1.5, 6)))
+    position = np.sin(np.outer(time, np.linspace(0.5, 1.5, 6)))
+    if rattling is not None:
+        during = (time >= 2.0) & (time < 2.5)
+        velocity[during, rattling] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
+    fields = {
+        "time": time,
+        "velocity": velocity,
+        "position": position,
+        "joint_names": names,
+        "robot": "ur5",
+    }
+    return Run(**(fields | changes))
+
+
+def test_bins_hold_the_mean_power_of_the_extended_noise():
+    run = arm_run()
+    robot = Robot.load("ur5")
+    noise = extended(robot, Surface.of(robot, "auto"), *robot.configuration(run), "normal")
+    found = link_noise(run)
+    # Within a bin the robot is taken to stand still: 1e-3 is 0.004 dB.
+    np.testing.assert_allclose(found.power.mean(axis=0), noise.power.mean(axis=0), rtol=1e-3)
+    np.testing.assert_allclose(found.total[7], noise.total[70:80].mean(), rtol=1e-3)
+    assert found.time[7] == pytest.approx(0.075)
+    assert found.links == noise.names
+
+
+def test_the_desired_motion_adds_its_own_power():
+    run = arm_run()
+    both = arm_run(velocity_desired=run.velocity, position_desired=run.position)
+    np.testing.assert_allclose(link_noise(both).power, 2 * link_noise(run).power, rtol=1e-12)
+
+
+def test_each_link_has_the_joints_that_move_it():
+    found = link_noise(arm_run())
+    movers = dict(zip(found.links, found.movers, strict=True))
+    assert movers["shoulder_link"] == {"shoulder_pan_joint"}
+    assert movers["wrist_3_link"] == set(Robot.load("ur5").joint_names)
+
+
+def test_slow_motion_is_no_vibration_and_fast_motion_is():
+    time = np.arange(4000) / 1000
+    valid = np.ones(4000, dtype=bool)
+    slow = np.sin(2 * np.pi * 0.5 * time)[:, None]
+    assert np.abs(vibrating(slow, valid, 1000.0))[100:-100].max() < 0.02
+    fast = np.sin(2 * np.pi * 100 * time)[:, None]
+    np.testing.assert_allclose(vibrating(fast, valid, 1000.0)[100:-100], fast[100:-100], atol=0.02)
+
+
+def test_gaps_are_silent_and_do_not_ring():
+    valid = np.ones(4000, dtype=bool)
+    valid[1500:1600] = False
+    velocity = np.where(valid[:, None], 1.0, 0.0) * np.ones((1, 6))
+    found = link_noise(arm_run(velocity=velocity, valid=valid))
+    assert found.power[150:160].max() == 0.0
+    assert found.vibration.max() < 1e-20
+
+
+def test_a_long_run_has_no_more_bins_than_a_short_one():
+    assert len(link_noise(arm_run(rate=100.0, seconds=120.0)).time) <= 4001
+
+
+def test_joints_that_the_run_does_not_name_are_remarked_on():
+    run = arm_run()
+    part = Run(
+        time=run.time,
+        velocity=run.velocity[:, :5],
+        position=run.position[:, :5],
+        joint_names=run.joint_names[:5],
+        robot="ur5",
+    )
+    assert "wrist_3_joint: they rest" in link_noise(part).remarks[0]
 
 
 def test_levels_are_relative_to_the_loudest_peak():

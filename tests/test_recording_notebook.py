@@ -57,7 +57,7 @@ def test_without_a_display_the_recording_is_named(run, monkeypatch):
         inspector.show(run)
 
 
-def test_a_viewer_that_dies_is_said_and_the_recording_named(run, monkeypatch):
+def test_a_viewer_that_dies_is_an_error_that_names_the_recording(run, monkeypatch):
     monkeypatch.setattr(viewer, "open_window", lambda _: "the viewer ended with status 101")
     with pytest.raises(ViewerError, match=r"status 101; the recording is in .*\.rrd"):
         inspector.show(run)
@@ -69,7 +69,7 @@ def test_what_is_no_run_is_named(tmp_path, opened):
     assert opened == []
 
 
-def test_a_notebook_without_the_widget_is_told_what_to_install(run, monkeypatch):
+def test_a_notebook_without_the_widget_is_an_error_with_what_to_install(run, monkeypatch):
     monkeypatch.setattr(notebook, "in_notebook", lambda: True)
     monkeypatch.setattr(notebook, "find_spec", lambda _: None)
     with pytest.raises(ViewerError, match=r'pip install "rerun-sdk\[notebook\]"'):

@@ -1,12 +1,11 @@
 import dataclasses
 import hashlib
-import re
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import pytest
 import rerun as rr
+from recordings import LANE, LINE, MOTION, check_columns, entities, read
 from rerun.chunk import RrdReader
 
 from inspector.analysis.analyse import Analysis, Status, analyse_file
@@ -62,22 +61,6 @@ def some_labels():
     return Labels(start=start, stop=start + 0.4, label=label, scores=scores, classes=CLASSES)
 
 
-def read(path: Path, entity: str, component: str):
-    """Read a component back: times in [s] (None if static), values."""
-    times, values = [], []
-    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
-        batch = chunk.to_record_batch()
-        if component in batch.schema.names:
-            values += batch.column(component).to_pylist()
-            if not chunk.is_static:
-                times += batch.column("time").cast(pa.int64()).to_pylist()
-    return (np.array(times) / 1e9 if times else None), values
-
-
-def entities(path: Path):
-    return set(RrdReader(path).store().schema().entity_paths())
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     rr.set_strict_mode(True)
@@ -88,12 +71,6 @@ def whole(tmp_path_factory):
     return folder / "out.rrd", run
 
 
-LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
-LINE |= {"SeriesLines:aggregation_policy"}
-LANE = {f"StateConfiguration:{part}" for part in ("values", "labels", "colors")}
-LANE |= {"StateChange:state"}
-MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
-MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
 COLUMNS = {
     r"/class/(found|annotated)": LANE,
     r"/level/panda_(link\d|leftfinger|rightfinger)": LANE,
@@ -116,20 +93,7 @@ COLUMNS = {
 
 def test_every_entity_has_its_columns_and_there_is_no_other(whole):
     path, _ = whole
-    schema = RrdReader(path).store().schema()
-    found = {}
-    for column in schema.component_columns():
-        found.setdefault(column.entity_path, set()).add(column.component)
-    seen = set()
-    for entity, components in found.items():
-        kinds = [kind for kind in COLUMNS if re.fullmatch(kind, entity)]
-        if entity.startswith(("/__properties", "/robot/panda")) or entity in ("/", "/robot/fixed"):
-            continue  # written by rerun and its URDF reader; what we add is tested below
-        assert kinds, entity
-        assert components == COLUMNS[kinds[0]], entity
-        seen.add(kinds[0])
-    assert seen == set(COLUMNS)
-    assert {column.name for column in schema.index_columns()} == {"time"}
+    check_columns(path, COLUMNS)
 
 
 def test_a_recording_is_one_run_with_one_layout(whole):
@@ -172,7 +136,7 @@ def test_the_spectrum_at_the_cursor_is_that_of_the_noise(whole):
     assert heights.min() >= 0.0
 
 
-def test_the_heat_strip_lies_at_its_frequencies(whole):
+def test_the_bands_lie_at_their_frequencies(whole):
     path, _ = whole
     _, low = read(path, "/spectrogram/bands/00", "Scalars:scalars")
     _, high = read(path, "/spectrogram/bands/47", "Scalars:scalars")
@@ -316,7 +280,7 @@ def one_legged(folder: Path) -> Path:
     return path
 
 
-def test_the_report_says_what_was_found(whole):
+def test_the_report_states_what_was_found(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert "**findings: 1 impact**" in text[0]
@@ -352,7 +316,7 @@ def test_a_run_of_few_samples_is_shown_too(tmp_path, samples, rate):
     assert np.ravel(noise).tolist() == list(range(samples))
 
 
-def test_a_robot_that_is_not_known_is_said_and_the_rest_is_shown(tmp_path):
+def test_an_unknown_robot_is_remarked_on_and_the_rest_is_shown(tmp_path):
     path = tmp_path / "out.rrd"
     write(inspected(panda_run(robot="hal9000"), tmp_path), path)
     _, (text,) = read(path, "/report", "TextDocument:text")

@@ -57,13 +57,13 @@ def test_where_another_program_listens_a_free_port_is_taken(monkeypatch, tmp_pat
     assert (tmp_path / "ports").read_text().split() == [viewer.PORT, "auto"]
 
 
-def test_a_viewer_that_dies_says_why_in_one_line(monkeypatch):
+def test_a_viewer_that_dies_is_one_line_with_the_reason(monkeypatch):
     says(monkeypatch, "printf 'INFO fine\\n\\033[31mError: no \\033[0mdisplay\\n' >&2; exit 101")
     problem = viewer.open_window(Path("run.rrd"))
     assert problem == "the viewer ended with status 101 (no display)"
 
 
-def test_a_viewer_that_is_missing_is_said(monkeypatch):
+def test_a_missing_viewer_is_an_error(monkeypatch):
     monkeypatch.setattr(viewer, "find_spec", lambda _: None)
     with pytest.raises(ViewerError, match="viewer is missing; `pip install rerun-sdk`"):
         viewer.open_window(Path("run.rrd"))
@@ -107,7 +107,7 @@ def test_a_port_that_is_taken_is_one_line(recording):
             pass
 
 
-def test_a_server_that_dies_at_once_says_why(monkeypatch, recording):
+def test_a_server_that_dies_at_once_is_an_error_with_the_reason(monkeypatch, recording):
     says(monkeypatch, "echo Error: no memory >&2; exit 3")
     with (
         pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"),
@@ -116,7 +116,7 @@ def test_a_server_that_dies_at_once_says_why(monkeypatch, recording):
         pass
 
 
-def test_a_server_that_dies_later_says_so(recording):
+def test_a_server_that_dies_later_is_an_error(recording):
     with web.serving(recording) as served:
         os.killpg(served.server.process.pid, signal.SIGKILL)
         with pytest.raises(ViewerError, match="the viewer ended with status -9"):

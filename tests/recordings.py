@@ -1,0 +1,62 @@
+"""Read recordings back, for the tests."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+from rerun.chunk import RrdReader
+
+LINE = {"Scalars:scalars", "SeriesLines:names", "SeriesLines:colors", "SeriesLines:widths"}
+LINE |= {"SeriesLines:aggregation_policy"}
+LANE = {f"StateConfiguration:{part}" for part in ("values", "labels", "colors")}
+LANE |= {"StateChange:state"}
+MOTION = {f"Transform3D:{part}" for part in ("translation", "quaternion")}
+MOTION |= {"Transform3D:parent_frame", "Transform3D:child_frame"}
+
+
+def read(path: Path, entity: str, component: str):
+    """Read a component back in order of time: times in [s] (None if static), values."""
+    rows = []
+    for chunk in RrdReader(path).store().stream().filter(content=entity, components=component):
+        batch = chunk.to_record_batch()
+        if component in batch.schema.names:
+            values = batch.column(component).to_pylist()
+            times = [None] * len(values)
+            if not chunk.is_static:
+                times = batch.column("time").cast(pa.int64()).to_pylist()
+            rows += zip(times, values, strict=True)
+    timed = sorted((row for row in rows if row[0] is not None), key=lambda row: row[0])
+    if not timed:
+        return None, [value for _, value in rows]
+    return np.array([time for time, _ in timed]) / 1e9, [value for _, value in timed]
+
+
+def entities(path: Path):
+    """Paths of all entities."""
+    return set(RrdReader(path).store().schema().entity_paths())
+
+
+def check_columns(path: Path, columns: dict[str, set[str]]) -> None:
+    """Check that entities have the components that their pattern has, and that there is no other.
+
+    What rerun and its URDF reader write is left out.
+
+    Args:
+        path: The recording.
+        columns: Components by pattern of entity paths; each pattern has to be matched.
+    """
+    schema = RrdReader(path).store().schema()
+    found = {}
+    for column in schema.component_columns():
+        found.setdefault(column.entity_path, set()).add(column.component)
+    seen = set()
+    for entity, components in found.items():
+        if entity.startswith(("/__properties", "/robot/panda")) or entity in ("/", "/robot/fixed"):
+            continue
+        patterns = [pattern for pattern in columns if re.fullmatch(pattern, entity)]
+        assert patterns, entity
+        assert components == columns[patterns[0]], entity
+        seen.add(patterns[0])
+    assert seen == set(columns)
+    assert {column.name for column in schema.index_columns()} == {"time"}
