@@ -42,7 +42,7 @@ def test_the_desired_motion_adds_its_own_power():
     np.testing.assert_allclose(link_noise(both).power, 2 * link_noise(run).power, rtol=1e-12)
 
 
-def test_each_link_has_the_joints_that_move_it():
+def test_each_link_knows_the_joints_that_move_it():
     found = link_noise(arm_run())
     movers = dict(zip(found.links, found.movers, strict=True))
     assert movers["shoulder_link"] == {"shoulder_pan_joint"}
@@ -71,7 +71,7 @@ def test_a_long_run_has_no_more_bins_than_a_short_one():
     assert len(link_noise(arm_run(rate=100.0, seconds=120.0)).time) <= 4001
 
 
-def test_joints_that_the_run_does_not_name_are_remarked_on():
+def test_joints_that_the_run_does_not_name_are_said_to_rest():
     run = arm_run()
     part = Run(
         time=run.time,
