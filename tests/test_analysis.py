@@ -81,7 +81,7 @@ def test_a_log_held_at_ten_hertz_cannot_be_told_in_any_output():
     held = Run(time=np.arange(5000) / RATE, velocity=velocity, joint_names=("a", "b"))
     found = analyse(held, LIBRARY)
     assert found.status is Status.CANNOT_TELL
-    assert "values are held for 100 samples" in found.headline
+    assert "zero-order hold of 100 samples" in found.headline
     assert found.reason == found.message
 
 

@@ -78,7 +78,7 @@ def test_a_run_and_itself_differ_by_nothing(itself):
 
 def test_failures_of_a_run_and_itself_are_unchanged(itself):
     found = changes(itself)
-    assert len(found) == len(itself.before.events) > 0
+    assert len(found) == len(itself.before.findings) > 0
     assert {change.kind for change in found} == {"unchanged"}
     assert f"findings: 0 new, 0 resolved, {len(found)} unchanged; vibration +0.0 dB" in summary(
         itself

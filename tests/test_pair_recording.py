@@ -159,7 +159,7 @@ def test_lanes_show_the_classes_of_both_and_what_changed(whole):
     path, _ = whole
     time, states = read(path, "/class/after/found", "StateChange:state")
     assert [state[0] for state in states] == ["ok", "impact", "ok", ""]
-    np.testing.assert_allclose(time, [0.15, 0.65, 0.95, 2.75], atol=1e-3)
+    np.testing.assert_allclose(time, [0.0, 0.5, 1.0, 2.9], atol=1e-3)
     _, states = read(path, "/class/before/found", "StateChange:state")
     assert [state[0] for state in states] == ["ok", ""]
     time, states = read(path, "/class/after/annotated", "StateChange:state")

@@ -117,7 +117,7 @@ def test_lanes_hold_changes_only_and_end_where_the_labels_end(whole):
     path, _ = whole
     time, states = read(path, "/class/found", "StateChange:state")
     assert [state[0] for state in states] == ["ok", "impact", "ok", ""]
-    np.testing.assert_allclose(time, [0.15, 0.65, 0.95, 2.75], atol=1e-6)
+    np.testing.assert_allclose(time, [0.0, 0.5, 1.0, 2.9], atol=1e-6)
     time, states = read(path, "/class/annotated", "StateChange:state")
     assert [state[0] for state in states] == ["ok", "oscillations", ""]
     np.testing.assert_allclose(time, [0.2, 1.0, 1.5], atol=1e-9)

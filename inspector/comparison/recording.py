@@ -127,7 +127,7 @@ def _lines(one: RobotComparison, part: str, name: str) -> Part:
     return unstable.above(*((plot, 1.0) for plot in plots), name=name)
 
 
-def _strip(one: Compared, kind: str) -> Part:
+def _spectrogram(one: RobotComparison, kind: str) -> Part:
     top = min(TOP_HZ, one.rate / 2)
     origin = f"{_root(one)}/spectrogram/{kind}"
     return unstable.plot(f"{kind}, 0-{top:.0f} Hz", origin, between=(0.0, top), fixed=True)

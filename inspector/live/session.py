@@ -102,7 +102,7 @@ class LiveSession:
         if not 1.0 <= rate < np.inf:
             raise LiveError(f"a rate of {rate:g} Hz; expected 1 or more")
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
-        self._library = load_library(assets.model_files()) if library is None else library
+        self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
         self._latest = -1.0 / rate
         self._buffer: SampleBuffer | None = None

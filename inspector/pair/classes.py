@@ -5,7 +5,6 @@ from itertools import pairwise
 
 import rerun as rr
 
-from inspector import colors
 from inspector.pair.changes import NEW, Change
 from inspector.pair.colors import KINDS
 from inspector.pair.pair import Pair
@@ -23,14 +22,11 @@ def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> i
     Returns:
         How many lanes there are.
     """
-    sides = [side for _, side in pair.sides]
-    known = [name for side in sides if side.labels for name in side.labels.classes]
-    annotated = sorted({block.label for side in sides for block in side.run.blocks})
-    every = colors.of_classes(tuple(dict.fromkeys([*known, *annotated])))
+    every = classes.colours_of(*(side for _, side in pair.sides))
     lanes: dict[str, classes.Lane] = {}
     for name, side in pair.sides:
         if side.labels is not None:
-            lanes[f"/class/{name}/found"] = classes.found(side.labels)
+            lanes[f"/class/{name}/found"] = side.lane
         if side.run.blocks:
             lanes[f"/class/{name}/annotated"] = classes.annotated(side.run)
     for path, lane in lanes.items():

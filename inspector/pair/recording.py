@@ -13,7 +13,6 @@ from inspector.errors import InspectorError
 from inspector.pair import classes, joints, links, noise
 from inspector.pair.blueprint import Contents, layout
 from inspector.pair.changes import NEW, Change, changes
-from inspector.pair.common import part
 from inspector.pair.levels import STEP, steps, whole
 from inspector.pair.pair import Pair
 from inspector.pair.report import report
@@ -21,8 +20,9 @@ from inspector.recording import robot, unstable
 from inspector.recording.limbs import limbs
 from inspector.recording.series import TIMELINE
 from inspector.recording.stream import log_report, writing
-from inspector.sound.listening import Settings, common_gain, sound_of
+from inspector.sound.sonification import Settings, common_gain, sound_of
 from inspector.sound.sound import SMALL_RATE
+from noisemodel.run import part
 
 MAX_VALUES = 8_000_000
 """Velocities of a run that are mixed into a sound: a second of work."""

@@ -1,8 +1,8 @@
 """Found and annotated classes in a recording: lanes, scores, events."""
 
+from collections.abc import Sequence
 from typing import TypeAlias
 
-import numpy as np
 import rerun as rr
 
 from inspector import colors
@@ -12,11 +12,11 @@ from inspector.report.markdown import sentence
 from models import Event, Labels
 from noisemodel import Block, Run
 
-Lane: TypeAlias = list[tuple[float, float, str]]
+Lane: TypeAlias = Sequence[tuple[float, float, str]]
 """Start and stop in [s] and class of stretches in order of time."""
 
 
-def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
+def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
     """Log the classes that a model found, and those that are annotated.
 
     Args:
@@ -24,27 +24,21 @@ def log(recording: rr.RecordingStream, inspection: Inspection) -> None:
         analysis: The run with its labels and blocks.
     """
     run, labels = analysis.run, analysis.labels
-    annotations = {block.label for block in run.blocks}
-    known = () if labels is None else labels.classes
-    colours = colors.of_classes((*known, *sorted(annotations - set(known))))
+    colours = colours_of(analysis)
     if labels is not None:
-        predicted = (*known, *sorted(set(labels.label.tolist()) - set(known)))
-        series.log_lane(recording, "/class/found", found(labels), colors.of_classes(predicted))
+        series.log_lane(recording, "/class/found", analysis.lane, colours)
         _log_scores(recording, labels, colours)
     if run.blocks:
         series.log_lane(recording, "/class/annotated", annotated(run), colours)
     _log_events(recording, analysis, colours)
 
 
-def found(labels: Labels) -> Lane:
-    """The class of each frame for the time around its centre, up to halfway to its neighbours."""
-    centres = (labels.start + labels.stop) / 2
-    hop = float(np.median(np.diff(centres))) if len(centres) > 1 else 0.1
-    halfway = (centres[1:] + centres[:-1]) / 2
-    apart = np.diff(centres) > 1.5 * hop
-    starts = [*(centres[:1] - hop / 2), *np.where(apart, centres[1:] - hop / 2, halfway)]
-    stops = [*np.where(apart, centres[:-1] + hop / 2, halfway), *(centres[-1:] + hop / 2)]
-    return list(zip(starts, stops, map(str, labels.debounced), strict=True))
+def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
+    """The colours of all classes of runs, found or annotated, those of their models first."""
+    known = dict.fromkeys(name for side in sides if side.labels for name in side.labels.classes)
+    others = {name for side in sides for *_, name in (*side.lane, *annotated(side.run))}
+    others |= {event.label for side in sides for event in side.findings}
+    return colors.of_classes((*known, *sorted(others - set(known))))
 
 
 def annotated(run: Run) -> Lane:

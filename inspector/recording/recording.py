@@ -42,7 +42,7 @@ def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: byt
     """
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
-        tree = robot.of_run(analysis.run, Path(folder)) if analysis.has_robot else None
+        tree = robot.of_run(analysis.run, Path(folder)) if analysis.links is not None else None
         contents = _log(recording, analysis, tree, sound)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
 
@@ -59,8 +59,8 @@ def _log(
     if sound:
         unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
     limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
-    shown = details.log(recording, inspection, moments)
-    _log_text(recording, inspection, {} if tree is None else robot.entities(tree))
+    shown = details.log(recording, analysis, moments)
+    _log_text(recording, analysis, {} if tree is None else robot.entities(tree))
     failures = [moment for moment in moments if moment.failure]
     return Contents(
         joints=limb_plots,
