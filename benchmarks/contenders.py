@@ -17,7 +17,7 @@ from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
 import models
-from models.estimators.estimator import learn
+from models.estimators.estimator import ESTIMATORS
 from models.features import feature_count, standard
 
 RATE = 1000.0
@@ -89,7 +89,7 @@ def on_features(profile: models.Profile, learnt: Callable[..., Decide]) -> Train
 def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -> Decide:
     """Let a machine of our own learn: networks, trees, or support vectors."""
     groups = np.array([models.group_of(run) for run in dataset.runs.tolist()])
-    estimator = learn(scaled, targets(dataset), groups, profile)
+    estimator = ESTIMATORS[profile.estimator].fit(scaled, targets(dataset), groups, profile)
 
     def decide(scaled: np.ndarray) -> Answer:
         decisions = estimator.decision(scaled)

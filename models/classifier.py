@@ -13,7 +13,7 @@ from models import modelfile
 from models.confusion import Evaluation
 from models.dataset import Dataset
 from models.errors import DatasetError, RateError, SignalError
-from models.estimators.estimator import Estimator, rebuilt
+from models.estimators.estimator import ESTIMATORS, Estimator
 from models.examples import CHUNK, Examples
 from models.features import features, standard
 from models.framing import frame_starts
@@ -71,8 +71,6 @@ class Classifier:
             DatasetError: If the frames are of fewer than two classes.
             SignalError: If the frames do not fit the profile.
         """
-        from models.estimators.estimator import learn, versions
-
         examples = _examples(dataset, profile)
         there = set(examples.labels.tolist())
         classes = tuple(name for name in profile.classes if name in there)
@@ -84,7 +82,7 @@ class Classifier:
         mean, scale = standard(examples.features, profile)
         targets = np.array([classes.index(label) for label in examples.labels.tolist()])
         scaled = (examples.features - mean) / scale
-        estimator = learn(scaled, targets, examples.groups, profile)
+        estimator = ESTIMATORS[profile.estimator].fit(scaled, targets, examples.groups, profile)
         classifier = cls(profile, classes, estimator, mean, scale, dict(examples.hashes))
         sets = {"training": examples}
         if validation is not None:
@@ -95,7 +93,7 @@ class Classifier:
             ).as_dict()
             for name, each in sets.items()
         }
-        return replace(classifier, metrics=metrics, versions=versions())
+        return replace(classifier, metrics=metrics, versions=modelfile.versions())
 
     @property
     def rate(self) -> float:
@@ -264,7 +262,7 @@ class Classifier:
         return cls(
             profile,
             tuple(manifest["classes"]),
-            rebuilt(arrays, profile),
+            ESTIMATORS[profile.estimator].of(arrays, profile),
             arrays["mean"],
             arrays["scale"],
             runs=manifest["runs"],

@@ -1,7 +1,7 @@
 """The model file, version 5: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
-`estimator.shapes` lists them. Nothing in it is ever unpickled; sizes are checked before an array is
+its ``DIMENSIONS`` list them. Nothing in it is ever unpickled; sizes are checked before an array is
 made. The same model is the same bytes. Version 4 is read too: it differs in two names.
 """
 
@@ -10,6 +10,7 @@ import json
 import os
 import zipfile
 from collections.abc import Mapping
+from importlib import metadata
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,9 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from models.errors import ModelFileError, OutputError, ProfileError
-from models.estimators.estimator import DIMENSIONS, shapes
+from models.atomic import write_bytes
+from models.errors import ModelFileError, ProfileError
+from models.estimators.estimator import ESTIMATORS
 from models.features import feature_count
 from models.labels import ANOMALY
 from models.profile import Profile
@@ -29,11 +31,23 @@ from models.types import Array
 FORMAT = "noise-model/5"
 OLD_FORMAT = "noise-model/4"
 LARGEST = 512 * 1024**2
-"""Bytes that a model file may have: a thousand times what is usual."""
+"""Bytes that a model file may have: a thousand times those of the shipped ones."""
 
 _KINDS = [
-    {"manifest": 0, "mean": 1, "scale": 1, **dimensions} for dimensions in DIMENSIONS.values()
+    {"manifest": 0, "mean": 1, "scale": 1, **estimator.DIMENSIONS}
+    for estimator in ESTIMATORS.values()
 ]
+
+
+def versions() -> dict[str, str]:
+    """Versions of the software that trains models, by name."""
+    import sklearn
+
+    try:
+        own = metadata.version("noise-inspector")
+    except metadata.PackageNotFoundError:
+        own = "not installed"
+    return {"noise-inspector": own, "numpy": np.__version__, "scikit-learn": sklearn.__version__}
 
 
 def write(
@@ -89,7 +103,7 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """Read a model file after a look at its table of contents.
+    """Manifest and arrays of a model file, once its table of contents is checked.
 
     Args:
         path: The file.
@@ -136,7 +150,7 @@ def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]
 
 
 def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: int) -> NDArray[Any]:
-    """Read one array, once its header has proved to be honest."""
+    """One array, once its header is checked."""
     content = archive.read(f"{name}.npy")
     header = io.BytesIO(content)
     try:
@@ -236,12 +250,13 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
 def _check_arrays(
     path: str | Path, profile: Profile, classes: int, arrays: Mapping[str, Array]
 ) -> None:
-    if lacking := sorted(DIMENSIONS[profile.estimator].keys() - arrays.keys()):
+    estimator = ESTIMATORS[profile.estimator]
+    if lacking := sorted(estimator.DIMENSIONS.keys() - arrays.keys()):
         raise ModelFileError(
             path, f"its profile asks for {profile.estimator}, but it has no {', '.join(lacking)}"
         )
     count = feature_count(profile)
-    wanted = shapes(arrays, profile, features=count, classes=classes)
+    wanted = estimator.shapes(arrays, profile, features=count, classes=classes)
     for name, shape in {**wanted, "mean": (count,), "scale": (count,)}.items():
         if arrays[name].shape != shape:
             raise ModelFileError(
@@ -249,7 +264,6 @@ def _check_arrays(
             )
     if not (arrays["scale"] > 0).all():
         raise ModelFileError(path, "array 'scale' holds values that are not above 0")
-    if profile.estimator == "trees":
-        for name, most in (("feature", count - 1), ("left", profile.leaves)):
-            if arrays[name].min() < 0 or arrays[name].max() > most:
-                raise ModelFileError(path, f"array {name!r} holds values beyond 0 to {most}")
+    for name, most in estimator.highest(profile, features=count).items():
+        if arrays[name].min() < 0 or arrays[name].max() > most:
+            raise ModelFileError(path, f"array {name!r} holds values beyond 0 to {most}")

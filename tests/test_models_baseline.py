@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import models
-from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, cover, distance
+from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, distance, k_centers
 from models.novelty.limit import HOUR, PEAKS, alarm_peaks, limit
 from models.novelty.training import GUARD, _parts
 
@@ -71,13 +71,13 @@ def test_distance_is_the_root_mean_square_to_the_nearest_frame():
     np.testing.assert_allclose(distance(fresh, known), apart, rtol=1e-12)
 
 
-def test_frames_that_stand_for_all_leave_nothing_uncovered_if_there_are_enough():
+def test_a_k_center_subset_of_all_frames_has_no_distance_from_any():
     generator = np.random.default_rng(1)
     features = generator.normal(size=(60, 5))
-    far = [distance(features, cover(features, count)).max() for count in (1, 5, 20, 60)]
+    far = [distance(features, k_centers(features, count)).max() for count in (1, 5, 20, 60)]
     assert far == sorted(far, reverse=True)
     assert far[-1] < 1e-6
-    assert len(cover(np.repeat(features[:3], 9, axis=0), 20)) == 1 + 3
+    assert len(k_centers(np.repeat(features[:3], 9, axis=0), 20)) == 1 + 3
 
 
 def test_the_limit_of_an_exponential_tail_is_where_it_has_to_be():

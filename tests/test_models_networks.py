@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import models
-from models.estimators.mlp import fit_networks
+from models.estimators.mlp import Networks
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
@@ -19,7 +19,7 @@ def test_networks_answer_as_scikit_learns_do():
     profile = models.SCALAR.at(1000.0)
     alone = replace(profile, units=16, epochs=40, networks=1, decay=0.0)
     groups = np.array(["one"] * 300)
-    ours = fit_networks(features, targets, groups, alone)
+    ours = Networks.fit(features, targets, groups, alone)
     counts = np.bincount(targets)
     theirs = MLPClassifier(
         (16,), alpha=0.0, batch_size=256, learning_rate_init=2e-3, max_iter=40,

@@ -10,7 +10,7 @@ import pytest
 
 import models
 from models.estimators.calibration import calibrate, calibrated
-from models.estimators.estimator import learn
+from models.estimators.estimator import ESTIMATORS
 from models.examples import Examples
 from models.signals import stacked
 
@@ -59,6 +59,10 @@ RECORDINGS = [
 ]
 
 
+def fit(features, targets, groups, profile):
+    return ESTIMATORS[profile.estimator].fit(features, targets, groups, profile)
+
+
 @pytest.fixture(scope="module", params=PROFILES)
 def classifier(request):
     profile = PROFILES[request.param]
@@ -93,7 +97,7 @@ def test_a_class_that_is_not_there_is_never_heard(estimator, classes):
     there = [0, classes]
     targets = np.where(features[:, 0] > 0, there[1], there[0])
     patient = replace(PROFILES[estimator], epochs=300, decay=0.0)
-    learnt = learn(features, targets, np.array(["one"] * 200), patient)
+    learnt = fit(features, targets, np.array(["one"] * 200), patient)
     scores = learnt.score(learnt.decision(features))
     assert scores.shape == (200, classes + 1)
     assert scores[:, 1:classes].max() < 1e-6
@@ -109,7 +113,7 @@ def test_a_class_that_one_group_alone_has_leaves_all_others_as_sure_as_they_are(
     rare = np.where((groups == "g5") & (features[:, 0] > 1.5), 2, targets)
     above_threshold = []
     for truth in (targets, rare):
-        learnt = learn(features, truth, groups, PROFILES[estimator])
+        learnt = fit(features, truth, groups, PROFILES[estimator])
         good = learnt.score(learnt.decision(features))[:, 0]
         above_threshold.append([good[truth == 0].mean(), good[truth > 0].mean()])
     np.testing.assert_allclose(above_threshold[1], above_threshold[0], atol=0.05)
@@ -121,7 +125,7 @@ def test_groups_of_one_class_each_cannot_calibrate(estimator):
     features = np.repeat([[0.0], [1.0]], 60, axis=0)
     targets = np.repeat([0, 1], 60)
     groups = np.repeat(["good", "bad"], 60)
-    learnt = learn(features, targets, groups, PROFILES[estimator])
+    learnt = fit(features, targets, groups, PROFILES[estimator])
     np.testing.assert_array_equal(learnt.calibration, [1.0, 0.0, 0.0])
 
 

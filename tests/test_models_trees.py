@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import models
-from models.estimators.trees import Trees, fit_trees
+from models.estimators.trees import Trees
 
 
 @pytest.mark.parametrize("leaves", [2, 5, 16])
@@ -19,7 +19,7 @@ def test_trees_answer_as_scikit_learns_do(leaves, classes):
     targets = (features[:, 0] > features[:, 2]).astype(int) + (features[:, 1] > 0.5)
     targets = np.minimum(targets, classes - 1)
     profile = replace(models.GENERAL.at(1000.0), rounds=30, leaves=leaves)
-    ours = fit_trees(features, targets, np.array(["one"] * 500), profile)
+    ours = Trees.fit(features, targets, np.array(["one"] * 500), profile)
     theirs = HistGradientBoostingClassifier(
         max_iter=30, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
         early_stopping=False, random_state=0,
@@ -45,4 +45,4 @@ def test_two_trees_by_hand_add_up():
     )
     features = np.array([[0.5, 9.0], [0.6, 2.0], [0.6, 2.1], [-1.0, 0.0]])
     expected = [[1.25, 19.75], [2.25, 19.75], [3.25, 19.75], [1.25, 9.75]]
-    np.testing.assert_array_equal(trees.answers(features), expected)
+    np.testing.assert_array_equal(trees.logits(features), expected)

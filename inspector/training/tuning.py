@@ -14,7 +14,7 @@ from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.training import recordings, settings
 from inspector.training.tuningfile import opened
-from models.estimators.estimator import versions
+from models.modelfile import versions
 from models.splitting import check_apart, folds, group_of
 from models.tuning.grid import LEARNT, Grid, Point
 from models.tuning.search import Asked, Criterion, Measures, ask, measure, order

@@ -1,57 +1,87 @@
-"""The baseline: what good motion sounds like, and how far a frame is from it.
+"""The baseline: the distance of a frame from the nearest of a k-center subset of good frames.
 
-A hundred frames of good runs stand for all of them. A frame is as far from good motion as from the
-one of these that it resembles most. What lies below all that is known is taken for the least that
-is, and that least, silence, is good too: a motion quieter than any other is no failure.
+Features below all of the training set are raised to its minimum, and that minimum, silence, is
+part of the subset: a motion quieter than all others is no anomaly.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar, NoReturn, Self
 
 import numpy as np
 
+from models.errors import ProfileError
 from models.labels import ANOMALY
 from models.logbands import GENERAL, SCALAR, LogBands
-from models.types import Array, Index
+from models.profile import Profile
+from models.types import Array, Index, Words
 
 CLASSES = ("ok", ANOMALY)
-"""A baseline knows no failure, so that it cannot name one."""
+"""A baseline learns from good runs alone, so that it names no failure."""
 
 MOTION: LogBands = replace(
     GENERAL, classes=CLASSES, estimator="baseline", relative=False, quick=0.0
 )
-"""For runs with measured and desired motion. Levels stay as they are: it is one robot, and how
-loud it is matters."""
+"""For runs with measured and desired motion. Levels are absolute: it is one robot, whose own level
+matters."""
 NOISE_ALONE: LogBands = replace(
     SCALAR, classes=CLASSES, estimator="baseline", relative=False, quick=0.0
 )
 """For the noise alone."""
 
 CENTRES = 100
-"""Frames that stand for all good ones."""
+"""Size of the k-center subset."""
 TINY = 1e-12
-"""Distances are told from none above this."""
+"""Smallest distance that counts as more than none."""
 
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
-    """Frames of good motion, and how far from them is too far.
+    """A k-center subset of good frames, and the limit of the distance from it.
 
     Attributes:
-        good: Features of frames that stand for all good ones, silence first, shape
-            (centres, features).
-        limit: The distance from which a frame departs from good motion, shape (1,).
+        good: Features of the subset, silence first, shape (1 + centres, features).
+        limit: The distance beyond which a frame is an anomaly, shape (1,).
     """
+
+    DIMENSIONS: ClassVar[Mapping[str, int]] = {"good": 2, "limit": 1}
 
     good: Array
     limit: Array
 
+    @classmethod
+    def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> NoReturn:
+        """Refuse: a baseline has no classes to learn; `models.learn_baseline` trains it.
+
+        Raises:
+            ProfileError: Always.
+        """
+        raise ProfileError("a baseline learns from good runs alone: call models.learn_baseline")
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
+        """Make a baseline from the arrays of a model file."""
+        return cls(**{name: arrays[name] for name in cls.DIMENSIONS})
+
+    @staticmethod
+    def shapes(
+        arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
+    ) -> dict[str, tuple[int, ...]]:
+        """Expected shape of each array; there may be any number of centres."""
+        return {"good": (max(len(arrays["good"]), 1), features), "limit": (1,)}
+
+    @staticmethod
+    def highest(profile: Profile, *, features: int) -> dict[str, int]:
+        """No array holds indices."""
+        return {}
+
     @property
     def width(self) -> int:
-        """Decisions on one frame."""
+        """Decision values of one frame."""
         return 1
 
     def decision(self, features: Array) -> Array:
-        """Say how far frames are from good motion, in limits.
+        """Distance of frames from good motion, in limits.
 
         Args:
             features: Feature vectors, standardised, shape (frames, features).
@@ -68,13 +98,13 @@ class Baseline:
         return beyond
 
     def above_threshold(self, decisions: Array) -> None:
-        """Leave it at what each frame is called: the limit is set for single frames."""
+        """None: the limit is set for single frames."""
 
     def novel(self, decisions: Array) -> None:
         """Leave it out: an anomaly is what is out of distribution."""
 
     def score(self, decisions: Array) -> Array:
-        """Grade both classes: `ok` always 1, a departure by its distance in limits.
+        """Score of both classes: of `ok` always 1, of an anomaly its distance in limits.
 
         Args:
             decisions: What `decision` gave.
@@ -85,41 +115,41 @@ class Baseline:
         return np.hstack((np.ones_like(decisions), decisions))
 
     def arrays(self) -> dict[str, Array]:
-        """Give what a model file keeps."""
+        """Arrays for a model file, by name."""
         return {"good": self.good, "limit": self.limit}
 
 
 def distance(features: Array, good: Array) -> Array:
-    """Say how far frames are from the good one that each resembles most.
+    """Distance of frames from the nearest of a subset of good ones.
 
     Args:
         features: Feature vectors, shape (frames, features).
-        good: What `cover` gave, shape (centres, features).
+        good: What `k_centers` gave, shape (1 + centres, features).
 
     Returns:
         Root mean square of the differences, shape (frames,), in deviations.
     """
-    heard = np.maximum(features, good[0])
+    raised = np.maximum(features, good[0])
     # |x - g|^2 = |x|^2 + |g|^2 - 2 x g
-    product = np.einsum("ij,ij->i", good, good) - 2.0 * heard @ good.T
-    nearest = product.min(axis=1) + np.einsum("ij,ij->i", heard, heard)
+    product = np.einsum("ij,ij->i", good, good) - 2.0 * raised @ good.T
+    nearest = product.min(axis=1) + np.einsum("ij,ij->i", raised, raised)
     root: Array = np.sqrt(np.maximum(nearest, 0.0) / features.shape[1])
     return root
 
 
-def cover(features: Array, count: int = CENTRES) -> Array:
-    """Choose frames that stand for all: each next one is the farthest from those before.
+def k_centers(features: Array, count: int = CENTRES) -> Array:
+    """A k-center subset: each next frame is the farthest from those before.
 
-    With as many, none could leave less than half as much uncovered (T. F. Gonzalez, *Clustering to
-    Minimize the Maximum Intercluster Distance*, 1985).
+    The largest distance of a frame from the subset is at most twice the least that as many frames
+    can have (T. F. Gonzalez, *Clustering to Minimize the Maximum Intercluster Distance*, 1985).
 
     Args:
         features: Feature vectors, standardised, shape (frames, features).
-        count: How many to choose.
+        count: Frames of the subset.
 
     Returns:
-        Silence, which is the least of each feature, and the frames chosen, the most usual one
-        first, shape (1 + centres, features).
+        Silence, which is the minimum of each feature, and the subset, the frame nearest to the
+        mean first, shape (1 + centres, features).
     """
     chosen = [int(np.square(features).sum(axis=1).argmin())]
     nearest = _squares(features, chosen[-1])

@@ -1,4 +1,4 @@
-"""Decisions by probabilities: the class of a frame, the alarm threshold, and novelty."""
+"""Decisions by probabilities: the class of a frame, and whether it may raise an alarm."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ LIKELY = 0.2
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Probable(ABC):
-    """What decides by probabilities.
+    """An estimator that decides by probabilities.
 
-    A decision is the logarithm of a class's probability, for all classes, and then the novelty
-    score: how far the frame's farthest feature lies above nearly all that was learnt from, in
-    deviations. Far above, a low probability of failure means nothing.
+    Its decision values are the logarithm of the probability of each class, and then the novelty
+    score: how far the farthest feature lies above nearly all training frames, in standard
+    deviations. Out of distribution, probabilities mean nothing.
 
     Attributes:
-        calibration: Scale of answers, then an offset for each class, shape (1 + classes,).
-        frequency: Share of each class in the frames that were learnt from, shape (classes,).
-        alarm: Probability of any failure from which a frame is above the alarm threshold.
+        calibration: Scale of the logits, then an offset for each class, shape (1 + classes,).
+        frequency: Share of each class in the training frames, shape (classes,).
+        alarm: Alarm threshold: a probability of any failure.
     """
 
     calibration: Array
@@ -36,20 +36,20 @@ class Probable(ABC):
 
     @property
     def width(self) -> int:
-        """Decisions on one frame."""
+        """Decision values of one frame."""
         return len(self.calibration)
 
     @property
     @abstractmethod
-    def highest(self) -> Array:
-        """Highest value of each feature that is known, shape (features,)."""
+    def maximum(self) -> Array:
+        """Highest value of each feature in nearly all training frames, shape (features,)."""
 
     @abstractmethod
-    def answers(self, features: Array) -> Array:
-        """Say how likely classes are; logarithms, not calibrated, shape (frames, classes)."""
+    def logits(self, features: Array) -> Array:
+        """Logits of the classes, not calibrated, shape (frames, classes)."""
 
     def decision(self, features: Array) -> Array:
-        """Say how probable each class is, and how novel the frame.
+        """Probability of each class, and novelty of the frame.
 
         Args:
             features: Feature vectors, shape (frames, features).
@@ -59,8 +59,8 @@ class Probable(ABC):
             (frames, classes + 1).
         """
         decisions = np.empty((len(features), self.width))
-        decisions[:, :-1] = calibrated(self.answers(features), self.calibration)
-        np.maximum.reduce(features - self.highest, 1, out=decisions[:, -1])
+        decisions[:, :-1] = calibrated(self.logits(features), self.calibration)
+        np.maximum.reduce(features - self.maximum, 1, out=decisions[:, -1])
         return decisions
 
     @cached_property
@@ -99,6 +99,6 @@ class Probable(ABC):
         return novel
 
     def score(self, decisions: Array) -> Array:
-        """Grade all classes by their probabilities, shape (frames, classes)."""
+        """Probability of each class, shape (frames, classes)."""
         probabilities: Array = np.exp(decisions[:, :-1])
         return probabilities

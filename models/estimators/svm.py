@@ -1,25 +1,26 @@
-"""Support vector machines, evaluated in NumPy.
+"""Two-class support vector machines, evaluated in NumPy, and their combination for more classes.
 
-Conventions: a machine decides between two sides, and a positive decision means its first one. In
+Conventions: a positive decision value of a machine means the first of its two classes. In
 one-vs-one the machines are the pairs (0, 1), (0, 2), …, (1, 2), … of classes; in one-vs-rest there
 is one for each class, against all others.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import combinations
 from math import isqrt
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from models.profile import Kernel, Multiclass, Profile
-from models.types import Array, Index
+from models.types import Array, Index, Words
 
 
 @dataclass(frozen=True, eq=False)
 class SupportVectorMachines:
-    """All two-class machines of a classifier, over the same vectors.
+    """All machines of a classifier, over the same vectors.
 
     Attributes:
         vectors: Support vectors, shape (vectors, features); with the linear kernel they may be
@@ -28,8 +29,10 @@ class SupportVectorMachines:
         intercept: Bias b, shape (machines,).
         kernel: The kernel function.
         gamma: Parameter of the RBF kernel.
-        multiclass: How the machines make a choice.
+        multiclass: How the machines are combined.
     """
+
+    DIMENSIONS: ClassVar[Mapping[str, int]] = {"vectors": 2, "coefficients": 2, "intercept": 1}
 
     vectors: Array
     coefficients: Array
@@ -38,48 +41,78 @@ class SupportVectorMachines:
     gamma: float
     multiclass: Multiclass
 
+    @classmethod
+    def fit(
+        cls, features: Array, targets: Index, groups: Words, profile: Profile
+    ) -> "SupportVectorMachines":
+        """Train machines on all frames, whatever their groups; see `fit`."""
+        return fit(features, targets, profile).condensed()
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
+        """Make machines from the arrays of a model file."""
+        return cls(
+            **{name: arrays[name] for name in cls.DIMENSIONS},
+            kernel=profile.kernel,
+            gamma=profile.gamma,
+            multiclass=profile.multiclass,
+        )
+
+    @staticmethod
+    def shapes(
+        arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
+    ) -> dict[str, tuple[int, ...]]:
+        """Expected shape of each array; there may be any number of support vectors."""
+        vectors, machines = len(arrays["vectors"]), machine_count(classes, profile.multiclass)
+        return {
+            "vectors": (vectors, features),
+            "coefficients": (machines, vectors),
+            "intercept": (machines,),
+        }
+
+    @staticmethod
+    def highest(profile: Profile, *, features: int) -> dict[str, int]:
+        """No array holds indices."""
+        return {}
+
     @property
     def width(self) -> int:
-        """Decisions on one frame."""
+        """Decision values of one frame."""
         return len(self.intercept)
 
     @property
     def classes(self) -> int:
-        """How many classes the machines tell apart."""
+        """How many classes there are."""
         if self.multiclass == "one-vs-rest":
             return self.width
         return (1 + isqrt(1 + 8 * self.width)) // 2
 
     def choose(self, decisions: Array) -> Index:
-        """Choose a class for each frame, see `choose`."""
+        """Class of each frame, as an index, shape (frames,); see `choose`."""
         return choose(decisions, classes=self.classes, multiclass=self.multiclass)
 
     def above_threshold(self, decisions: Array) -> None:
-        """Leave it at what each frame is called."""
+        """None: each frame that is called a failure counts."""
 
     def novel(self, decisions: Array) -> None:
         """Leave it out: support vector machines have no measure of novelty."""
 
     def score(self, decisions: Array) -> Array:
-        """Grade all classes for each frame, see `score`."""
+        """Score of each class, shape (frames, classes); see `score`."""
         return score(decisions, classes=self.classes, multiclass=self.multiclass)
 
     def arrays(self) -> dict[str, Array]:
-        """Give what a model file keeps."""
-        return {
-            "vectors": self.vectors,
-            "coefficients": self.coefficients,
-            "intercept": self.intercept,
-        }
+        """Arrays for a model file, by name."""
+        return {name: getattr(self, name) for name in self.DIMENSIONS}
 
     def decision(self, features: Array) -> Array:
-        """Evaluate every machine, sum y_i alpha_i K(x_i, x) + b (paper, Sec. III-B).
+        """Decision values, sum y_i alpha_i K(x_i, x) + b (paper, Sec. III-B).
 
         Args:
             features: Feature vectors, shape (frames, features).
 
         Returns:
-            Decisions, shape (frames, machines).
+            Shape (frames, machines).
         """
         similarity = features @ self.vectors.T
         if self.kernel == "rbf":  # K(x, y) = exp(-gamma |x - y|^2)
@@ -89,7 +122,7 @@ class SupportVectorMachines:
         return decisions
 
     def condensed(self) -> Self:
-        """Merge the vectors of linear machines into one weight vector for each machine."""
+        """The same machines, each linear one as a single weight vector."""
         if self.kernel != "linear":
             return self
         machines = len(self.intercept)
@@ -104,17 +137,17 @@ class SupportVectorMachines:
 
 
 def machine_count(classes: int, multiclass: Multiclass) -> int:
-    """Say how many two-class machines tell classes apart."""
+    """Number of machines for so many classes."""
     return classes * (classes - 1) // 2 if multiclass == "one-vs-one" else classes
 
 
 def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
-    """Choose a class for each frame: by votes of the pairs, or by the largest decision.
+    """Class of each frame: that of most votes of the pairs, or of the largest decision value.
 
     Args:
-        decisions: Decisions of all machines, shape (frames, machines).
+        decisions: Decision values, shape (frames, machines).
         classes: How many classes there are.
-        multiclass: How machines make a choice.
+        multiclass: How the machines are combined.
 
     Returns:
         Index of a class for each frame, shape (frames,); the first of equals.
@@ -127,17 +160,18 @@ def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
 
 
 def score(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
-    """Grade all classes for each frame, larger meaning more certain.
+    """Score of each class, larger meaning more certain.
 
     Args:
-        decisions: Decisions of all machines, shape (frames, machines).
+        decisions: Decision values, shape (frames, machines).
         classes: How many classes there are.
-        multiclass: How machines make a choice.
+        multiclass: How the machines are combined.
 
     Returns:
-        Scores, shape (frames, classes). One-vs-rest: the decisions. One-vs-one: votes, and less
-        than half a vote for the sum of decisions, as scikit-learn grades (`decision_function` in
-        its shape "ovr"); among classes with the same votes, `choose` takes the first.
+        Scores, shape (frames, classes). One-vs-rest: the decision values. One-vs-one: votes, and
+        less than half a vote for the sum of decision values, as scikit-learn has it
+        (`decision_function` in its shape "ovr"); among classes with the same votes, `choose` takes
+        the first.
     """
     if multiclass == "one-vs-rest":
         return decisions
@@ -154,19 +188,19 @@ def _votes(decisions: Array, classes: int) -> Array:
 
 @lru_cache
 def _sides(classes: int) -> tuple[Array, Array]:
-    """Mark the first and the second class of each pair, shape (machines, classes) each."""
+    """First and second class of each pair, one-hot, shape (machines, classes) each."""
     first, second = np.array(list(combinations(range(classes), 2))).T
     unit = np.eye(classes)
     return unit[first], unit[second]
 
 
 def fit(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
-    """Learn support vector machines.
+    """Train support vector machines.
 
     Args:
         features: Feature vectors, shape (frames, features).
         targets: Class of each, as an index from 0 without a gap, shape (frames,).
-        profile: Kernel, parameters, and how machines make a choice.
+        profile: Kernel, parameters, and how the machines are combined.
 
     Returns:
         The machines, with their support vectors.
@@ -177,23 +211,23 @@ def fit(features: Array, targets: Index, profile: Profile) -> SupportVectorMachi
 
 def _one_vs_one(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
     """Train a machine for each pair of classes, C times N / (classes N_c) for each class."""
-    svc = _svc(profile, profile.regularization, dict(enumerate(balance(targets))))
-    svc.fit(features, targets)
-    pairs = list(combinations(range(len(svc.classes_)), 2))
-    stops = np.cumsum(svc.n_support_)
-    coefficients = np.zeros((len(pairs), len(svc.support_)))
+    fitted = svc(profile, profile.regularization, dict(enumerate(balance(targets))))
+    fitted.fit(features, targets)
+    pairs = list(combinations(range(len(fitted.classes_)), 2))
+    stops = np.cumsum(fitted.n_support_)
+    coefficients = np.zeros((len(pairs), len(fitted.support_)))
     for machine, (first, second) in enumerate(pairs):
         # libsvm keeps, for a vector of class i, one row for each other class j in their order.
         for own, other in ((first, second), (second, first)):
-            columns = slice(stops[own] - svc.n_support_[own], stops[own])
+            columns = slice(stops[own] - fitted.n_support_[own], stops[own])
             row = other - (other > own)
-            coefficients[machine, columns] = svc.dual_coef_[row, columns]
+            coefficients[machine, columns] = fitted.dual_coef_[row, columns]
     # With two classes, scikit-learn turns the sign so that positive means the second.
     sign = -1.0 if len(pairs) == 1 else 1.0
     return SupportVectorMachines(
-        svc.support_vectors_,
+        fitted.support_vectors_,
         sign * coefficients,
-        sign * svc.intercept_,
+        sign * fitted.intercept_,
         profile.kernel,
         profile.gamma,
         profile.multiclass,
@@ -205,10 +239,10 @@ def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> SupportVe
     weights = balance(targets)
     coefficients, intercept = np.zeros((len(weights), len(targets))), np.zeros(len(weights))
     for machine, weight in enumerate(weights):
-        svc = _svc(profile, profile.regularization * float(weight))
-        svc.fit(features, targets == machine)
-        coefficients[machine, svc.support_] = svc.dual_coef_[0]
-        intercept[machine] = svc.intercept_[0]
+        fitted = svc(profile, profile.regularization * float(weight))
+        fitted.fit(features, targets == machine)
+        coefficients[machine, fitted.support_] = fitted.dual_coef_[0]
+        intercept[machine] = fitted.intercept_[0]
     used = np.flatnonzero(coefficients.any(axis=0))
     return SupportVectorMachines(
         features[used],
@@ -221,18 +255,32 @@ def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> SupportVe
 
 
 def balance(targets: Index) -> Array:
-    """Weigh classes against their frequency, N / (classes N_c)."""
+    """Balanced weights of the classes, N / (classes N_c), shape (classes,)."""
     counts = np.bincount(targets)
     balance: Array = len(targets) / len(counts) / counts
     return balance
 
 
-def _svc(profile: Profile, regularization: float, weights: dict[int, float] | None = None) -> Any:
+def svc(
+    profile: Profile,
+    regularization: float,
+    weights: dict[int, float] | None = None,
+    *,
+    precomputed: bool = False,
+) -> Any:
+    """scikit-learn's support vector machines, not yet trained.
+
+    Args:
+        profile: Kernel and its parameter.
+        regularization: C.
+        weights: Factor of C for each class; 1 by default.
+        precomputed: Whether it is trained on kernel matrices in place of features.
+    """
     from sklearn.svm import SVC
 
     return SVC(
         C=regularization,
-        kernel=profile.kernel,
+        kernel="precomputed" if precomputed else profile.kernel,
         gamma=profile.gamma,
         class_weight=weights,
         decision_function_shape="ovo",

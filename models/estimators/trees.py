@@ -1,49 +1,69 @@
-"""Boosted trees, evaluated in NumPy, that say how probable each class is.
+"""Boosted trees, evaluated in NumPy, with calibrated probabilities of the classes.
 
-In each round of boosting, a small tree for each class adds to how likely that class is; the sums
-are then calibrated. What lies below all that is known falls to the same leaves as the least of it:
-a motion quieter than any other is no failure.
+In each round of boosting, a small tree for each class adds to the logit of that class; the sums
+are then calibrated. A feature below all of the training set leads to the same leaves as its
+minimum: a motion quieter than any other is no failure.
 
-All splits of all trees are looked at together, in place of a walk down each: a split that a frame
-passes on the right rules the leaves on its left out, and of those that are left in the end, the
+All splits of all trees are evaluated together, in place of a walk down each: a split that a frame
+passes on the right rules out the leaves on its left, and of those that are left in the end, the
 first one is where the walk would have led (C. Lucchese et al., *QuickScorer: A Fast Algorithm to
 Rank Documents with Additive Ensembles of Regression Trees*, 2015).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.estimators.calibration import calibrate, familiar, plain
+from models.estimators.calibration import calibrate, identity, of_seen_classes
 from models.estimators.probabilistic import Probable
 from models.profile import MOST_LEAVES, Profile
 from models.splitting import folds
 from models.types import Array, Index, Words
 
-TOGETHER = 32
-"""Frames that are looked at together: fewer take longer, more gain nothing but memory."""
+BATCH = 32
+"""Frames that are evaluated together: fewer take longer, more take memory and no less time."""
+MANY = 10_000
+"""Training frames from which several processes train the trees."""
+PARTS = 3
+"""Parts of the groups; each is left out of the training of some trees, for the calibration."""
+UNSEEN = -30.0
+"""Prior of a class without training frames."""
+TAIL = 1e-3
+"""Share of the training frames above the upper bound of a feature."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Trees(Probable):
-    """Trees whose answers are summed up, their calibration, and what they know.
+    """Trees whose leaves are summed up, their calibration, and bounds of the features.
 
     Trees are in the order of rounds, one for each class in each; their leaves from left to right.
     A tree with fewer splits than others has some that rule nothing out.
 
     Attributes:
-        feature: Number of the feature that a split looks at, shape (trees, splits).
+        feature: Index of the feature of a split, shape (trees, splits).
         threshold: A frame is on the right of a split if its feature exceeds this, shape
             (trees, splits).
         left: The first leaf on the left of a split, and the first one that is not, shape
             (2, trees, splits).
         leaf: What a leaf adds to its tree's class, shape (trees, leaves).
         prior: What classes start from, shape (classes,).
-        known: Highest value of each feature that is known, shape (features,).
+        known: Highest value of each feature in nearly all training frames, shape (features,).
     """
+
+    DIMENSIONS: ClassVar[Mapping[str, int]] = {
+        "feature": 2,
+        "threshold": 2,
+        "left": 3,
+        "leaf": 2,
+        "prior": 1,
+        "calibration": 1,
+        "frequency": 1,
+        "known": 1,
+    }
 
     feature: Array
     threshold: Array
@@ -52,16 +72,73 @@ class Trees(Probable):
     prior: Array
     known: Array
 
+    @classmethod
+    def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> "Trees":
+        """Train trees on all frames, and calibrate them by trees that left a part out.
+
+        Args:
+            features: Standardised, shape (frames, features).
+            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
+            groups: Runs of a group share their motion, shape (frames,).
+            profile: Number and size of the trees.
+
+        Returns:
+            The trees; equal input gives equal trees. Those of one group are not calibrated.
+        """
+        from joblib import Parallel, delayed
+
+        parts = _parts(targets, groups)
+        everything = np.arange(len(targets))
+        parallel = Parallel(n_jobs=-1 if len(targets) > MANY else 1)
+        fitted: list[Trees] = parallel(
+            delayed(_fit)(features, targets, train, profile)
+            for train in (everything, *(train for train, _ in parts))
+        )
+        trees, *others = fitted
+        seen = [of_seen_classes(targets, train, test) for train, test in parts]
+        if not sum(map(len, seen)):
+            return trees
+        logits = [one.logits(features[those]) for one, those in zip(others, seen, strict=True)]
+        truth = targets[np.concatenate(seen)]
+        return replace(trees, calibration=calibrate(np.concatenate(logits), truth))
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
+        """Make trees from the arrays of a model file."""
+        return cls(**{name: arrays[name] for name in cls.DIMENSIONS}, alarm=profile.alarm)
+
+    @staticmethod
+    def shapes(
+        arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
+    ) -> dict[str, tuple[int, ...]]:
+        """Expected shape of each array."""
+        trees, leaves = profile.rounds * classes, profile.leaves
+        return {
+            "feature": (trees, leaves - 1),
+            "threshold": (trees, leaves - 1),
+            "left": (2, trees, leaves - 1),
+            "leaf": (trees, leaves),
+            "prior": (classes,),
+            "calibration": (1 + classes,),
+            "frequency": (classes,),
+            "known": (features,),
+        }
+
+    @staticmethod
+    def highest(profile: Profile, *, features: int) -> dict[str, int]:
+        """Highest index of a feature, and of a leaf or the end of the leaves."""
+        return {"feature": features - 1, "left": profile.leaves}
+
     @property
-    def highest(self) -> Array:
-        """Highest value of each feature that is known, shape (features,)."""
+    def maximum(self) -> Array:
+        """Highest value of each feature in nearly all training frames, shape (features,)."""
         return self.known
 
-    def answers(self, features: Array) -> Array:
-        """Sum up the leaves that frames fall to, and the prior, shape (frames, classes)."""
+    def logits(self, features: Array) -> Array:
+        """Sums of the leaves that frames lead to, and the prior, shape (frames, classes)."""
         found = np.empty((len(features), len(self.prior)))
-        for first in range(0, len(features), TOGETHER):
-            few = slice(first, first + TOGETHER)
+        for first in range(0, len(features), BATCH):
+            few = slice(first, first + BATCH)
             found[few] = self._sums(features[few])
         return found
 
@@ -77,7 +154,7 @@ class Trees(Probable):
 
     @cached_property
     def _side_by_side(self) -> tuple[Index, Array, NDArray[np.uint16], Array, Index]:
-        """Lay all first splits of trees side by side, and then all second ones.
+        """All first splits of the trees side by side, and then all second ones.
 
         Returns:
             Features, thresholds and leaves on the left, as bits, shape (splits, trees); all
@@ -95,21 +172,12 @@ class Trees(Probable):
         )
 
     def arrays(self) -> dict[str, Array]:
-        """Give what a model file keeps."""
-        return {
-            "feature": self.feature,
-            "threshold": self.threshold,
-            "left": self.left,
-            "leaf": self.leaf,
-            "prior": self.prior,
-            "calibration": self.calibration,
-            "frequency": self.frequency,
-            "known": self.known,
-        }
+        """Arrays for a model file, by name."""
+        return {name: getattr(self, name) for name in self.DIMENSIONS}
 
 
 def _first_bits() -> NDArray[np.uint8]:
-    """Say of each number of 16 bits which is its first one, shape (65536,); of none, the first."""
+    """Lowest set bit of each number of 16 bits, shape (65536,); 0 if none is set."""
     numbers = np.arange(1 << MOST_LEAVES)
     first = np.frexp(numbers & -numbers)[1] - 1
     found: NDArray[np.uint8] = np.maximum(first, 0).astype(np.uint8)
@@ -119,55 +187,15 @@ def _first_bits() -> NDArray[np.uint8]:
 _FIRST = _first_bits()
 
 
-MANY = 10_000
-"""Frames from which trees are learnt by several processes."""
-PARTS = 3
-"""Parts of the groups; trees that have not learnt from one are asked about it to calibrate all."""
-NEVER = -30.0
-"""Prior of a class that no frame is of."""
-USUAL = 1e-3
-"""Share of the training frames that lie above what is known."""
-
-
-def fit_trees(features: Array, targets: Index, groups: Words, profile: Profile) -> Trees:
-    """Learn trees from all frames, and their calibration from trees that do not know them.
-
-    Args:
-        features: Standardised, shape (frames, features).
-        targets: Class of each, as an index from 0 without a gap, shape (frames,).
-        groups: What shares its motion, shape (frames,).
-        profile: Number and size of the trees.
-
-    Returns:
-        The trees; equal input gives equal trees. Those of a single group are not calibrated.
-    """
-    from joblib import Parallel, delayed
-
-    parts = _parts(targets, groups)
-    everything = np.arange(len(targets))
-    parallel = Parallel(n_jobs=-1 if len(targets) > MANY else 1)
-    learnt: list[Trees] = parallel(
-        delayed(_fit)(features, targets, known, profile)
-        for known in (everything, *(known for known, _ in parts))
-    )
-    trees, *others = learnt
-    asked = [familiar(targets, known, fresh) for known, fresh in parts]
-    if not sum(map(len, asked)):
-        return trees
-    answers = [one.answers(features[those]) for one, those in zip(others, asked, strict=True)]
-    truth = targets[np.concatenate(asked)]
-    return replace(trees, calibration=calibrate(np.concatenate(answers), truth))
-
-
 def _parts(targets: Index, groups: Words) -> list[tuple[Index, Index]]:
-    """Say which frames trees learn from, and which they are asked about."""
+    """Training and test frames of each part, as indices."""
     count = min(PARTS, len(set(groups.tolist())))
     parts = folds(groups.tolist(), count) if count > 1 else []
     return [part for part in parts if len(set(targets[part[0]].tolist())) > 1]
 
 
-def _fit(features: Array, targets: Index, known: Index, profile: Profile) -> Trees:
-    """Learn trees from the frames that are known; their calibration changes nothing."""
+def _fit(features: Array, targets: Index, train: Index, profile: Profile) -> Trees:
+    """Train trees on some of the frames, without calibration."""
     from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits
 
@@ -180,14 +208,14 @@ def _fit(features: Array, targets: Index, known: Index, profile: Profile) -> Tre
         random_state=0,
     )
     with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
-        boosting.fit(features[known], targets[known])
+        boosting.fit(features[train], targets[train])
     classes = int(targets.max()) + 1
-    counts = np.bincount(targets[known], minlength=classes)
+    counts = np.bincount(targets[train], minlength=classes)
     there = np.flatnonzero(counts)
-    # Private is where its trees are; a test holds ours to them. It has none for a class that it
-    # does not see, and of two classes for the second alone.
+    # Its trees are private attributes; a test compares ours with them. It has none for a class
+    # without frames, and of two classes for the second alone.
     learnt = there if len(there) > 2 else there[1:]
-    prior = np.where(counts > 0, 0.0, NEVER)
+    prior = np.where(counts > 0, 0.0, UNSEEN)
     prior[learnt] = boosting._baseline_prediction.ravel()
     shape = profile.rounds, classes, profile.leaves
     splits, leaf = np.zeros((4, *shape[:2], shape[2] - 1)), np.zeros(shape)
@@ -203,15 +231,15 @@ def _fit(features: Array, targets: Index, known: Index, profile: Profile) -> Tre
         left=np.array(left),
         leaf=leaf.reshape(-1, shape[2]),
         prior=prior,
-        known=np.quantile(features[known], 1.0 - USUAL, axis=0),
-        calibration=plain(classes),
-        frequency=counts / len(known),
+        known=np.quantile(features[train], 1.0 - TAIL, axis=0),
+        calibration=identity(classes),
+        frequency=counts / len(train),
         alarm=profile.alarm,
     )
 
 
 def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
-    """Read a tree as scikit-learn keeps it.
+    """Splits and leaves of a tree of scikit-learn.
 
     Returns:
         Of each split the feature, the threshold, the first leaf on its left, and the first one

@@ -7,9 +7,9 @@ import numpy as np
 
 from models.classifier import Classifier
 from models.errors import DatasetError, ProfileError
-from models.estimators.baseline import Baseline, cover, distance
-from models.estimators.estimator import versions
+from models.estimators.baseline import Baseline, distance, k_centers
 from models.features import standard
+from models.modelfile import versions
 from models.novelty.frames import GoodMotion
 from models.novelty.limit import Limit, limit
 from models.profile import Profile
@@ -81,7 +81,7 @@ def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -
         )
     found = limit(_unseen(good, profile), good, alarms)
     mean, scale = standard(good.features, profile)
-    estimator = Baseline(cover((good.features - mean) / scale), np.array([found.distance]))
+    estimator = Baseline(k_centers((good.features - mean) / scale), np.array([found.distance]))
     groups = len(set(good.groups.tolist()))
     metrics = {"baseline": {**asdict(found), "groups": groups, "runs": len(good.hashes)}}
     classifier = Classifier(
@@ -95,7 +95,7 @@ def _unseen(good: GoodMotion, profile: Profile) -> Array:
     apart = np.zeros(len(good))
     for train, test in _parts(good):
         mean, scale = standard(good.features[train], profile)
-        centres = cover((good.features[train] - mean) / scale)
+        centres = k_centers((good.features[train] - mean) / scale)
         apart[test] = distance((good.features[test] - mean) / scale, centres)
     return apart
 

@@ -7,14 +7,13 @@ C alone the kernel matrix, so that a point costs little more than libsvm's own w
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from models.estimators import svm
 from models.estimators.calibration import TINY
-from models.estimators.estimator import learn
-from models.estimators.svm import balance
+from models.estimators.estimator import ESTIMATORS
 from models.profile import Profile
 from models.tuning.logloss import grades
 from models.types import Array, Index, Words
@@ -51,7 +50,7 @@ def answers(
     """
     if profiles[0].estimator != "svm" or len(known) > LARGEST:
         for profile in profiles:
-            estimator = learn(known, targets, groups, profile)
+            estimator = ESTIMATORS[profile.estimator].fit(known, targets, groups, profile)
             decisions = estimator.decision(fresh)
             chosen = estimator.choose(decisions)
             if profile.estimator == "svm":
@@ -78,17 +77,20 @@ def answers(
 
 def _decisions(learnt: Array, asked: Array, targets: Index, profile: Profile) -> Array:
     """Do on kernel matrices what `training` does on features, shape (frames, machines)."""
-    weights = balance(targets)
+    weights = svm.balance(targets)
     if profile.multiclass == "one-vs-one":
-        svc = _svc(profile.regularization, dict(enumerate(weights.tolist())))
-        decisions: Array = svc.fit(learnt, targets).decision_function(asked)
+        weighted = dict(enumerate(weights.tolist()))
+        fitted = svm.svc(profile, profile.regularization, weighted, precomputed=True)
+        decisions: Array = fitted.fit(learnt, targets).decision_function(asked)
         # With two classes, scikit-learn turns the sign so that positive means the second.
         return decisions if decisions.ndim == 2 else -decisions[:, None]
     each = [
-        _svc(profile.regularization * weight).fit(learnt, targets == estimator)
-        for estimator, weight in enumerate(weights.tolist())
+        svm.svc(profile, profile.regularization * weight, precomputed=True).fit(
+            learnt, targets == machine
+        )
+        for machine, weight in enumerate(weights.tolist())
     ]
-    return np.stack([svc.decision_function(asked) for svc in each], axis=1)
+    return np.stack([fitted.decision_function(asked) for fitted in each], axis=1)
 
 
 def _unchecked() -> AbstractContextManager[None]:
@@ -103,14 +105,3 @@ def _unchecked() -> AbstractContextManager[None]:
 
 def _graded(decisions: Array, targets: Index, profile: Profile) -> Array:
     return grades(decisions, classes=int(targets.max()) + 1, multiclass=profile.multiclass)
-
-
-def _svc(regularization: float, weights: dict[int, float] | None = None) -> Any:
-    from sklearn.svm import SVC
-
-    return SVC(
-        C=regularization,
-        kernel="precomputed",
-        class_weight=weights,
-        decision_function_shape="ovo",
-    )
