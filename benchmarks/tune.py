@@ -23,7 +23,7 @@ from joblib.externals.loky import get_reusable_executor
 import models
 from inspector.training.tuning import Question, tune
 from inspector.training.tuningtable import table
-from models.tuning.search import ask
+from models.tuning.search import validate
 
 
 def timed(work: Callable[[], object]) -> tuple[object, float, float]:
@@ -74,8 +74,8 @@ def main() -> None:
     for index in random.integers(len(tuned.profiles), size=given.naive):
         point = tuned.profiles[index]
         called, cpu, _ = timed(lambda point=point: alone(point, sets))
-        asked = ask([point], tuned.trial)
-        same += np.array_equal(called, np.array(asked.classes)[asked.answers[0].chosen])
+        asked = validate([point], tuned.trial)
+        same += np.array_equal(called, np.array(asked.classes)[asked.decisions[0].chosen])
         spent += cpu
     each = spent / given.naive
     print(f"naively {1e3 * each:.0f} ms CPU a point, {each * count / 60:.0f} min for the grid;")

@@ -107,7 +107,7 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
         Norms by name, each of shape (samples,), and velocities joint by joint, shape
         (joints, samples), in [rad/s].
     """
-    return models.signals.telling({**nm.norms(run), **nm.by_joint(run)})
+    return models.signals.without_zero_error({**nm.norms(run), **nm.by_joint(run)})
 
 
 def _counted(labelled: Labelled) -> Labelled:

@@ -1,15 +1,15 @@
-"""Noise becomes labels: what a robot's noise signal says about its health.
+"""Classification of a robot's noise: from a signal to labels.
 
-    frames -> |STFT| -> bands -> log -> course in time -> machines -> class
+    frames -> |STFT| -> bands -> log -> temporal pooling -> estimator -> class
 
-after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` names each
-choice on the way: NoisyTest's own, the paper's, or ours for any rate (`LogBands`). A `Dataset`
-holds annotated frames, a `Classifier` learns from them and labels signals, `evaluate` counts, and
-`assess` measures whole recordings. A `Stream` labels a signal while it comes in. `learn_baseline`
-takes good runs alone.
+after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` holds
+all settings: NoisyTest's, the paper's, or ours for any rate (`LogBands`). A `Dataset` holds
+annotated frames, a `Classifier` is trained on them and labels signals, `evaluate` measures frames,
+and `assess` whole recordings. A `Stream` labels a signal sample by sample. `learn_baseline` takes
+good runs alone.
 
-This package knows no robot: a signal and its rate are all that it takes. It needs NumPy, and
-scikit-learn only to train.
+This package knows no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
+only to train.
 """
 
 from models.choice import nearest

@@ -11,9 +11,9 @@ from models.signals import NOISE, feeds
 def nearest(
     models: Iterable[Classifier], rate: float, signals: Collection[str] = (NOISE,)
 ) -> Classifier:
-    """Find the model of the nearest rate at or below a signal's own: down, never up.
+    """Model of the nearest rate at or below that of the signals.
 
-    Of models of one rate, it is the one that listens to most signals.
+    Of models of one rate, it is the one of most signals.
 
     Args:
         models: Models of any rates.
@@ -21,7 +21,7 @@ def nearest(
         signals: Names of the signals that there are.
 
     Raises:
-        MissingSignalError: If all models listen to something that is not there.
+        MissingSignalError: If each model needs a signal that is missing.
         RateError: If all others are of higher rates, or there are no models.
     """
     models = list(models)

@@ -1,4 +1,4 @@
-"""The classifier: a profile, its machines, and where they were learnt."""
+"""The classifier: a profile, its estimator, and the training set of it."""
 
 import hashlib
 from collections.abc import Mapping
@@ -25,14 +25,14 @@ from models.types import Array, Index, Mask, Real, Words
 
 @dataclass(frozen=True, eq=False)
 class Classifier:
-    """A trained model: frames of noise become class names.
+    """A trained model: predicts the class of frames of noise.
 
     Attributes:
         profile: How a signal becomes features.
-        classes: What frames can be called, in the profile's order: those it was trained with.
-        estimator: What decides: support vector machines, networks, trees, or a baseline.
-        mean: What is subtracted from the features, shape (features,).
-        scale: What they are divided by then, shape (features,).
+        classes: Names of the classes that it was trained with, in the profile's order.
+        estimator: Decides on standardised features.
+        mean: Mean of each feature, to be subtracted, shape (features,).
+        scale: Scale of each feature, to divide by, shape (features,).
         runs: SHA-256 of each training recording, by name.
         metrics: Measures of the training set, and of a validation set if one was given.
         versions: Of the software that trained it.
@@ -57,12 +57,12 @@ class Classifier:
         *,
         validation: Dataset | Examples | None = None,
     ) -> Self:
-        """Learn a classifier; needs scikit-learn.
+        """Train a classifier; needs scikit-learn.
 
         Args:
-            dataset: Annotated frames cut by the same profile, or what was made of them.
-            profile: What to learn.
-            validation: Others, to be measured by.
+            dataset: Annotated frames cut by the same profile, or their features.
+            profile: All settings.
+            validation: Others, for measures.
 
         Returns:
             The classifier; equal input gives an equal model.
@@ -97,11 +97,11 @@ class Classifier:
 
     @property
     def rate(self) -> float:
-        """Sample rate of the signals that it takes, in [Hz]."""
+        """Sample rate of its signals, in [Hz]."""
         return self.profile.rate
 
     def predict(self, frames: Real) -> Words:
-        """Name the class of each frame.
+        """Class of each frame.
 
         Args:
             frames: Stretches of noise signal, shape (frames, length).
@@ -115,13 +115,13 @@ class Classifier:
         return self._choose(self.decision(frames))
 
     def decision(self, frames: Real) -> Array:
-        """Decide on frames.
+        """Decision values of frames.
 
         Args:
             frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length).
 
         Returns:
-            Decisions, shape (frames, decisions); `svm` and `probable` say what they mean.
+            Shape (frames, decisions); `models.estimators` define their meaning.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
@@ -129,13 +129,13 @@ class Classifier:
         return self._decide(frames, np.arange(len(frames)))
 
     def scores(self, frames: Real) -> Array:
-        """Grade all classes for each frame, larger meaning more certain.
+        """Score of each class, larger meaning more certain.
 
         Args:
             frames: Stretches of noise signal, shape (frames, length).
 
         Returns:
-            Scores, shape (frames, classes): see `svm.score`; of networks and trees, probabilities.
+            Shape (frames, classes): see `svm.score`; of networks and trees, probabilities.
 
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
@@ -204,7 +204,7 @@ class Classifier:
         )
 
     def decide(self, plain: Array) -> Array:
-        """Decide on features.
+        """Decision values of features.
 
         Args:
             plain: Features, not yet standardised, shape (frames, features).
@@ -215,7 +215,7 @@ class Classifier:
         return self.estimator.decision((plain - self.mean) / self.scale)
 
     def predict_features(self, plain: Array) -> Words:
-        """Name the class of each frame by its features.
+        """Class of each frame, from its features.
 
         Args:
             plain: Features, not yet standardised, shape (frames, features).

@@ -1,4 +1,4 @@
-"""Evaluation: how often a classifier is right, in the paper's measures and in plain ones."""
+"""Evaluation of frames: the paper's measures, and recall and precision."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,11 +14,11 @@ from models.types import Array, Words
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Frames by what they are and what they were called; measures are shares from 0 to 1.
+    """Confusion matrix of frames, and measures of it, which are shares from 0 to 1.
 
     Attributes:
         classes: Names of the classes.
-        confusion: Frames of class (row) that were called class (column), shape (classes, classes).
+        confusion: Frames by true (row) and predicted class (column), shape (classes, classes).
     """
 
     classes: tuple[str, ...]
@@ -26,11 +26,11 @@ class Evaluation:
 
     @classmethod
     def of(cls, truth: Words, called: Words, classes: Sequence[str]) -> Self:
-        """Count frames.
+        """Confusion matrix of predictions.
 
         Args:
-            truth: What each frame is, shape (frames,).
-            called: What it was called, shape (frames,).
+            truth: True class of each frame, shape (frames,).
+            called: Predicted class of each frame, shape (frames,).
             classes: Names of the classes, in their order; others that occur come after them.
 
         Raises:
@@ -104,7 +104,7 @@ class Evaluation:
         return float(_ratio(quiet[:, ~self._ok].sum(), quiet.sum()))
 
     def as_dict(self) -> dict[str, Any]:
-        """Give all measures as JSON can hold them, None for what is not defined."""
+        """All measures for JSON, None where undefined."""
 
         def by_class(values: Array) -> dict[str, float | None]:
             return {name: _plain(value) for name, value in zip(self.classes, values, strict=True)}
@@ -172,7 +172,7 @@ class Evaluation:
 
 
 def _ratio(part: Any, whole: Any) -> Any:
-    """Divide, NaN where there is nothing to divide by."""
+    """Quotient, NaN where the denominator is 0."""
     whole = np.asarray(whole, dtype=np.float64)
     return np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
 

@@ -24,8 +24,8 @@ class Dataset:
 
     Attributes:
         frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length)
-            if the profile listens to several.
-        labels: What each frame is, shape (frames,).
+            if the profile has several.
+        labels: Class of each frame, shape (frames,).
         runs: Name of the recording that each frame is from, shape (frames,).
         hashes: SHA-256 of each recording, by name.
     """
@@ -44,7 +44,7 @@ class Dataset:
         Args:
             recordings: Annotated signals at the profile's rate, each of another name.
             profile: How blocks are cut and framed, and which labels there are.
-            training: Whether the frames are to learn from; `cut` says what that changes.
+            training: Whether the frames are for training; `cut` says what that changes.
 
         Returns:
             All frames without an invalid sample.
@@ -83,7 +83,7 @@ class Dataset:
         Args:
             folder: Folder that holds a ``.toml`` beside each ``.log``.
             profile: How blocks are cut and framed, and which labels there are.
-            training: Whether the frames are to learn from; `cut` says what that changes.
+            training: Whether the frames are for training; `cut` says what that changes.
 
         Returns:
             All annotated frames.
@@ -115,7 +115,7 @@ def _check(recording: Recording, profile: Profile, hashes: Mapping[str, str]) ->
 def cut(
     recording: Recording, block: Block, profile: Profile, *, training: bool
 ) -> tuple[Real, Mask]:
-    """Take a block's samples out of a recording, one frame of them or more.
+    """Samples of a block of a recording, one frame of them or more.
 
     A block shorter than a frame is padded in training, lest a frame mixes failures that follow
     each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
@@ -125,10 +125,10 @@ def cut(
         recording: Where the block lies.
         block: One annotated stretch of it.
         profile: How long a frame is, and how blocks are cut.
-        training: Whether the frames are to learn from.
+        training: Whether the frames are for training.
 
     Returns:
-        Samples, shape (samples,), or (signals, samples) if the profile listens to several, and
+        Samples, shape (samples,), or (signals, samples) if the profile has several, and
         which of them are valid, shape (samples,); padding counts as valid.
 
     Raises:
@@ -166,7 +166,7 @@ def cut(
 
 
 def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[float, float]:
-    """Say from when to when, in NoisyTest's order of operations, for its rounding to be the same.
+    """Start and stop of the samples, in NoisyTest's order of operations, for equal rounding.
 
     Args:
         time: Times of the recording's samples, shape (samples,), in [s].
@@ -189,10 +189,10 @@ def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[f
 
 
 def _spread(block: Block, time: Real, profile: Profile) -> Block:
-    """Widen a block to all frames that hold it whole, or that it fills by half or more.
+    """A block widened to all frames that hold it whole, or that it fills by half or more.
 
-    When a signal is labelled, a frame sees a failure come in at its end and leave at its start; a
-    machine that has learnt it from the middle alone takes it for another one there.
+    In a signal, a failure enters a frame at its end and leaves at its start; an estimator that was
+    trained on failures in the middle alone confuses them there.
     """
     if not len(time):
         return block
@@ -203,7 +203,7 @@ def _spread(block: Block, time: Real, profile: Profile) -> Block:
 
 
 def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
-    """Find the samples from a start to a stop, by their times or by counting them."""
+    """Samples from a start to a stop, by their times or by their number."""
     if profile.cut_by_time:
         inside = np.flatnonzero((time >= start) & (time <= stop))
         return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)

@@ -1,4 +1,4 @@
-"""What can be wrong with a signal, a data set or a model: one base error, facts in subclasses."""
+"""Errors of signals, data sets and models: one base error, facts in subclasses."""
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -13,11 +13,11 @@ class SignalError(ModelsError):
 
 
 class MissingSignalError(SignalError):
-    """Signals that a model needs and that are not there.
+    """Signals that a model needs and that are missing.
 
     Args:
         lacking: Their names.
-        there: What there is.
+        there: Names of the signals that there are.
     """
 
     def __init__(self, lacking: Iterable[str], there: Iterable[str]) -> None:
@@ -97,7 +97,7 @@ class OutputError(FileError):
 
 
 class DatasetError(ModelsError):
-    """A data set that cannot be built, or that no classifier can be learnt from."""
+    """A data set that cannot be built, or that no classifier can be trained on."""
 
 
 class NoFrameError(DatasetError):
@@ -117,11 +117,11 @@ class NoFrameError(DatasetError):
 
 
 class SeenError(DatasetError):
-    """Recordings that a model is to be measured by, and that it has learnt from.
+    """Test recordings that a model was trained on.
 
     Args:
-        seen: What the model knows, by name of the recording.
-        total: How many recordings there are to measure by.
+        seen: What the model was trained on, by name of the recording.
+        total: Number of test recordings.
         advice: What to do about it.
     """
 

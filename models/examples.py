@@ -1,4 +1,4 @@
-"""Examples: what a machine learns from, features in place of frames."""
+"""Examples: features and labels to train an estimator with."""
 
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
@@ -17,7 +17,7 @@ from models.splitting import group_of
 from models.types import Array, Words
 
 CHUNK = 64
-"""Frames that are looked at together, which bounds the memory that they take."""
+"""Frames per evaluation, which bounds the memory that they take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,7 +26,7 @@ class Examples:
 
     Attributes:
         features: Not yet standardised, shape (frames, features).
-        labels: What each frame is, shape (frames,).
+        labels: Class of each frame, shape (frames,).
         runs: Name of the recording that each frame is from, shape (frames,).
         hashes: SHA-256 of each recording, by name.
     """
@@ -38,7 +38,7 @@ class Examples:
 
     @classmethod
     def of(cls, dataset: Dataset, profile: Profile) -> Self:
-        """Compute the features of all frames.
+        """Features of all frames of a data set.
 
         Args:
             dataset: Annotated frames, cut by the same profile.
@@ -53,11 +53,11 @@ class Examples:
 
     @classmethod
     def read(cls, recordings: Iterable[Recording], profile: Profile) -> Self:
-        """Look at recordings one after the other; only their features are kept.
+        """Features of recordings, read one after the other; only the features are kept.
 
         Args:
             recordings: Annotated signals at the profile's rate, each of another name; those
-                without a frame are passed over.
+                without a frame are skipped.
             profile: How blocks are cut and framed, and what to compute.
 
         Raises:
@@ -84,7 +84,7 @@ class Examples:
 
     @property
     def groups(self) -> Words:
-        """What each frame shares its motion with, shape (frames,); see `splitting.group_of`."""
+        """Group of each frame, shape (frames,); see `splitting.group_of`."""
         return np.array([group_of(name) for name in self.runs.tolist()])
 
     def __len__(self) -> int:

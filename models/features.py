@@ -1,9 +1,9 @@
-"""Features: the numbers by which a machine tells one frame from another.
+"""Features: log-band energies of the frames, pooled over time.
 
-Conventions: a spectrogram has the axes (frames, time, frequency). What there is of several signals
-follows one after the other, among the levels of a window as well as in a feature vector. A feature
-vector of NoisyTest and the paper runs over time first: all coefficients of the first band, then
-those of the second.
+Conventions: a spectrogram has the axes (frames, time, frequency). Signals follow one after the
+other, among the log-band energies of a window as well as in a feature vector. A feature vector of
+NoisyTest and the paper has the coefficients over time of the first band first, and then those of
+the second.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ from models.types import Array, Index, Real
 
 
 def features(frames: Real, profile: Profile) -> Array:
-    """Describe each frame by the levels of its frequency bands and their course in time.
+    """Features of each frame: its log-band energies, pooled over time.
 
     Args:
         frames: Stretches of noise signal, shape (frames, length), or (frames, rows, length).
@@ -35,15 +35,17 @@ def features(frames: Real, profile: Profile) -> Array:
     _check(frames, profile)
     rows = frames.shape[1] if frames.ndim > 2 else 1
     exact = rounded(frames, profile).reshape(len(frames), rows, profile.length)
-    loudness = [
-        levels(np.swapaxes(_stretches(exact, each.window, each.stride), 1, 2), profile, each)
+    energies = [
+        log_band_energies(
+            np.swapaxes(_windows(exact, each.window, each.stride), 1, 2), profile, each
+        )
         for each in profile.resolutions
     ]
-    return course(loudness, profile)
+    return temporal_pooling(energies, profile)
 
 
 def rounded(samples: Real, profile: Profile) -> Array:
-    """Round samples as the profile asks for, and make 64-bit numbers of them.
+    """Samples as 64-bit numbers, rounded to the precision of the profile.
 
     Args:
         samples: A noise signal, any shape.
@@ -54,45 +56,45 @@ def rounded(samples: Real, profile: Profile) -> Array:
     return samples.astype(np.float64, copy=False)
 
 
-def levels(stretches: Array, profile: Profile, resolution: Resolution) -> Array:
-    """Tell how loud each frequency band is in each window of a Fourier transform.
+def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) -> Array:
+    """Logarithm of the amplitude of each frequency band, in each window of a Fourier transform.
 
     Args:
-        stretches: Samples of the windows, shape (..., rows, window).
+        windows: Samples of the windows, shape (..., rows, window).
         profile: What to compute.
         resolution: The one of the profile's that the windows are of.
 
     Returns:
-        Logarithms of the bands' amplitudes, shape (..., levels): of each norm, and then, in a
-        profile that is relative, what each norm's is above that of the one before; then the same
-        of the loudest joint of each signal that goes joint by joint, and how far that one is above
-        the mean of all joints.
+        Shape (..., energies), in [Np]: of each norm, and then, in a relative profile, the
+        difference of each norm from the one before; then the same of the loudest joint of each
+        signal that goes joint by joint, and the difference of that joint from the mean of all
+        joints.
     """
-    rows = stretches.shape[:-2]
+    rows = windows.shape[:-2]
     if profile.bands != "log":
-        amplitude = compress(_amplitude(stretches), comb=profile.bands == "comb")
+        amplitude = compress(_amplitude(windows), comb=profile.bands == "comb")
         return np.log(amplitude + profile.floor).reshape(*rows, prod(amplitude.shape[-2:]))
-    spectrum = _transform(stretches)
+    spectrum = _transform(windows)
     squares = np.square(spectrum.real)
     squares += np.square(spectrum.imag)
     shares = _power_shares(profile.rate, resolution)
-    # Side by side, windows of all signals are one product of matrices.
+    # Windows of all signals in one product of matrices.
     power = squares.reshape(-1, len(shares)) @ shares
     np.sqrt(power, out=power)
     power += profile.floor
     bands = shares.shape[1]
     if profile.norms < len(profile.signals):
         return _with_joints(np.log(power).reshape(*rows, -1, bands), profile)
-    own = stretches.shape[-2] * bands
-    loudness = np.empty((*rows, 2 * own - bands if profile.relative else own))
-    np.log(power.reshape(*rows, own), loudness[..., :own])
+    own = windows.shape[-2] * bands
+    energies = np.empty((*rows, 2 * own - bands if profile.relative else own))
+    np.log(power.reshape(*rows, own), energies[..., :own])
     if profile.relative:
-        np.subtract(loudness[..., bands:own], loudness[..., : own - bands], loudness[..., own:])
-    return loudness
+        np.subtract(energies[..., bands:own], energies[..., : own - bands], energies[..., own:])
+    return energies
 
 
 def _with_joints(found: Array, profile: Profile) -> Array:
-    """Lay out levels of all rows as `levels` says.
+    """Log-band energies of norms and joints, in the order of `log_band_energies`.
 
     Args:
         found: Shape (..., rows, bands).
@@ -101,8 +103,8 @@ def _with_joints(found: Array, profile: Profile) -> Array:
     rows, bands = found.shape[:-2], found.shape[-1]
     norms, kinds = profile.norms, len(profile.signals) - profile.norms
     joints = found[..., norms:, :].reshape(*rows, kinds, -1, bands)
-    loudness = np.empty((*rows, 2 * norms - 1 + 3 * kinds - 1, bands))
-    own, loudest = loudness[..., : 2 * norms - 1, :], loudness[..., 2 * norms - 1 :, :]
+    energies = np.empty((*rows, 2 * norms - 1 + 3 * kinds - 1, bands))
+    own, loudest = energies[..., : 2 * norms - 1, :], energies[..., 2 * norms - 1 :, :]
     own[..., :norms, :] = found[..., :norms, :]
     np.subtract(own[..., 1:norms, :], own[..., : norms - 1, :], own[..., norms:, :])
     most, above = loudest[..., :kinds, :], loudest[..., -kinds:, :]
@@ -111,28 +113,28 @@ def _with_joints(found: Array, profile: Profile) -> Array:
     np.add.reduce(joints, -2, out=above)
     above /= joints.shape[-2]
     np.subtract(most, above, above)
-    return loudness.reshape(*rows, -1)
+    return energies.reshape(*rows, -1)
 
 
-def course(loudness: Sequence[Array], profile: Profile) -> Array:
-    """Describe each frame by the course of its levels in time.
+def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
+    """Features of each frame: log-band energies of its windows, pooled over time.
 
     Args:
-        loudness: For each of the profile's resolutions, levels of the frames' windows, shape
-            (frames, time, levels).
+        energies: For each of the profile's resolutions, log-band energies of the frames' windows,
+            shape (frames, time, energies).
         profile: What to compute.
 
     Returns:
         Features, not yet standardised, shape (frames, features).
     """
     if profile.bands == "log":
-        return pooled(loudness, profile)
-    flat = dct(loudness[0]).reshape(len(loudness[0]), feature_count(profile))
+        return pooled(energies, profile)
+    flat = dct(energies[0]).reshape(len(energies[0]), feature_count(profile))
     return flat.astype(np.float32).astype(np.float64) if profile.single_precision else flat
 
 
 def feature_count(profile: Profile) -> int:
-    """Say how many features a frame has."""
+    """Number of features of a frame."""
     if profile.bands == "log":
         bands = sum(len(each.edges) - 1 for each in profile.resolutions)
         return len(spectra(profile)) * POOLED * bands + profile.relative
@@ -140,11 +142,11 @@ def feature_count(profile: Profile) -> int:
 
 
 def standard(plain: Array, profile: Profile) -> tuple[Array, Array]:
-    """Learn what features are scaled by; 0 and 1 where they stay as they are.
+    """Mean and scale for the standardisation of features; 0 and 1 if they stay as they are.
 
     Args:
-        plain: Features to learn from, shape (frames, features).
-        profile: Says the least deviation.
+        plain: Features of the training set, shape (frames, features).
+        profile: Least standard deviation.
 
     Returns:
         Mean and scale of each feature, shape (features,) each.
@@ -165,7 +167,7 @@ def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
     Returns:
         Amplitudes, shape (frames, time, frequency).
     """
-    return _amplitude(_stretches(frames, window, stride))
+    return _amplitude(_windows(frames, window, stride))
 
 
 def compress(spectrum: Array, *, comb: bool = False) -> Array:
@@ -183,17 +185,17 @@ def compress(spectrum: Array, *, comb: bool = False) -> Array:
     return bands
 
 
-def dct(loudness: Array) -> Array:
-    """Describe the course of each band in time by its cosine transform of type II, orthonormal.
+def dct(energies: Array) -> Array:
+    """Cosine transform of each band over time, of type II, orthonormal.
 
     Args:
-        loudness: Levels of the bands, shape (..., time, frequency).
+        energies: Log-band energies, shape (..., time, frequency).
 
     Returns:
         Coefficients, shape (..., frequency, time). Distances between frames stay what they
         were: the transform is a rotation, so that no decision depends on it.
     """
-    coefficients: Array = np.swapaxes(loudness, -1, -2) @ _cosines(loudness.shape[-2])
+    coefficients: Array = np.swapaxes(energies, -1, -2) @ _cosines(energies.shape[-2])
     return coefficients
 
 
@@ -219,24 +221,24 @@ def band_shares(rate: float, resolution: Resolution) -> Array:
     return normalised
 
 
-def _stretches(frames: Array, window: int, stride: int) -> Array:
+def _windows(frames: Array, window: int, stride: int) -> Array:
     return np.lib.stride_tricks.sliding_window_view(frames, window, axis=-1)[..., ::stride, :]
 
 
 @lru_cache
 def _power_shares(rate: float, resolution: Resolution) -> Array:
-    """Make the matrix from squares of a transform to mean powers, shape (frequency, bands)."""
+    """Matrix from squares of a transform to mean powers, shape (frequency, bands)."""
     amplitude = 2.0 / _hann(resolution.window).sum()
     shares: Array = amplitude**2 * band_shares(rate, resolution)
     return shares
 
 
-def _transform(stretches: Array) -> NDArray[np.complex128]:
-    return np.fft.rfft(stretches * _hann(stretches.shape[-1]), axis=-1)
+def _transform(windows: Array) -> NDArray[np.complex128]:
+    return np.fft.rfft(windows * _hann(windows.shape[-1]), axis=-1)
 
 
-def _amplitude(stretches: Array) -> Array:
-    amplitude: Array = np.abs(_transform(stretches))
+def _amplitude(windows: Array) -> Array:
+    amplitude: Array = np.abs(_transform(windows))
     return amplitude
 
 
@@ -248,7 +250,7 @@ def _hann(window: int) -> Array:
 
 @lru_cache
 def _bins_of_bands(bins: int, *, comb: bool) -> Index:
-    """List the three bins of each band, shape (3, bands)."""
+    """The three bins of each band, shape (3, bands)."""
     bands = bins // 3
     third = np.arange(3)[:, None]
     if not comb:
@@ -260,7 +262,7 @@ def _bins_of_bands(bins: int, *, comb: bool) -> Index:
 
 @lru_cache
 def _cosines(count: int) -> Array:
-    """Make the matrix of the cosine transform, shape (time, coefficients)."""
+    """Matrix of the cosine transform, shape (time, coefficients)."""
     n, k = np.arange(count)[:, None], np.arange(count)
     # X_k = sqrt(2 / n_t) sum x_n cos(pi / n_t (n + 1/2) k), X_0 over sqrt(2): the paper's pi / 2 in
     # place of pi / n_t is a slip, being no orthonormal transform.

@@ -16,7 +16,7 @@ Scalar = TypeVar("Scalar", bound=np.generic)
 
 
 def frame(signal: NDArray[Scalar], *, length: int = 4000, hop: int = 1000) -> NDArray[Scalar]:
-    """Cut a signal into overlapping frames.
+    """Overlapping frames of a signal.
 
     Args:
         signal: The noise signal, shape (samples,), or several, shape (signals, samples).
@@ -40,13 +40,13 @@ def frame(signal: NDArray[Scalar], *, length: int = 4000, hop: int = 1000) -> ND
 
 
 def frame_starts(samples: int, *, length: int, hop: int, flush_end: bool) -> Index:
-    """Say where the frames of a signal start.
+    """Start of each frame of a signal.
 
     Args:
         samples: Samples of the signal, at least ``length``.
         length: Samples of a frame.
         hop: Samples from the start of one frame to the start of the next.
-        flush_end: Whether a last frame, flush with the end, covers what the hops leave over.
+        flush_end: Whether a last frame, flush with the end, covers the tail that the hops leave.
 
     Returns:
         Index of the first sample of each frame, shape (frames,).
@@ -57,11 +57,11 @@ def frame_starts(samples: int, *, length: int, hop: int, flush_end: bool) -> Ind
 
 
 def pad_end(signal: Real, *, length: int) -> Real:
-    """Lengthen a signal at its end, continuous in value and slope.
+    """A signal lengthened at its end, continuous in value and slope.
 
     Args:
         signal: The signal, shape (..., samples), at least one sample.
-        length: Samples that are wanted.
+        length: Samples of the result.
 
     Returns:
         The signal reflected at its last sample in time and in amplitude (paper, Sec. III-A),

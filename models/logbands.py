@@ -15,21 +15,21 @@ WIDE = 2.0 ** (4 / 3)
 
 @dataclass(frozen=True, kw_only=True)
 class LogBands:
-    """Levels of log-spaced bands, pooled over time and standardised.
+    """Energies of log-spaced bands, pooled over time and standardised.
 
     Band edges do not depend on the sample rate; bands that reach beyond half the rate drop out.
     """
 
     classes: tuple[str, ...] = CLASSES
-    """What a frame can be called, `ok` first."""
+    """Names of the classes, `ok` first."""
     signals: tuple[str, ...] = (NOISE,)
-    """What is listened to."""
+    """Input signals."""
     relative: bool = False
-    """Whether levels are told from the whole frame's, and from those of the signal before."""
+    """Whether energies are relative to the level of the frame, and to the signal before."""
     estimator: EstimatorKind = "svm"
-    """What decides."""
+    """Name of the estimator."""
     alarm: float = 0.5
-    """Probability of any failure from which a frame is sure enough of it to raise an alarm."""
+    """Alarm threshold: a probability of any failure."""
     frame: float = 0.4
     """Duration of a frame, in [s]."""
     hop: float = 0.1
@@ -45,24 +45,24 @@ class LogBands:
     per_octave: float = 4.0
     """Bands in an octave, where they are wider than what the window resolves."""
     quick: float = 0.0
-    """Duration of a second, shorter window beside the first, in [s]; 0 for none. Its bands are few
-    and wide, since they tell when rather than what."""
+    """Duration of a second, shorter window, in [s]; 0 for none. Its bands are few and wide: it
+    resolves time rather than frequency."""
     quick_stride: float = 0.01
     """Time from one of its transforms to the next, in [s]."""
     speed: bool = False
-    """Whether the speed itself is a quick band, too: the first one, below all others."""
+    """Whether the first quick band, below all others, is the speed itself."""
     floor: float = 3e-5
-    """Added to a band's amplitude: what is quieter than the best encoders is all the same."""
+    """Added to the amplitude of a band, in [rad/s]: about the noise of the best encoders."""
     regularization: float = 10.0
-    """The machine's C."""
+    """C of the support vector machine."""
     softness: float = 0.5
-    """Kernel parameter times the number of features: below 1, frames unlike any known still
-    fall on the side of those that they resemble most."""
+    """Kernel parameter times the number of features: below 1, frames out of distribution still get
+    the class of the nearest training frames."""
     least_deviation: float = 0.5
-    """Deviation of a level that is chance: what changes less is not scaled up, in [Np]."""
+    """Least standard deviation of a feature in the standardisation, in [Np]."""
 
     def at(self, rate: float) -> Profile:
-        """Make the profile for a sample rate, each duration rounded to the nearest sample.
+        """Profile for a sample rate, each duration rounded to the nearest sample.
 
         Args:
             rate: Sample rate of the signal, in [Hz].
@@ -111,7 +111,7 @@ class LogBands:
         )
 
     def _edges(self, nyquist: float) -> tuple[float, ...]:
-        """List the edges up to half the rate, each band as wide as the window resolves or wider."""
+        """Edges up to the Nyquist frequency, each band as wide as the window resolves or wider."""
         edges, ratio, resolution = [self.lowest], 2.0 ** (1.0 / self.per_octave), 1.0 / self.window
         while (upper := max(edges[-1] + resolution, edges[-1] * ratio)) <= min(
             self.highest, nyquist
@@ -120,7 +120,7 @@ class LogBands:
         return tuple(edges)
 
     def _quick_edges(self, nyquist: float) -> tuple[float, ...]:
-        """List the edges of the quick window's bands, none if not even the first one fits."""
+        """Edges of the bands of the quick window, none if not even the first one fits."""
         if not self.quick or nyquist * self.quick < SPEED:
             return ()
         edges = [0.0, SPEED / self.quick] if self.speed else [SPEED / self.quick]
@@ -130,13 +130,13 @@ class LogBands:
 
 
 SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.85, quick=0.02)
-"""For the noise alone. Failures are louder than 0.03 rad/s; what lies far below is the business of
-encoders, and differs from robot to robot and from simulator to simulator."""
+"""For the noise alone. Failures are louder than 0.03 rad/s; amplitudes far below depend on encoders
+and simulators."""
 GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.7, speed=True)
-"""For runs with measured and desired motion; good motion startles it less. The noise alone cannot
-tell a fast motion without sensor noise from a failure by its speed. Trees find more of what is like
-what they have learnt from; networks, of what is not: of a rattle on a motion without any other
-noise, say, which the noise alone cannot tell by its error."""
+"""For runs with measured and desired motion; with fewer false positives in good motion. The noise
+alone does not separate a fast motion without sensor noise from a failure. Trees find more failures
+that resemble the training set; networks more that do not, say a rattle on a motion without any
+other noise, which the noise alone does not show as an error."""
 
 EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.75)
-"""For runs that name their joints: what a single one does drowns in the norm of all."""
+"""For runs that name their joints: the norm of all masks a single one."""

@@ -1,4 +1,4 @@
-"""Pooling: the course of levels in time, by what does not depend on when things happen."""
+"""Temporal pooling: statistics of log-band energies over the windows of a frame."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -10,54 +10,54 @@ from models.profile import Profile, Resolution
 from models.types import Array
 
 Spectrum: TypeAlias = Literal["norm", "loudest", "difference"]
-"""What the levels of one spectrum are of: a norm, the loudest joint, or a difference."""
+"""What a spectrum is of: a norm, the loudest joint, or a difference."""
 
 POOLED = 3
-"""Numbers that `pool` keeps of each level."""
+"""Statistics that `pool` computes of each log-band energy."""
 
 
-def pooled(loudness: Sequence[Array], profile: Profile) -> Array:
-    """Describe each frame by its pooled levels.
+def pooled(energies: Sequence[Array], profile: Profile) -> Array:
+    """Statistics of the log-band energies of each frame.
 
     Args:
-        loudness: For each of the profile's resolutions, levels of the frames' windows, shape
-            (frames, time, levels).
-        profile: Says whether levels are told from how loud the frame is on the whole.
+        energies: For each of the profile's resolutions, log-band energies of the frames' windows,
+            shape (frames, time, energies).
+        profile: Whether energies are relative to the level of the frame.
 
     Returns:
         Mean, maximum and standard deviation of each band, spectrum by spectrum; if the profile is
-        relative, the level of the whole frame comes last, and those of the signals are above it.
-        Shape (frames, features).
+        relative, the level of the frame comes last, and is subtracted from the energies of the
+        signals. Shape (frames, features).
     """
     rows = [
         _by_spectrum(pool(each), len(resolution.edges) - 1)
-        for each, resolution in zip(loudness, profile.resolutions, strict=True)
+        for each, resolution in zip(energies, profile.resolutions, strict=True)
     ]
     if not profile.relative:
         return np.concatenate(rows, axis=1)
-    share, above = _whole(spectra(profile), profile.resolutions)
+    share, above = _level(spectra(profile), profile.resolutions)
     described = np.concatenate((*rows, np.zeros((len(rows[0]), 1))), axis=1)
     described -= (described @ share)[:, None] * above
     return described
 
 
-def pool(loudness: Array) -> Array:
-    """Describe the course of each level in time by what does not depend on when things happen.
+def pool(energies: Array) -> Array:
+    """Mean, maximum and standard deviation over time of each log-band energy.
 
     Args:
-        loudness: Shape (frames, time, levels).
+        energies: Shape (frames, time, energies).
 
     Returns:
-        Mean, maximum and standard deviation of each level, shape (frames, 3, levels).
+        Statistics, which do not depend on the order in time, shape (frames, 3, energies).
     """
     # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
-    frames, count, levels = loudness.shape
-    found = np.empty((frames, POOLED, levels))
+    frames, count, bands = energies.shape
+    found = np.empty((frames, POOLED, bands))
     mean, most, deviation = found[:, 0], found[:, 1], found[:, 2]
-    np.add.reduce(loudness, 1, out=mean)
+    np.add.reduce(energies, 1, out=mean)
     mean /= count
-    np.maximum.reduce(loudness, 1, out=most)
-    squares = loudness - mean[:, None]
+    np.maximum.reduce(energies, 1, out=most)
+    squares = energies - mean[:, None]
     squares *= squares
     np.add.reduce(squares, 1, out=deviation)
     deviation /= count
@@ -66,14 +66,14 @@ def pool(loudness: Array) -> Array:
 
 
 def _by_spectrum(found: Array, bands: int) -> Array:
-    """Lay out what `pool` gave spectrum by spectrum, shape (frames, features)."""
-    frames, numbers, levels = found.shape
-    apart = found.reshape(frames, numbers, levels // bands, bands)
-    return apart.swapaxes(1, 2).reshape(frames, numbers * levels)
+    """What `pool` gave, spectrum by spectrum, shape (frames, features)."""
+    frames, numbers, count = found.shape
+    apart = found.reshape(frames, numbers, count // bands, bands)
+    return apart.swapaxes(1, 2).reshape(frames, numbers * count)
 
 
 def spectra(profile: Profile) -> tuple[Spectrum, ...]:
-    """Say what the spectra of a window are, in the order of its levels (`features.levels`)."""
+    """Kinds of the spectra of a window, in the order of `features.log_band_energies`."""
     norms, joints = profile.norms, len(profile.signals) - profile.norms
     found: list[Spectrum] = ["norm"] * norms
     if profile.relative:
@@ -84,14 +84,14 @@ def spectra(profile: Profile) -> tuple[Spectrum, ...]:
 
 
 @lru_cache
-def _whole(kinds: tuple[Spectrum, ...], resolutions: tuple[Resolution, ...]) -> tuple[Array, Array]:
-    """Say how levels are told from the whole frame's.
+def _level(kinds: tuple[Spectrum, ...], resolutions: tuple[Resolution, ...]) -> tuple[Array, Array]:
+    """Weights by which features become relative to the level of the frame.
 
     Returns:
-        The share of each feature in the level of the whole frame, which is the mean of all means
-        of the norms; and how often that level is subtracted from each: once from the means and
-        maxima of norms and loudest joints, minus once from the last feature, which thereby is the
-        level itself. Shape (features,) each.
+        The share of each feature in the level of the frame, which is the mean of all means of the
+        norms; and how often that level is subtracted from each: once from the means and maxima of
+        norms and loudest joints, minus once from the last feature, which thereby is the level
+        itself. Shape (features,) each.
     """
     share, above = [], []
     for each in resolutions:

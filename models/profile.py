@@ -1,4 +1,4 @@
-"""The profile: every number that turns a noise signal into features and labels."""
+"""The profile: every setting of framing, features and estimator."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
@@ -35,7 +35,9 @@ _POSITIVE = (
 
 @dataclass(frozen=True)
 class Resolution:
-    """Long windows tell frequencies apart, quick ones tell when something happens.
+    """Window, stride and bands of a Fourier transform.
+
+    Long windows resolve frequency, short ones resolve time.
 
     Attributes:
         window: Samples of the Hann window of one transform.
@@ -48,25 +50,25 @@ class Resolution:
     edges: tuple[float, ...]
 
     def transforms(self, length: int) -> int:
-        """Count the transforms of so many samples."""
+        """Number of transforms of so many samples."""
         return 1 + (length - self.window) // self.stride
 
 
 @dataclass(frozen=True, kw_only=True)
 class Profile:
-    """Settings of framing, features and support vector machine; defaults are the paper's.
+    """Settings of framing, features and estimator; defaults are the paper's.
 
     Raises:
         ProfileError: If a setting is out of its range or two do not fit together.
     """
 
     name: str
-    """Whose recipe this is."""
+    """Name of the recipe."""
     classes: tuple[str, ...] = CLASSES
-    """What a frame can be called, `ok` first."""
+    """Names of the classes, `ok` first."""
     signals: tuple[str, ...] = ("noise",)
-    """The signals that are listened to, all in [rad/s]: noise estimates, norms of velocities, and
-    after those what goes joint by joint (`signals.JOINTS`), of which the loudest joint is heard."""
+    """Input signals, all in [rad/s]: noise estimates, norms of velocities, and after those the ones
+    joint by joint (`signals.JOINTS`), of which the loudest joint counts."""
     rate: float = 10_000.0
     """Sample rate of the signal, in [Hz]."""
     length: int = 4000
@@ -88,51 +90,50 @@ class Profile:
     quick_edges: tuple[float, ...] = ()
     """Edges of its bands, ascending, in [Hz]."""
     relative: bool = False
-    """Whether levels of ``log`` bands are told from how loud the frame is on the whole, and from
-    those of the signal before: what matters then is the shape of a spectrum, and how much of a
-    noise is neither wanted nor followed."""
+    """Whether log-band energies are relative to the level of the frame, and differences from the
+    signal before are features, too: then the shape of a spectrum counts, and how much of a noise is
+    neither desired nor tracked."""
     floor: float = 1e-6
-    """What is added to an amplitude before its logarithm."""
+    """Added to an amplitude before its logarithm."""
     least_deviation: float = 0.0
-    """Deviation that a feature is taken to have at least, when features are scaled to the mean 0
-    and the deviation 1 of the training set; 0 leaves them as they are."""
+    """Least standard deviation in the standardisation of features by the training set; 0 leaves
+    them as they are."""
     estimator: EstimatorKind = "svm"
-    """What decides: support vector machines, small networks, boosted trees, or a distance from good
-    runs."""
+    """Support vector machines, small networks, boosted trees, or a baseline of good runs."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1
-    """The machine's C."""
+    """C of the support vector machine."""
     gamma: float = 5.7e-4
     """Kernel parameter; the linear kernel has none."""
     multiclass: Multiclass = "one-vs-rest"
-    """How two-class machines make one for more classes."""
+    """How two-class machines are combined for more classes."""
     networks: int = 5
-    """Networks whose answers are averaged; each leaves so great a part of the groups out."""
+    """Networks whose probabilities are averaged, each trained without one part of the groups."""
     units: int = 64
     """Units in the hidden layer of a network."""
     decay: float = 0.1
     """Penalty on the squares of a network's weights."""
     epochs: int = 30
-    """How often a network sees each training frame."""
+    """Passes over the training set."""
     rounds: int = 100
     """Rounds of boosting; each adds a tree for each class."""
     leaves: int = 16
-    """Leaves that a tree has at most."""
+    """Leaves of a tree at most."""
     learning_rate: float = 0.15
-    """Share of its answer that each tree adds."""
+    """Factor of the leaves of each tree."""
     penalty: float = 1.0
-    """Penalty on the squares of what leaves add."""
+    """Penalty on the squares of the leaves."""
     alarm: float = 0.5
-    """Probability of any failure from which a frame is sure enough of it to raise an alarm."""
+    """Alarm threshold: a probability of any failure."""
     pad_short: bool = True
     """Whether a training block shorter than a frame is padded, or else widened."""
     spread_failures: bool = False
-    """Whether training frames hold a failure in every place, and not in their middle alone."""
+    """Whether failures lie anywhere in training frames, rather than in their middle."""
     open_end: int = 1
     """Samples after the last one at which a block that lasts to the end stops."""
     flush_end: bool = False
-    """Whether a last frame, flush with the end, leaves no tail of a signal unread."""
+    """Whether a last frame, flush with the end, covers the tail of a signal."""
 
     # What follows is NoisyTest's own, and off in every other profile.
     # (Its `open_end` is 0.1 s: no sample more, but a short block's middle lies elsewhere.)
@@ -143,7 +144,7 @@ class Profile:
     cut_by_time: bool = False
     """A block holds each sample whose time is from its start to its stop, both included."""
     widen_extra: int = 0
-    """Samples that a short block of a validation set is widened to beyond one frame."""
+    """Samples beyond one frame to which a short block of a validation set is widened."""
     pad_widened: bool = False
     """A block widened past an end of its recording is padded, where others are moved inside."""
 
@@ -184,7 +185,7 @@ class Profile:
 
     @classmethod
     def of(cls, settings: Mapping[str, Any]) -> Self:
-        """Make a profile from what `as_dict` gave.
+        """Profile with the settings that `as_dict` gave.
 
         Args:
             settings: A value for each field.
@@ -200,13 +201,13 @@ class Profile:
         return cls(**{**settings, **lists})
 
     def as_dict(self) -> dict[str, Any]:
-        """Give a value for each field, as JSON can hold it."""
+        """Value of each field, for JSON."""
         settings = asdict(self)
         return {k: list(v) if isinstance(v, tuple) else v for k, v in settings.items()}
 
     @cached_property
     def norms(self) -> int:
-        """How many of the signals are norms."""
+        """Number of signals that are norms."""
         return sum(not by_joint(name) for name in self.signals)
 
     @property
@@ -221,7 +222,7 @@ class Profile:
 
     @cached_property
     def resolutions(self) -> tuple[Resolution, ...]:
-        """Say at which lengths of its window a frame is transformed."""
+        """Resolutions of the Fourier transforms of a frame."""
         main = Resolution(self.window, self.stride, self.edges)
         quick = Resolution(self.quick_window, self.quick_stride, self.quick_edges)
         return (main, quick) if self.quick_window else (main,)
@@ -233,7 +234,7 @@ class Profile:
 
 
 def _tuned(kernel: Kernel) -> dict[str, Any]:
-    """Give the hyper-parameters that the paper's table lists for a kernel."""
+    """Hyper-parameters of a kernel in the paper's table."""
     if kernel == "linear":
         return {"kernel": kernel, "stride": 401, "regularization": 1.0}
     return {"kernel": kernel, "stride": 834, "regularization": 1.1, "gamma": 5.7e-4}

@@ -21,7 +21,7 @@ class Block(NamedTuple):
     stop: float
     """When it stops, in [s]; infinity if it lasts to the end."""
     label: str
-    """What is heard in it."""
+    """Its class."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class Recording:
     """Annotated noise, checked when it is made.
 
     Attributes:
-        name: What the recording is called in messages and models.
+        name: Name of the recording in messages and models.
         signal: The noise estimate, shape (samples,), or signals by name, each of that shape, or
             joint by joint of shape (joints, samples).
         rate: Sample rate, in [Hz].
@@ -65,7 +65,7 @@ class Recording:
 
     @property
     def samples(self) -> int:
-        """How many samples there are."""
+        """Number of samples."""
         count: int = next(iter(named(self.signal).values())).shape[-1]
         return count
 

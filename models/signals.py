@@ -1,8 +1,8 @@
-"""Signals: what is listened to, one noise estimate or several side by side.
+"""Signals: the input of a classifier, one noise estimate or several signals by name.
 
-A signal is a norm, shape (samples,), or that which a norm is of, joint by joint, shape
-(joints, samples), which its name says. Side by side they are rows: norms first, and then all joints
-of one signal after those of the other.
+A signal is a norm, shape (samples,), or what the norm is of, joint by joint, shape
+(joints, samples); its name says which. Stacked, they are rows: norms first, and then all joints of
+one signal after those of the other.
 """
 
 from collections.abc import Collection, Mapping, Sequence
@@ -17,7 +17,7 @@ NOISE = "noise"
 """The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A)."""
 
 MOTION = ("desired", "measured", "error")
-"""Norms of what a run with a desired motion has."""
+"""Norms of the velocities of a run with a desired motion."""
 
 JOINTS = tuple(f"{name}_joints" for name in MOTION)
 """The same, joint by joint."""
@@ -28,7 +28,7 @@ joint, shape (joints, samples)."""
 
 
 def named(signals: Signals) -> Mapping[str, Real]:
-    """Give each signal its name; one alone is the noise."""
+    """Signals by name; one alone is the noise."""
     return signals if isinstance(signals, Mapping) else {NOISE: signals}
 
 
@@ -37,26 +37,26 @@ def by_joint(name: str) -> bool:
     return name in JOINTS
 
 
-def telling(signals: Mapping[str, Real]) -> dict[str, Real]:
-    """Leave the error out where there is none: what is desired is what was measured."""
+def without_zero_error(signals: Mapping[str, Real]) -> dict[str, Real]:
+    """All signals but the error where it is zero: the log has no desired motion of its own."""
     return {
         name: each for name, each in signals.items() if not name.startswith("error") or np.any(each)
     }
 
 
 def feeds(there: Collection[str], names: Sequence[str]) -> bool:
-    """Whether all that are named are there; the noise can be made of its two parts."""
+    """Whether all that are named are there; the noise can be computed from its two parts."""
     parts = "measured" in there and "desired" in there
     return all(name in there or (name == NOISE and parts) for name in names)
 
 
 def stacked(signals: Signals, names: Sequence[str]) -> Real:
-    """Lay signals side by side.
+    """Signals as rows of one array.
 
     Args:
         signals: The noise, or signals by name.
-        names: Those that are wanted, in order. ``noise`` is made of ``measured`` and ``desired``
-            where it is not there.
+        names: Those to stack, in order. ``noise`` is computed from ``measured`` and ``desired``
+            where it is missing.
 
     Returns:
         One norm as it is, shape (samples,); several signals as rows, shape (rows, samples).
@@ -97,7 +97,7 @@ def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
 
 
 def check(samples: Real, valid: Mask | None = None, *, first: int = 0) -> None:
-    """Check what is to be classified.
+    """Check the input of a classifier.
 
     Args:
         samples: Shape (samples,) or (rows, samples).

@@ -1,4 +1,4 @@
-"""Splits of recordings into those to learn from and those to be measured by.
+"""Splits of recordings into training and test sets.
 
 Conventions: frames of one recording overlap, so that it stands on one side as a whole. Samples of
 simulated runs are called ``robot/scenario-seed``; those of one robot and seed share their motion
@@ -24,7 +24,7 @@ SHARE = 0.25
 
 @cache
 def group_of(name: str) -> str:
-    """Name the group of recordings that share their motion.
+    """Group of recordings that share their motion.
 
     Args:
         name: Of a recording: ``talos/obstacle-toe-007``.
@@ -37,7 +37,7 @@ def group_of(name: str) -> str:
 
 
 def robot_of(name: str) -> str:
-    """Name the robot of a sample; no text where a name does not say it.
+    """Robot of a sample; empty where a name does not contain it.
 
     Args:
         name: Of a recording: ``talos/obstacle-toe-007``.
@@ -47,7 +47,7 @@ def robot_of(name: str) -> str:
 
 
 def held_out(group: str, share: float = SHARE) -> bool:
-    """Tell whether a group belongs to the fixed test set, whatever else there is.
+    """Whether a group belongs to the fixed test set, whatever other groups there are.
 
     The first 8 bytes of the SHA-256 of the group's name (UTF-8), read as a fraction of 2^64, lie
     below the share. A group that is held out at one share is held out at all larger ones.
@@ -70,7 +70,7 @@ def folds(groups: Sequence[str], count: int) -> list[tuple[Index, Index]]:
         count: How many folds, two or more.
 
     Returns:
-        For each fold, indices of the items to learn from, and of those to measure by; each item is
+        For each fold, indices of the training items, and of the test items; each item is
         measured once.
 
     Raises:
@@ -125,14 +125,14 @@ def leave_one_out(robots: Sequence[str]) -> list[tuple[str, Index, Index]]:
 
 
 def seen(train: Mapping[str, str], test: Mapping[str, str]) -> dict[str, str]:
-    """List the recordings to measure by that a model knows something of.
+    """Test recordings that a model was trained on, or that share their motion with such.
 
     Args:
-        train: SHA-256 of each recording that it learns from, by name.
-        test: SHA-256 of each recording that it is measured by, by name.
+        train: SHA-256 of each training recording, by name.
+        test: SHA-256 of each test recording, by name.
 
     Returns:
-        What it knows, by name of the recording. Other names than those of samples say nothing
+        What of them, by name of the recording. Other names than those of samples say nothing
         where there are hashes: `run.npz` of one folder is not that of another.
     """
     hashes = {digest: name for name, digest in train.items() if digest}
@@ -149,11 +149,11 @@ def seen(train: Mapping[str, str], test: Mapping[str, str]) -> dict[str, str]:
 
 
 def check_apart(train: Mapping[str, str], test: Mapping[str, str]) -> None:
-    """Refuse to measure a model by what it learnt from: the guard against overlapping frames.
+    """Refuse to test a model on its training set: a check against overlapping frames.
 
     Args:
-        train: SHA-256 of each recording that it learns from, by name.
-        test: SHA-256 of each recording that it is measured by, by name.
+        train: SHA-256 of each training recording, by name.
+        test: SHA-256 of each test recording, by name.
 
     Raises:
         SeenError: If a recording, its content, or its group is on both sides.

@@ -1,4 +1,4 @@
-"""Labels of a noise signal while it comes in, the same as those of the whole signal."""
+"""Labels of a noise signal sample by sample, the same as those of the whole signal."""
 
 from typing import TypeAlias
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from models.classifier import Classifier
 from models.errors import RateError, SignalError
-from models.features import course, rounded
+from models.features import rounded, temporal_pooling
 from models.labels import Labels
 from models.profile import TOLERANCE
 from models.signals import Signals, check, stacked
@@ -14,27 +14,27 @@ from models.types import Array, Index, Mask
 from models.windows import Windows
 
 Decided: TypeAlias = tuple[Index, Array]
-"""Where frames start, shape (frames,), and the decisions on them, shape (frames, decisions)."""
+"""Start of frames, shape (frames,), and their decision values, shape (frames, decisions)."""
 
 
 class Stream:
-    """A classifier that is fed sample by sample, or in chunks of any size.
+    """A classifier of samples one by one, or in chunks of any size.
 
-    What it answers, one after the other, is what `Classifier.classify` says of the whole signal; a
-    frame's label comes with the frame's last sample. Each Fourier transform is computed once, for
-    all frames that it belongs to: many at a time, since they take little longer than one, and all
-    but the last few before the chunk that completes a frame. Memory does not grow.
+    Its labels are those of `Classifier.classify` for the whole signal; the label of a frame comes
+    with its last sample. Each Fourier transform is computed once, for all frames that share it:
+    many at a time, since they take little longer than one, and all but the last few before the
+    chunk that completes a frame. Memory does not grow.
 
     Args:
         classifier: The model.
         rate: Sample rate of the signal, in [Hz], which must be the model's; the model's unless
             given.
         start: Time of the first sample, in [s].
-        joints: How many joints there are, if the model listens to each.
+        joints: Number of joints, if the model takes signals joint by joint.
 
     Raises:
-        RateError: If the model is of another rate. Motion can be lowered before it becomes noise;
-            the noise itself cannot.
+        RateError: If the model is of another rate. Motion can be decimated before it becomes
+            noise; the noise itself cannot.
     """
 
     def __init__(
@@ -60,26 +60,26 @@ class Stream:
         self._windows = [Windows(self._samples, profile, each) for each in profile.resolutions]
         nothing = np.empty(0, dtype=np.intp), np.empty((0, classifier.estimator.width))
         self._nothing = self._labels([nothing])
-        # Windows may wait for each other, but not until their samples are gone.
-        self._patience = profile.length - max(each.window for each in profile.resolutions)
+        # Longest latency of a window: its samples have to be in the buffer still.
+        self._latency = profile.length - max(each.window for each in profile.resolutions)
         self._lead = min(profile.hop // 2, *(each.stride for each in profile.resolutions))
         self._begin()
 
     @property
     def count(self) -> int:
-        """Samples that came so far."""
+        """Samples so far."""
         return self._count
 
     def push(self, samples: Signals, valid: Mask | None = None) -> Labels:
-        """Take samples of the noise.
+        """Labels of the frames that samples complete.
 
         Args:
-            samples: Any number of them, none included, shape (samples,), or of each signal by name,
+            samples: Any number of them, also none, shape (samples,), or of each signal by name,
                 of that shape or, joint by joint, (joints, samples).
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
 
         Returns:
-            Labels of the frames that these samples complete, most often none.
+            Labels, most often none.
 
         Raises:
             SignalError: If the samples are not finite, not one-dimensional, or not all that the
@@ -95,7 +95,7 @@ class Stream:
         return self._labels(found) if found else self._nothing
 
     def _take(self, exact: Array, valid: Mask | None) -> list[Decided]:
-        """Take samples as they are, shape (samples,) or (rows, samples)."""
+        """Decision values of the frames that samples, shape (..., samples), complete."""
         found: list[Decided] = []
         for first in range(0, exact.shape[-1], self._profile.length):
             piece = slice(first, first + self._profile.length)
@@ -105,14 +105,14 @@ class Stream:
         return found
 
     def skip(self, samples: int) -> None:
-        """Pass over a gap: the same as pushing so many samples that are not valid.
+        """Skip a gap: the same as pushing so many samples that are not valid.
 
         Args:
             samples: How many were lost; a gap of hours takes no longer than one of seconds.
         """
         length, hop = self._profile.length, self._profile.hop
         self._lose(min(samples, length))
-        # Frames that wait now lie wholly in the gap, and so would all that are jumped over.
+        # Pending frames lie wholly in the gap now, and so would all that are skipped.
         jump = max(samples - length, 0) // hop * hop
         self._count += jump
         self._frame += jump
@@ -138,7 +138,7 @@ class Stream:
         return self._labels(found) if found else self._nothing
 
     def _begin(self) -> None:
-        self._count = 0  # samples that came
+        self._count = 0  # samples so far
         self._held = 0  # samples in the buffer
         self._first = int(self._profile.drop_first_sample)
         self._frame = self._first  # start of the next frame
@@ -163,10 +163,10 @@ class Stream:
         self._count += count
 
     def _advance(self, chunk: int) -> list[Decided]:
-        """Transform the windows that are complete now, and decide on the frames that are.
+        """Transform the windows that are complete, and decide on the frames that are.
 
         Args:
-            chunk: Samples that came last; as many are expected next.
+            chunk: Samples of the last chunk; the next one is expected to have as many.
         """
         profile = self._profile
         for windows in self._windows:
@@ -181,14 +181,14 @@ class Stream:
         return self._decide(whole, [windows.of_frames(numbers) for windows in self._windows])
 
     def _next_due(self, chunk: int) -> int:
-        """Say with which count to go on: that before the chunk that completes a frame, and then."""
+        """Count at which to go on: before the chunk that completes a frame, and after it."""
         complete = self._frame + self._profile.length
         early = complete - max(chunk, self._lead)
-        return min(early if early > self._count else complete, self._count + self._patience)
+        return min(early if early > self._count else complete, self._count + self._latency)
 
     @property
     def _base(self) -> int:
-        """The sample that is first in the buffer."""
+        """Index of the first sample in the buffer."""
         return self._count - self._held
 
     def _is_whole(self, frame: int) -> bool:
@@ -196,9 +196,10 @@ class Stream:
         place = frame - self._base
         return bool(self._valid[place : place + self._profile.length].all())
 
-    def _decide(self, frames: list[int], loudness: list[Array]) -> list[Decided]:
-        """Decide on frames by the levels of their windows, as `course` takes them."""
-        return [(np.array(frames), self.classifier.decide(course(loudness, self._profile)))]
+    def _decide(self, frames: list[int], energies: list[Array]) -> list[Decided]:
+        """Decision values of frames, from the log-band energies of their windows."""
+        features = temporal_pooling(energies, self._profile)
+        return [(np.array(frames), self.classifier.decide(features))]
 
     def _labels(self, found: list[Decided]) -> Labels:
         starts, decisions = found[0]

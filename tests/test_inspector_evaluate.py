@@ -6,7 +6,7 @@ import struct
 import numpy as np
 import pytest
 from commandline import call
-from hearings import BLOW, CLASSES, QUIET, SWING, frames, heard, many, perfect
+from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
 from inspector.training import evaluation
 from models.evaluation.assessment import measure
@@ -124,7 +124,7 @@ def sure(name, blocks, random):
     scores = np.exp(4 * scores + random.normal(size=scores.shape))
     scores /= scores.sum(axis=1, keepdims=True)
     called = [CLASSES[best] for best in scores.argmax(axis=1)]
-    return heard(name, blocks, called, scores=scores)
+    return predicted(name, blocks, called, scores=scores)
 
 
 def test_pictures_show_what_there_is_and_leave_out_what_is_not(tmp_path, monkeypatch):
@@ -137,9 +137,11 @@ def test_pictures_show_what_there_is_and_leave_out_what_is_not(tmp_path, monkeyp
     probable = [
         sure(f"talos/{name}-{seed:03d}", blocks, random)
         for seed in range(8)
-        for name, blocks in (("good", QUIET), ("blow", BLOW), ("swing", SWING))
+        for name, blocks in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
     ]
-    silent = [heard("a", SWING[1:2], ["ok"] * len(frames()))]  # no ok motion, and nothing found
+    silent = [
+        predicted("a", OSCILLATION[1:2], ["ok"] * len(frames()))
+    ]  # no ok motion, and nothing found
     for recordings in (probable, many(6), silent):
         evaluation.draw(measure(recordings), tmp_path / "p.png", title="m", overwrite=True)
     texts = [

@@ -3,7 +3,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hearings import BLOW, CLASSES, QUIET, heard, many
+from predicted_runs import CLASSES, GOOD, IMPACT, many, predicted
 
 import models
 from models.confusion import Evaluation
@@ -58,7 +58,7 @@ def test_frames_are_those_that_were_always_counted(classifier):
 def test_measures_with_intervals_are_the_measures_without():
     cut = ["ok", "impact", "ok"], ["ok", "ok", "highaccelerations"], ["ok", "impact", "impact"]
     runs = [
-        heard(f"talos/blow-{seed:03d}", BLOW, cut=cut[seed % 3] if seed else ["unknown"] * 3)
+        predicted(f"talos/blow-{seed:03d}", IMPACT, cut=cut[seed % 3] if seed else ["unknown"] * 3)
         for seed in range(7)
     ]
     frames = measure(runs).frames
@@ -123,7 +123,7 @@ def test_names_that_repeat_and_runs_without_blocks_are_refused(classifier):
         models.assess(classifier, [])
 
 
-def test_a_run_whose_blocks_lie_in_gaps_is_heard_all_the_same(classifier):
+def test_a_run_whose_blocks_lie_in_gaps_is_classified_from_end_to_end(classifier):
     valid = np.ones(4000, dtype=bool)
     valid[1000:3000:100] = False
     gappy = replace(fresh()[0], valid=valid, blocks=(models.Block(1.2, 2.8, "oscillations"),))
@@ -152,7 +152,7 @@ def text_of(assessment):
 
 
 def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
-    lines = text_of(measure([*many(6), heard("talos/good-009", QUIET, ["impact"] * 47)]))
+    lines = text_of(measure([*many(6), predicted("talos/good-009", GOOD, ["impact"] * 47)]))
     assert "ok 100.0% [82.4, 100.0] 100.0% [82.4, 100.0] 31 31 19" in lines
     assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6 6" in lines
     assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6" in lines
@@ -172,12 +172,15 @@ def test_it_prints_the_papers_measures_under_the_papers_names():
 
 def test_it_says_why_there_are_no_intervals():
     text = str(measure(many(2)))
-    assert "There are none where fewer than 5 groups had anything to say." in text
+    assert "Measures of fewer than 5 groups have none." in text
     assert "Balanced accuracy       100.0%\n" in text
 
 
-def test_robots_are_told_apart_where_there_are_several():
-    one, other = many(6), [heard(f"go2/blow-{seed:03d}", BLOW, ["ok"] * 47) for seed in range(6)]
+def test_several_robots_have_a_row_each():
+    one, other = (
+        many(6),
+        [predicted(f"go2/blow-{seed:03d}", IMPACT, ["ok"] * 47) for seed in range(6)],
+    )
     assert "By robot" not in str(measure(one))
     lines = text_of(measure([*one, *other]))
     assert "go2 0.0% [0.0, 45.9] 0.0% [0.0, 45.9] 0 [0, 553]" in lines

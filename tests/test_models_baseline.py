@@ -135,11 +135,11 @@ def test_of_a_single_run_parts_are_left_out_with_time_between():
         gap += np.maximum(good.start[test] - good.stop[train][:, None], 0)
         assert gap.min() >= GUARD
     alone = models.learn_baseline(good, PROFILE)
-    assert "how much another run differs, it cannot say" in str(alone)
+    assert "which does not show how much another run differs" in str(alone)
     assert alone.classifier.classify(signals(12, rattle=0.3), RATE).events()
 
 
-def test_of_an_annotated_run_only_what_is_ok_is_learnt():
+def test_of_an_annotated_run_only_ok_blocks_are_for_training():
     blocks = ((0.0, 3.0, "ok"), (4.0, 6.0, "impact"), (6.0, 8.0, "ok"))
     good = models.GoodMotion.read([recording("one", 0, 0.3, blocks)], PROFILE)
     assert ((good.stop <= 3.0 + 1e-9) | (good.start >= 6.0 - 1e-9)).all()
@@ -147,7 +147,7 @@ def test_of_an_annotated_run_only_what_is_ok_is_learnt():
     assert good.annotated == ("one",)
 
 
-def test_frames_that_touch_a_gap_are_not_learnt():
+def test_frames_that_touch_a_gap_are_not_for_training():
     valid = np.ones(SECONDS * 1000, dtype=bool)
     valid[3000:3500] = False
     good = models.GoodMotion.read([recording("one", 0, valid=valid)], PROFILE)
@@ -172,7 +172,7 @@ def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
         models.Classifier.load(tmp_path / "odd.npz")
 
 
-def test_a_stream_hears_what_the_whole_signal_says(learnt):
+def test_a_stream_has_the_labels_of_the_whole_signal(learnt):
     whole = signals(12, rattle=0.3)
     stream = models.Stream(learnt.classifier)
     heard = [
@@ -185,7 +185,7 @@ def test_a_stream_hears_what_the_whole_signal_says(learnt):
     assert models.ANOMALY in labels
 
 
-def test_a_failure_of_any_name_is_found_by_an_anomaly(learnt):
+def test_a_failure_of_any_class_is_an_anomaly(learnt):
     blocks = ((0.0, 3.5, "ok"), (4.0, 6.0, "oscillations"), (6.5, 8.0, "ok"))
     tests = [recording(f"bad{seed}", seed, 0.3, blocks) for seed in (21, 22)]
     measured = models.assess(learnt.classifier, tests)

@@ -48,7 +48,7 @@ def ours():
     return trained(OURS)
 
 
-def test_it_learns_what_it_was_shown(ours):
+def test_the_training_set_is_classified_right(ours):
     report = models.evaluate(ours, models.Dataset.of(DATA, OURS))
     assert report.subset_accuracy == 1.0
     assert ours.metrics["training"] == report.as_dict()
@@ -194,7 +194,7 @@ def test_one_class_is_not_enough_to_learn():
         models.Classifier.train(alone, OURS)
 
 
-def test_failures_without_ok_can_be_told_apart():
+def test_failures_are_classified_without_ok():
     profile = OURS
     classifier = models.Classifier.train(models.Dataset.of(DATA[1:], profile), profile)
     assert classifier.classes == ("impact", "oscillations")

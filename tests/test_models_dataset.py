@@ -178,7 +178,7 @@ def test_recordings_that_cannot_be_are_refused(changes, reason):
 
 
 @pytest.mark.parametrize("duration", [0.1, 0.2, 0.3, 0.7])
-def test_our_profile_learns_a_failure_in_every_place_of_a_frame(duration):
+def test_our_profile_trains_on_failures_anywhere_in_a_frame(duration):
     profile = models.LogBands().at(1000.0)
     signal = np.arange(4000.0)
     block = Block(2.0, 2.0 + duration, "impact")

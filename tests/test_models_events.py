@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hearings import BLOW, QUIET, SWING, blocks, frames, heard, many, perfect
+from predicted_runs import GOOD, IMPACT, OSCILLATION, blocks, frames, many, perfect, predicted
 
 from models.evaluation.eventmeasures import measure
 from models.evaluation.eventscore import score
@@ -65,112 +65,114 @@ def test_a_model_that_never_falls_silent_finds_everything_and_pays_for_it():
 
 
 def test_one_false_alarm_of_three_frames_counts_once():
-    assert false(scored(heard("a", QUIET, called(impact=[10, 11, 12])))) == 1
+    assert false(scored(predicted("a", GOOD, called(impact=[10, 11, 12])))) == 1
 
 
 def test_an_alarm_is_one_whatever_classes_its_frames_are_called():
-    assert len(scored(heard("a", QUIET, called(impact=[10], oscillations=[11, 13]))).alarms) == 1
+    assert len(scored(predicted("a", GOOD, called(impact=[10], oscillations=[11, 13]))).alarms) == 1
 
 
 def test_frames_that_touch_are_one_alarm_and_those_further_apart_are_two():
-    touching = scored(heard("a", QUIET, called(impact=[10, 14])))  # 1.0 to 1.4 s, 1.4 to 1.8 s
+    touching = scored(predicted("a", GOOD, called(impact=[10, 14])))  # 1.0 to 1.4 s, 1.4 to 1.8 s
     assert len(touching.alarms) == false(touching) == 1
     assert (touching.alarms.start[0], touching.alarms.stop[0]) == pytest.approx((1.0, 1.8))
-    assert false(scored(heard("a", QUIET, called(impact=[10, 15])))) == 2
+    assert false(scored(predicted("a", GOOD, called(impact=[10, 15])))) == 2
 
 
 def test_alarms_of_two_runs_never_join():
     last, first = called(impact=[COUNT - 1]), called(impact=[0])
-    result = scored(heard("a", QUIET, last), heard("b", QUIET, first, start=5.0))
+    result = scored(predicted("a", GOOD, last), predicted("b", GOOD, first, start=5.0))
     assert false(result) == 2
     assert [each["run"] for each in result.false_alarms()] == ["a", "b"]
 
 
 def test_an_alarm_that_runs_on_into_a_failure_is_not_false_but_wrong_where_it_is_ok():
     early = range(10, 21)  # from 1.0 s on; the blow comes at 2.03 s
-    result = scored(heard("a", BLOW, called(impact=early)))
+    result = scored(predicted("a", IMPACT, called(impact=early)))
     assert (false(result), result.wrong.tolist()) == (0, [1.0])
     assert result.found.tolist() == [True]
 
 
 def test_an_alarm_in_time_that_nobody_annotated_is_neither_right_nor_false():
     gap = blocks((0.0, 1.0, "ok"), (2.0, 5.0, "ok"))
-    assert false(scored(heard("a", gap, called(impact=[12, 13])))) == 0
-    assert false(scored(heard("a", gap, called(impact=[12, 16, 20])))) == 1  # 2.0 s on is ok
+    assert false(scored(predicted("a", gap, called(impact=[12, 13])))) == 0
+    assert false(scored(predicted("a", gap, called(impact=[12, 16, 20])))) == 1  # 2.0 s on is ok
 
 
 def test_ok_blocks_that_touch_are_one_stretch_of_ok():
     halves = blocks((0.0, 2.5, "ok"), (2.5, 5.0, "ok"))
-    assert false(scored(heard("a", halves, called(impact=[23])))) == 1
+    assert false(scored(predicted("a", halves, called(impact=[23])))) == 1
 
 
 def test_a_failure_is_named_by_a_frame_of_its_own_class_alone():
-    result = scored(heard("a", BLOW, called(highaccelerations=[18, 19])))
+    result = scored(predicted("a", IMPACT, called(highaccelerations=[18, 19])))
     assert (result.found.tolist(), result.named.tolist()) == ([True], [False])
-    result = scored(heard("a", BLOW, called(highaccelerations=[18], impact=[19])))
+    result = scored(predicted("a", IMPACT, called(highaccelerations=[18], impact=[19])))
     assert result.named.tolist() == [True]
-    beside = scored(heard("a", BLOW, called(highaccelerations=[18], impact=[30])))
+    beside = scored(predicted("a", IMPACT, called(highaccelerations=[18], impact=[30])))
     assert beside.named.tolist() == [False]
 
 
 @pytest.mark.parametrize(("frame", "delay"), [(17, 0.07), (18, 0.17), (20, 0.37)])
 def test_the_delay_lasts_until_the_first_frame_that_tells_is_complete(frame, delay):
     # The blow starts at 2.03 s; frame 17 lasts from 1.7 s to 2.1 s.
-    result = scored(heard("a", BLOW, called(impact=range(frame, 23))))
+    result = scored(predicted("a", IMPACT, called(impact=range(frame, 23))))
     assert result.delay.tolist() == pytest.approx([delay])
 
 
 def test_a_frame_that_shares_no_more_than_a_sample_with_a_failure_does_not_find_it():
     late = blocks((0.0, 2.0, "ok"), (2.1, 2.2, "impact"))
-    assert scored(heard("a", late, called(impact=[17]))).found.tolist() == [False]
+    assert scored(predicted("a", late, called(impact=[17]))).found.tolist() == [False]
     sooner = blocks((0.0, 2.0, "ok"), (2.098, 2.2, "impact"))
-    assert scored(heard("a", sooner, called(impact=[17]))).found.tolist() == [True]
+    assert scored(predicted("a", sooner, called(impact=[17]))).found.tolist() == [True]
 
 
 def test_what_is_missed_is_listed():
-    result = scored(heard("a", SWING), heard("b", BLOW, called()))
+    result = scored(predicted("a", OSCILLATION), predicted("b", IMPACT, called()))
     assert result.missed() == [{"run": "b", "label": "impact", "start": 2.03, "stop": 2.2}]
     assert np.isnan(result.delay[1])
 
 
 def test_two_failures_in_one_alarm_are_found_both():
     twice = blocks((0.0, 1.0, "ok"), (1.1, 1.2, "impact"), (1.4, 2.0, "oscillations"))
-    result = scored(heard("a", twice))
+    result = scored(predicted("a", twice))
     assert (result.found.tolist(), result.named.tolist()) == ([True, True], [True, True])
     assert len(result.alarms) == 1
 
 
 def test_a_frame_is_a_failure_if_it_holds_it_or_is_filled_by_it_by_half():
-    truth = Matched.of([heard("a", BLOW)]).frames.truth
+    truth = Matched.of([predicted("a", IMPACT)]).frames.truth
     # 0.17 s from 2.03 s on: held whole by the frames that start at 1.8, 1.9 and 2.0 s
     assert np.flatnonzero(truth == "impact").tolist() == [18, 19, 20]
     assert np.flatnonzero(truth == "ok").tolist() == [*range(17), *range(30, COUNT)]
-    truth = Matched.of([heard("a", SWING)]).frames.truth
+    truth = Matched.of([predicted("a", OSCILLATION)]).frames.truth
     assert np.flatnonzero(truth == "oscillations").tolist() == [*range(9, 34)]
 
 
 def test_time_in_which_no_alarm_could_be_false_is_not_counted_as_heard():
     short = blocks((0.0, 0.3, "ok"), (0.5, 0.6, "impact"), (1.05, 1.85, "ok"))
-    matched = Matched.of([heard("a", short), heard("b", QUIET)])
+    matched = Matched.of([predicted("a", short), predicted("b", GOOD)])
     assert matched.ok_annotated.tolist() == pytest.approx([1.1, 5.0])
     assert matched.ok_heard.tolist() == pytest.approx([0.7, 5.0])  # frames from 1.1 s to 1.8 s
 
 
 def test_times_may_start_anywhere():
-    moved = scored(heard("a", BLOW, start=1e6), heard("b", QUIET, called(impact=[3]), start=-7.0))
-    plain = scored(heard("a", BLOW), heard("b", QUIET, called(impact=[3])))
+    moved = scored(
+        predicted("a", IMPACT, start=1e6), predicted("b", GOOD, called(impact=[3]), start=-7.0)
+    )
+    plain = scored(predicted("a", IMPACT), predicted("b", GOOD, called(impact=[3])))
     assert moved.found.tolist() == plain.found.tolist()
     assert moved.delay == pytest.approx(plain.delay, abs=1e-6)
     assert false(moved) == false(plain) == 1
 
 
 def test_a_failure_in_a_gap_is_missed():
-    deaf = heard("a", blocks((0.0, 1.0, "ok"), (6.0, 6.5, "impact")))
+    deaf = predicted("a", blocks((0.0, 1.0, "ok"), (6.0, 6.5, "impact")))
     assert scored(deaf).found.tolist() == [False]
 
 
 def test_a_recording_without_a_frame_counts_for_nothing():
-    silent = heard("a", blocks((0.0, 0.2, "impact")), [], seconds=0.4)
+    silent = predicted("a", blocks((0.0, 0.2, "impact")), [], seconds=0.4)
     empty = silent.labels.__class__(
         np.zeros(0), np.zeros(0), np.zeros(0, dtype=str), np.zeros((0, 4)), silent.labels.classes
     )
@@ -183,7 +185,7 @@ def test_the_order_of_the_recordings_does_not_matter():
     random = np.random.default_rng(1)
     recordings = many(6)
     noisy = [
-        heard(
+        predicted(
             each.name,
             each.blocks,
             [
@@ -203,7 +205,10 @@ def test_the_order_of_the_recordings_does_not_matter():
 
 
 def test_a_robot_alone_is_measured_by_its_own_runs():
-    recordings = [*many(6), *[heard(f"go2/blow-{seed:03d}", BLOW, called()) for seed in range(6)]]
+    recordings = [
+        *many(6),
+        *[predicted(f"go2/blow-{seed:03d}", IMPACT, called()) for seed in range(6)],
+    ]
     resampling = Resampling.of([each.group for each in recordings])
     result = score(Matched.of(recordings))
     own = np.array([each.name.startswith("go2") for each in recordings])

@@ -84,16 +84,16 @@ def test_the_comb_is_the_matrix_that_noisytest_builds():
 
 
 def test_the_cosine_transform_is_scipys():
-    loudness = RANDOM.random((2, 8, 171))
+    energies = RANDOM.random((2, 8, 171))
     np.testing.assert_allclose(
-        dct(loudness), scipy_dct(loudness, norm="ortho", axis=1).swapaxes(1, 2), atol=1e-12
+        dct(energies), scipy_dct(energies, norm="ortho", axis=1).swapaxes(1, 2), atol=1e-12
     )
 
 
 def test_the_cosine_transform_changes_no_distance():
-    loudness = RANDOM.random((6, 4, 171))
+    energies = RANDOM.random((6, 4, 171))
     np.testing.assert_allclose(
-        distances(dct(loudness).reshape(6, -1)), distances(loudness.reshape(6, -1))
+        distances(dct(energies).reshape(6, -1)), distances(energies.reshape(6, -1))
     )
 
 
@@ -112,7 +112,7 @@ def test_a_tone_lands_in_its_band(frequency):
 
 
 @pytest.mark.parametrize("rate", [333.0, 1000.0, 48_000.0])
-def test_log_bands_hear_the_same_tone_at_any_rate(rate):
+def test_log_bands_of_a_tone_are_equal_at_any_rate(rate):
     def mean(profile):
         return models.features(tone(profile, 61.0), profile)[0, 4]
 
@@ -120,7 +120,7 @@ def test_log_bands_hear_the_same_tone_at_any_rate(rate):
     assert mean(low) == pytest.approx(mean(high), abs=0.05)
 
 
-def test_log_bands_do_not_care_when_a_burst_comes():
+def test_log_bands_do_not_depend_on_the_time_of_a_burst():
     profile = models.LogBands().at(10_000.0)
     burst = RANDOM.standard_normal(300)
     frames = np.zeros((2, 4000))
@@ -137,7 +137,7 @@ def test_each_band_shares_out_its_power_once():
             np.testing.assert_allclose(shares.sum(axis=0), 1.0)
 
 
-def test_quick_windows_tell_a_short_burst_from_a_longer_murmur():
+def test_quick_windows_separate_a_short_burst_from_a_longer_one():
     profile = QUICK
     hiss = RANDOM.standard_normal(20)
     frames = np.full((2, 400), 1.0)
@@ -148,7 +148,7 @@ def test_quick_windows_tell_a_short_burst_from_a_longer_murmur():
     assert (burst[1:] - murmur[1:] > 0.5).all()  # the loudest moment, in all but the speed's band
 
 
-def test_the_first_quick_band_is_the_speed_and_no_other_hears_it():
+def test_the_first_quick_band_alone_holds_the_speed():
     profile = QUICK
     quick = len(profile.quick_edges) - 1
     steady = models.features(np.full((1, 400), 5.0), profile)[0]
@@ -170,7 +170,7 @@ def test_three_signals_that_grow_alike_change_the_level_of_the_whole_frame_alone
     np.testing.assert_allclose(change[:, -1], np.log(8.0), atol=1e-6)
 
 
-def test_a_signal_that_grows_alone_is_told_from_the_whole_frame_and_from_its_neighbours():
+def test_a_signal_that_grows_alone_is_relative_to_the_frame_and_to_its_neighbours():
     profile = models.GENERAL.at(1000.0)
     frames = 1e6 * RANDOM.standard_normal((1, 3, 400))
     louder = frames * np.array([1.0, 8.0, 1.0])[:, None]
@@ -190,14 +190,14 @@ def test_a_signal_that_grows_alone_is_told_from_the_whole_frame_and_from_its_nei
     assert first == len(change) - 1
 
 
-def test_a_constant_signal_sounds_only_at_zero_hertz():
+def test_a_constant_signal_has_power_only_at_zero_hertz():
     profile = models.LogBands().at(1000.0)
     features = models.features(np.full((1, 400), 5.0), profile)
     silent, bands = np.log(profile.floor), len(profile.edges) - 1
     np.testing.assert_allclose(features[0, : 2 * bands], silent, atol=1e-6)
 
 
-def test_single_precision_is_all_that_32_bits_can_tell():
+def test_single_precision_rounds_to_32_bits():
     profile = models.Profile.noisytest()
     frames = RANDOM.random((2, 4000))
     features = models.features(frames, profile)
@@ -271,7 +271,7 @@ def test_joints_leave_the_features_of_the_norms_as_they_are():
     assert whole[-1] == pytest.approx(alone[-1], abs=1e-12)
 
 
-def test_one_joint_whose_error_grows_is_told_from_the_others():
+def test_one_joint_whose_error_grows_is_above_the_mean_of_all():
     joints = 1e6 * RANDOM.standard_normal((1, 3, 1, 400)) * np.ones((4, 1))
     norms = 1e6 * RANDOM.standard_normal((1, 3, 400))
     louder = joints.copy()

@@ -12,7 +12,7 @@ def test_as_many_frames_as_hops_fit(samples, frames):
     assert np.array_equal(cut[:, 0], 100.0 * np.arange(frames))
 
 
-def test_frames_are_of_the_paper_unless_told_otherwise():
+def test_frames_are_of_the_paper_by_default():
     assert models.frame(np.zeros(10_000)).shape == (7, 4000)
 
 

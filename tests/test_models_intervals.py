@@ -92,7 +92,7 @@ def test_fewer_than_five_groups_have_no_interval():
     assert (rate.low, rate.high) == pytest.approx(garwood(1))
 
 
-def test_only_what_has_something_to_say_is_behind_a_measure():
+def test_only_runs_in_the_sample_of_a_measure_count():
     whole = np.array([0.0, 4.0, 4.0, 4.0, 4.0, 4.0, 0.0])
     assert each_its_own(7).share(whole / 2, whole).runs == 5
     nothing = each_its_own(7).share(np.zeros(7), np.zeros(7))

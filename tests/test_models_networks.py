@@ -10,7 +10,7 @@ from models.estimators.mlp import Networks
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
-def test_networks_answer_as_scikit_learns_do():
+def test_networks_have_the_probabilities_of_scikit_learn():
     from sklearn.neural_network import MLPClassifier
 
     generator = np.random.default_rng(0)

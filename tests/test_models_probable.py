@@ -69,7 +69,7 @@ def classifier(request):
     return models.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)
 
 
-def test_what_was_learnt_is_heard_in_other_runs(classifier):
+def test_classes_are_found_in_other_runs(classifier):
     for each in RECORDINGS[12:]:
         labels = classifier.classify(each.signal, RATE)
         inside = (labels.start >= 0.5) & (labels.stop <= SECONDS - 0.5)
@@ -91,7 +91,7 @@ def test_a_frame_by_itself_is_decided_on_as_among_others(classifier):
 
 @pytest.mark.parametrize("classes", [2, 3])
 @pytest.mark.parametrize("estimator", PROFILES)
-def test_a_class_that_is_not_there_is_never_heard(estimator, classes):
+def test_a_class_without_frames_is_never_predicted(estimator, classes):
     generator = np.random.default_rng(1)
     features = generator.normal(size=(200, 4))
     there = [0, classes]
@@ -105,7 +105,7 @@ def test_a_class_that_is_not_there_is_never_heard(estimator, classes):
 
 
 @pytest.mark.parametrize("estimator", PROFILES)
-def test_a_class_that_one_group_alone_has_leaves_all_others_as_sure_as_they_are(estimator):
+def test_a_class_of_one_group_alone_leaves_other_probabilities_as_they_are(estimator):
     generator = np.random.default_rng(0)
     features = generator.normal(size=(1200, 6))
     groups = np.array([f"g{number % 6}" for number in range(1200)])
@@ -129,7 +129,7 @@ def test_groups_of_one_class_each_cannot_calibrate(estimator):
     np.testing.assert_array_equal(learnt.calibration, [1.0, 0.0, 0.0])
 
 
-def test_calibration_finds_how_much_too_sure_probabilities_are():
+def test_calibration_finds_the_scale_of_overconfident_logits():
     generator = np.random.default_rng(2)
     true = generator.normal(size=(20_000, 3)) * 1.5
     log_true = true - np.log(np.exp(true).sum(axis=1, keepdims=True))
@@ -163,13 +163,13 @@ def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classi
     assert named == ["impact", "oscillations", "ok"]
 
 
-def test_machines_know_how_frequent_each_class_was(classifier):
+def test_estimators_keep_the_frequency_of_each_class(classifier):
     examples = Examples.read(RECORDINGS[:12], PROFILE)
     shares = [(examples.labels == name).mean() for name in classifier.classes]
     np.testing.assert_allclose(classifier.estimator.frequency, shares)
 
 
-def test_what_is_louder_than_all_that_was_learnt_is_unknown_and_a_finding(classifier):
+def test_a_frame_louder_than_all_of_the_training_set_is_unknown(classifier):
     loud = 1e6 * np.random.default_rng(4).random(round(2 * RATE))
     labels = classifier.classify(alike(loud), RATE)
     assert set(labels.label) == {"unknown"}
@@ -185,13 +185,13 @@ def test_silence_and_uniform_motion_are_no_failure(classifier, level):
     assert set(labels.label) == {"ok"}
 
 
-def test_what_was_learnt_is_known(classifier):
+def test_training_frames_are_not_unknown(classifier):
     labels = np.concatenate([classifier.classify(r.signal, RATE).label for r in RECORDINGS[12:]])
     assert "unknown" not in labels
 
 
 @pytest.mark.parametrize("chunk", [1, 37, 400, 999, 5000])
-def test_a_stream_hears_the_same(classifier, chunk):
+def test_a_stream_has_the_same_labels(classifier, chunk):
     each = RECORDINGS[14]
     batch = classifier.classify(each.signal, RATE)
     stream, found = models.Stream(classifier, joints=JOINTS), []
@@ -209,13 +209,13 @@ def test_a_stream_hears_the_same(classifier, chunk):
     np.testing.assert_allclose(together["scores"], batch.scores, atol=1e-12)
 
 
-def test_a_model_that_lacks_a_signal_says_which(classifier):
+def test_a_missing_signal_is_named(classifier):
     signals = RECORDINGS[0].signal
     with pytest.raises(models.SignalError, match=r"no signal error.*; there is desired, measured"):
         classifier.classify({name: signals[name] for name in ("desired", "measured")}, RATE)
 
 
-def test_frames_after_a_gap_are_heard_as_if_it_were_silence_left_out(classifier):
+def test_frames_after_a_gap_are_classified_as_without_it(classifier):
     signals = RECORDINGS[14].signal
     parts = [slice(0, 2000), slice(2000, None)]
     first, rest = ({name: each[..., part] for name, each in signals.items()} for part in parts)

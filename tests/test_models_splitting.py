@@ -124,7 +124,7 @@ def test_a_run_a_group_or_a_content_on_both_sides_is_refused(test, text):
     assert "\n" not in str(caught.value)
 
 
-def test_the_refusal_says_how_many_there_are():
+def test_the_refusal_names_the_number_of_runs():
     names = {f"talos/curve-001-{copy}": "" for copy in range(3)} | {"other": "aa", "run8": "bb"}
     with pytest.raises(models.SeenError, match=r"\(and 1 more of 5\); measure it on other runs$"):
         check_apart(TRAIN, names)

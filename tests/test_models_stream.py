@@ -47,13 +47,13 @@ def classifier(name):
 
 @pytest.mark.parametrize("chunk", [1, 7, 10])
 def test_the_chunk_that_completes_a_frame_finds_nearly_all_its_windows_done(chunk, monkeypatch):
-    transformed, plain = [], windows.levels
+    transformed, original = [], windows.log_band_energies
 
-    def counted(stretches, *rest):
-        transformed.append(len(stretches))
-        return plain(stretches, *rest)
+    def counted(samples, *rest):
+        transformed.append(len(samples))
+        return original(samples, *rest)
 
-    monkeypatch.setattr(windows, "levels", counted)
+    monkeypatch.setattr(windows, "log_band_energies", counted)
     stream, signal = models.Stream(classifier("two windows")), noise(4000)
     for first in range(0, len(signal), chunk):
         transformed.clear()
@@ -175,13 +175,13 @@ def test_every_transform_is_computed_once(monkeypatch):
 
     transformed = []
 
-    def counted(stretches, profile, resolution):
-        transformed.append(len(stretches))
-        return original(stretches, profile, resolution)
+    def counted(windows, profile, resolution):
+        transformed.append(len(windows))
+        return original(windows, profile, resolution)
 
-    original = module.levels
+    original = module.log_band_energies
     stream = models.Stream(classifier("ours"))
-    monkeypatch.setattr(module, "levels", counted)
+    monkeypatch.setattr(module, "log_band_energies", counted)
     for sample in np.split(noise(1000), 40):
         stream.push(sample)
     assert sum(transformed) == 1 + (1000 - OURS.window) // OURS.stride

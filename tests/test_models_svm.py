@@ -48,7 +48,7 @@ def test_one_vs_one_decides_as_scikit_learn(one_vs_one, classes, condense):
     assert np.array_equal(chosen, svc.predict(fresh))
 
 
-def test_one_vs_one_grades_as_scikit_learn(one_vs_one):
+def test_one_vs_one_has_the_scores_of_scikit_learn(one_vs_one):
     features, targets = blobs(4)
     svc, machines = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
     svc.decision_function_shape = "ovr"

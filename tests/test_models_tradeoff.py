@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hearings import BLOW, CLASSES, QUIET, SWING, frames, heard, many, perfect
+from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
 from models.evaluation.calibration import are_probabilities, reliability
 from models.evaluation.eventscore import score
@@ -17,7 +17,7 @@ def graded(name, blocks, risk):
     scores = np.full((len(risk), 4), -9.0)
     scores[:, 0], scores[:, 1] = 0.0, risk
     called = np.where(risk > 0, "impact", "ok").tolist()
-    return heard(name, blocks, called, scores=scores)
+    return predicted(name, blocks, called, scores=scores)
 
 
 def noisy(seeds, spread=1.0):
@@ -30,7 +30,7 @@ def noisy(seeds, spread=1.0):
             + spread * random.normal(size=COUNT),
         )
         for seed in range(seeds)
-        for scenario, blocks in (("good", QUIET), ("blow", BLOW), ("swing", SWING))
+        for scenario, blocks in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
     ]
 
 
@@ -49,7 +49,7 @@ def test_scores_without_fault_find_everything_for_nothing():
 
 
 def test_scores_that_know_nothing_find_nothing_for_nothing():
-    dull = [graded(f"talos/blow-{seed:03d}", BLOW, np.zeros(COUNT)) for seed in range(6)]
+    dull = [graded(f"talos/blow-{seed:03d}", IMPACT, np.zeros(COUNT)) for seed in range(6)]
     curve = trade_off(Matched.of(dull)).curve()
     assert curve["failure_recall"].tolist() == [0.0]
     assert read(dull, 1000.0)[0][0].value == 0.0
@@ -93,10 +93,10 @@ def test_what_is_read_stays_within_the_budget_and_grows_with_it():
 def test_alarms_that_grow_together_are_not_cheaper_than_before_they_did():
     # At a low threshold, one alarm lasts through the run; a little above, there are five.
     risk = np.where(np.arange(COUNT) % 10 == 0, -1.0, -2.0)
-    loud = np.array([5.0 if label != "ok" else -3.0 for label in perfect(BLOW)])
+    loud = np.array([5.0 if label != "ok" else -3.0 for label in perfect(IMPACT)])
     loud[20] = -1.5  # the last frame that holds the blow, heard below that threshold alone
-    recordings = [graded(f"talos/good-{seed:03d}", QUIET, risk) for seed in range(5)]
-    recordings += [graded(f"talos/blow-{seed:03d}", BLOW, loud) for seed in range(5)]
+    recordings = [graded(f"talos/good-{seed:03d}", GOOD, risk) for seed in range(5)]
+    recordings += [graded(f"talos/blow-{seed:03d}", IMPACT, loud) for seed in range(5)]
     curve = trade_off(Matched.of(recordings)).curve()
     assert curve["false_alarms_per_hour"][-1] < curve["false_alarms_per_hour"].max()
     hours = Matched.of(recordings).ok_heard.sum() / 3600
@@ -111,7 +111,8 @@ def test_alarms_that_grow_together_are_not_cheaper_than_before_they_did():
 
 def test_without_ok_motion_nothing_is_read():
     swings = [
-        heard(f"talos/swing-{seed:03d}", SWING[1:2], called=perfect(SWING)) for seed in range(6)
+        predicted(f"talos/swing-{seed:03d}", OSCILLATION[1:2], called=perfect(OSCILLATION))
+        for seed in range(6)
     ]
     assert np.isnan(read(swings, 5.0)[0][0].value)
 
@@ -121,7 +122,7 @@ def test_intervals_of_what_is_read_shrink_with_more_groups():
     assert widths[1] < 0.7 * widths[0]
 
 
-def test_probabilities_and_margins_are_told_apart():
+def test_probabilities_differ_from_margins():
     above_threshold = np.array([[0.7, 0.1, 0.2, 0.0], [0.0, 0.0, 0.5, 0.5]])
     assert are_probabilities(above_threshold)
     assert failure_score(above_threshold, CLASSES).tolist() == pytest.approx([0.3, 1.0])
@@ -137,7 +138,7 @@ def confident(name, confidence, right, random):
     called = np.where(hits, "ok", "impact")
     scores = np.full((COUNT, 4), (1 - confidence) / 3)
     scores[np.arange(COUNT), np.where(hits, 0, 1)] = confidence
-    return heard(name, QUIET, called.tolist(), scores=scores)
+    return predicted(name, GOOD, called.tolist(), scores=scores)
 
 
 @pytest.mark.parametrize(("confidence", "right"), [(0.75, 0.75), (0.99, 0.69), (0.55, 0.95)])

@@ -11,7 +11,7 @@ from models.estimators.trees import Trees
 
 @pytest.mark.parametrize("leaves", [2, 5, 16])
 @pytest.mark.parametrize("classes", [2, 3])
-def test_trees_answer_as_scikit_learns_do(leaves, classes):
+def test_trees_have_the_probabilities_of_scikit_learn(leaves, classes):
     from sklearn.ensemble import HistGradientBoostingClassifier
 
     generator = np.random.default_rng(0)

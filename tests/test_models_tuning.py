@@ -8,7 +8,7 @@ from models.recording import Block, Recording
 from models.splitting import folds
 from models.tuning import kernels
 from models.tuning.grid import Grid
-from models.tuning.search import CRITERIA, Measures, ask, measure, order
+from models.tuning.search import CRITERIA, Measures, measure, order, validate
 from models.tuning.trial import Trial
 
 SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
@@ -70,15 +70,15 @@ def some_points(profile, count=6):
     return [points[index] for index in sorted(drawn)]
 
 
-def names(asked, point=0):
+def names(validation, point=0):
     """Names of what a point calls the frames."""
-    return np.array((*asked.classes, "unknown"))[asked.answers[point].chosen]
+    return np.array((*validation.classes, "unknown"))[validation.decisions[point].chosen]
 
 
 def assert_equal_to_training(points, sets):
-    asked = ask(points, sets.trial)
+    validation = validate(points, sets.trial)
     for index, point in enumerate(points):
-        assert np.array_equal(names(asked, index), sets.called(point))
+        assert np.array_equal(names(validation, index), sets.called(point))
 
 
 @pytest.mark.parametrize("name", PROFILES)
@@ -99,26 +99,26 @@ def test_points_of_trees_predict_what_a_classifier_predicts():
     assert_equal_to_training(points, sets(learn=range(12), check=range(12, 14)))
 
 
-def test_too_many_frames_for_a_kernel_matrix_change_no_answer(monkeypatch):
+def test_too_many_frames_for_a_kernel_matrix_change_no_decision(monkeypatch):
     points, trial = some_points(PROFILES["paper"]), sets().trial
-    kept = ask(points, trial).answers
+    kept = validate(points, trial).decisions
     monkeypatch.setattr(kernels, "LARGEST", 0)
-    for with_matrix, without in zip(kept, ask(points, trial).answers, strict=True):
+    for with_matrix, without in zip(kept, validate(points, trial).decisions, strict=True):
         assert np.array_equal(with_matrix.chosen, without.chosen)
-        np.testing.assert_allclose(with_matrix.graded, without.graded, atol=1e-6)
+        np.testing.assert_allclose(with_matrix.margins, without.margins, atol=1e-6)
 
 
 def test_folds_predict_what_a_classifier_of_the_other_recordings_predicts():
     profile = PROFILES["logbands"]
     recordings = [recording(number) for number in range(5)]
     splits = folds([each.name for each in recordings], 3)
-    asked = ask([profile], Trial(recordings, splits))
+    validation = validate([profile], Trial(recordings, splits))
     for learn, check in splits:
         others = [recordings[index] for index in learn]
         for index in check:
-            own = asked.runs == recordings[index].name
+            own = validation.runs == recordings[index].name
             theirs = Sets(others, [recordings[index]]).called(profile)
-            assert np.array_equal(names(asked)[own], theirs)
+            assert np.array_equal(names(validation)[own], theirs)
 
 
 def test_recordings_without_annotations_are_passed_over():
@@ -143,10 +143,10 @@ def test_frames_that_are_out_of_distribution_are_never_ok():
     profile = replace(PROFILES["logbands"], estimator="trees", rounds=3)
     given = sets(learn=range(12), check=range(12, 14))
     strange = [replace(each, signal=1e6 * each.signal) for each in given.check]
-    asked = ask([profile], Trial.against(given.learn, strange))
-    assert "ok" not in set(names(asked))
-    (found,) = asked.measures()
-    assert (found.failure_recall, found.false_alarm_rate) == (1.0, 1.0)
+    validation = validate([profile], Trial.against(given.learn, strange))
+    assert set(names(validation)) == {"unknown"}
+    (found,) = validation.measures()
+    assert (found.failure_recall, found.false_alarm_rate, found.subset_accuracy) == (0.0, 0.0, 0.0)
 
 
 def test_a_measure_of_nothing_is_none_in_json():
@@ -179,7 +179,7 @@ def test_recordings_without_any_annotation_cannot_be_tuned():
         measure([PROFILES["paper"]], trial)
 
 
-def test_a_class_that_is_checked_and_never_learnt_is_named():
+def test_a_test_class_without_training_frames_is_named():
     trial = Trial.against([recording(0, ("ok", "impact"))], [recording(1)])
     reason = "no frame of highaccelerations to learn from where those of walk-1 are checked"
     with pytest.raises(models.DatasetError, match=reason):
@@ -210,6 +210,6 @@ def test_points_of_the_papers_grid_predict_what_a_classifier_predicts(stand_in, 
 
 def test_the_papers_own_point_is_golden(stand_in, golden):
     arrays, _ = golden
-    asked = ask([models.Profile.noisytest()], stand_in.trial)
-    assert asked.classes == models.CLASSES
-    assert np.array_equal(asked.answers[0].chosen, arrays["rbf_validation_pred"])
+    validation = validate([models.Profile.noisytest()], stand_in.trial)
+    assert validation.classes == models.CLASSES
+    assert np.array_equal(validation.decisions[0].chosen, arrays["rbf_validation_pred"])

@@ -146,4 +146,4 @@ def _check(source: Source, first: Source) -> None:
 
 def _signals(recording: models.Recording) -> dict[str, models.types.Real]:
     """Take signals by name, without the error where what is desired is what was measured."""
-    return models.signals.telling(models.signals.named(recording.signal))
+    return models.signals.without_zero_error(models.signals.named(recording.signal))

@@ -16,8 +16,8 @@ from inspector.training.training import recordings, settings
 from inspector.training.tuningfile import opened
 from models.modelfile import versions
 from models.splitting import check_apart, folds, group_of
-from models.tuning.grid import LEARNT, Grid, Point
-from models.tuning.search import Asked, Criterion, Measures, ask, measure, order
+from models.tuning.grid import ESTIMATOR_SETTINGS, Grid, Point
+from models.tuning.search import Criterion, Measures, Validation, measure, order, validate
 from models.tuning.trial import Trial
 from noisemodel.atomic import refuse_existing
 from noisemodel.parallel import each
@@ -68,7 +68,7 @@ class Tuned:
     profiles: Sequence[models.Profile]
     measures: Sequence[Measures]
     untuned: models.Profile
-    asked: Asked
+    asked: Validation
     trial: Trial
 
     def ranked(self, criterion: Criterion) -> list[int]:
@@ -142,7 +142,7 @@ def tune(
         "number_of_folds": None if fresh else question.folds,
         "software": versions(),
     }
-    asked = ask([base], trial)  # first, so that data that cannot be learnt from leave no file
+    asked = validate([base], trial)  # first, so that data that cannot be learnt from leave no file
     with opened(output, facts, points, overwrite=overwrite) as results:
         done = len(results.measures)
         batches = _batches(points[done:], profiles[done:], BATCHES * jobs)
@@ -183,7 +183,7 @@ def _batches(
 ) -> list[list[models.Profile]]:
     """Group points that share their features, or their kernel matrix if those are too few."""
     found: list[list[models.Profile]] = []
-    for fast in (LEARNT, ("regularization",)):
+    for fast in (ESTIMATOR_SETTINGS, ("regularization",)):
         keys = [tuple(v for name, v in point.items() if name not in fast) for point in points]
         pairs = groupby(zip(keys, profiles, strict=True), key=lambda pair: pair[0])
         found = [[profile for _, profile in group] for _, group in pairs]

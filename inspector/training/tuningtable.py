@@ -74,8 +74,9 @@ def _basis(tuned: Tuned) -> str:
     if not tuned.question.validation:
         others = f"the same, in {len(splits)} folds"
     return (
-        f"{len(tuned.grid)} points of {tuned.question.profile}, trained on {asked.learnt} frames of"
-        f" {learnt} recordings, measured on {len(asked.truth)} frames of {others}"
+        f"{len(tuned.grid)} points of {tuned.question.profile}, trained on"
+        f" {asked.training_frames} frames of {learnt} recordings,"
+        f" measured on {len(asked.truth)} frames of {others}"
     )
 
 

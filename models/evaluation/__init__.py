@@ -1,6 +1,6 @@
-"""Honest measuring of a classifier: whole runs, events, intervals over groups of runs.
+"""Evaluation of a classifier: whole runs, events, intervals over groups of runs.
 
-    run -> heard -> matching -> frames and events -> intervals -> assessment -> table
+    run -> predictions -> matching -> frames and events -> intervals -> assessment -> table
 
-Nothing here learns. `heard` asks the classifier, the rest counts.
+Nothing here is trained: `predictions` calls the classifier, the rest counts.
 """

@@ -1,4 +1,4 @@
-"""The assessment: how well a model does on recordings, and how sure that is."""
+"""The assessment: all measures of a model on recordings, with confidence intervals."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from models.types import Array
 FORMAT = "noise-evaluation/1"
 ADVICE = "measure it on other runs, or have the report say so (--seen-too)"
 BUDGETS = (5.0, 20.0, 100.0)
-"""False alarms per hour at which it is read what could be found."""
+"""False-alarm budgets, per hour, at which recall is read from the trade-off."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,14 +38,14 @@ class Assessment:
         groups: How many groups of them that share their motion.
         blocks: Annotated blocks of each class.
         runs_with: Recordings with such a block, of each class.
-        copies: Recordings that were left out, and which other each equals, by their names.
-        seen: What the model knew of some recordings, by their names.
+        copies: Recordings that were left out, and the equal one of each, by name.
+        seen: Recordings that the model was trained on, and what of them, by name.
         frames: Measures of the frames that are cut from blocks.
         events: Measures of whole recordings.
-        by_robot: The same of each robot alone, if names say which there are.
+        by_robot: The same of each robot alone, if names contain it.
         score: The events themselves.
         trade_off: Counts at falling thresholds.
-        at_budgets: For each budget of false alarms per hour, failure frames and failures found.
+        at_budgets: For each false-alarm budget, recall of failure frames and failures found.
         reliability: Confidence and truth; None if the scores are no probabilities.
         calibration_error: Expected calibration error; None likewise.
     """
@@ -66,7 +66,7 @@ class Assessment:
     calibration_error: Estimate | None
 
     def as_dict(self) -> dict[str, Any]:
-        """Give everything as JSON can hold it, None for what is not defined."""
+        """All measures for JSON, None where undefined."""
         evaluation, table = self.frames.evaluation, self.reliability
         return {
             "format": FORMAT,
@@ -103,28 +103,28 @@ class Assessment:
 def assess(
     classifier: Classifier, recordings: Iterable[Recording], *, seen_too: bool = False
 ) -> Assessment:
-    """Measure a model by recordings, each of which is let go once it was heard.
+    """Assessment of a model on recordings, each of which is released once it is classified.
 
     Args:
         classifier: The model.
         recordings: Annotated noise at its rate, each of another name. Of recordings that are equal
             bit for bit, the first counts.
-        seen_too: Whether recordings count that the model has learnt from, or that share their
+        seen_too: Whether recordings count that the model was trained on, or that share their
             motion with such; the assessment lists them.
 
     Returns:
         All measures.
 
     Raises:
-        SeenError: If the model knows a recording, unless that is asked for.
+        SeenError: If the model was trained on a recording, unless ``seen_too``.
         DatasetError: If there is no annotated frame, or a name repeats.
         ModelsError: If a recording does not fit the model.
     """
-    heard: dict[str, Predictions] = {}
+    predictions: dict[str, Predictions] = {}
     first, copies, known = dict[str, str](), dict[str, str](), dict[str, str]()
     for recording in recordings:
         name, digest = recording.name, recording.sha256
-        if name in heard or name in copies:
+        if name in predictions or name in copies:
             raise DatasetError(f"two recordings are called {name!r}; name them apart")
         known |= seen(classifier.runs, {name: digest})
         if known and not seen_too:
@@ -133,22 +133,22 @@ def assess(
             copies[name] = first[digest]
         else:
             first[digest] = name
-            heard[name] = predict(classifier, recording)
-    return measure(tuple(heard.values()), copies=copies, known=known)
+            predictions[name] = predict(classifier, recording)
+    return measure(tuple(predictions.values()), copies=copies, known=known)
 
 
 def measure(
-    heard: Sequence[Predictions],
+    predictions: Sequence[Predictions],
     *,
     copies: Mapping[str, str] | None = None,
     known: Mapping[str, str] | None = None,
 ) -> Assessment:
-    """Measure what a model heard.
+    """Assessment of predictions.
 
     Args:
-        heard: Recordings.
-        copies: Recordings that were left out, and which other each equals.
-        known: What the model knew of some of them.
+        predictions: Of a model, on recordings.
+        copies: Recordings that were left out, and the equal one of each.
+        known: Recordings that the model was trained on, and what of them.
 
     Returns:
         All measures.
@@ -156,19 +156,19 @@ def measure(
     Raises:
         DatasetError: If there is no annotated frame.
     """
-    if not any(len(one.truth) for one in heard):
-        raise DatasetError(f"no annotated frame in {len(heard)} recordings; annotate blocks")
-    groups = [one.group for one in heard]
-    resampling, matched = Resampling.of(groups), Matched.of(heard)
+    if not any(len(one.truth) for one in predictions):
+        raise DatasetError(f"no annotated frame in {len(predictions)} recordings; annotate blocks")
+    groups = [one.group for one in predictions]
+    resampling, matched = Resampling.of(groups), Matched.of(predictions)
     events, curve, table = eventscore.score(matched), trade_off(matched), reliability(matched)
-    robots = np.array([robot_of(one.name) for one in heard])
-    frames = framescore.score(heard, resampling)
+    robots = np.array([robot_of(one.name) for one in predictions])
+    frames = framescore.score(predictions, resampling)
     owned = {
-        label: [sum(block.label == label for block in one.blocks) for one in heard]
+        label: [sum(block.label == label for block in one.blocks) for one in predictions]
         for label in frames.evaluation.classes
     }
     return Assessment(
-        runs=len(heard),
+        runs=len(predictions),
         groups=len(set(groups)),
         blocks={label: sum(counts) for label, counts in owned.items()},
         runs_with={label: sum(map(bool, counts)) for label, counts in owned.items()},
@@ -202,7 +202,7 @@ SHOWN = 5
 
 
 def table(assessment: Assessment) -> str:
-    """Write an assessment as people read it.
+    """Table of an assessment, as text.
 
     Args:
         assessment: The measures.
@@ -215,12 +215,12 @@ def table(assessment: Assessment) -> str:
 
 
 def percent(estimate: Estimate) -> str:
-    """Write a share: ``97.9% [96.1, 98.8]``."""
+    """A share as text: ``97.9% [96.1, 98.8]``."""
     return _figure(estimate, lambda value: f"{100 * value:.1f}", "%")
 
 
 def number(estimate: Estimate, unit: str = "") -> str:
-    """Write a number of any unit: ``0.14 s [0.12, 0.15]``."""
+    """A number of any unit as text: ``0.14 s [0.12, 0.15]``."""
 
     def text(value: float) -> str:
         return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
@@ -271,13 +271,13 @@ def _frames(assessment: Assessment) -> list[str]:
 def _events(assessment: Assessment) -> list[str]:
     events = assessment.events
     lines = [
-        "Events in whole runs, as they are heard from end to end",
+        "Events in whole runs, classified from end to end",
         _row("", ["found", "by its own name"], ["failures", "", "runs"]),
     ]
     for label, found in events.found.items():
         figures = [percent(found), percent(events.named[label])]
         lines.append(_row(label, figures, [assessment.blocks.get(label, 0), "", found.runs]))
-    late = f"a tenth takes more than {number(events.late_delay, 's')}"
+    late = f"90th percentile {number(events.late_delay, 's')}"
     return [
         *lines,
         _row(
@@ -291,8 +291,8 @@ def _events(assessment: Assessment) -> list[str]:
             "Wrong stretches",
             [_per_hour(events.wrong_stretches, events.wrong_stretches_per_hour)],
         ),
-        _row("Failure recall", [f"{percent(events.failure_recall)} of the frames heard"]),
-        _row("False alarm rate", [f"{percent(events.false_alarm_rate)} of the frames heard"]),
+        _row("Failure recall", [f"{percent(events.failure_recall)} of all frames"]),
+        _row("False alarm rate", [f"{percent(events.false_alarm_rate)} of all frames"]),
     ]
 
 
@@ -312,9 +312,7 @@ def _errors(assessment: Assessment) -> list[str]:
 def _by_robot(assessment: Assessment) -> list[str]:
     if len(assessment.by_robot) < 2:
         return []
-    lines = [
-        _row("By robot", ["failures found", "frames heard, recall"], ["false alarms per hour"])
-    ]
+    lines = [_row("By robot", ["failures found", "recall of frames"], ["false alarms per hour"])]
     for robot, events in assessment.by_robot.items():
         figures = [percent(events.all_found), percent(events.failure_recall)]
         lines.append(_row(robot, figures, [number(events.false_alarms_per_hour)]))
@@ -323,8 +321,8 @@ def _by_robot(assessment: Assessment) -> list[str]:
 
 def _scores(assessment: Assessment) -> list[str]:
     lines = [
-        "What the scores are good for, with a threshold chosen on these very runs",
-        _row("at most", ["failures found", "frames heard, recall"]),
+        "Trade-off at false-alarm budgets, with a threshold chosen on these very runs",
+        _row("at most", ["failures found", "recall of frames"]),
     ]
     for budget, (recall, found) in assessment.at_budgets.items():
         title = f"{budget:g} false alarms per h"
@@ -367,12 +365,9 @@ def _confusion(assessment: Assessment) -> list[str]:
 
 
 def _foot(assessment: Assessment) -> list[str]:
-    lines = [
-        "Brackets are 95 % intervals over groups of runs, as sure as so many runs can make it at"
-        " most."
-    ]
+    lines = ["Brackets are 95 % confidence intervals over groups of runs."]
     if assessment.groups < LEAST_GROUPS:
-        lines.append(f"There are none where fewer than {LEAST_GROUPS} groups had anything to say.")
+        lines.append(f"Measures of fewer than {LEAST_GROUPS} groups have none.")
     return lines
 
 

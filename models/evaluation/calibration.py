@@ -1,10 +1,10 @@
-"""The calibration error: whether a model that says 90 % is right in 90 % of cases.
+"""The calibration error: how far confidence is from the share of right predictions.
 
-Conventions: a frame's *confidence* is the probability that the model gives the class that it names.
+Conventions: a frame's *confidence* is the probability of the class that the model predicts.
 Frames are sorted into ten bins of equal width by confidence. The expected calibration error is the
-mean distance of confidence and share of right names in a bin, weighted by the bin's frames (Naeini
-et al., 2015; Guo et al., 2017, with 15 bins). It is a matter of probabilities alone: votes and
-margins have none.
+mean distance of confidence and share of right predictions in a bin, weighted by the bin's frames
+(Naeini et al., 2015; Guo et al., 2017, with 15 bins). It is defined for probabilities alone, not
+for votes and margins.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Reliability:
         edges: Edges of the bins of confidence, shape (bins + 1,).
         frames: How many, shape (runs, bins).
         confidence: Sum of their confidences, shape (runs, bins).
-        right: How many were named what they are, shape (runs, bins).
+        right: How many predictions are right, shape (runs, bins).
     """
 
     edges: Array
@@ -35,7 +35,7 @@ class Reliability:
     right: Array
 
     def table(self) -> dict[str, Array]:
-        """Give the bins of all recordings together.
+        """Table of the bins, over all recordings.
 
         Returns:
             By name: ``low`` and ``high`` edge, ``frames``, mean ``confidence`` and share
@@ -67,7 +67,7 @@ class Reliability:
 
 
 def are_probabilities(scores: Array) -> bool:
-    """Tell whether scores are probabilities: none below 0, and 1 together.
+    """Whether scores are probabilities: none below 0, with the sum 1.
 
     Args:
         scores: Of all classes, shape (frames, classes).
@@ -77,7 +77,7 @@ def are_probabilities(scores: Array) -> bool:
 
 
 def reliability(matched: Matched) -> Reliability | None:
-    """Compare confidence with truth, over all frames of whole recordings whose truth is clear.
+    """Confidence and share of right predictions, over all frames whose truth is clear.
 
     Args:
         matched: The recordings.
@@ -90,7 +90,7 @@ def reliability(matched: Matched) -> Reliability | None:
         return None
     clear = frames.truth != UNCLEAR
     column = {name: number for number, name in enumerate(matched.classes)}
-    # A name that is no class, say "unknown", is not given a probability: it counts for nothing.
+    # A label that is no class, say "unknown", has no probability: it does not count.
     named = np.array([column.get(str(name), -1) for name in frames.called], dtype=np.intp)
     kept = clear & (named >= 0)
     confidence = frames.scores[kept, named[kept]]

@@ -1,16 +1,16 @@
-"""Intervals: within which bounds a measure lies, given how few recordings it was taken from.
+"""Confidence intervals of measures, by bootstrap over groups of recordings.
 
 Frames of a recording and recordings of a group (`splitting.group_of`) resemble each other, so that
 only groups are drawn: of 2000 sets of as many groups, drawn with replacement, the bounds hold the
-middle 95 % (percentile bootstrap). Where hardly anything went wrong, the sets hardly differ, and
-bounds that follow from counting take over:
+middle 95 % (percentile bootstrap). With few errors the sets hardly differ, and bounds that follow
+from counting take over:
 
-- *shares*: n recordings without a mistake leave room for a true share of 0.025^(1/n), so that no
+- *shares*: n recordings without an error are consistent with a share of 0.025^(1/n), so that no
   interval ends closer to 1, nor closer to 0 than 1 - 0.025^(1/n) (Clopper and Pearson, 1934);
 - *events in a time*: the exact bounds of Garwood (1936), if they are wider; for 0 events the upper
   one is 3.7 over the time, and 3.0 with 95 % on this one side (the "rule of three").
 
-Fewer than five groups tell nothing of how groups differ: shares then have no interval.
+With fewer than five groups, shares have no interval.
 """
 
 from collections.abc import Sequence
@@ -31,21 +31,21 @@ LEAST_GROUPS = 5
 
 @dataclass(frozen=True)
 class Estimate:
-    """A measure, its bounds, and what is behind it; NaN where there is none."""
+    """A measure, its bounds, and the size of its sample; NaN where undefined."""
 
     value: float
-    """What was measured."""
+    """The measure."""
     low: float
     """Lower bound with 95 %."""
     high: float
     """Upper bound with 95 %."""
     runs: int
-    """Recordings that had anything to say."""
+    """Recordings in the sample."""
     groups: int
-    """Groups of recordings that share their motion."""
+    """Groups of recordings that share their motion, in the sample."""
 
     def as_dict(self) -> dict[str, float | int | None]:
-        """Give the fields as JSON can hold them, None for what is not defined."""
+        """All fields for JSON, None where undefined."""
         bounds = {"value": self.value, "low": self.low, "high": self.high}
         plain = {name: None if isnan(each) else float(each) for name, each in bounds.items()}
         return {**plain, "runs": self.runs, "groups": self.groups}
@@ -79,18 +79,18 @@ class Resampling:
         """Estimate a share.
 
         Args:
-            part: What counts, shape (runs,).
-            whole: What it is a share of, shape (runs,).
+            part: Numerator, shape (runs,).
+            whole: Denominator, shape (runs,).
         """
         drawn = ratio(self.weights @ part, self.weights @ whole)
         return self.bounded(float(ratio(part.sum(), whole.sum())), drawn, [whole > 0])
 
     def rate(self, events: Array, time: Array) -> Estimate:
-        """Estimate how many events there are in a unit of time.
+        """Estimate the rate of events.
 
         Args:
             events: Of each recording, shape (runs,).
-            time: How long each was watched, shape (runs,).
+            time: Time of each, shape (runs,).
         """
         value = float(ratio(events.sum(), time.sum()))
         runs, groups = self._behind(time > 0)
@@ -102,12 +102,12 @@ class Resampling:
         return Estimate(value, low, high, runs, groups)
 
     def bounded(self, value: float, drawn: Array, behind: Sequence[Mask]) -> Estimate:
-        """Put bounds to a share, or a mean of shares, that was computed for all sets.
+        """Bounds of a share, or of a mean of shares, that was computed for all sets.
 
         Args:
-            value: What was measured.
+            value: The measure.
             drawn: The same of each set, shape (resamples,).
-            behind: For each share, which recordings had anything to say, shape (runs,).
+            behind: For each share, whether recordings are in its sample, shape (runs,).
         """
         runs = int(np.any(behind, axis=0).sum())
         groups = min(self._behind(mask)[1] for mask in behind)
@@ -119,12 +119,12 @@ class Resampling:
         return Estimate(value, min(low, room), max(high, 1.0 - room), runs, groups)
 
     def plain(self, value: float, drawn: Array, behind: Mask) -> Estimate:
-        """Put bounds to any other measure that was computed for all sets.
+        """Bounds of any other measure that was computed for all sets.
 
         Args:
-            value: What was measured.
+            value: The measure.
             drawn: The same of each set, shape (resamples,).
-            behind: Which recordings had anything to say, shape (runs,).
+            behind: Whether recordings are in the sample, shape (runs,).
         """
         runs, groups = self._behind(behind)
         low, high = _middle(drawn) if groups >= LEAST_GROUPS else (nan, nan)
@@ -135,7 +135,7 @@ class Resampling:
 
 
 def garwood(events: float) -> tuple[float, float]:
-    """Bound the mean of a Poisson distribution, exactly.
+    """Exact bounds of the mean of a Poisson distribution.
 
     Args:
         events: How many there were.
@@ -151,7 +151,7 @@ def garwood(events: float) -> tuple[float, float]:
 
 
 def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:
-    """Divide, NaN where there is nothing to divide by."""
+    """Quotient, NaN where the denominator is 0."""
     part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
     share: Array = np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
     return share

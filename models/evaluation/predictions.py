@@ -1,4 +1,4 @@
-"""What a model hears in a recording: in the blocks that were annotated, and from end to end."""
+"""Predictions of a model on a recording: on its annotated blocks, and from end to end."""
 
 from dataclasses import dataclass, replace
 from math import inf
@@ -16,16 +16,16 @@ from models.types import Words
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """One recording, as it was annotated and as a model heard it.
+    """Annotations of one recording, and predictions of a model.
 
     Attributes:
         name: Of the recording.
         group: Of the recording, as `splitting.group_of` names it.
         step: Time from one sample to the next, in [s].
         blocks: Annotations, in order; each ends with the recording at the latest.
-        truth: What each frame is that was cut from a block, shape (frames,).
-        called: What the model calls it, shape (frames,).
-        labels: What the model says of the whole recording.
+        truth: Class of each frame that is cut from a block, shape (frames,).
+        called: Predicted class of it, shape (frames,).
+        labels: Predictions on the whole recording.
     """
 
     name: str
@@ -38,15 +38,15 @@ class Predictions:
 
 
 def predict(classifier: Classifier, recording: Recording) -> Predictions:
-    """Let a model hear a recording.
+    """Predictions of a model on a recording.
 
     Args:
         classifier: The model.
         recording: Annotated noise at its rate.
 
     Returns:
-        What it says; a recording whose blocks all lie in gaps has no frame that was cut. To a
-        baseline, which can name no failure, all of them are departures.
+        Predictions; a recording whose blocks all lie in gaps has no frame of a block. For a
+        baseline, which names no failure, each failure is an anomaly.
 
     Raises:
         ModelsError: If the recording does not fit the model.
@@ -70,14 +70,14 @@ def _unnamed(block: Block) -> Block:
 
 
 def _whole(classifier: Classifier, recording: Recording) -> Labels:
-    """Label a recording from end to end, as a user would."""
+    """Labels of a recording from end to end, as a user would see them."""
     return classifier.classify(
         recording.signal, recording.rate, start=recording.start, valid=recording.valid
     )
 
 
 def _of_blocks(classifier: Classifier, recording: Recording) -> tuple[Words, Words]:
-    """Cut frames from the blocks as the paper does for validation, and let a model name them."""
+    """True and predicted classes of frames cut from blocks as the paper does for validation."""
     try:
         dataset = Dataset.of([recording], classifier.profile, training=False)
     except DatasetError:  # no frame without a gap

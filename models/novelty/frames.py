@@ -1,4 +1,4 @@
-"""Good motion: the frames of runs in which nothing went wrong."""
+"""Good motion: the frames of runs without a failure."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -42,17 +42,17 @@ class GoodMotion:
 
     @classmethod
     def read(cls, recordings: Iterable[Recording], profile: Profile) -> Self:
-        """Look at recordings one after the other; only their features are kept.
+        """Features of recordings, read one after the other; only the features are kept.
 
         Args:
             recordings: Signals at the profile's rate, each of another name: good as a whole, or
                 where they are annotated as `ok`.
-            profile: How they are framed, as for classifying, and what to compute.
+            profile: How they are framed, as for classification, and what to compute.
 
         Raises:
             DatasetError: If there is no good frame at all, or a name repeats.
             RateError: If a recording has another rate than the profile.
-            RecordingError: If a recording lacks a signal that the profile listens to.
+            RecordingError: If a recording lacks a signal of the profile.
         """
         parts: list[tuple[Array, Array, Array]] = []
         runs: list[str] = []
@@ -83,7 +83,7 @@ class GoodMotion:
 
     @property
     def groups(self) -> Words:
-        """What each frame shares its motion with, shape (frames,); see `splitting.group_of`."""
+        """Group of each frame, shape (frames,); see `splitting.group_of`."""
         return np.array([group_of(name) for name in self.runs.tolist()])
 
     @property
@@ -103,7 +103,7 @@ class GoodMotion:
 
 
 def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array]:
-    """Frame what is good of a recording: features, start and stop of each frame."""
+    """Features, start and stop of each good frame of a recording."""
     if abs(recording.rate / profile.rate - 1.0) > TOLERANCE:
         raise RateError(
             recording.rate,
@@ -127,7 +127,7 @@ def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array
 
 
 def _good(recording: Recording) -> Mask:
-    """Tell which samples are good: not in a gap, and `ok` where something is annotated."""
+    """Whether samples are good: not in a gap, and `ok` where something is annotated."""
     good = np.ones(recording.samples, dtype=bool)
     if recording.blocks:
         slack = 0.5 / recording.rate

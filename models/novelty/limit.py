@@ -1,8 +1,8 @@
-"""The limit of a baseline: how far is too far, for so many false alarms in an hour.
+"""The limit of a baseline: the distance at which false alarms keep to a budget.
 
 Conventions: an *alarm* is a stretch of frames beyond the limit that overlap or touch, as everywhere
-in this house. Alarms are rare and good motion is short, so that the limit lies beyond what was
-heard more often than not: the tail of the distances is then taken for exponential. From a level
+in this package. Alarms are rare and good motion is short, so that the limit often lies beyond all
+distances of the training set: the tail of the distances is then assumed exponential. From a level
 that few alarms exceed, by `mean` on average, alarms become e times rarer with each further `mean`
 (peaks over a threshold; J. Pickands, *Statistical Inference Using Extreme Order Statistics*, 1975,
 with the shape 0).
@@ -23,21 +23,21 @@ PEAKS = 30
 LEVELS = 200
 """Levels at which alarms are counted, at most."""
 LEAST = 0.1
-"""No limit is below, in deviations: copies of one run know nothing of chance."""
-NONE_HEARD = 3.0
-"""Alarms that may well be due where none was heard (Poisson: 95 %)."""
+"""Least limit, in deviations: copies of one run have distances near 0."""
+RULE_OF_THREE = 3.0
+"""Upper bound of the mean number of alarms where there was none (Poisson, 95 %)."""
 
 
 @dataclass(frozen=True)
 class Limit:
-    """How far is too far, and how that is known.
+    """The limit, and what it follows from.
 
     Attributes:
         distance: The limit, in deviations.
-        budget: False alarms in an hour of good motion that were asked for.
+        budget: False-alarm budget, per hour of good motion.
         hours: Good motion that there was, in [h].
-        alarms: Alarms at the limit in that, by baselines that had not learnt from the part.
-        level: The level from which on the tail is taken for exponential, in deviations.
+        alarms: Alarms at the limit in that, by cross-validation.
+        level: The level beyond which the tail is assumed exponential, in deviations.
         peaks: Alarms at that level.
     """
 
@@ -50,33 +50,33 @@ class Limit:
 
     @property
     def shown(self) -> float:
-        """False alarms in an hour that so much good motion cannot exclude, even without one."""
-        return NONE_HEARD / self.hours
+        """Least bound on false alarms per hour that so much good motion can show."""
+        return RULE_OF_THREE / self.hours
 
     @property
     def extrapolated(self) -> bool:
-        """Whether there was too little good motion to see whether the budget is kept."""
+        """Whether there was too little good motion to check the budget."""
         return self.shown > self.budget
 
     def __str__(self) -> str:
         lines = [
             f"limit {self.distance:.2f} deviations, for {self.budget:g} false alarms per hour;"
-            f" {self.alarms} in {self.hours:.3g} h, each part heard by a baseline without it"
+            f" {self.alarms} in {self.hours:.3g} h, each part classified by a baseline without it"
         ]
         if self.extrapolated:
             lines.append(
                 f"{self.hours:.3g} h of good motion can show no fewer than {self.shown:.3g} alarms"
                 f" per hour: the limit is extrapolated from {self.peaks} alarms beyond"
-                f" {self.level:.2f} deviations, as if their tail were exponential"
+                f" {self.level:.2f} deviations, assuming an exponential tail"
             )
         return "\n".join(lines)
 
 
 def limit(distance: Array, good: GoodMotion, budget: float) -> Limit:
-    """Find the limit for a budget of false alarms.
+    """Limit for a false-alarm budget.
 
     Args:
-        distance: Of each frame from good motion, by a baseline that has not learnt from it, shape
+        distance: Of each frame from good motion, by a baseline that was trained without it, shape
             (frames,), in deviations.
         good: The frames.
         budget: False alarms in an hour.
@@ -94,7 +94,7 @@ def limit(distance: Array, good: GoodMotion, budget: float) -> Limit:
 
 
 def alarm_peaks(distance: Array, good: GoodMotion, level: float) -> Array:
-    """Give the largest distance in each alarm at a level.
+    """Largest distance in each alarm at a level.
 
     Args:
         distance: Of each frame, shape (frames,).
@@ -116,7 +116,7 @@ def alarm_peaks(distance: Array, good: GoodMotion, level: float) -> Array:
 
 
 def _level(distance: Array, good: GoodMotion, allowed: int) -> float:
-    """Find the lowest level in the tail above which there are never more alarms than allowed."""
+    """Lowest level in the tail above which there are never more alarms than allowed."""
     falling = np.sort(distance)[::-1]
     last = max(round(TAIL * len(falling)), 1)
     ranks = np.unique(np.geomspace(1, last, LEVELS).round().astype(np.intp)) - 1

@@ -1,4 +1,4 @@
-"""Learn a baseline from good runs alone."""
+"""Training of a baseline, on good runs alone."""
 
 from dataclasses import asdict, dataclass
 from math import isfinite
@@ -19,21 +19,21 @@ from models.types import Array, Index
 FOLDS = 10
 """Parts of the good motion that are left out in turn, at most."""
 GUARD = 1.0
-"""Time before and after a part of a single run that is learnt from neither, in [s]."""
+"""Time before and after a left-out part of a single run that is not for training, in [s]."""
 LEAST = 5.0
-"""Good motion that there has to be, in [s]."""
+"""Least good motion, in [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """A baseline, and what it was learnt from.
+    """A baseline, and facts of its training set.
 
     Attributes:
         classifier: The model.
-        limit: How far is too far, and how that is known.
-        runs: Recordings that it was learnt from.
-        groups: How many groups of them that share their motion; 1 means that parts of one stand
-            for runs that are not there.
+        limit: The limit, and what it follows from.
+        runs: Training recordings.
+        groups: Groups of them that share their motion; 1 means that parts of one run were left
+            out in place of runs.
         annotated: Recordings of which only what is annotated `ok` was taken.
     """
 
@@ -52,18 +52,18 @@ class Learnt:
             lines.append(f"of {annotated} that somebody annotated, what is annotated `ok` alone")
         if self.groups == 1:
             lines.append(
-                "its parts were left out in turn: how much another run differs, it cannot say"
+                "its parts were left out in turn, which does not show how much another run differs"
             )
         return "\n".join([*lines, str(self.limit)])
 
 
 def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -> Learnt:
-    """Learn a baseline; the limit is set by parts that are left out in turn.
+    """Train a baseline; its limit follows from cross-validation.
 
     Args:
         good: Good motion, cut by the same profile.
         profile: What to compute: ``MOTION`` or ``NOISE_ALONE`` at some rate.
-        alarms: False alarms in an hour of good motion that the user can bear.
+        alarms: False-alarm budget, per hour of good motion.
 
     Returns:
         The baseline; equal input gives an equal one.
@@ -91,7 +91,7 @@ def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -
 
 
 def _unseen(good: GoodMotion, profile: Profile) -> Array:
-    """Say how far each frame is from good motion that its part does not belong to."""
+    """Distance of each frame from the good motion of all other parts, shape (frames,)."""
     apart = np.zeros(len(good))
     for train, test in _parts(good):
         mean, scale = standard(good.features[train], profile)
@@ -101,7 +101,7 @@ def _unseen(good: GoodMotion, profile: Profile) -> Array:
 
 
 def _parts(good: GoodMotion) -> list[tuple[Index, Index]]:
-    """List frames to learn from and to leave out: by groups, or by the time of a single one."""
+    """Training and left-out frames: by groups, or by the time of a single one."""
     groups = good.groups.tolist()
     if (count := len(set(groups))) > 1:
         return folds(groups, min(count, FOLDS))

@@ -1,4 +1,4 @@
-"""The grid: the values that are tried for some settings of a profile.
+"""The grid: the values of some settings of a profile, in all combinations.
 
 A grid is written as texts, one for each setting: ``stride=224:1024:100`` counts from a first value
 to a last one, both included, ``C=0.1:1000:x10`` multiplies, ``bands=comb,adjacent`` lists. The word
@@ -17,17 +17,17 @@ from models.profile import Kernel, Profile
 Value: TypeAlias = int | float | str
 Point: TypeAlias = Mapping[str, Value]
 
-HEARD = ("window", "stride", "bands", "floor", "least_deviation")
-"""What can be tuned of the features."""
+FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
+"""Settings of the features that can be tuned."""
 OWN = {
     "networks": ("networks", "units", "epochs", "decay", "alarm"),
     "trees": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
     "support vector machines": ("multiclass", "gamma", "regularization"),
 }
-LEARNT = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
-"""What can be tuned of the machines; points that differ in it alone share their features."""
-SETTINGS = HEARD + LEARNT
-"""What can be tuned, which is all that comes after framing; the last varies fastest."""
+ESTIMATOR_SETTINGS = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
+"""Settings of the estimators; points that differ in these alone share their features."""
+SETTINGS = FEATURE_SETTINGS + ESTIMATOR_SETTINGS
+"""Settings that can be tuned: all that come after framing; the last varies fastest."""
 OTHER_NAMES = {"C": "regularization"}
 MOST = 1_000_000
 """Points that a grid may have."""
@@ -39,7 +39,7 @@ class GridError(ModelsError):
 
 @dataclass(frozen=True)
 class Grid:
-    """Settings of a profile, and the values that are tried for each.
+    """Settings of a profile, and the values of each.
 
     Attributes:
         axes: Values by name of the setting, sorted as ``SETTINGS`` are.
@@ -113,7 +113,7 @@ class Grid:
             yield dict(zip(self.axes, values, strict=True))
 
     def profiles(self, base: Profile) -> list[Profile]:
-        """Make the profile of each point.
+        """Profile of each point.
 
         Args:
             base: Where all other settings are from.
@@ -138,9 +138,9 @@ class Grid:
 
 
 def _idle(base: Profile) -> Iterator[tuple[str, str]]:
-    """Name settings that change nothing, and why."""
+    """Settings that change nothing, and why."""
     estimator = base.estimator if base.estimator in OWN else "support vector machines"
-    for name in LEARNT:
+    for name in ESTIMATOR_SETTINGS:
         if name not in OWN[estimator]:
             yield name, estimator
     if base.kernel == "linear":

@@ -1,4 +1,4 @@
-"""What the machines of many points of a grid say, trained on kernel matrices that they share.
+"""Decisions of the estimators of many points of a grid, trained on shared kernel matrices.
 
 Points that differ in C and gamma alone share the distances between frames, and those that differ in
 C alone the kernel matrix, so that a point costs little more than libsvm's own work.
@@ -15,38 +15,37 @@ from models.estimators import svm
 from models.estimators.calibration import TINY
 from models.estimators.estimator import ESTIMATORS
 from models.profile import Profile
-from models.tuning.logloss import grades
+from models.tuning.logloss import class_margins
 from models.types import Array, Index, Words
 
 LARGEST = 5000
-"""Frames to learn from up to which a kernel matrix is kept, 200 MB then; above, libsvm keeps what
-it needs of its own."""
+"""Training frames up to which a kernel matrix is kept, 200 MB then; above, libsvm has a cache."""
 
 
-class Answer(NamedTuple):
-    """What the machines of a point say of frames."""
+class Decisions(NamedTuple):
+    """Decisions of one point on frames."""
 
     chosen: Index
     """Class of each, as an index, shape (frames,); of one that is unknown, beyond the classes."""
-    graded: Array
-    """Grades of the classes, see `logloss`, or logarithms of their probabilities, shape (frames,
+    margins: Array
+    """Margins of the classes, see `logloss`, or logarithms of their probabilities, shape (frames,
     classes)."""
 
 
-def answers(
+def decide(
     known: Array, targets: Index, groups: Words, fresh: Array, profiles: Sequence[Profile]
-) -> Iterator[Answer]:
-    """Train the machines of each point, and ask them.
+) -> Iterator[Decisions]:
+    """Train the estimator of each point, and decide on test frames.
 
     Args:
-        known: Feature vectors to learn from, shape (frames, features).
+        known: Training features, shape (frames, features).
         targets: Class of each, as an index from 0 without a gap, shape (frames,).
-        groups: What each shares its motion with, shape (frames,).
-        fresh: Feature vectors to ask about, shape (frames, features).
+        groups: Runs of a group share their motion, shape (frames,).
+        fresh: Test features, shape (frames, features).
         profiles: Points that share their features; it pays if those of one gamma follow each other.
 
     Yields:
-        The answer of each point.
+        The decisions of each point.
     """
     if profiles[0].estimator != "svm" or len(known) > LARGEST:
         for profile in profiles:
@@ -54,9 +53,9 @@ def answers(
             decisions = estimator.decision(fresh)
             chosen = estimator.choose(decisions)
             if profile.estimator == "svm":
-                yield Answer(chosen, _graded(decisions, targets, profile))
+                yield Decisions(chosen, _margins(decisions, targets, profile))
             else:
-                yield Answer(chosen, np.log(estimator.score(decisions) + TINY))
+                yield Decisions(chosen, np.log(estimator.score(decisions) + TINY))
         return
     near, far = known @ known.T, fresh @ known.T
     rbf = profiles[0].kernel == "rbf"
@@ -65,43 +64,43 @@ def answers(
         far = np.einsum("ij,ij->i", fresh, fresh)[:, None] + squares - 2.0 * far
         near = squares[:, None] + squares - 2.0 * near
     for gamma, points in groupby(profiles, key=lambda profile: profile.gamma):
-        learnt, asked = (np.exp(-gamma * near), np.exp(-gamma * far)) if rbf else (near, far)
+        train, test = (np.exp(-gamma * near), np.exp(-gamma * far)) if rbf else (near, far)
         for profile in points:
             with _unchecked():
-                decisions = _decisions(learnt, asked, targets, profile)
-            graded = _graded(decisions, targets, profile)
-            count = graded.shape[1]
+                decisions = _decisions(train, test, targets, profile)
+            margins = _margins(decisions, targets, profile)
+            count = margins.shape[1]
             chosen = svm.choose(decisions, classes=count, multiclass=profile.multiclass)
-            yield Answer(chosen, graded)
+            yield Decisions(chosen, margins)
 
 
-def _decisions(learnt: Array, asked: Array, targets: Index, profile: Profile) -> Array:
-    """Do on kernel matrices what `training` does on features, shape (frames, machines)."""
+def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> Array:
+    """Decision values of machines trained on a kernel matrix, shape (frames, machines)."""
     weights = svm.balance(targets)
     if profile.multiclass == "one-vs-one":
         weighted = dict(enumerate(weights.tolist()))
         fitted = svm.svc(profile, profile.regularization, weighted, precomputed=True)
-        decisions: Array = fitted.fit(learnt, targets).decision_function(asked)
+        decisions: Array = fitted.fit(train, targets).decision_function(test)
         # With two classes, scikit-learn turns the sign so that positive means the second.
         return decisions if decisions.ndim == 2 else -decisions[:, None]
     each = [
         svm.svc(profile, profile.regularization * weight, precomputed=True).fit(
-            learnt, targets == machine
+            train, targets == machine
         )
         for machine, weight in enumerate(weights.tolist())
     ]
-    return np.stack([fitted.decision_function(asked) for fitted in each], axis=1)
+    return np.stack([fitted.decision_function(test) for fitted in each], axis=1)
 
 
 def _unchecked() -> AbstractContextManager[None]:
-    """Spare scikit-learn its checks of what it gets, which take a sixth of the time here."""
+    """A context without the input checks of scikit-learn, which take a sixth of the time here."""
     from sklearn import config_context
 
-    spared: AbstractContextManager[None] = config_context(
+    unchecked: AbstractContextManager[None] = config_context(
         assume_finite=True, skip_parameter_validation=True
     )
-    return spared
+    return unchecked
 
 
-def _graded(decisions: Array, targets: Index, profile: Profile) -> Array:
-    return grades(decisions, classes=int(targets.max()) + 1, multiclass=profile.multiclass)
+def _margins(decisions: Array, targets: Index, profile: Profile) -> Array:
+    return class_margins(decisions, classes=int(targets.max()) + 1, multiclass=profile.multiclass)

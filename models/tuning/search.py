@@ -1,4 +1,4 @@
-"""Tuning: how the points of a grid do on recordings that they were not trained on.
+"""Tuning: measures of the points of a grid on recordings that they were not trained on.
 
 What a point predicts is what `Classifier.train` with its profile would predict.
 """
@@ -15,21 +15,21 @@ from models.errors import DatasetError
 from models.features import standard
 from models.labels import UNKNOWN
 from models.profile import Profile
-from models.tuning.kernels import Answer, answers
+from models.tuning.kernels import Decisions, decide
 from models.tuning.logloss import balanced_log_loss
-from models.tuning.trial import Predictions, Trial, predict_features
+from models.tuning.trial import FrameFeatures, Trial, frame_features
 from models.types import Index, Words
 
 Criterion: TypeAlias = Literal["balanced-accuracy", "log-loss", "subset-accuracy"]
 CRITERIA: tuple[Criterion, ...] = get_args(Criterion)
 
 DIGITS = 9
-"""Of a measure, so that what is equal stays so, in whatever order it was added up."""
+"""Decimals of a measure: equal measures stay equal whatever the order of summation."""
 
 
 @dataclass(frozen=True)
 class Measures:
-    """How a point does; all but the loss are shares from 0 to 1, NaN where nothing is to count.
+    """Measures of a point; all but the loss are shares from 0 to 1, NaN where undefined.
 
     Attributes:
         balanced_accuracy: Mean recall of the classes.
@@ -46,39 +46,39 @@ class Measures:
     subset_accuracy: float
 
     def as_dict(self) -> dict[str, float | None]:
-        """Give all measures as JSON can hold them, None for what is not defined."""
+        """All measures for JSON, None where undefined."""
         return {name: None if isnan(value) else value for name, value in asdict(self).items()}
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
-    """What points that share their features say of the frames to check.
+class Validation:
+    """Decisions of points, which share their features, on all test frames.
 
     Attributes:
         classes: Names of the classes.
         truth: Class of each frame, as an index, shape (frames,).
         runs: Name of the recording that each is from, shape (frames,).
-        answers: What each point says; of one that is unknown, the index is beyond the classes.
-        learnt: How many frames there were to learn from in all.
+        decisions: Of each point.
+        training_frames: Number of training frames in all.
     """
 
     classes: tuple[str, ...]
     truth: Index
     runs: Words
-    answers: Sequence[Answer]
-    learnt: int
+    decisions: Sequence[Decisions]
+    training_frames: int
 
     def measures(self) -> list[Measures]:
-        """Measure each point."""
+        """Measures of each point."""
         names = (*self.classes, UNKNOWN)
         measures = []
-        for answer in self.answers:
+        for each in self.decisions:
             cells = np.zeros((len(names), len(names)), dtype=np.int64)
-            np.add.at(cells, (self.truth, answer.chosen), 1)
+            np.add.at(cells, (self.truth, each.chosen), 1)
             found = Evaluation(names, cells)
             values = (
                 found.balanced_accuracy,
-                balanced_log_loss(answer.graded, self.truth),
+                balanced_log_loss(each.margins, self.truth),
                 found.failure_recall,
                 found.false_alarm_rate,
                 found.subset_accuracy,
@@ -88,10 +88,10 @@ class Asked:
 
 
 def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
-    """Make the key that sorts points, the best first.
+    """Key that sorts points, the best first.
 
     Args:
-        criterion: What counts; where it is the same, the log-loss decides.
+        criterion: The measure; the log-loss decides between equals.
     """
     if criterion == "log-loss":
         return lambda measures: (measures.log_loss, 0.0)
@@ -100,30 +100,30 @@ def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
 
 
 def measure(profiles: Sequence[Profile], trial: Trial) -> list[Measures]:
-    """Train and check points, see `ask`."""
-    return ask(profiles, trial).measures()
+    """Measures of points on test frames, see `validate`."""
+    return validate(profiles, trial).measures()
 
 
-def ask(profiles: Sequence[Profile], trial: Trial) -> Asked:
-    """Train points, and ask each about all frames to check.
+def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
+    """Train points, and decide on all test frames by each.
 
     Args:
         profiles: Points that share their features; it pays if those of one gamma follow each other.
-        trial: What they learn from, and what they are asked about.
+        trial: Training and test recordings.
 
     Returns:
-        What they say.
+        Their decisions.
 
     Raises:
-        DatasetError: If there are fewer than two classes, or one to check that some split does not
-            learn.
+        DatasetError: If there are fewer than two classes, or a test class that some split has no
+            training frame of.
         ModelsError: If a recording does not fit the profile.
     """
-    known = predict_features(trial, profiles[0], training=True)
-    fresh = predict_features(trial, profiles[0], training=False)
+    known = frame_features(trial, profiles[0], training=True)
+    fresh = frame_features(trial, profiles[0], training=False)
     classes = _classes(known, fresh, profiles[0])
     chosen = np.empty((len(profiles), len(fresh.labels)), dtype=np.intp)
-    graded = np.empty((*chosen.shape, len(classes)))
+    margins = np.empty((*chosen.shape, len(classes)))
     for learn, check in trial.splits:
         learnt, checked = known.of(learn), fresh.of(check)
         if not checked.any():
@@ -132,21 +132,22 @@ def ask(profiles: Sequence[Profile], trial: Trial) -> Asked:
         near, far = known.features[learnt], fresh.features[checked]
         mean, scale = standard(near, profiles[0])
         targets, groups = _indices(known.labels[learnt], classes), known.groups[learnt]
-        found = answers((near - mean) / scale, targets, groups, (far - mean) / scale, profiles)
-        for point, answer in enumerate(found):
-            chosen[point, checked], graded[point, checked] = answer
-    said = [Answer(*each) for each in zip(chosen, graded, strict=True)]
-    return Asked(classes, _indices(fresh.labels, classes), fresh.runs, said, len(known.labels))
+        found = decide((near - mean) / scale, targets, groups, (far - mean) / scale, profiles)
+        for point, each in enumerate(found):
+            chosen[point, checked], margins[point, checked] = each
+    decisions = [Decisions(*each) for each in zip(chosen, margins, strict=True)]
+    truth = _indices(fresh.labels, classes)
+    return Validation(classes, truth, fresh.runs, decisions, len(known.labels))
 
 
-def _classes(known: Predictions, fresh: Predictions, profile: Profile) -> tuple[str, ...]:
+def _classes(known: FrameFeatures, fresh: FrameFeatures, profile: Profile) -> tuple[str, ...]:
     there = {*known.labels.tolist(), *fresh.labels.tolist()}
     if len(there) < 2:
         raise DatasetError(f"all frames are {', '.join(there)}; tuning takes two classes")
     return tuple(name for name in profile.classes if name in there)
 
 
-def _check_learnt(learnt: Words, fresh: Predictions, classes: Sequence[str]) -> None:
+def _check_learnt(learnt: Words, fresh: FrameFeatures, classes: Sequence[str]) -> None:
     if missing := [name for name in classes if name not in learnt]:
         runs = sorted(set(fresh.runs[fresh.labels == missing[0]].tolist()))
         raise DatasetError(

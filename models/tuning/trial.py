@@ -1,7 +1,7 @@
-"""A trial: recordings to learn from and recordings to check, and what is heard in them.
+"""A trial: training and test recordings, and the features of their frames.
 
-Frames are cut and listened to recording by recording, so that a trial takes hardly more memory than
-its signals do.
+Features are computed recording by recording, so that a trial takes hardly more memory than its
+signals do.
 """
 
 from collections.abc import Sequence
@@ -21,12 +21,12 @@ from models.types import Array, Index, Mask, Words
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """What points are trained on, and what they are measured by.
+    """Recordings to train points on, and to measure them by.
 
     Attributes:
         recordings: Annotated signals.
-        splits: Indices of the recordings to learn from, and of those to check then; each is
-            checked in one split at most.
+        splits: Indices of the training recordings, and of the test recordings; each is tested in
+            one split at most.
     """
 
     recordings: Sequence[Recording]
@@ -34,40 +34,40 @@ class Trial:
 
     @classmethod
     def against(cls, training: Sequence[Recording], validation: Sequence[Recording]) -> Self:
-        """Learn from some recordings and check by others."""
+        """A single split: train on some recordings, test on others."""
         every = np.arange(len(training) + len(validation))
         return cls([*training, *validation], [(every[: len(training)], every[len(training) :])])
 
 
-class Predictions(NamedTuple):
-    """What is heard in recordings, frame by frame."""
+class FrameFeatures(NamedTuple):
+    """Features of the frames of recordings."""
 
     features: Array
     """Not yet standardised, shape (frames, features)."""
     labels: Words
-    """What each frame is, shape (frames,)."""
+    """Class of each frame, shape (frames,)."""
     runs: Words
     """Name of the recording that it is from, shape (frames,)."""
     groups: Words
-    """What it shares its motion with, shape (frames,)."""
+    """Group of it; runs of a group share their motion, shape (frames,)."""
     owner: Index
     """Index of the recording that it is from, shape (frames,)."""
 
     def of(self, recordings: Index) -> Mask:
-        """Mark the frames of some recordings."""
+        """Whether each frame is of some recordings, shape (frames,)."""
         return np.isin(self.owner, recordings)
 
 
-def predict_features(trial: Trial, profile: Profile, *, training: bool) -> Predictions:
-    """Listen to the recordings of one side, one after the other.
+def frame_features(trial: Trial, profile: Profile, *, training: bool) -> FrameFeatures:
+    """Features of the training recordings, or of the test recordings.
 
     Args:
         trial: The recordings.
-        profile: What to listen for.
-        training: Whether to those to learn from, or to those to check.
+        profile: What to compute.
+        training: Whether of the training recordings.
 
     Returns:
-        What is heard; recordings without a frame are passed over.
+        Their features; recordings without a frame are skipped.
 
     Raises:
         NoFrameError: If there is no frame at all.
@@ -82,7 +82,7 @@ def predict_features(trial: Trial, profile: Profile, *, training: bool) -> Predi
     if not found:
         raise NoFrameError(len(wanted), profile.classes)
     each = [examples for _, examples in found]
-    return Predictions(
+    return FrameFeatures(
         np.concatenate([examples.features for examples in each]),
         np.concatenate([examples.labels for examples in each]),
         np.concatenate([examples.runs for examples in each]),

@@ -1,4 +1,4 @@
-"""Recordings as a made-up model heard them."""
+"""Recordings with predictions of a made-up model."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def frames(seconds=5.0):
 
 
 def perfect(blocks, seconds=5.0):
-    """What a model without fault calls each frame: a failure as soon as it hears any of it."""
+    """True class of each frame: a failure as soon as the frame holds any of it."""
     called = []
     for start in frames(seconds):
         stop = start + LENGTH / RATE
@@ -39,8 +39,8 @@ def perfect(blocks, seconds=5.0):
     return called
 
 
-def heard(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, start=0.0):
-    """A recording; by default it is heard without fault, and frames cut from blocks likewise."""
+def predicted(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, start=0.0):
+    """Predictions on a recording; by default without errors, also of frames cut from blocks."""
     called = perfect(blocks, seconds) if called is None else called
     called = np.array(called)
     begins = start + frames(seconds)
@@ -58,15 +58,15 @@ def heard(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, star
     )
 
 
-QUIET = blocks((0.0, 5.0, "ok"))
-BLOW = blocks((0.0, 2.0, "ok"), (2.03, 2.2, "impact"), (3.0, 5.0, "ok"))
-SWING = blocks((0.0, 1.0, "ok"), (1.05, 3.5, "oscillations"), (3.6, 5.0, "ok"))
+GOOD = blocks((0.0, 5.0, "ok"))
+IMPACT = blocks((0.0, 2.0, "ok"), (2.03, 2.2, "impact"), (3.0, 5.0, "ok"))
+OSCILLATION = blocks((0.0, 1.0, "ok"), (1.05, 3.5, "oscillations"), (3.6, 5.0, "ok"))
 
 
 def many(seeds, called=None):
-    """Good runs, blows and swings of one robot."""
+    """Good runs, impacts and oscillations of one robot."""
     return [
-        heard(f"talos/{scenario}-{seed:03d}", annotated, called)
+        predicted(f"talos/{scenario}-{seed:03d}", annotated, called)
         for seed in range(seeds)
-        for scenario, annotated in (("good", QUIET), ("blow", BLOW), ("swing", SWING))
+        for scenario, annotated in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
     ]
