@@ -17,6 +17,7 @@ from models.classifier import Classifier
 from models.confusion import Evaluation
 from models.dataset import Dataset
 from models.errors import (
+    AnnotationError,
     DataFileError,
     DatasetError,
     FileError,
@@ -57,6 +58,7 @@ __all__ = [
     "NOISE",
     "SCALAR",
     "UNKNOWN",
+    "AnnotationError",
     "Assessment",
     "Block",
     "Classifier",
@@ -102,3 +104,8 @@ __all__ = [
     "nominal_rate",
     "read_log",
 ]
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return [*__all__]

@@ -88,6 +88,19 @@ class DataFileError(FileError):
     """A file or folder of a data set that cannot be used."""
 
 
+class AnnotationError(ModelsError):
+    """Annotations that cannot be understood.
+
+    Args:
+        problem: What is wrong with them, in one line.
+        where: The place, say "chunk 3"; may be empty.
+    """
+
+    def __init__(self, problem: str, where: str = "") -> None:
+        self.problem, self.where = problem, where
+        super().__init__(f"{where}: {problem}" if where else problem)
+
+
 class ModelFileError(FileError):
     """A file that is not a model, or that holds one that is wrong."""
 

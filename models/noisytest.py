@@ -9,7 +9,7 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from models.errors import DataFileError, ProfileError, RateError
+from models.errors import AnnotationError, DataFileError, ProfileError, RateError
 from models.logfile import nominal_rate, read_log
 from models.profile import CLASSES, TOLERANCE, Profile
 from models.recording import Block, Recording
@@ -24,11 +24,16 @@ _SETTINGS = {
     "feature_preprocessor": {"fft_sample_length": "window", "fft_stride_length": "stride"},
     "model": {"regularization": "regularization", "kernel": "kernel", "kernel_gamma": "gamma"},
 }
-"""NoisyTest's names of what a profile holds, by section of its configuration."""
+"""Settings of a profile by NoisyTest's names, by section of its configuration."""
+
+END = -1.0
+"""A stop that stands for the end of the recording."""
+LATEST = 1e12
+"""All times lie before, in [s]."""
 
 
 def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Recording]:
-    """Read all recordings of a folder, in sorted order.
+    """Recordings of a folder, in sorted order.
 
     Args:
         folder: Folder that holds a ``.toml`` beside each ``.log``.
@@ -50,11 +55,11 @@ def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Re
 
 
 def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
-    """Read one noise signal and the annotations beside it.
+    """Recording of a noise signal and the annotations beside it.
 
     Args:
         log: The ``.log``; the annotations are in the ``.toml`` of the same name.
-        rate: Sample rate that it must have, in [Hz]; by default, what its times say.
+        rate: Sample rate that it must have, in [Hz]; by default, that of its times.
 
     Returns:
         The recording, named after the file, with the hash of the file.
@@ -75,35 +80,54 @@ def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
 
 
 def read_annotations(path: str | Path) -> tuple[Block, ...]:
-    """Read annotated blocks: ``chunk_ranges`` and ``chunk_labels`` of the table ``data``.
+    """Annotated blocks of a ``.toml``, in their order; see `parse_annotations`.
 
     Args:
-        path: A ``.toml``; a stop of -1 means the end of the recording.
-
-    Returns:
-        The blocks, in their order.
+        path: The file.
 
     Raises:
-        DataFileError: If the file is missing, is no TOML, or lacks a pair of numbers or a label.
+        DataFileError: If the file is missing, or cannot be understood.
     """
     try:
-        data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))["data"]
-        ranges, labels = data["chunk_ranges"], data["chunk_labels"]
+        return tuple(parse_annotations(Path(path).read_text(encoding="utf-8-sig")))
     except OSError as error:
         raise DataFileError(
             path, f"cannot be read ({error.strerror}); each .log needs its .toml"
         ) from error
-    except ValueError as error:
-        raise DataFileError(path, f"is no TOML ({error})") from error
-    except (KeyError, TypeError) as error:
-        raise DataFileError(path, "lacks chunk_ranges or chunk_labels in a table [data]") from error
-    if not (isinstance(ranges, list) and isinstance(labels, list)) or len(ranges) != len(labels):
-        raise DataFileError(path, "chunk_ranges and chunk_labels are not lists of one length")
-    return tuple(_block(path, *each) for each in zip(ranges, labels, strict=True))
+    except UnicodeDecodeError as error:
+        raise DataFileError(path, f"not TOML ({error})") from error
+    except AnnotationError as error:
+        raise DataFileError(path, str(error)) from error
+
+
+def parse_annotations(text: str) -> Iterator[Block]:
+    """Annotated blocks: ``chunk_ranges`` and ``chunk_labels`` of the table ``data``.
+
+    Args:
+        text: TOML; a stop of -1 means the end of the recording.
+
+    Yields:
+        The blocks, in their order; those that last to the end stop at infinity.
+
+    Raises:
+        AnnotationError: If it is no TOML, lacks the lists, or they hold other things.
+    """
+    try:
+        data = tomllib.loads(text).get("data", {})
+    except tomllib.TOMLDecodeError as error:
+        raise AnnotationError(f"not TOML ({error})") from error
+    table = data if isinstance(data, dict) else {}
+    ranges, labels = table.get("chunk_ranges"), table.get("chunk_labels")
+    if not (isinstance(ranges, list) and isinstance(labels, list)):
+        raise AnnotationError("lacks the lists chunk_ranges and chunk_labels in a table [data]")
+    if len(ranges) != len(labels):
+        raise AnnotationError(f"{len(ranges)} chunk_ranges and {len(labels)} chunk_labels")
+    for count, (span, label) in enumerate(zip(ranges, labels, strict=True), start=1):
+        yield _block(span, label, f"chunk {count}")
 
 
 def profile_from_config(path: str | Path) -> Profile:
-    """Read NoisyTest's JSON configuration, what it leaves open being NoisyTest's defaults.
+    """Profile of NoisyTest's JSON configuration, with NoisyTest's defaults.
 
     Args:
         path: The file, say ``noisytest-config.json``.
@@ -136,18 +160,20 @@ def profile_from_config(path: str | Path) -> Profile:
     return replace(profile, open_end=round(0.1 * profile.rate))
 
 
-def _block(path: str | Path, span: Any, label: Any) -> Block:
-    numbers = isinstance(span, list) and [type(each) in (int, float) for each in span]
+def _block(span: Any, label: Any, where: str) -> Block:
+    numbers = isinstance(span, list) and [
+        type(each) in (int, float) and -LATEST < each < LATEST for each in span
+    ]
     if numbers != [True, True] or not isinstance(label, str):
-        raise DataFileError(
-            path, f"chunk {span!r} with label {label!r}, expected [start, stop] in seconds and text"
+        raise AnnotationError(
+            f"{span!r} with label {label!r}, expected [start, stop] in seconds and text", where
         )
     start, stop = float(span[0]), float(span[1])
-    return Block(start, inf if stop == -1 else stop, label)
+    return Block(start, inf if stop == END else stop, label)
 
 
 def _known(path: str | Path, table: Any, names: Any, where: str) -> dict[str, Any]:
-    """Check that a table is one, and has no name that would be ignored in silence."""
+    """A table without unknown names."""
     if not isinstance(table, dict):
         raise DataFileError(path, f"{where} is {table!r}, expected a JSON object")
     for key in table:
@@ -159,7 +185,7 @@ def _known(path: str | Path, table: Any, names: Any, where: str) -> dict[str, An
 
 
 def _classes(path: str | Path, targets: Any) -> tuple[str, ...]:
-    """Order labels by their numbers, which have to be 0, 1, 2 and so on."""
+    """Labels in the order of their numbers, which have to be 0, 1, 2 and so on."""
     if not targets:
         return CLASSES
     if not isinstance(targets, dict) or sorted(targets.values(), key=str) != [*range(len(targets))]:

@@ -7,6 +7,7 @@ from a folder ``training`` and measures on a folder ``validation``, 10 kHz both.
 
 import json
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -79,7 +80,7 @@ def write(run: Run, log: Path) -> None:
         raise SampleError(log, f"NoisyTest takes {RATE:g} Hz only, the run has {run.rate:g} Hz")
     rows = np.column_stack((run.time, simplified(run.motion, run.velocity_desired)))
     with replacing(log.with_suffix(".toml"), overwrite=True) as temporary:
-        temporary.write_text(_annotations(run), encoding="ascii")
+        temporary.write_text(annotations(run.blocks) + _simulation(run), encoding="utf-8")
     with replacing(log, overwrite=True) as temporary:
         np.savetxt(temporary, rows, fmt=("%.4f", "%.9g"), header="time [s], noise estimate [rad/s]")
 
@@ -112,18 +113,24 @@ def read(log: Path) -> tuple[tuple[Block, ...], float]:
         raise SampleError(path, f"damaged ({' '.join(str(error).split())})") from error
 
 
-def _annotations(run: Run) -> str:
-    """Write the blocks, and the recipe to make the run again as a JSON text."""
+def annotations(blocks: Sequence[Block]) -> str:
+    """Labelled stretches as NoisyTest has them beside each of its logs.
+
+    Both numbers of a range are written with a decimal point: NoisyTest's TOML reader takes no mixed
+    ones.
+
+    Args:
+        blocks: Stretches with their labels.
+
+    Returns:
+        TOML: ``chunk_ranges`` and ``chunk_labels`` in a table ``data``.
+    """
+    ranges = "".join(f"    [{float(each.start)!r}, {float(each.stop)!r}],\n" for each in blocks)
+    labels = "".join(f"    {json.dumps(each.label, ensure_ascii=False)},\n" for each in blocks)
+    return f"[data]\nchunk_ranges = [\n{ranges}]\nchunk_labels = [\n{labels}]\n"
+
+
+def _simulation(run: Run) -> str:
+    """The recipe to make the run again, as a JSON text in TOML."""
     recipe = json.dumps({**run.meta, "robot": run.robot, "sha256": digest(run)}, sort_keys=True)
-    ranges = [[float(block.start), float(block.stop)] for block in run.blocks]
-    return "\n".join(
-        (
-            "[data]",
-            f"chunk_ranges = {ranges}",
-            f"chunk_labels = {json.dumps([block.label for block in run.blocks])}",
-            "",
-            "[simulation]",
-            f"recipe = {json.dumps(recipe)}",  # JSON's escapes are TOML's too
-            "",
-        )
-    )
+    return f"\n[simulation]\nrecipe = {json.dumps(recipe)}\n"  # JSON's escapes are TOML's too

@@ -120,12 +120,16 @@ def test_annotations_take_integers_and_open_ends(log):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("chunk_ranges = [", "is no TOML"),
-        ("[data]\nchunk_ranges = []", "lacks chunk_ranges or chunk_labels in a table"),
-        ("[simulation]\n", "lacks chunk_ranges or chunk_labels"),
-        ('[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]', "not lists of one length"),
-        ('[data]\nchunk_ranges = [[0]]\nchunk_labels = ["ok"]', r"chunk \[0\] with label 'ok'"),
-        ("[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = [1]", r"chunk \[0, 1\] with label 1"),
+        ("chunk_ranges = [", r"not TOML \(Invalid value"),
+        ("[data]\nchunk_ranges = []", "lacks the lists chunk_ranges and chunk_labels in a table"),
+        ("[simulation]\n", "lacks the lists chunk_ranges and"),
+        (
+            '[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = ["ok", "ok"]',
+            "1 chunk_ranges and 2 chunk_labels",
+        ),
+        ('[data]\nchunk_ranges = [[0]]\nchunk_labels = ["ok"]', r"chunk 1: \[0\] with label 'ok'"),
+        ("[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = [1]", r"chunk 1: \[0, 1\] with label 1"),
+        (f'[data]\nchunk_ranges = [[0, {10**400}]]\nchunk_labels = ["ok"]', "chunk 1: .* expected"),
     ],
 )
 def test_what_is_wrong_with_annotations_is_named(log, text, reason):
