@@ -191,3 +191,23 @@ def test_lines_are_short_and_lists_too():
     text = str(measure(many(40, ["ok"] * 47)))
     assert max(map(len, text.splitlines())) <= 120
     assert "and 75 more" in text
+
+
+def test_a_table_of_arrow_has_all_measures_in_long_form():
+    many_robots = [predicted(f"go2/good-{seed:03d}", GOOD) for seed in range(6)]
+    found = measure([*many(6), *many_robots])
+    table = found.to_arrow()
+    assert table.column_names[:4] == ["of", "measure", "class", "robot"]
+    rows = {
+        (row["of"], row["measure"], row["class"], row["robot"], row["budget"]): row
+        for row in table.to_pylist()
+    }
+    assert len(rows) == len(table)
+    recall = rows["frames", "recall", "impact", None, None]
+    expected = found.frames.recall["impact"].as_dict()
+    assert {name: recall[name] for name in expected} == expected
+    assert rows["events", "false_alarms", None, "talos", None]["value"] == 0.0
+    assert rows["events", "all_found", None, "go2", None]["value"] is None  # it has no failures
+    at_budget = rows["scores", "events_found", None, None, 5.0]
+    assert at_budget["value"] == found.at_budgets[5.0][1].value
+    assert {row["class"] for row in rows.values()} == {None, *CLASSES}

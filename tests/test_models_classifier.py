@@ -225,3 +225,8 @@ def test_classifying_needs_neither_scikit_learn_nor_scipy(ours, tmp_path):
     command = [sys.executable, "-c", code, tmp_path / "model.npz"]
     answer = subprocess.run(command, capture_output=True, text=True, check=True)
     assert answer.stdout.split("\n")[:2] == ["17", "[]"]
+
+
+def test_the_package_lists_its_public_names_alone():
+    assert dir(models) == sorted(models.__all__)
+    assert all(hasattr(models, name) for name in dir(models))

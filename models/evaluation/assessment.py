@@ -96,6 +96,29 @@ class Assessment:
             "false_alarms": self.score.false_alarms(),
         }
 
+    def to_arrow(self) -> Any:
+        """All measures as a table of Arrow in long form; needs pyarrow.
+
+        Returns:
+            A ``pyarrow.Table`` with one row for each measure, and of it for each class and robot.
+            Columns: ``of`` (frames, events or scores), ``measure``, ``class``, ``robot``,
+            ``budget`` in false alarms per hour, ``value``, ``low``, ``high``, ``runs`` and
+            ``groups``; null where undefined.
+        """
+        import pyarrow as pa
+
+        rows = [*_rows("frames", vars(self.frames)), *_rows("events", vars(self.events))]
+        for robot, events in self.by_robot.items():
+            rows += _rows("events", vars(events), robot=robot)
+        for budget, (recall, found) in self.at_budgets.items():
+            measures = {"failure_recall": recall, "events_found": found}
+            rows += _rows("scores", measures, budget=budget)
+        rows += _rows("scores", {"calibration_error": self.calibration_error})
+        columns = {name: pa.string() for name in ("of", "measure", "class", "robot")}
+        columns |= {name: pa.float64() for name in ("budget", "value", "low", "high")}
+        columns |= {name: pa.int64() for name in ("runs", "groups")}
+        return pa.Table.from_pylist(rows, schema=pa.schema(columns))
+
     def __str__(self) -> str:
         return table(self)
 
@@ -186,6 +209,19 @@ def measure(
         reliability=table,
         calibration_error=table.error(resampling) if table else None,
     )
+
+
+def _rows(of: str, measures: Mapping[str, Any], **keys: str | float) -> list[dict[str, Any]]:
+    """Rows of the measures that are estimates, estimates by class, or plain numbers."""
+    rows = []
+    for measure, found in measures.items():
+        for label, each in found.items() if isinstance(found, dict) else [(None, found)]:
+            row = {"of": of, "measure": measure, "class": label, **keys}
+            if isinstance(each, Estimate):
+                rows.append(row | each.as_dict())
+            elif isinstance(each, (int, float)):
+                rows.append(row | {"value": float(each)})
+    return rows
 
 
 def _columns(table: Mapping[str, Array]) -> dict[str, list[float | None]]:
