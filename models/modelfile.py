@@ -20,8 +20,7 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from models.atomic import write_bytes
-from models.errors import ModelFileError, ProfileError
+from models.errors import ModelFileError, OutputError, ProfileError
 from models.estimators.estimator import ESTIMATORS
 from models.features import feature_count
 from models.labels import ANOMALY

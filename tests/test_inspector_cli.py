@@ -86,6 +86,9 @@ def test_a_viewer_that_dies_is_said_and_the_recording_stays(inspector, monkeypat
         def wait(self, timeout):
             return 101
 
+        def poll(self):
+            return 101
+
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(viewer, "has_display", lambda: True)
     monkeypatch.setattr(subprocess, "Popen", Viewer)

@@ -1,4 +1,4 @@
-"""Decisions by probabilities: the class of a frame, and whether it may raise an alarm."""
+"""Decisions by probabilities: the class of a frame, the alarm threshold, and novelty."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class Probable(ABC):
 
     Its decision values are the logarithm of the probability of each class, and then the novelty
     score: how far the farthest feature lies above nearly all training frames, in standard
-    deviations. Out of distribution, probabilities mean nothing.
+    deviations. Out of distribution, a low probability of failure means nothing.
 
     Attributes:
         calibration: Scale of the logits, then an offset for each class, shape (1 + classes,).
