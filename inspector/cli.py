@@ -1,7 +1,8 @@
-"""The command line: the commands under their names, and expected errors as one line."""
+"""The command line: the commands in panels, and expected errors as one line."""
 
 import os
 import sys
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -28,6 +29,7 @@ from inspector.commands.view import view
 app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    epilog="Example: inspector view",
 )
 
 
@@ -51,27 +53,33 @@ def _inspector(
         ),
     ] = False,
 ) -> None:
-    """Inspect the noise that a robot's joints would make."""
+    """Find faults of a robot in the noise that its joints would make."""
 
 
-app.command()(view)
-app.command()(live)
-app.command()(classify)
-app.command()(noise)
-app.command()(listen)
-app.command()(shot)
-app.command()(report)
-app.command("import")(import_)
-app.command()(audit)
-app.command()(labels)
-app.command()(export)
-app.add_typer(simulate, name="simulate")
-app.command()(train)
-app.command()(baseline)
-app.command()(tune)
-app.command()(evaluate)
-app.command()(compare)
-app.command()(robots)
+def _add(panel: str, command: Callable[..., None], example: str, *, name: str = "") -> None:
+    """Add a command to a panel of `inspector --help`, and an example to its own help."""
+    add = app.command(name or None, rich_help_panel=panel, epilog=f"Example: {example}")
+    add(command)
+
+
+_add("Look", view, "inspector view run.npz")
+_add("Look", live, "inspector live --rate 1000 --robot panda < samples.csv")
+_add("Look", noise, "inspector noise run.npz --kind normal --csv noise.csv")
+_add("Look", listen, "inspector listen before.npz after.npz -o noise.wav")
+_add("Look", shot, "inspector shot run.npz -o run.png")
+_add("Look", report, "inspector report run.npz -o run.html")
+_add("Look", compare, "inspector compare --robots panda,go2 --csv comparison.csv")
+_add("Look", robots, "inspector robots")
+_add("Judge", classify, "inspector classify run.npz --format junit")
+_add("Judge", audit, "inspector audit run.npz")
+_add("Import and export", import_, "inspector import log.csv -o run.npz", name="import")
+_add("Import and export", labels, "inspector labels run.npz --to labels.txt")
+_add("Import and export", export, "inspector export run.npz -o run.mcap")
+_add("Train", train, "inspector train data/ --part training --rate 1000 -o model.npz")
+_add("Train", baseline, "inspector baseline good1.npz good2.npz -o baseline.npz --alarms 1")
+_add("Train", tune, "inspector tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl")
+_add("Train", evaluate, "inspector evaluate model.npz data/ --part test")
+app.add_typer(simulate, name="simulate", rich_help_panel="Simulate")
 
 
 def main() -> None:

@@ -1,1 +1,1 @@
-"""The commands of the command line, a module for each room of the house."""
+"""The commands of the command line, one module each."""

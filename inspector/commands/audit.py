@@ -1,4 +1,4 @@
-"""The command `inspector audit`."""
+"""`inspector audit`: what a log can show."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -10,7 +10,7 @@ from inspector.commands.options import ModelFiles
 
 
 class Format(StrEnum):
-    """Formats of audits."""
+    """The output formats of an audit."""
 
     TEXT = "text"
     JSON = "json"
@@ -21,10 +21,18 @@ def audit(
         list[Path],
         typer.Argument(help="Run files, or logs that `import` reads.", show_default=False),
     ],
-    format: Annotated[Format, typer.Option("--format", help="How to print.")] = Format.TEXT,  # noqa: A002
+    format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     model: ModelFiles = None,
 ) -> None:
-    """Audit logs: rate, gaps, bandwidth, observable classes; exit 4 if a log shows no class."""
+    """Print what logs can show: rates, quantisation, failure classes.
+
+    Exit status:
+
+      0  every log can show a failure class
+      2  wrong usage
+      3  bad input: a file cannot be read
+      4  cannot tell: a log can show no failure class
+    """
     from inspector import assets
     from inspector.audit.formats import as_json, text
     from inspector.audit.logs import audit_all

@@ -1,4 +1,4 @@
-"""The command that learns from good runs alone."""
+"""`inspector baseline`: train a baseline on good runs."""
 
 from typing import Annotated
 
@@ -12,25 +12,27 @@ def baseline(
     inputs: Inputs,
     output: Output,
     alarms: Annotated[
-        float, typer.Option(help="False alarms to bear in an hour of good motion.")
+        float, typer.Option(help="False-alarm budget, per hour of good motion.")
     ] = 1.0,
     profile: Annotated[
         str,
         typer.Option(
-            help="general (desired, measured, error) or scalar (the noise alone); by default what"
-            " the first run feeds."
+            help="general (desired, measured, error) or scalar (noise only); by default the richest"
+            " that the first run has the signals for."
         ),
     ] = "",
     rate: Annotated[
         float | None,
         typer.Option(
-            min=1.0, help="Rate of the model in [Hz]; faster runs are lowered.", show_default=False
+            min=1.0,
+            help="Rate of the model in [Hz]; faster runs are decimated.",
+            show_default=False,
         ),
     ] = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
 ) -> None:
-    """Learn from good runs alone what is good; what departs from that is then found."""
+    """Train a baseline on good runs only, to find anomalies."""
     from inspector.training.baseline import learn
 
     learnt = learn(
@@ -43,4 +45,4 @@ def baseline(
         overwrite=overwrite,
     )
     typer.echo(str(learnt))
-    typer.echo(f"{output}: written; classify --model {output} finds what departs from these runs")
+    typer.echo(f"{output}: written; classify --model {output} finds anomalies against these runs")

@@ -1,4 +1,4 @@
-"""The command that judges runs."""
+"""`inspector classify`: the verdicts on runs."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -10,7 +10,7 @@ from inspector.commands.options import ModelFiles, Overwrite
 
 
 class Format(StrEnum):
-    """How verdicts are written."""
+    """The output formats of verdicts."""
 
     TEXT = "text"
     JSON = "json"
@@ -29,17 +29,18 @@ def classify(
     runs: Annotated[
         list[Path], typer.Argument(help="Run files, or NoisyTest's logs.", show_default=False)
     ],
-    format: Annotated[Format, typer.Option("--format", help="How to print.")] = Format.TEXT,  # noqa: A002
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Runs at once.")] = 1,
+    format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
     model: ModelFiles = None,
     labels_to: Annotated[
-        Path | None, typer.Option(help="Write findings into this folder, a file per run.")
+        Path | None, typer.Option(help="Write the findings to this folder, one file per run.")
     ] = None,
     labels_format: Annotated[
-        str, typer.Option(help="Of those files: noisytest, csv or audacity.")
+        str, typer.Option(help="Format of these files: noisytest, csv or audacity.")
     ] = "audacity",
-    localise: Annotated[
-        bool, typer.Option("--localise", help="In JSON, add the localisation of each finding.")
+    origins: Annotated[
+        bool,
+        typer.Option("--origins", help="Add the fault localisation of each finding to the JSON."),
     ] = False,
     unknown: Annotated[
         OnUnknown,
@@ -47,7 +48,16 @@ def classify(
     ] = OnUnknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:
-    """Label runs; exit 0 if all are quiet, 1 findings, 3 bad input, 4 cannot tell."""
+    """Classify runs and print verdicts; the exit status is the worst.
+
+    Exit status:
+
+      0  quiet: no run has a finding
+      1  findings: at least one run has a failure or an anomaly
+      2  wrong usage
+      3  bad input: a file cannot be read
+      4  cannot tell: say, a rate too low for every model
+    """
     from inspector import assets
     from inspector.analysis.analyse import Unknown
     from inspector.analysis.verdict import exit_status, judge_all

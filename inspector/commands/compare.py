@@ -14,24 +14,27 @@ def compare(
         list[Path] | None, typer.Argument(help="Run files with robot and positions.")
     ] = None,
     robots: Annotated[
-        str, typer.Option(help="Robots to move by a built-in motion: talos,go2 or all.")
+        str, typer.Option(help="Robots to move by a generated motion: talos,go2 or all.")
     ] = "",
     kinds: Annotated[
-        str, typer.Option(help="Of simplified, paper, A, B, C, mean, rms, normal.")
+        str, typer.Option(help="Some of simplified, paper, A, B, C, mean, rms, normal.")
     ] = "simplified,C,paper,mean,rms,normal",
     geometry: Annotated[str, typer.Option(help="visual, collision, hull or auto.")] = "auto",
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of the built-in motion.")] = 0,
-    csv: Annotated[Path | None, typer.Option(help="Write all numbers here.")] = None,
-    save: Annotated[Path | None, typer.Option(help="Write a recording (.rrd) here.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the generated motion.")] = 0,
+    csv: Annotated[Path | None, typer.Option(help="Write all numbers to this file.")] = None,
+    save: Annotated[Path | None, typer.Option(help="Write a recording (.rrd).")] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Write a PNG here (needs the extra `report`).")
+        Path | None, typer.Option(help="Write a PNG (needs the extra `report`).")
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Robots at once.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs or robots.")] = 1,
     overwrite: Overwrite = False,
 ) -> None:
-    """Compare the noise models; exit 3 if nothing could be compared."""
-    import noisemodel as nm
-    from inspector.comparison.output import Outputs
+    """Compare noise models on runs or on robots.
+
+    The exit status is 3 if nothing could be compared.
+    """
+    from inspector.comparison import comparing, output
+    from inspector.comparison.table import table
     from inspector.progress import progress
 
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]

@@ -1,4 +1,4 @@
-"""`inspector evaluate`: measure a model on annotated runs."""
+"""`inspector evaluate`: the measures of a model on annotated runs."""
 
 from pathlib import Path
 from typing import Annotated
@@ -17,15 +17,16 @@ def evaluate(
         Path | None, typer.Option("--output", "-o", help="Write JSON to this file.")
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option(help="Write a PNG here (needs the extra `report`).")
+        Path | None, typer.Option(help="Write a PNG (needs the extra `report`).")
     ] = None,
     part: InPart = Part.ALL,
     seen_too: Annotated[
-        bool, typer.Option("--seen-too", help="Take runs that it was trained on, and say so.")
+        bool,
+        typer.Option("--seen-too", help="Accept runs that the model was trained on, and say so."),
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Measure a model on annotated runs that it was not trained on."""
+    """Evaluate a model on annotated runs that it was not trained on."""
     from inspector.training.evaluation import Outputs
     from inspector.training.evaluation import as_json as json_of
     from inspector.training.training import evaluate as evaluate_model

@@ -19,7 +19,10 @@ def export(
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write noise, labels and scores of a run for Foxglove, PlotJuggler and data frames."""
+    """Write noise, labels and scores as MCAP, CSV or Parquet.
+
+    Foxglove and PlotJuggler read MCAP; data frames read CSV and Parquet.
+    """
     from inspector import assets
     from inspector.export import export as write
     from inspector.library import load_library

@@ -1,4 +1,4 @@
-"""`inspector import`: logs to run files."""
+"""`inspector import`: run files from logs of robots."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -13,27 +13,29 @@ def import_(
     logs: Annotated[
         list[Path],
         typer.Argument(
-            help="CSV, Parquet, HDF5, npz, ROS bags, LeRobot data sets.", show_default=False
+            help="CSV, Parquet, HDF5, npz, ROS bags or LeRobot data sets.", show_default=False
         ),
     ],
     output: Annotated[
         Path | None,
-        typer.Option("--output", "-o", help="The run file; a folder for several runs."),
+        typer.Option("--output", "-o", help="The run file to write; a folder for several runs."),
     ] = None,
     desired: Annotated[
         Path | None, typer.Option(help="Another log, with the desired motion on its own clock.")
     ] = None,
-    robot: Annotated[str | None, typer.Option(help="A listed robot, or a URDF.")] = None,
+    robot: Annotated[
+        str | None, typer.Option(help="A name that `robots` lists, or a URDF.")
+    ] = None,
     rate: Annotated[
-        float | None, typer.Option(min=1.0, help="The log's rate in [Hz], if it is known.")
+        float | None, typer.Option(min=1.0, help="Rate of the log in [Hz], if it is known.")
     ] = None,
     map_: Annotated[
         list[str] | None,
         typer.Option("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
     ] = None,
-    mapping: Annotated[Path | None, typer.Option(help="A mapping that was saved.")] = None,
+    mapping: Annotated[Path | None, typer.Option(help="A saved mapping (TOML).")] = None,
     save_mapping: Annotated[
-        Path | None, typer.Option(help="Keep what is said here as a mapping (TOML).")
+        Path | None, typer.Option(help="Save these options as a mapping (TOML).")
     ] = None,
     joints: Annotated[
         str | None, typer.Option(help="Names of the columns of arrays: a,b,c.")
@@ -41,19 +43,26 @@ def import_(
     topic: Annotated[
         list[str] | None, typer.Option(help="Read this topic of a bag; repeatable.")
     ] = None,
-    episode: Annotated[list[str] | None, typer.Option(help="Read this one; repeatable.")] = None,
+    episode: Annotated[
+        list[str] | None, typer.Option(help="Read this episode of a data set; repeatable.")
+    ] = None,
     offset: Annotated[
         float | None,
-        typer.Option(help="Add this to the desired motion's stamps, in [s]; else estimated."),
+        typer.Option(help="Added to the time stamps of --desired, in seconds; else estimated."),
     ] = None,
     units: Annotated[
-        str | None, typer.Option(help="Of angles: radians, degrees or normalised.")
+        str | None, typer.Option(help="Unit of angles: radians, degrees or normalised.")
     ] = None,
     degrees: Annotated[bool, typer.Option("--degrees", help="Angles are in degrees.")] = False,
-    list_: Annotated[bool, typer.Option("--list", help="Only list what is inside.")] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="List the contents of the logs, write nothing.")
+    ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Turn logs into run files; exit 3 if one of them cannot be read."""
+    """Convert logs of robots to run files.
+
+    The exit status is 3 if a log cannot be read; the others are written.
+    """
     from inspector.logs.batch import import_logs
     from inspector.logs.reading import listing, read_options
 

@@ -1,4 +1,4 @@
-"""`inspector labels`: annotations to and from other tools."""
+"""`inspector labels`: annotated blocks of a run, from and for other tools."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,20 +11,22 @@ from inspector.commands.options import Overwrite, RunFile
 def labels(
     run: RunFile,
     to: Annotated[
-        Path | None, typer.Option("--to", help="Write the run's labels to this file.")
+        Path | None, typer.Option("--to", help="Write the labels of the run to this file.")
     ] = None,
     from_: Annotated[
-        Path | None, typer.Option("--from", help="Read labels from this file, in place of its own.")
+        Path | None,
+        typer.Option("--from", help="Replace the labels of the run by those of this file."),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The run to write, with --from.")
+        Path | None, typer.Option("--output", "-o", help="The run file to write, with --from.")
     ] = None,
     format: Annotated[  # noqa: A002
-        str, typer.Option("--format", help="noisytest, csv or audacity; else as the file ends.")
+        str,
+        typer.Option("--format", help="noisytest, csv or audacity; by default from the suffix."),
     ] = "",
     overwrite: Overwrite = False,
 ) -> None:
-    """Print a run's annotated blocks, or take them to and from NoisyTest, CSV and Audacity."""
+    """Print, import or export the annotated blocks of a run."""
     from dataclasses import replace
 
     from inspector.errors import InspectorError
@@ -41,8 +43,8 @@ def labels(
         recorded.save(output, overwrite=overwrite)
     elif not recorded.blocks:
         raise InspectorError(
-            f"{run}: has no labels; `inspector labels --from` brings some in,"
-            " `inspector classify --labels-to` writes what is found"
+            f"{run}: has no labels; `inspector labels --from` imports labels,"
+            " `inspector classify --labels-to` writes the findings"
         )
     elif to:
         write_labels(recorded.blocks, to, format_name=format, overwrite=overwrite)

@@ -1,35 +1,40 @@
-"""`inspector listen`: the noise of runs as sound files."""
+"""`inspector listen`: the noise of runs as sound."""
 
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from inspector.commands.options import Output, Overwrite
+from inspector.commands.options import Overwrite
 
 
 def listen(
     runs: Annotated[
         list[Path],
-        typer.Argument(help="A run file, or several to hear at equal gain.", show_default=False),
+        typer.Argument(help="Run files; several are written at one gain.", show_default=False),
     ],
-    output: Output,
+    output: Annotated[
+        Path, typer.Option("--output", "-o", help="WAV file; several get .a, .b ... in its name.")
+    ],
     kind: Annotated[
         str, typer.Option("--kind", help="simplified (of joints), normal or rms (of links).")
     ] = "",
-    joint: Annotated[str, typer.Option("--joint", help="Hear this joint alone.")] = "",
-    link: Annotated[str, typer.Option("--link", help="Hear this link alone.")] = "",
+    joint: Annotated[str, typer.Option("--joint", help="The noise of this joint only.")] = "",
+    link: Annotated[str, typer.Option("--link", help="The noise of this link only.")] = "",
     gain: Annotated[
         float | None,
-        typer.Option("--gain", help="In dB; at 0, full scale is 1 rad/s (or √W). Else it fits."),
+        typer.Option(
+            "--gain",
+            help="In dB; at 0, full scale is 1 rad/s (or √W). By default, the peak fits.",
+        ),
     ] = None,
     speed: Annotated[
-        float, typer.Option("--speed", help="Play so many times as fast, and as high.")
+        float, typer.Option("--speed", help="Playback speed; the pitch changes by the same factor.")
     ] = 1.0,
     overwrite: Overwrite = False,
 ) -> None:
-    """Make noise audible: a WAV per run, of what would be heard, at a gain that is said."""
-    from inspector.sound import sonification
+    """Write the noise of runs as sound, one WAV file per run."""
+    from inspector.sound import listening
     from noisemodel import Run
 
     settings = sonification.Settings(kind, joint, link, speed)

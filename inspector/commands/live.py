@@ -1,4 +1,4 @@
-"""The command that shows motion while it happens."""
+"""`inspector live`: the noise of motion while it is measured."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,28 +10,30 @@ from inspector.commands.options import ModelFiles, Overwrite
 
 def live(
     rate: Annotated[
-        float, typer.Option(min=1.0, help="Samples per second, in [Hz].", show_default=False)
+        float, typer.Option(min=1.0, help="Sampling rate in [Hz].", show_default=False)
     ],
     robot: Annotated[
-        str | None, typer.Option(help="A listed robot, or a URDF, to draw as it moves.")
+        str | None, typer.Option(help="A name that `robots` lists, or a URDF, to draw.")
     ] = None,
     names: Annotated[
-        str, typer.Option(help="Joints in the order of their columns: elbow,wrist,...")
+        str, typer.Option(help="Joints in the order of the columns: elbow,wrist,...")
     ] = "",
     save: Annotated[
-        Path | None, typer.Option("--save", help="Write the recording here, open nothing.")
+        Path | None,
+        typer.Option("--save", help="Write the recording to this file, open no viewer."),
     ] = None,
     connect: Annotated[
         str | None,
-        typer.Option(help="Show it in the viewer at PORT or HOST:PORT; else one is opened."),
+        typer.Option(help="Send to the viewer at PORT or HOST:PORT; by default one is opened."),
     ] = None,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Show samples as they come on standard input, as CSV with a header or JSON lines.
+    """Show samples from standard input as they arrive.
 
-    CSV names its columns: time,elbow.velocity,elbow.velocity_desired,elbow.position,... JSON has
-    an object per line: {"time": 0.1, "velocity": [...], "position": [...]}. Ctrl-C ends it.
+    CSV has a header: time,elbow.velocity,elbow.velocity_desired,elbow.position
+    JSON lines have one object each: {"time": 0.1, "velocity": [0.2]}
+    Ctrl-C ends the recording.
     """
     import sys
     from functools import partial

@@ -1,14 +1,11 @@
-"""`inspector noise`: how loud a run is, and which joints and links make it so."""
+"""`inspector noise`: the noise level of a run, by joints and links."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from inspector.commands.options import Overwrite, RunFile
-
-if TYPE_CHECKING:
-    pass
 
 
 def noise(
@@ -18,11 +15,11 @@ def noise(
         typer.Option("--kind", help="simplified, paper, A, B, C, mean, rms, normal; repeatable."),
     ] = None,
     csv: Annotated[
-        Path | None, typer.Option("--csv", help="Write the noises over time here.")
+        Path | None, typer.Option("--csv", help="Write the noise over time to this file.")
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Print how loud a run is, when, and which joints and links make it so."""
+    """Print the noise level of a run, by joints and links."""
     from inspector.analysis.level import default_kinds, estimate, loudness, write_csv
     from noisemodel import Run
 

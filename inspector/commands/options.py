@@ -1,4 +1,4 @@
-"""Arguments that several commands share."""
+"""Arguments and options that several commands share."""
 
 from pathlib import Path
 from typing import Annotated
@@ -12,9 +12,7 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
 ModelFiles = Annotated[
     list[Path] | None,
-    typer.Option(
-        "--model", help="Use this model alone: a file, or the name of one that ships; repeatable."
-    ),
+    typer.Option("--model", help="Use this model instead of the shipped ones; repeatable."),
 ]
 
 
@@ -31,7 +29,8 @@ Kind = Annotated[
     typer.Option("--kind", callback=_known, help=f"Extended noise, one of {', '.join(KINDS)}."),
 ]
 InPart = Annotated[
-    Part, typer.Option("--part", help="Take all runs, or those (not) held out for the last test.")
+    Part,
+    typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),
 ]
 Inputs = Annotated[
     list[Path],

@@ -1,4 +1,4 @@
-"""`inspector report`: a page about a run."""
+"""`inspector report`: an HTML page about a run."""
 
 from typing import Annotated
 
@@ -12,12 +12,13 @@ def report(
     output: Output,
     model: ModelFiles = None,
     robot: Annotated[
-        bool, typer.Option("--robot/--no-robot", help="Look at the robot, and hear its links.")
+        bool,
+        typer.Option("--robot/--no-robot", help="Draw the robot, with the noise of its links."),
     ] = True,
     kind: Kind = "normal",
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a page with pictures, tables and sound, for those without a viewer."""
+    """Write one HTML page about a run: pictures, tables, sound."""
     from inspector import assets
     from inspector.analysis.analyse import analyse_file
     from inspector.audit.formats import text

@@ -4,7 +4,7 @@ import typer
 
 
 def robots() -> None:
-    """List the robots that can be had by name."""
+    """List the robots that are available by name."""
     from noisemodel import ROBOTS
 
     for name, robot in ROBOTS.items():

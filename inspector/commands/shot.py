@@ -16,14 +16,17 @@ def shot(
     output: Output,
     at: Annotated[
         float | None,
-        typer.Option("--at", help="Time in seconds; else that of the worst finding."),
+        typer.Option("--at", help="Time in seconds; by default that of the worst finding."),
     ] = None,
-    size: Annotated[str, typer.Option("--size", help="Width and height, in points.")] = "1440x900",
+    size: Annotated[str, typer.Option("--size", help="Width and height in pixels.")] = "1440x900",
     model: ModelFiles = None,
     kind: Kind = "normal",
     overwrite: Overwrite = False,
 ) -> None:
-    """Write what the viewer shows as a PNG, without a display (needs a Vulkan driver)."""
+    """Write a PNG of what the viewer shows, without a display.
+
+    Needs a Vulkan driver (Debian: mesa-vulkan-drivers libvulkan1).
+    """
     from inspector import assets
     from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library

@@ -1,4 +1,4 @@
-"""The commands that make runs: one, or a data set of them."""
+"""`inspector simulate`: one simulated run, or a data set of them."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 
 class OneRunUnlessNamed(TyperGroup):
-    """A group of commands that takes ``run`` for meant when none of them is named."""
+    """A group of commands that calls ``run`` if no command is named."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Put ``run`` in front, unless a command is named or help is asked for."""
+        """Insert ``run``, unless the first argument is a command or ``--help``."""
         named = not args or args[0] in (*self.commands, "--help")
         return super().parse_args(ctx, args if named else ["run", *args])
 
@@ -27,44 +27,46 @@ class OneRunUnlessNamed(TyperGroup):
 app = typer.Typer(
     cls=OneRunUnlessNamed,
     no_args_is_help=True,
-    help="""Simulate robots with defects, labelled by construction (needs the extra `sim`).
+    help="""Simulate labelled runs of robots with defects.
 
-    `inspector simulate talos --scenario 7 --seed 1 -o run.npz` makes one run (`run` may be left
-    out), `inspector simulate dataset --robots talos,go2,panda --seeds 8 -o data/` makes many,
-    `inspector simulate --list` says which scenarios there are.""",
+    Needs the extra `sim`. The default command is `run`.
+    `inspector simulate --list` prints scenarios and robots.""",
+    epilog="Example: inspector simulate talos --scenario 7 --seed 1 -o run.npz",
 )
 
 
 class Only(StrEnum):
-    """Which scenarios are kept."""
+    """The scenarios to keep."""
 
     OK = "ok"
 
 
 class Form(StrEnum):
-    """In which form a data set keeps its runs."""
+    """The file formats of a data set."""
 
     SAMPLES = "samples"
     NOISYTEST = "noisytest"
 
 
-@app.command()
+@app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
 def run(
     robot: Annotated[
-        str | None, typer.Argument(help="The robot, as --list has it.", show_default=False)
+        str | None, typer.Argument(help="A robot that --list prints.", show_default=False)
     ] = None,
-    scenario: Annotated[str, typer.Option(help="What happens: its name or number.")] = "straight",
-    seed: Annotated[int, typer.Option(help="Makes each run another one; at least 0.")] = 0,
+    scenario: Annotated[str, typer.Option(help="Name or number of a scenario.")] = "straight",
+    seed: Annotated[int, typer.Option(help="Random seed, at least 0.")] = 0,
     duration: Annotated[
-        float | None, typer.Option(help="In seconds; as long as the motion is unless given.")
+        float | None, typer.Option(help="In seconds; by default that of the motion.")
     ] = None,
     output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path(
         "run.npz"
     ),
-    list_: Annotated[bool, typer.Option("--list", help="Print the scenarios, do nothing.")] = False,
+    list_: Annotated[
+        bool, typer.Option("--list", help="Print scenarios and robots, simulate nothing.")
+    ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Simulate one run."""
+    """Simulate one run, with its failures annotated."""
     import scenarios
     from noisemodel.atomic import refuse_existing
 
@@ -82,38 +84,38 @@ def run(
         typer.echo(f"  {block.label} from {block.start:.2f} s to {block.stop:.2f} s")
 
 
-@app.command()
+@app.command(epilog="Example: inspector simulate dataset --robots talos,go2 --seeds 8 -o data/")
 def dataset(
-    robots: Annotated[str, typer.Option(help="Robots: talos,go2,panda.")],
+    robots: Annotated[str, typer.Option(help="Names of robots: talos,go2,panda.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")],
     seeds: Annotated[
         int | None,
-        typer.Option(help="Runs of each robot in each scenario; 8 unless --hours is given."),
+        typer.Option(help="Seeds per robot and scenario; 8 by default."),
     ] = None,
-    first_seed: Annotated[int, typer.Option(help="The first seed; at least 0.")] = 0,
+    first_seed: Annotated[int, typer.Option(help="The first random seed, at least 0.")] = 0,
     hours: Annotated[
         float | None,
-        typer.Option(help="Instead of --seeds: time to fill with runs, evenly over the robots."),
+        typer.Option(
+            help="Instead of --seeds: total duration in hours, divided evenly between the robots."
+        ),
     ] = None,
     scenarios: Annotated[
-        str, typer.Option(help="Names or numbers: 1,7,obstacle-toe; all unless given.")
+        str, typer.Option(help="Names or numbers: 1,7,obstacle-toe; by default all.")
     ] = "",
-    only: Annotated[
-        Only | None, typer.Option(help="Only scenarios in which nothing goes wrong.")
-    ] = None,
+    only: Annotated[Only | None, typer.Option(help="Only scenarios without a failure.")] = None,
     form: Annotated[
-        Form, typer.Option("--format", help="Samples of our own, or NoisyTest's files.")
+        Form, typer.Option("--format", help="Samples (.npz), or the files of NoisyTest.")
     ] = Form.SAMPLES,
     duration: Annotated[
-        float | None, typer.Option(help="Of each run, in seconds; as its motion is unless given.")
+        float | None, typer.Option(help="Of each run, in seconds; by default that of its motion.")
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Runs at once.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
     overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Make damaged files again; whole ones stay.")
+        bool, typer.Option("--overwrite", help="Replace damaged files; intact files stay.")
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Simulate a data set; started again, it makes what is missing and redoes nothing."""
+    """Simulate a data set; resumes if killed: only missing runs are made."""
     from json import dumps
 
     from inspector.progress import progress

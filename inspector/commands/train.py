@@ -19,7 +19,7 @@ def train(
         ),
     ] = "general",
     rate: Annotated[
-        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are lowered.")
+        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are decimated.")
     ] = 10000.0,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
@@ -29,4 +29,4 @@ def train(
 
     report = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
     typer.echo(str(report))
-    typer.echo(f"{output}: written; measured above on the frames that it was trained on")
+    typer.echo(f"{output}: written; the measures above are of the training frames")

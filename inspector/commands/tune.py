@@ -1,4 +1,4 @@
-"""The command that tunes profiles."""
+"""`inspector tune`: a grid search over the settings of a profile."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -11,7 +11,7 @@ from inspector.training.part import Part
 
 
 class By(StrEnum):
-    """What makes a point the best; of equals, the log-loss decides."""
+    """The criterion that ranks points; the log-loss breaks ties."""
 
     BALANCED_ACCURACY = "balanced-accuracy"
     LOG_LOSS = "log-loss"
@@ -25,15 +25,15 @@ def tune(
         typer.Option(
             "--output",
             "-o",
-            help="The results, a line of JSON for each point; a file that exists is gone on with.",
+            help="Results file, one line of JSON per point; resumes if it exists.",
         ),
     ],
     validation: Annotated[
         list[Path] | None,
-        typer.Option(help="Other runs to measure by, instead of folds; may be repeated."),
+        typer.Option(help="Runs of a validation set, instead of folds; repeatable."),
     ] = None,
     folds: Annotated[
-        int | None, typer.Option(min=2, help="Folds of the training runs.", show_default="5")
+        int | None, typer.Option(min=2, help="Folds of the cross-validation.", show_default="5")
     ] = None,
     part: InPart = Part.ALL,
     profile: Annotated[
@@ -44,28 +44,29 @@ def tune(
         ),
     ] = "noisytest-rbf",
     rate: Annotated[
-        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are lowered.")
+        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are decimated.")
     ] = 10000.0,
     grid: Annotated[
         list[str] | None,
         typer.Option(
             help="paper, or a setting and its values: stride=224:1024:100, C=0.1:1000:x10,"
-            " gamma=1e-4,1e-3, bands=comb,adjacent; may be repeated.",
+            " gamma=1e-4,1e-3, bands=comb,adjacent; repeatable.",
             show_default="paper",
         ),
     ] = None,
     criterion: Annotated[
-        By, typer.Option(help="What makes a point the best; then log-loss.")
+        By, typer.Option(help="Ranks the points; the log-loss breaks ties.")
     ] = By.BALANCED_ACCURACY,
     train: Annotated[
-        Path | None, typer.Option(help="Train the best point on all training runs into this file.")
+        Path | None,
+        typer.Option(help="Train the best point on all training runs, write the model."),
     ] = None,
-    rows: Annotated[int, typer.Option(min=1, help="Points to print.")] = 10,
+    rows: Annotated[int, typer.Option(min=1, help="Number of points to print.")] = 10,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Processes at once.")] = 1,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")] = 1,
     overwrite: Overwrite = False,
 ) -> None:
-    """Tune a profile's stride, C, gamma and more; killed and called again, it goes on."""
+    """Tune the settings of a profile by grid search; resumes if killed."""
     if validation and folds:
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
     from json import dumps

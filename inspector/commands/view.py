@@ -1,4 +1,4 @@
-"""`inspector view`: show a run, or two beside each other."""
+"""`inspector view`: one run in the viewer, or two side by side."""
 
 from enum import StrEnum
 from pathlib import Path
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Aligned(StrEnum):
-    """How a second run is laid beside the first."""
+    """The methods to align a second run with the first."""
 
     AUTO = "auto"
     START = "start"
@@ -22,35 +22,42 @@ class Aligned(StrEnum):
 
 def view(
     run: Annotated[
-        Path | None, typer.Argument(help="A run file; without one, the demo that ships.")
+        Path | None, typer.Argument(help="A run file; by default the shipped demo.")
     ] = None,
     after: Annotated[
-        Path | None, typer.Argument(help="Another, after a change: what came, went, got louder.")
+        Path | None, typer.Argument(help="A second run, after a change: new, resolved, louder.")
     ] = None,
     save: Annotated[
-        Path | None, typer.Option("--save", help="Write the recording here, open nothing.")
+        Path | None,
+        typer.Option("--save", help="Write the recording to this file, open no viewer."),
     ] = None,
     model: ModelFiles = None,
     robot: Annotated[
-        bool, typer.Option("--robot/--no-robot", help="Draw the robot, and hear its links.")
+        bool,
+        typer.Option("--robot/--no-robot", help="Draw the robot, with the noise of its links."),
     ] = True,
     kind: Kind = "normal",
     terms: Annotated[
-        bool, typer.Option("--terms", help="Show the paper's terms A, B and C one by one.")
+        bool, typer.Option("--terms", help="Show the terms A, B and C of the paper separately.")
     ] = False,
     web: Annotated[
-        bool, typer.Option("--web", help="Show it in a browser on this machine, until Ctrl-C.")
+        bool, typer.Option("--web", help="Serve it to a browser on this machine until Ctrl-C.")
     ] = False,
     port: Annotated[
-        int, typer.Option("--port", min=0, max=65535, help="Of --web; 0 takes a free one.")
+        int, typer.Option("--port", min=0, max=65535, help="Port of --web; 0 takes a free one.")
     ] = 0,
     align: Annotated[
         Aligned | None,
-        typer.Option("--align", help="Two runs: by their motion (auto), starts, or clocks (none)."),
+        typer.Option(
+            "--align", help="Align two runs by motion (auto), start, or not at all (none)."
+        ),
     ] = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Show a run in rerun: joints, noise, spectrogram, classes, the moving robot; or two."""
+    """Show a run, or two side by side, in the rerun viewer.
+
+    The views: joints, noise, spectrogram, classes and the moving robot.
+    """
     from inspector import assets
     from inspector.library import load_library
     from inspector.recording import viewer
