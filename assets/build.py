@@ -18,8 +18,9 @@ import models
 import scenarios
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.training import recordings, train
-from noisemodel import Run
+from inspector.training.recordings import recordings
+from inspector.training.training import train
+from noisemodel import Block, Run
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.simulation import RECIPE

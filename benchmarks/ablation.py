@@ -21,7 +21,7 @@ import numpy as np
 import models
 from benchmarks.paper import RATE, files, first_seeds
 from inspector.training.part import Part
-from inspector.training.training import recordings
+from inspector.training.recordings import recordings
 from models.evaluation.assessment import measure
 from models.evaluation.predictions import Predictions, predict
 from models.examples import Examples

@@ -32,7 +32,8 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
-from inspector.training import training
+from inspector.parallel import each
+from inspector.training import recordings, training
 from inspector.training.part import Part
 from models.evaluation.assessment import measure, number, percent
 from models.evaluation.predictions import Predictions, predict
@@ -171,7 +172,7 @@ def measured(
     classifier, reduced = models.Classifier.load(path), ()
     every = [*test, *good]
     names = {name_of(one) for one in test}
-    heard = listened(classifier, training.recordings(every, classifier.rate))
+    heard = listened(classifier, recordings.recordings(every, classifier.rate))
     if classifier.profile.kernel != "linear":
         limbed = [one for one in every if one.parent.name in HALF]
         half = listened(classifier, halved(limbed, classifier.rate))
@@ -216,7 +217,7 @@ def halved(paths: Sequence[Path], rate: float) -> Iterator[models.Recording]:
         }
         # A norm over several limbs is the root of the sum of the squares of theirs.
         signal = {name: np.linalg.norm(norms, axis=0) for name, norms in limbs.items()}
-        yield replace(training.of_sample(path, rate), signal=signal)
+        yield replace(recordings.of_sample(path, rate), signal=signal)
 
 
 def tables(found: Sequence[Measured]) -> str:

@@ -31,7 +31,7 @@ from sklearn.metrics import roc_auc_score
 
 import models
 from benchmarks.contenders import RATE, Contender, contenders
-from inspector.training.training import of_sample
+from inspector.training.recordings import of_sample
 from models.evaluation.assessment import percent
 from models.evaluation.intervals import Resampling
 

@@ -21,13 +21,12 @@ import numpy as np
 from joblib.externals.loky import get_reusable_executor
 
 import models
-from inspector.training.tuning import Question, tune
-from inspector.training.tuningtable import table
-from models.tuning.search import validate
+from inspector.training.tuning import Search, tune
+from models.tuning.search import ask
 
 
 def timed(work: Callable[[], object]) -> tuple[object, float, float]:
-    """Do some work; its result, CPU time of all processes and wall time, in [s]."""
+    """Result of a call, CPU time of all processes and wall time, in [s]."""
     wall, cpu = time.perf_counter(), used()
     result = work()
     get_reusable_executor().shutdown(wait=True)  # processes are counted when they have ended
@@ -35,13 +34,13 @@ def timed(work: Callable[[], object]) -> tuple[object, float, float]:
 
 
 def used() -> float:
-    """CPU time of this process and of those that it has seen end, in [s]."""
+    """CPU time of this process and of its ended children, in [s]."""
     each = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
     return sum(one.ru_utime + one.ru_stime for one in each)
 
 
 def alone(point: models.Profile, sets: list[models.Dataset]) -> np.ndarray:
-    """Train and ask one point by itself."""
+    """Predictions of one point that is trained by itself."""
     return models.Classifier.train(sets[0], point).predict(sets[1].frames)
 
 
@@ -52,19 +51,17 @@ def main() -> None:
     arguments.add_argument("--jobs", type=int, default=2)
     arguments.add_argument("--naive", type=int, default=8)
     given = arguments.parse_args()
-    question = Question(
-        training=[given.folder / "training"], validation=[given.folder / "validation"]
-    )
+    search = Search(training=[given.folder / "training"], validation=[given.folder / "validation"])
     with tempfile.TemporaryDirectory() as folder:
         output = Path(folder) / "tuned.jsonl"
-        tuned, cpu, wall = timed(lambda: tune(question, output, jobs=given.jobs))
+        tuned, cpu, wall = timed(lambda: tune(search, output, jobs=given.jobs))
         size = output.stat().st_size
-        print(table(tuned, "balanced-accuracy", rows=5))
+        print(tuned.table("balanced-accuracy", rows=5))
         count = len(tuned.grid)
         print(f"\n{count} points, {given.jobs} jobs: {cpu:.1f} s CPU, {wall:.1f} s wall,")
         print(f"{1e3 * cpu / count:.2f} ms CPU a point; results of {size / 1e6:.1f} MB")
-        _, cpu, wall = timed(lambda: tune(question, output, jobs=given.jobs))
-        print(f"again, with all results there: {cpu:.1f} s CPU, {wall:.1f} s wall")
+        _, cpu, wall = timed(lambda: tune(search, output, jobs=given.jobs))
+        print(f"resumed, with all results present: {cpu:.1f} s CPU, {wall:.1f} s wall")
     base = tuned.untuned
     sets = [
         models.Dataset.read(given.folder / name, base, training=name == "training")
@@ -73,9 +70,9 @@ def main() -> None:
     random, same, spent = np.random.default_rng(0), 0, 0.0
     for index in random.integers(len(tuned.profiles), size=given.naive):
         point = tuned.profiles[index]
-        called, cpu, _ = timed(lambda point=point: alone(point, sets))
-        asked = validate([point], tuned.trial)
-        same += np.array_equal(called, np.array(asked.classes)[asked.decisions[0].chosen])
+        predicted, cpu, _ = timed(lambda point=point: alone(point, sets))
+        found = ask([point], tuned.trial)
+        same += np.array_equal(predicted, np.array(found.classes)[found.answers[0].chosen])
         spent += cpu
     each = spent / given.naive
     print(f"naively {1e3 * each:.0f} ms CPU a point, {each * count / 60:.0f} min for the grid;")

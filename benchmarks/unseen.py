@@ -18,7 +18,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import models
 from benchmarks.paper import files, first_seeds
-from inspector.training import training
+from inspector.training import recordings, training
 from inspector.training.part import Part
 from models.evaluation.assessment import number, percent
 
@@ -64,7 +64,7 @@ def measured(
         training.train(known, profile, rate, path)
     classifier = models.Classifier.load(path)
     test = files([folder / robot for folder in data], Part.TEST)
-    found = models.assess(classifier, training.recordings(test, classifier.rate))
+    found = models.assess(classifier, recordings.recordings(test, classifier.rate))
     recall, events = found.at_budgets[BUDGET]
     cells = (
         *(profile, robot, str(len(classifier.runs)), f"{found.runs}, {found.groups}"),

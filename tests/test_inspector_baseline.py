@@ -103,12 +103,12 @@ def test_faster_runs_are_lowered_if_a_rate_is_asked_for(tmp_path):
     [
         (
             run_of(1, rate=2000.0),
-            "recorded at 2000 Hz, .*a.npz at 1000 Hz; --rate 1000 lowers the faster ones",
+            "recorded at 2000 Hz, .*a.npz at 1000 Hz; --rate 1000 decimates the faster ones",
         ),
-        (run_of(1, robot="ur5"), "a run of ur5, but .*a.npz of panda; a baseline knows one robot"),
+        (run_of(1, robot="ur5"), "a run of ur5, but .*a.npz of panda; a baseline is of one robot"),
         (
             run_of(1, names=("hip", "knee", "wrist")),
-            r"has other joints than .*a.npz \(elbow, hip, knee\); a baseline knows one robot",
+            r"has other joints than .*a.npz \(elbow, hip, knee\); a baseline is of one robot",
         ),
         (
             run_of(1, desired=False),

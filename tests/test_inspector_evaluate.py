@@ -149,5 +149,5 @@ def test_pictures_show_what_there_is_and_leave_out_what_is_not(tmp_path, monkeyp
         for figure in drawn
     ]
     assert any(text.startswith("expected calibration error") for text in texts[0])
-    assert "the scores are no probabilities" in texts[1]
+    assert "the scores are not probabilities" in texts[1]
     assert drawn[0].get_suptitle() == "m: 24 runs of 8 groups, 0.0253 h of ok motion"

@@ -14,7 +14,7 @@ import pytest
 
 import scenarios
 from inspector.cli import main
-from inspector.training.training import recordings
+from inspector.training.recordings import recordings
 from noisemodel import Block, Run
 from scenarios import dataset
 from scenarios.sample import Sample, is_sample

@@ -104,7 +104,7 @@ def test_the_best_points_are_printed_under_each_other(whole):
     assert names.split()[:3] == ["stride", "gamma", "regularization"]
     assert first.split()[:4] == ["1", *(f"{best[name]:g}" for name in names.split()[:3])]
     assert f"{best['log_loss']:.4f}" in first
-    assert "as was        25" in out
+    assert "untuned        25" in out
 
 
 def test_the_number_of_points_that_share_the_best_is_printed(whole):

@@ -29,7 +29,7 @@ def evaluate(
     """Evaluate a model on annotated runs that it was not trained on."""
     from inspector.training.evaluation import Outputs
     from inspector.training.evaluation import as_json as json_of
-    from inspector.training.training import evaluate as evaluate_model
+    from inspector.training.evaluation import evaluate as evaluate_model
 
     outputs = Outputs(output, picture, overwrite=overwrite)
     outputs.check()

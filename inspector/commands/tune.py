@@ -71,11 +71,10 @@ def tune(
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
     from json import dumps
 
-    from inspector.training.tuning import Question
+    from inspector.training.tuning import Search
     from inspector.training.tuning import tune as tune_profile
-    from inspector.training.tuningtable import as_dict, table
 
-    question = Question(
+    search = Search(
         training=training,
         validation=validation or (),
         part=part,
@@ -84,9 +83,9 @@ def tune(
         rate=rate,
         grid=grid or ("paper",),
     )
-    tuned = tune_profile(question, output, model=train, jobs=jobs, overwrite=overwrite)
-    report = dumps(as_dict(tuned, criterion.value, rows=rows), indent=2)
-    typer.echo(report if as_json else table(tuned, criterion.value, rows=rows))
+    tuned = tune_profile(search, output, model=train, jobs=jobs, overwrite=overwrite)
+    report = dumps(tuned.as_dict(criterion.value, rows=rows), indent=2)
+    typer.echo(report if as_json else tuned.table(criterion.value, rows=rows))
     if train:
         tuned.train(train, criterion.value, overwrite=overwrite)
         typer.echo(f"{train}: written, the best point trained on all training runs", err=as_json)

@@ -1,1 +1,1 @@
-"""Models learnt and measured from files: training, baselines, tuning, evaluation."""
+"""Models trained and evaluated on files: training, baselines, grid search, evaluation."""

@@ -1,4 +1,4 @@
-"""Learn from good runs alone, from files, and write a model."""
+"""Baselines trained on good runs only, from files."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -11,27 +11,27 @@ import noisemodel as nm
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.training import of_sample, recording_of
+from inspector.training.recordings import in_part, of_run, of_sample
 from models.estimators.baseline import MOTION, NOISE_ALONE
 from noisemodel.atomic import refuse_existing
 from scenarios.sample import Sample, is_sample
 from scenarios.signals import WHOLE
 
 PROFILES: dict[str, models.LogBands] = {"general": MOTION, "scalar": NOISE_ALONE}
-"""What a baseline listens to, by the names of the profiles that listen to the same."""
+"""Profiles of baselines, by the names of the classifier profiles with the same signals."""
 
 
 class Source(NamedTuple):
-    """What all good runs have in common."""
+    """The properties that all good runs must share."""
 
     path: Path
-    """The first of them."""
+    """The file."""
     rate: float
     """In [Hz]."""
     robot: str = ""
-    """Empty where nobody says it."""
+    """Empty if the file does not name it."""
     joints: frozenset[str] = frozenset()
-    """Their names; none where there is but a noise."""
+    """Their names; empty if there is only a noise."""
 
 
 def learn(
@@ -44,21 +44,21 @@ def learn(
     part: Part = Part.ALL,
     overwrite: bool = False,
 ) -> models.Learnt:
-    """Learn a baseline and write it.
+    """Train a baseline and write it.
 
     Args:
-        inputs: Run files of good motion, samples, folders of them, or NoisyTest folders; where
-            something is annotated, what is annotated `ok` counts.
+        inputs: Run files of good motion, samples, folders of them, or NoisyTest folders; of
+            annotated runs, only the blocks `ok` count.
         output: The model file to write.
-        alarms: False alarms in an hour of good motion that the user can bear.
-        profile: One of ``PROFILES``; the richest that the first run feeds unless given.
-        rate: Rate of the model, in [Hz], to which faster runs are lowered; that of the runs, which
-            must agree, unless given.
-        part: Which of the recordings to learn from.
+        alarms: False-alarm budget, per hour of good motion.
+        profile: One of ``PROFILES``; by default the richest that the first run has the signals for.
+        rate: Rate of the model, in [Hz], to which faster runs are decimated; by default that of
+            the runs, which must be equal.
+        part: The part of the recordings to train on.
         overwrite: Whether a file that exists may be replaced.
 
     Returns:
-        What was learnt.
+        The baseline, and its measures on the good runs.
 
     Raises:
         InspectorError: If runs are of different rates or robots, or there is no such profile.
@@ -86,7 +86,7 @@ def learn(
 
 
 def _files(inputs: Sequence[Path]) -> Iterator[Path]:
-    """List runs and samples, and folders of NoisyTest."""
+    """Run files, samples, and folders of NoisyTest."""
     for path in inputs:
         if path.is_dir() and not any(path.glob("*.toml")):
             yield from sorted(path.rglob("*.npz"))
@@ -97,12 +97,11 @@ def _files(inputs: Sequence[Path]) -> Iterator[Path]:
 def _recordings(
     files: Sequence[Path], rate: float | None, part: Part
 ) -> Iterator[models.Recording]:
-    """Read recordings one after the other, all of one rate and robot."""
+    """Recordings, all of one rate and robot."""
     first: Source | None = None
     for path in files:
         for source, recording in _read(path, rate):
-            held_out = models.held_out(models.group_of(recording.name))
-            if part is Part.ALL or held_out == (part is Part.TEST):
+            if in_part(recording, part):
                 first = first or source
                 _check(source, first)
                 yield replace(recording, signal=_signals(recording))
@@ -120,30 +119,30 @@ def _read(path: Path, rate: float | None) -> Iterator[tuple[Source, models.Recor
         run = nm.Run.load(path)
         wanted = rate or run.rate
         source = Source(path, wanted, run.robot or "", frozenset(run.joint_names))
-        yield source, recording_of(path, run, wanted)
+        yield source, of_run(path, run, wanted)
 
 
 def _check(source: Source, first: Source) -> None:
-    """Refuse what is not of the first run's rate and robot."""
+    """Refuse a recording of another rate or robot than the first."""
     if abs(source.rate / first.rate - 1) > models.profile.TOLERANCE:
         slower = min(source.rate, first.rate)
         raise InspectorError(
             f"{source.path}: recorded at {source.rate:g} Hz, {first.path} at {first.rate:g} Hz;"
-            f" --rate {slower:g} lowers the faster ones"
+            f" --rate {slower:g} decimates the faster ones"
         )
     if source.robot and first.robot and source.robot != first.robot:
         raise InspectorError(
             f"{source.path}: a run of {source.robot}, but {first.path} of {first.robot};"
-            " a baseline knows one robot"
+            " a baseline is of one robot"
         )
     if source.joints and first.joints and source.joints != first.joints:
         odd = sorted(source.joints ^ first.joints)
         raise InspectorError(
             f"{source.path}: has other joints than {first.path} ({', '.join(odd[:3])});"
-            " a baseline knows one robot"
+            " a baseline is of one robot"
         )
 
 
 def _signals(recording: models.Recording) -> dict[str, models.types.Real]:
-    """Take signals by name, without the error where what is desired is what was measured."""
-    return models.signals.without_zero_error(models.signals.named(recording.signal))
+    """Signals by name, without the error if the desired motion is the measured one."""
+    return models.signals.telling(models.signals.named(recording.signal))

@@ -1,5 +1,6 @@
-"""The files that the measures of a model are written to."""
+"""The measures of a model on annotated runs, printed, as JSON and as a picture."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
@@ -7,8 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+import models
 from inspector.colors import SERIES, Color, of_classes
 from inspector.comparison import picture
+from inspector.progress import progress
+from inspector.training.part import Part
+from inspector.training.recordings import count, recordings
 from models import Assessment
 from noisemodel.atomic import refuse_existing, replacing
 
@@ -18,12 +23,37 @@ if TYPE_CHECKING:
     from models.evaluation.intervals import Estimate
 
 
+def evaluate(
+    model: Path, inputs: Sequence[Path], *, part: Part = Part.ALL, seen_too: bool = False
+) -> Assessment:
+    """Measure a model.
+
+    Args:
+        model: A model file.
+        inputs: Annotated runs, samples or NoisyTest folders that it was not trained on.
+        part: The part of the recordings to measure it on.
+        seen_too: Whether to accept runs that it was trained on, or that share their motion with
+            such.
+
+    Returns:
+        The measures of the paper, those of frames and those of events.
+
+    Raises:
+        SeenError: If it was trained on a run, unless ``seen_too``.
+    """
+    classifier = models.Classifier.load(model)
+    found = recordings(inputs, classifier.rate, part)
+    return models.assess(
+        classifier, progress(found, "evaluate", total=count(inputs)), seen_too=seen_too
+    )
+
+
 @dataclass(frozen=True)
 class Outputs:
-    """What to write; None is not written.
+    """The files to write; None is not written.
 
     Attributes:
-        json: All measures, the curve, and each failure that was missed.
+        json: All measures, the curve, and each missed failure.
         picture: A PNG file.
         overwrite: Whether files that exist may be replaced.
     """
@@ -33,7 +63,7 @@ class Outputs:
     overwrite: bool = False
 
     def check(self) -> None:
-        """Refuse what cannot be written before long work is done for it.
+        """Refuse files that cannot be written, before the work.
 
         Raises:
             OutputError: If a file exists and may not be replaced, or cannot be written.
@@ -62,7 +92,7 @@ class Outputs:
 
 
 def as_json(assessment: Assessment, model: Path) -> str:
-    """Write the measures of a model as JSON.
+    """The measures of a model as a JSON text.
 
     Args:
         assessment: The measures.
@@ -86,7 +116,7 @@ def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = Fa
     Args:
         assessment: The measures.
         path: The file to write.
-        title: What the model is called.
+        title: The name of the model.
         overwrite: Whether a file that exists may be replaced.
 
     Raises:
@@ -112,19 +142,19 @@ def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = Fa
 
 
 def _confusion(axes: "Axes", assessment: Assessment) -> None:
-    """Colour each row by its class, the stronger the larger its share of the row."""
+    """Draw the confusion matrix, each row in the colour of its class, shaded by share."""
     evaluation = assessment.frames.evaluation
     names, counts = evaluation.classes, evaluation.confusion
     shares = counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
     inks = np.array([_ink(color) for color in of_classes(names).values()])
-    # As much colour as the share, on white.
+    # The share is the opacity of the colour, on white.
     axes.imshow(1.0 - shares[..., None] * (1.0 - inks[:, None, :]), aspect="auto")
     for row, column in np.ndindex(counts.shape):
         text = f"{counts[row, column]}\n{shares[row, column]:.1%}" if counts[row, column] else "0"
         axes.text(column, row, text, ha="center", va="center", fontsize=9)
     axes.set_xticks(range(len(names)), names, fontsize=8)
     axes.set_yticks(range(len(names)), names, fontsize=8)
-    axes.set_xlabel("called")
+    axes.set_xlabel("predicted")
     axes.set_title("Frames of annotated blocks (share of the row)", fontsize=10)
 
 
@@ -138,7 +168,7 @@ def _intervals(axes: "Axes", assessment: Assessment) -> None:
         ("balanced accuracy", frames.balanced_accuracy, (0, 0, 0)),
         ("failure recall", frames.failure_recall, (0, 0, 0)),
         ("failures found", events.all_found, (0, 0, 0)),
-        ("found by their own name", events.all_named, (0, 0, 0)),
+        ("found with the right class", events.all_named, (0, 0, 0)),
     ]
     rows = [row for row in rows if not np.isnan(row[1].value)]
     for place, (_, each, color) in enumerate(rows):
@@ -155,20 +185,20 @@ def _intervals(axes: "Axes", assessment: Assessment) -> None:
 def _reliability(axes: "Axes", assessment: Assessment) -> None:
     axes.set_title("Reliability", fontsize=10)
     axes.set_xlabel("confidence")
-    axes.set_ylabel("share of right names")
+    axes.set_ylabel("share of correct classes")
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(0.0, 1.0)
     if assessment.reliability is None or assessment.calibration_error is None:
-        axes.text(0.5, 0.5, "the scores are no probabilities", ha="center", va="center")
+        axes.text(0.5, 0.5, "the scores are not probabilities", ha="center", va="center")
         return
     axes.plot([0.0, 1.0], [0.0, 1.0], "--", color=GREY, lw=1)
     table = assessment.reliability.table()
     width = table["high"] - table["low"]
     axes.bar(table["low"], table["right"], width, align="edge", color=_ink(BLUE), alpha=0.35)
     axes.plot(table["confidence"], table["right"], "o", color=_ink(BLUE))
-    for x, y, count in zip(table["confidence"], table["right"], table["frames"], strict=True):
-        if count:
-            axes.annotate(f"{count:.0f}", (x, y), (0, -12), textcoords="offset points", fontsize=7)
+    for x, y, frames in zip(table["confidence"], table["right"], table["frames"], strict=True):
+        if frames:
+            axes.annotate(f"{frames:.0f}", (x, y), (0, -12), textcoords="offset points", fontsize=7)
     error = assessment.calibration_error
     axes.text(0.03, 0.94, f"expected calibration error {error.value:.1%}")
 
@@ -185,7 +215,7 @@ def _trade_off(axes: "Axes", assessment: Assessment) -> None:
     for budget in assessment.at_budgets:
         axes.axvline(budget, color=GREY, lw=0.8, ls=":")
     if events.ok_hours:
-        # Below one false alarm in all the time there was, nothing can be told apart.
+        # Rates below one false alarm in the whole time cannot be distinguished.
         least = 1.0 / events.ok_hours
         axes.set_xscale("symlog", linthresh=least)
         decades = 10.0 ** np.arange(np.ceil(np.log10(least)), 6.0)
@@ -195,7 +225,7 @@ def _trade_off(axes: "Axes", assessment: Assessment) -> None:
     axes.set_xlabel("false alarms per hour of ok motion")
     axes.set_ylabel("share found")
     axes.grid(alpha=0.4)
-    axes.plot([], [], "o", color="black", label="as it labels now")
+    axes.plot([], [], "o", color="black", label="the alarm threshold of the model")
     axes.legend(loc="best", fontsize=8)
     axes.set_ylim(0.0, 1.02)
     axes.set_title("Found against false alarms, by a threshold", fontsize=10)

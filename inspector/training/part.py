@@ -1,11 +1,19 @@
-"""Which recordings of a data set are meant."""
+"""The parts of a data set, without numpy: `inspector --help` imports this module."""
 
 from enum import StrEnum
 
 
 class Part(StrEnum):
-    """The part of a data set; `test` is fixed by hash, see ``models.held_out``."""
+    """A part of a data set; a hash decides what is in `test`, see ``models.held_out``."""
 
     ALL = "all"
     TRAINING = "training"
     TEST = "test"
+
+    def has(self, *, held_out: bool) -> bool:
+        """Whether a recording belongs to this part.
+
+        Args:
+            held_out: What ``models.held_out`` says of its group.
+        """
+        return self is Part.ALL or held_out == (self is Part.TEST)

@@ -1,9 +1,8 @@
-"""The file that results of tuning are kept in, a line of JSON for each point of the grid.
+"""The results file of a grid search, one line of JSON per point of the grid.
 
-The first line is the question: profile, grid, what was trained on and measured by, and the software
-that did it. Points follow in the order of the grid as they are worked off, so that whatever lines
-are there is the beginning of the whole. Tuning that was killed goes on from there; so does another
-look at results that are complete.
+The first line is the header: profile, grid, training and validation set, and versions of software.
+Points follow in the order of the grid, so that any number of complete lines is a valid beginning. A
+killed search resumes there; a complete one is only read.
 """
 
 import fcntl
@@ -24,7 +23,7 @@ FORMAT = "noise-tuning/1"
 
 
 class ResultsError(InspectorError):
-    """A file of results that cannot be gone on with.
+    """A results file that the search cannot resume.
 
     Args:
         path: The file.
@@ -38,10 +37,10 @@ class ResultsError(InspectorError):
 
 @dataclass(eq=False)
 class Results:
-    """What is known of the points of a grid, in their order.
+    """The measures of the points of a grid, in their order.
 
     Attributes:
-        path: Where it is kept.
+        path: The results file.
         points: All points.
         measures: Measures of the first of them.
     """
@@ -52,7 +51,7 @@ class Results:
     _file: IO[bytes]
 
     def add(self, measures: Sequence[Measures]) -> None:
-        """Keep the measures of the next points, safely on the disk.
+        """Append the measures of the next points, flushed to the disk.
 
         Raises:
             InspectorError: If they cannot be written.
@@ -66,35 +65,35 @@ class Results:
 
 @contextmanager
 def opened(
-    path: Path, question: Mapping[str, Any], points: Sequence[Point], *, overwrite: bool = False
+    path: Path, settings: Mapping[str, Any], points: Sequence[Point], *, overwrite: bool = False
 ) -> Iterator[Results]:
-    """Open a file of results to go on with it, or make it.
+    """Open a results file to resume, or create it.
 
     Args:
         path: The file.
-        question: What the results answer, by topic, as JSON can hold it.
+        settings: The settings of the search, by name, as JSON can hold them.
         points: All points of the grid.
-        overwrite: Whether to start anew, whatever the file holds.
+        overwrite: Whether to discard what the file holds.
 
     Yields:
-        The results that there are.
+        The results so far.
 
     Raises:
-        ResultsError: If the file is no such file, is damaged, or answers another question.
-        InspectorError: If it cannot be read or written, or somebody else is writing it.
+        ResultsError: If the file is no such file, is damaged, or of other settings.
+        InspectorError: If it cannot be read or written, or another process is writing it.
     """
     with _locked(path) as file:
         file.seek(0)
         whole, _, torn = (b"" if overwrite else file.read()).rpartition(b"\n")
-        header = _line({"format": FORMAT, **question})
+        header = _line({"format": FORMAT, **settings})
         measures: list[Measures] = []
         if whole:
             first, *rows = whole.split(b"\n")
-            _check_question(path, first, json.loads(header))
+            _check_header(path, first, json.loads(header))
             measures = _read(path, rows, points)
         elif not header.startswith(torn):
             raise ResultsError(path, "holds no results of tuning")
-        # A line without its end is one that was being written when the end came.
+        # A line without its end was being written when the process was killed.
         file.truncate(len(whole) + bool(whole))
         if not whole:
             _append(path, file, header)
@@ -124,14 +123,14 @@ def _append(path: Path, file: IO[bytes], content: bytes) -> None:
         raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
-def _check_question(path: Path, line: bytes, question: Mapping[str, Any]) -> None:
+def _check_header(path: Path, line: bytes, settings: Mapping[str, Any]) -> None:
     try:
         there = json.loads(line)
     except ValueError:
         there = None
     if not isinstance(there, dict) or not str(there.get("format")).startswith("noise-tuning/"):
         raise ResultsError(path, "holds no results of tuning")
-    for topic, mine in question.items():
+    for topic, mine in settings.items():
         if there.get(topic) != mine:
             name = topic.replace("_", " ")
             raise ResultsError(
@@ -140,7 +139,7 @@ def _check_question(path: Path, line: bytes, question: Mapping[str, Any]) -> Non
 
 
 def _difference(there: Any, mine: Any) -> str:
-    """Name the first thing that is not the same."""
+    """The first difference, in words."""
     if not (isinstance(there, dict) and isinstance(mine, dict)):
         return f"{there}, not {mine}"
     names = [*mine, *(name for name in there if name not in mine)]
@@ -151,7 +150,7 @@ def _difference(there: Any, mine: Any) -> str:
 
 
 def _read(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> list[Measures]:
-    """Read the measures, of the points that they have to be of."""
+    """The measures in the rows, which must be of these points."""
     if len(rows) > len(points):
         raise ResultsError(path, f"is damaged: {len(rows)} points of {len(points)}")
     names = [field.name for field in fields(Measures)]
