@@ -24,7 +24,7 @@ from noisemodel import Block, Run
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.simulation import RECIPE
-from scenarios.tasks import Task, Wish, choose
+from scenarios.tasks import DatasetSpec, Task, choose
 
 HERE = Path(__file__).parent
 SEEDS = {"talos": 20, "go2": 40, "panda": 23, "solo12": 6, "anymal": 6}
@@ -74,13 +74,15 @@ def main() -> None:
     tasks = [
         task
         for robot, count in SEEDS.items()
-        for task in Wish(choice=choose((robot,)), seeds=LAST).tasks()
+        for task in DatasetSpec(choice=choose((robot,)), seeds=LAST).tasks()
         if wanted(task, count)
     ]
     healthy = [
         task
         for robot, hours in HOURS.items()
-        for task in Wish(choice=choose((robot,), healthy=True), first=FIRST, hours=hours).tasks()
+        for task in DatasetSpec(
+            choice=choose((robot,), healthy=True), first=FIRST, hours=hours
+        ).tasks()
     ]
     simulate(data, tasks, options.jobs)
     simulate(good, healthy, options.jobs)

@@ -1,6 +1,5 @@
-"""Robots in simulation, with and without defects, as labelled runs."""
+"""Labelled runs of simulated robots, with and without defects."""
 
-from scenarios.again import again
 from scenarios.errors import (
     ChangedRunError,
     DatasetError,
@@ -13,6 +12,7 @@ from scenarios.errors import (
     UnsuitedScenarioError,
     UnsupportedModelError,
 )
+from scenarios.reproduction import reproduce
 from scenarios.robots import ROBOTS
 from scenarios.sample import Sample
 from scenarios.simulation import simulate
@@ -33,6 +33,6 @@ __all__ = [
     "UnsimulatedRobotError",
     "UnsuitedScenarioError",
     "UnsupportedModelError",
-    "again",
+    "reproduce",
     "simulate",
 ]

@@ -1,4 +1,4 @@
-"""What a scenario is for one family of robots."""
+"""A scenario for one family of robots."""
 
 from dataclasses import dataclass, field
 
@@ -14,12 +14,12 @@ BANDS: tuple[tuple[int, int], ...] = (
 
 @dataclass(frozen=True)
 class Case:
-    """What a scenario is for one family of robots.
+    """A scenario for one family of robots.
 
     Attributes:
-        motion: What the robot does; without the defect, this is the run's twin.
-        defect: What is wrong.
-        description: What happens, where it is not what the scenario's own description says.
+        motion: The motion of the robot; without the defect, it is that of the twin.
+        defect: The defect.
+        description: Replaces the description of the scenario, unless empty.
     """
 
     motion: Motion

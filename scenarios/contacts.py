@@ -1,4 +1,4 @@
-"""Contacts that are planned, and those that are not."""
+"""Planned and unplanned contacts."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,23 +10,23 @@ from scenarios.clock import STEP
 from scenarios.events import Event
 
 APART = 0.05
-"""Contacts with a shorter pause between them are one, in [s]."""
-BLOW = 0.02
-"""Time over which the impulse of a contact is taken, in [s]."""
+"""Contacts with a shorter pause are merged, in [s]."""
+IMPACT = 0.02
+"""Time over which the impulse of a contact is integrated, in [s]."""
 
 
 @dataclass(frozen=True)
 class Contact:
-    """A contact that is planned.
+    """A planned contact.
 
     Attributes:
         start: When the effector may first touch, in [s].
-        lift: When it is to leave, in [s].
-        stop: When it must have let go, in [s].
+        lift: When it is to lift off, in [s].
+        stop: When it must have lifted off, in [s].
         place: x, y, z of the surface there, in [m].
         effector: Index of the effector.
         yaw: Direction of the effector there, in [rad].
-        approach: From when on it is in the air over the place, in [s]; 0 if it always was.
+        approach: When it starts to descend to the place, in [s]; 0 for the first contact.
     """
 
     start: float
@@ -38,7 +38,7 @@ class Contact:
     approach: float = 0.0
 
     def later(self, delay: float) -> "Contact":
-        """Move it in time."""
+        """The contact with all times later by a delay, in [s]."""
         return Contact(
             self.start + delay,
             self.lift + delay,
@@ -51,7 +51,7 @@ class Contact:
 
 
 def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
-    """Find where a robot touched what it was not to touch.
+    """Unplanned contacts, as events.
 
     Args:
         force: Contact force of each effector, shape (samples, effectors), in [N].
@@ -62,20 +62,20 @@ def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
         impulse in [N s] and its largest force in [N].
     """
     events = []
-    for effector, felt in enumerate(force.T):
+    for effector, measured in enumerate(force.T):
         own = [contact for contact in planned if contact.effector == effector]
-        for first, last in _contacts(felt):
+        for first, last in _contacts(measured):
             onset = first * STEP
             if any(contact.start <= onset < contact.stop for contact in own):
                 continue
-            blow = felt[first : first + round(BLOW / STEP)]
+            onset_force = measured[first : first + round(IMPACT / STEP)]
             facts = {
                 "effector": effector,
-                "impulse": float(blow.sum() * STEP),
-                "force": float(blow.max()),
+                "impulse": float(onset_force.sum() * STEP),
+                "force": float(onset_force.max()),
             }
-            # The blow is the cause; leaning on the obstacle afterwards is none.
-            stop = min(last * STEP, onset + BLOW)
+            # The impact is the cause; leaning on the obstacle afterwards is not.
+            stop = min(last * STEP, onset + IMPACT)
             events.append(
                 Event("impact", "unplanned contact", onset, max(stop, onset + STEP), facts)
             )

@@ -1,4 +1,4 @@
-"""A data set is made: what is missing of it, several runs at once."""
+"""Simulation of the missing runs of a data set, several at once."""
 
 import os
 import time
@@ -14,31 +14,30 @@ from scenarios.errors import (
 )
 from scenarios.folder import Folder
 from scenarios.simulation import simulate
-from scenarios.tasks import Task, together
+from scenarios.tasks import Task, grouped_by_twin
 
 POLL = 0.5
-"""Time between two looks at what other processes have made, in [s]."""
+"""Time between two checks for runs of other processes, in [s]."""
 
 
 def make(folder: Folder, tasks: Sequence[Task], *, jobs: int = 1) -> Iterator[Task]:
-    """Make those runs of a data set that are missing; the rest is left alone.
+    """Simulate the missing runs of a data set.
 
-    Each run is written as soon as it is made, so that stopping costs no more than the runs that
-    are being made.
+    Each run is written at once, so that a killed process loses only the runs in work.
 
     Args:
-        folder: Where to keep them.
-        tasks: The runs that it is to have.
-        jobs: How many to make at once.
+        folder: The folder of the data set.
+        tasks: The runs of the data set.
+        jobs: Number of parallel processes.
 
     Yields:
-        The runs as they are made, those that fell included.
+        The runs in the order of completion, including those that fell.
 
     Raises:
         MissingSimulatorError: If MuJoCo is not installed.
-        DatasetError: If a run cannot be made or written.
+        DatasetError: If a run cannot be simulated or written.
     """
-    groups = together(folder.missing(tasks))
+    groups = grouped_by_twin(folder.missing(tasks))
     if groups and find_spec("mujoco") is None:
         raise MissingSimulatorError
     if jobs == 1 or len(groups) < 2:
@@ -49,7 +48,7 @@ def make(folder: Folder, tasks: Sequence[Task], *, jobs: int = 1) -> Iterator[Ta
 
 
 def _make_at_once(folder: Folder, groups: Sequence[tuple[Task, ...]], jobs: int) -> Iterator[Task]:
-    """Give each group to one process, which then simulates its twin once."""
+    """Simulate each group in one process, so that its twin is simulated once."""
     from concurrent.futures import wait
 
     from joblib.externals.loky import get_reusable_executor
@@ -71,7 +70,7 @@ def _make_at_once(folder: Folder, groups: Sequence[tuple[Task, ...]], jobs: int)
 
 def _make_all(folder: Folder, group: tuple[Task, ...], caller: int) -> None:
     runs = _make(folder, group)
-    # If the caller was killed, nobody waits for the rest, and somebody may begin anew.
+    # If the caller was killed, stop: another process may have resumed the data set.
     while os.getppid() == caller and next(runs, None):
         pass
 
@@ -83,11 +82,11 @@ def _make(folder: Folder, group: tuple[Task, ...]) -> Iterator[Task]:
             try:
                 run = simulate(task.robot, task.scenario, task.seed, duration=folder.duration)
             except SimulationError as fall:
-                folder.keep_fall(task, fall)
+                folder.save_fall(task, fall)
             else:
-                folder.keep(task, run)
-            folder.keep_time(task, time.process_time() - start)
+                folder.save(task, run)
+            folder.save_time(task, time.process_time() - start)
         except (ScenarioError, NoiseModelError) as error:
-            # One text, since errors with facts of their own do not pass between processes.
-            raise DatasetError(f"{error}; started again, it goes on from there") from error
+            # Only a text, since errors with attributes of their own do not pass between processes.
+            raise DatasetError(f"{error}; the same command resumes there") from error
         yield task

@@ -1,4 +1,4 @@
-"""A robot's drives: encoders that are read, velocities that are reported, torques that follow."""
+"""Drives of a robot: from encoder readings to velocities and torques."""
 
 from collections import deque
 
@@ -9,18 +9,18 @@ from scenarios.imperfections import Imperfections
 
 
 def tracking_gains(bandwidth: float, step: float) -> tuple[float, float]:
-    """Set the filter by which a drive tells velocities from its encoder.
+    """Gains of the filter that estimates velocities from an encoder.
 
-    Differences of single encoder counts at 10 kHz would drown every motion; servo drives track
-    their encoders instead. This is the critically damped alpha-beta filter: it predicts, and
-    corrects position and velocity by a share of what it missed.
+    At 10 kHz, differences of encoder counts would mask every motion; servo drives track their
+    encoders instead. This is the critically damped alpha-beta filter: it predicts, and corrects
+    position and velocity by a share of the innovation.
 
     Args:
         bandwidth: Natural frequency, in [Hz].
         step: Time between two readings, in [s].
 
     Returns:
-        Share of the miss that corrects the position, and its multiple that corrects the
+        Share of the innovation that corrects the position, and its multiple that corrects the
         velocity, in [1/s]; both poles lie at exp(-2 pi bandwidth step).
     """
     pole = float(np.exp(-2 * np.pi * bandwidth * step))
@@ -35,7 +35,7 @@ class Drives:
         stiffness: Position gains, shape (joints,), in [N m/rad].
         damping: Velocity gains, shape (joints,), in [N m s/rad].
         limit: Largest torques, shape (joints,), in [N m].
-        offset: What the encoders are off by at rest, shape (joints,), in [rad].
+        offset: Encoder error at rest, shape (joints,), in [rad].
         imperfections: Encoder, filter and delay.
         step: Time between two samples, in [s].
     """
@@ -62,26 +62,26 @@ class Drives:
         )
 
     def read(self, position: Array, error: Array) -> tuple[Array, Array]:
-        """Read all encoders.
+        """Readings of all encoders.
 
         Args:
             position: True joint positions, shape (joints,), in [rad].
-            error: What the encoders are off by, shape (joints,), in [rad].
+            error: Error of the encoders, shape (joints,), in [rad].
 
         Returns:
             Positions, in [rad], and velocities, in [rad/s], as the drives report them.
         """
         reading = np.rint((position + error) / self._count) * self._count
         predicted = self._tracked + self._step * self._velocity
-        miss = reading - predicted
-        self._tracked = predicted + self._alpha * miss
-        self._velocity = self._velocity + self._beta * miss
+        innovation = reading - predicted
+        self._tracked = predicted + self._alpha * innovation
+        self._velocity = self._velocity + self._beta * innovation
         return reading, self._velocity
 
     def torque(
         self, position: Array, velocity: Array, desired: Array, rate: Array, feedforward: Array
     ) -> Array:
-        """Answer a reading; the answer arrives after the drives' delay.
+        """Torques that act now, after the delay of the drives.
 
         Args:
             position: Positions read, shape (joints,), in [rad].
@@ -93,8 +93,8 @@ class Drives:
         Returns:
             Torques that act now, shape (joints,), in [N m].
         """
-        wanted = feedforward + self._stiffness * (desired - position)
-        wanted += self._damping * (rate - velocity)
+        demanded = feedforward + self._stiffness * (desired - position)
+        demanded += self._damping * (rate - velocity)
         acting = self._waiting.popleft()
-        self._waiting.append(np.minimum(np.maximum(wanted, self._least), self._limit))
+        self._waiting.append(np.minimum(np.maximum(demanded, self._least), self._limit))
         return acting

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Drivetrain:
-    """One drive per joint, as a robot has them before anything is imperfect about it.
+    """One drive per joint, nominal values.
 
     Attributes:
         joints: Names of the joints; all others are locked.

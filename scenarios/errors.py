@@ -1,4 +1,4 @@
-"""What can go wrong in a simulation: one base error, subclasses that keep their facts."""
+"""Errors of a simulation: one base error, subclasses with their facts as attributes."""
 
 from collections.abc import Iterable
 from difflib import get_close_matches
@@ -13,8 +13,8 @@ class UnknownScenarioError(ScenarioError):
     """A scenario that is not in the table.
 
     Args:
-        name: The scenario that was asked for.
-        known: The scenarios that there are.
+        name: The name given.
+        known: The known scenarios.
     """
 
     def __init__(self, name: str, known: Iterable[str]) -> None:
@@ -25,10 +25,10 @@ class UnknownScenarioError(ScenarioError):
 
 
 class UnsimulatedRobotError(ScenarioError):
-    """A robot that nobody has set up for simulation.
+    """A robot that cannot be simulated.
 
     Args:
-        name: The robot that was asked for.
+        name: The name given.
         known: The robots that can be simulated.
     """
 
@@ -41,18 +41,18 @@ class UnsimulatedRobotError(ScenarioError):
 
 
 class UnsuitedScenarioError(ScenarioError):
-    """A scenario that has no meaning on a robot.
+    """A scenario that does not exist for a robot.
 
     Args:
-        scenario: The scenario that was asked for.
-        robot: The robot that was asked for.
+        scenario: The name of the scenario.
+        robot: The name of the robot.
         known: The scenarios that the robot has.
     """
 
     def __init__(self, scenario: str, robot: str, known: Iterable[str]) -> None:
         self.scenario, self.robot, self.known = scenario, robot, tuple(known)
         super().__init__(
-            f"scenario {scenario!r} has no meaning on {robot!r}; it has {', '.join(self.known)}"
+            f"scenario {scenario!r} does not exist for {robot!r}; it has {', '.join(self.known)}"
         )
 
 
@@ -71,11 +71,11 @@ class UnsupportedModelError(ScenarioError):
 
 
 class DivergedError(ScenarioError):
-    """A simulation left the realm of robots.
+    """A simulation that diverged.
 
     Args:
         time: When, in [s].
-        problem: What was seen.
+        problem: The observation, in a few words.
     """
 
     def __init__(self, time: float, problem: str) -> None:
@@ -95,14 +95,14 @@ class FallenError(DivergedError):
 
 
 class SimulationError(ScenarioError):
-    """A run that diverged, or in which the robot fell: it is no sample.
+    """A run that diverged, or in which the robot fell.
 
     Args:
-        robot: The robot that moved.
-        scenario: What happened to it.
+        robot: The robot.
+        scenario: The scenario.
         seed: The seed of the run.
-        time: When that was, in [s].
-        problem: What was seen.
+        time: Time of the failure, in [s].
+        problem: The observation, in a few words.
     """
 
     def __init__(self, robot: str, scenario: str, seed: int, time: float, problem: str) -> None:
@@ -110,12 +110,12 @@ class SimulationError(ScenarioError):
         self.time, self.problem = time, problem
         super().__init__(
             f"{robot} in scenario {scenario!r} with seed {seed} went out of control at {time:.3f} s"
-            f" ({problem}); such a run is no sample, take another seed"
+            f" ({problem}); such a run is not used, take another seed"
         )
 
 
 class SampleError(ScenarioError):
-    """A file that is no sample, or a damaged one.
+    """A file that is not a sample, or is damaged.
 
     Args:
         path: The file that was read.
@@ -128,27 +128,27 @@ class SampleError(ScenarioError):
 
 
 class ChangedRunError(ScenarioError):
-    """A run that does not come out as it once did.
+    """A run that cannot be reproduced with the present software.
 
     Args:
-        name: The sample that was made of it.
-        made: What it was made with, in a few words.
-        here: What there is now.
+        name: The sample.
+        made: Recipe and versions of the sample.
+        here: Recipe and versions now.
     """
 
     def __init__(self, name: str, made: str, here: str) -> None:
         self.name, self.made, self.here = name, made, here
         super().__init__(
-            f"{name} comes out another way than before: it was made with {made}, here is {here};"
-            " the versions that made it make it again"
+            f"{name} cannot be reproduced: it was made with {made}, here is {here};"
+            " install the versions that it was made with"
         )
 
 
 class DatasetError(ScenarioError):
-    """A data set that cannot be made as it was asked for."""
+    """A data set that cannot be made with these settings."""
 
 
 def _hint(name: str, known: Iterable[str]) -> str:
-    """Say which known name was probably meant, or nothing."""
+    """The closest known name as a hint, or nothing."""
     close = get_close_matches(name, list(known), n=1)
     return f" (did you mean {close[0]!r}?)" if close else ""

@@ -1,4 +1,4 @@
-"""What a simulator knows to have gone wrong."""
+"""Ground truth of a simulation: events that may lead to failures."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -7,14 +7,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Event:
-    """Something that the simulator knows to have gone wrong.
+    """An event that may lead to a failure.
 
     Attributes:
-        label: The class of failure that it may lead to.
-        cause: What happened, in a few words.
+        label: The class of that failure.
+        cause: The cause, in a few words.
         start: When it began, in [s].
-        stop: When its cause had gone, in [s].
-        facts: What else is known of it, in SI units.
+        stop: When its cause ended, in [s].
+        facts: Further quantities, in SI units.
     """
 
     label: str

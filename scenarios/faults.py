@@ -1,4 +1,4 @@
-"""The faults of one run, in the five places where they act, and the signals they consist of."""
+"""The faults to inject into one run, and the signals that they consist of."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -18,20 +18,20 @@ Signal: TypeAlias = Callable[[Array], Array]
 
 @dataclass(frozen=True, kw_only=True)
 class Faults:
-    """The faults of one run; by default there are none.
+    """The faults to inject into one run; by default none.
 
     Attributes:
-        boxes: What stands on the ground and was not expected.
-        ground: What the robot really stands on, if that is not what it plans with.
-        decalibration: What the encoders of joints, by index, read too much, in [rad].
+        boxes: Obstacles unknown to the controller.
+        ground: The real ground, if it differs from the planned one.
+        decalibration: Offsets of encoders by the index of the joint, in [rad].
         shift: Added to the planned places of the effectors: time to shape
             (ticks, effectors, 3), in [m].
-        overlay: Heights and their rates added to what the drives are to follow: time to shape
+        overlay: Heights and their rates, added to the reference of the drives: time to shape
             (samples, effectors, 2), in [m] and [m/s].
-        sensors: Added to what sensors say, by the sensor's name: time to shape (ticks, values).
+        sensors: Added to the values of sensors, by name: time to shape (ticks, values).
         gain: Scale of the force control's gains: time to shape (ticks,).
-        events: What is known to go wrong before the robot moves.
-        facts: What was drawn, for the record.
+        events: Events that are known before the simulation.
+        facts: The drawn values, for the metadata of the run.
     """
 
     boxes: tuple[Box, ...] = ()
@@ -45,7 +45,7 @@ class Faults:
     facts: Mapping[str, Any] = field(default_factory=dict)
 
     def offsets(self, joints: int) -> Array:
-        """What each of a number of encoders reads too much, shape (joints,), in [rad]."""
+        """Offsets of a number of encoders, shape (joints,), in [rad]."""
         return np.array([self.decalibration.get(joint, 0.0) for joint in range(joints)])
 
 
@@ -67,7 +67,7 @@ def pulses(time: Array, *, starts: Array, stops: Array, sizes: Array) -> Array:
 
 
 def step(time: Array, *, start: float, factor: float) -> Array:
-    """Go from 1 to a factor at once, shape (times,)."""
+    """Step from 1 to a factor, shape (times,)."""
     return np.where(time < start, 1.0, factor)
 
 
@@ -87,10 +87,10 @@ def sines(
         time: Shape (times,), in [s].
         rates: Of the sines, shape (sines,), in [rad/s].
         phases: Of the sines, shape (sines,), in [rad].
-        amplitude: Of the one sine that would carry as much power.
-        start: When it sets in, in [s].
+        amplitude: Of one sine of equal power.
+        start: When it starts, in [s].
         stop: When it ends, in [s].
-        shares: Which share of it each effector gets, shape (effectors,).
+        shares: Scale of each effector, shape (effectors,).
 
     Returns:
         Shape (times, effectors, 2).

@@ -1,9 +1,9 @@
-"""The folder of a data set: what it is made of, what is in it, what fell, what is missing.
+"""The folder of a data set: its settings, its runs, and those that are missing.
 
-``dataset.json`` says how it is made. Samples lie at ``<robot>/<scenario>-<seed>.npz``; in the form
+``dataset.json`` has the settings. Samples lie at ``<robot>/<scenario>-<seed>.npz``; in the format
 of NoisyTest, runs lie at ``training/<robot>-<scenario>-<seed>.log`` or in ``validation``. A run in
-which the robot fell leaves ``….fallen.json`` instead. ``times.csv`` gets a line with each run: its
-name, and the processor time that it took, in [s].
+which the robot fell leaves ``….fallen.json`` instead. ``times.csv`` has a line per run: its name
+and its processor time, in [s].
 """
 
 import json
@@ -16,7 +16,7 @@ from typing import Any, Self
 from noisemodel import Block, Run
 from noisemodel.atomic import replacing
 from scenarios.errors import DatasetError, SampleError, SimulationError
-from scenarios.forms import FORMS
+from scenarios.formats import FORMATS, Format
 from scenarios.robots import ROBOTS
 from scenarios.simulation import RECIPE, SHORTEST
 from scenarios.table import SCENARIOS
@@ -34,80 +34,84 @@ class Folder:
     """The folder of a data set.
 
     Attributes:
-        path: Where it is.
-        form: A name in ``FORMS``.
-        duration: How long each run lasts, in [s]; as its motion says if None.
+        path: Its path.
+        format_name: A name in ``FORMATS``.
+        duration: Duration of each run, in [s]; None is that of its motion.
     """
 
     path: Path
-    form: str = "samples"
+    format_name: str = "samples"
     duration: float | None = None
 
     @classmethod
     def opened(
-        cls, path: str | Path, *, form: str = "samples", duration: float | None = None
+        cls, path: str | Path, *, format_name: str = "samples", duration: float | None = None
     ) -> Self:
-        """Open a folder, or make it.
+        """Open a folder, or create it.
 
         Args:
-            path: An empty folder, one that is to be made, or one that was made in the same way.
-            form: A name in ``FORMS``.
-            duration: How long each run is to last, in [s]; as its motion says unless given.
+            path: An empty folder, a new one, or one with the same settings.
+            format_name: A name in ``FORMATS``.
+            duration: Duration of each run, in [s]; by default that of its motion.
 
         Returns:
             The folder.
 
         Raises:
-            DatasetError: If it was made in another way, holds something else, or cannot be made,
-                or the duration is too short.
+            DatasetError: If its settings differ, it holds other files or cannot be created, or the
+                duration is too short.
         """
         path = Path(path)
-        if form not in FORMS:
-            raise DatasetError(f"no form {form!r} of data sets; there are {', '.join(FORMS)}")
+        if format_name not in FORMATS:
+            known = ", ".join(FORMATS)
+            raise DatasetError(f"no format {format_name!r} of data sets; there are {known}")
         if duration is not None and not duration >= SHORTEST:
             raise DatasetError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
-        way = {"format": FORMAT, "recipe": RECIPE, "form": form, "duration": duration}
+        settings = {"format": FORMAT, "recipe": RECIPE, "form": format_name, "duration": duration}
         try:
             if path.exists() and not path.is_dir():
                 raise DatasetError(f"{path}: is a file; name a folder")
             if (path / MANIFEST).exists():
-                _compare(path, _read_json(path / MANIFEST), way)
+                _compare(path, _read_json(path / MANIFEST), settings)
             elif path.is_dir() and any(path.iterdir()):
                 raise DatasetError(
-                    f"{path}: holds something else (it has no {MANIFEST}); name an empty folder"
+                    f"{path}: holds other files (it has no {MANIFEST}); name an empty folder"
                 )
             else:
                 path.mkdir(parents=True, exist_ok=True)
-                _write_json(path / MANIFEST, way)
+                _write_json(path / MANIFEST, settings)
         except OSError as error:
             raise DatasetError(f"{path}: cannot be made ({error.strerror or error})") from error
-        return cls(path, form, duration)
+        return cls(path, format_name, duration)
+
+    @property
+    def _format(self) -> Format:
+        return FORMATS[self.format_name]
 
     def file(self, task: Task) -> Path:
-        """Say where a run is kept."""
-        form = FORMS[self.form]
-        return self.path / f"{form.place(task)}{form.suffix}"
+        """Path of the file of a run."""
+        return self.path / f"{self._format.stem(task)}{self._format.suffix}"
 
-    def keep(self, task: Task, run: Run) -> None:
-        """Write a run; what is there is replaced.
+    def save(self, task: Task, run: Run) -> None:
+        """Write a run; an existing file is replaced.
 
         Raises:
             OutputError: If it cannot be written.
         """
-        FORMS[self.form].write(run, self._room(task))
+        self._format.write(run, self._prepared(task))
 
-    def keep_fall(self, task: Task, fall: SimulationError) -> None:
-        """Write when and why a run is no sample.
+    def save_fall(self, task: Task, fall: SimulationError) -> None:
+        """Record when and why a robot fell.
 
         Raises:
             OutputError: If it cannot be written.
         """
         facts = {"robot": task.robot, "scenario": task.scenario, "seed": task.seed}
         record = {**facts, "time": fall.time, "problem": fall.problem, "recipe": RECIPE}
-        _write_json(self._room(task).with_suffix(FALLEN), {**record, "duration": self.duration})
+        _write_json(self._prepared(task).with_suffix(FALLEN), {**record, "duration": self.duration})
 
-    def keep_time(self, task: Task, seconds: float) -> None:
-        """Note the processor time that a run took, in [s].
+    def save_time(self, task: Task, seconds: float) -> None:
+        """Record the processor time of a run, in [s].
 
         Raises:
             DatasetError: If it cannot be written.
@@ -120,23 +124,23 @@ class Folder:
             raise DatasetError(f"{path}: cannot be written ({error.strerror})") from error
 
     def read(self, task: Task) -> tuple[tuple[Block, ...], float]:
-        """Read a run's blocks, and how long it lasts, in [s].
+        """Blocks of a run, and its duration, in [s].
 
         Raises:
             SampleError: If its file is damaged.
         """
-        return FORMS[self.form].read(self.file(task))
+        return self._format.read(self.file(task))
 
     def kept(self) -> list[Task]:
-        """List the runs that are there, in order."""
-        return self._found(FORMS[self.form].suffix)
+        """The runs in the folder, in order."""
+        return self._found(self._format.suffix)
 
     def fallen(self) -> list[Task]:
-        """List the runs in which the robot fell, in order."""
+        """The runs in which the robot fell, in order."""
         return self._found(FALLEN)
 
     def times(self) -> dict[Task, float]:
-        """Read the processor time of each run that it was noted of, in [s]."""
+        """Processor time of each run, where it was recorded, in [s]."""
         path, times = self.path / TIMES, {}
         for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
             name, _, seconds = line.partition(",")
@@ -145,15 +149,15 @@ class Folder:
         return times
 
     def missing(self, tasks: Iterable[Task]) -> list[Task]:
-        """List those runs that are neither there nor known to fall."""
+        """Those of the runs that are neither in the folder nor known to fall."""
         done = {*self.kept(), *self.fallen()}
         return [task for task in tasks if task not in done]
 
     def clear(self, *, overwrite: bool) -> None:
-        """Check what is there, and make room for what is to be made again.
+        """Check all files, and remove damaged ones.
 
         Args:
-            overwrite: Whether damaged files are removed.
+            overwrite: Whether to remove damaged files.
 
         Raises:
             SampleError: If a file is damaged and may not be removed.
@@ -164,19 +168,19 @@ class Folder:
             except SampleError as error:
                 if not overwrite:
                     raise SampleError(
-                        error.path, f"{error.problem}; --overwrite makes it again"
+                        error.path, f"{error.problem}; --overwrite replaces it"
                     ) from error
                 self.file(task).unlink()
 
-    def _room(self, task: Task) -> Path:
-        """Make the folder of a run, without what a run that was killed has left there."""
+    def _prepared(self, task: Task) -> Path:
+        """Path of a run in an existing folder, without temporary files of a killed process."""
         path = self.file(task)
         try:
             path.parent.mkdir(exist_ok=True)
         except OSError as error:
             raise DatasetError(f"{path.parent}: cannot be made ({error.strerror})") from error
-        for rest in path.parent.glob(f".{path.stem}.*"):
-            rest.unlink(missing_ok=True)
+        for temporary in path.parent.glob(f".{path.stem}.*"):
+            temporary.unlink(missing_ok=True)
         return path
 
     def _found(self, suffix: str) -> list[Task]:
@@ -190,8 +194,8 @@ def _task(found: re.Match[str]) -> Task:
     return Task(found[1], found[2], int(found[3]))
 
 
-def _compare(path: Path, made: Any, way: dict[str, Any]) -> None:
-    for key, wanted in way.items():
+def _compare(path: Path, made: Any, settings: dict[str, Any]) -> None:
+    for key, wanted in settings.items():
         found = made.get(key) if isinstance(made, dict) else None
         if found != wanted:
             raise DatasetError(

@@ -1,4 +1,4 @@
-"""What is imperfect about every robot, healthy ones too: drawn once per seed."""
+"""Imperfections of every robot, healthy ones too: drawn once per seed."""
 
 from dataclasses import dataclass
 from typing import Any, Self
@@ -10,21 +10,21 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Imperfections:
-    """How one robot differs from its model; scales multiply the robot's own settings.
+    """Deviations of one robot from its model; scales multiply the nominal values.
 
     Attributes:
         stiffness: Scale of each drive's position gain.
         damping: Scale of each drive's velocity gain.
         force_gain: Scale of the force control's gain.
         mass: Scale of each moving body's inertia; the controller does not know it.
-        payload: Mass that it carries and the controller does not know, in [kg].
+        payload: Mass unknown to the controller, in [kg].
         friction: Scale of each joint's Coulomb friction.
         viscous: Scale of each joint's viscous friction.
         encoder_bits: Encoder counts per turn of a joint, as a power of two.
         encoder_noise: Standard deviation of the encoders' noise, in [rad].
         encoder_bandwidth: Natural frequency of the filter that reports velocities, in [Hz].
         force_noise: Standard deviation of the force sensors' noise per millisecond, in [N].
-        torque_delay: Samples between a reading and the torque that answers it.
+        torque_delay: Samples between a reading and the torque computed from it.
     """
 
     stiffness: tuple[float, ...]
@@ -47,10 +47,10 @@ class Imperfections:
         """Draw the imperfections of one robot.
 
         Args:
-            rng: Source of chance.
+            rng: Random number generator.
             joints: How many drives the robot has.
             bodies: How many moving bodies it has.
-            payload: Largest mass that nobody told the controller of, in [kg].
+            payload: Largest mass that the controller does not know, in [kg].
             force: Largest standard deviation of the force sensors' noise, in [N].
 
         Returns:
@@ -78,18 +78,18 @@ class Imperfections:
 
     @property
     def encoder_step(self) -> float:
-        """What an encoder can tell apart, in [rad]."""
+        """Resolution of an encoder, in [rad]."""
         return float(2 * np.pi / 2**self.encoder_bits)
 
 
 def real_model(model: Any, frame: str, point: Array, imperfections: Imperfections) -> Any:
-    """Change a robot's masses as its controller does not know them.
+    """A robot's model with its real masses, unknown to its controller.
 
     Args:
         model: The ``pinocchio.Model`` that the controller has.
         frame: Name of the frame that carries the payload.
         point: Where it hangs, in the frame's axes, shape (3,), in [m].
-        imperfections: How the real robot differs.
+        imperfections: The imperfections of the robot.
 
     Returns:
         A changed copy of the model.

@@ -1,30 +1,29 @@
 """The labelling rule: from a simulator's events to annotated blocks.
 
-A run is compared with its *twin*: the same seed without the defect, sample by sample the same
-until the defect acts. The difference of the measured joint velocities, less what is slower than
-`Rule.lowest`, is the *deviation*; its *loudness* is the root mean square of its norm over
-`Rule.smoothing`, and the motion is *felt* to deviate while that exceeds `Rule.felt` (gaps up to
-`Rule.gap` are bridged).
+A run is compared with its *twin*: the same seed without the defect, equal sample by sample until
+the defect acts. The high-passed difference of the measured joint velocities (above `Rule.lowest`)
+is the *deviation*; its *level* is the root mean square of its norm over `Rule.smoothing`. The
+deviation is *significant* while its level exceeds `Rule.felt` (gaps up to `Rule.gap` are bridged).
 
-A walking robot that was disturbed once never meets its twin's steps again: two good walks deviate
-from each other at every touchdown. Therefore an event is held against the loudest of the
-`Rule.before` seconds in front of it, those of earlier events left out: it has to become
-`Rule.contrast` times as loud, and an oscillation counts only while it is louder at all. An
-oscillation that was commanded in a band is looked for in that band alone.
+After a disturbance, a walking robot does not return to the steps of its twin: two good walks
+deviate from each other at every touchdown. Therefore an event is compared with the *background*,
+the highest level of the `Rule.before` seconds before it, earlier events left out: its level must
+reach `Rule.contrast` times the background, and an oscillation counts only while it exceeds the
+background. An oscillation commanded in a band is detected in that band only.
 
-An event becomes blocks of its class: the stretches in which it is felt between its start and
-`Rule.tail` after its stop, but not beyond the next event, each on the condition of its class:
+An event becomes blocks of its class: the significant stretches between its start and `Rule.tail`
+after its stop, but not beyond the next event, each on the condition of its class:
 
-- `impact`: the loudness reaches `Rule.blow`;
-- `highaccelerations`: a joint's deviation changes faster than `Rule.acceleration`;
-- `oscillations`: the joint that deviates most swings through `Rule.periods` periods or more.
+- `impact`: the level reaches `Rule.blow`;
+- `highaccelerations`: the deviation of a joint changes faster than `Rule.acceleration`;
+- `oscillations`: the joint that deviates most has `Rule.periods` periods or more.
 
-What begins while the cause of an event still acts belongs to that event and is none of its own,
-as when a tool that shakes knocks on the table.
+An event that starts while the cause of another one acts belongs to that one, as when a shaking tool
+knocks on the table.
 
-All time that is neither felt nor part of an event, `Rule.margin` away from both, is `ok` (pieces
-shorter than `Rule.shortest` are left out). The rest, such as a commanded oscillation that left no
-trace or an arm that lags behind its twin after an impact, carries no label.
+All time that is neither significant nor part of an event, `Rule.margin` away from both, is `ok`
+(stretches shorter than `Rule.shortest` are left out). The rest, such as a commanded oscillation
+without an effect or an arm that lags behind its twin after an impact, has no label.
 """
 
 from collections.abc import Sequence
@@ -44,20 +43,20 @@ Span = tuple[int, int]
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """Thresholds of the labelling rule.
+    """Thresholds of the labelling rule; the metadata of runs has them by these names.
 
     Attributes:
-        lowest: Slower deviations are a matter of place, not of noise, in [Hz].
-        smoothing: Time over which the root mean square is taken, in [s].
-        felt: Loudness from which a deviation counts, in [rad/s].
-        contrast: How much louder than before it an event has to be.
-        before: The time before an event that it is held against, in [s].
-        gap: Quiet time that is bridged, in [s].
-        tail: How long an event lasts on after its cause has gone, in [s].
-        blow: Loudness that an impact has to reach, in [rad/s].
-        acceleration: What a high acceleration has to reach, in [rad/s²].
-        periods: How many periods make an oscillation.
-        margin: Unlabelled time around what is no ok, in [s].
+        lowest: Cut-off frequency of the high-pass of the deviation, in [Hz].
+        smoothing: Window of the root mean square, in [s].
+        felt: Level above which a deviation is significant, in [rad/s].
+        contrast: Least ratio of the level of an event to its background.
+        before: Duration of the background before an event, in [s].
+        gap: Longest gap that is bridged, in [s].
+        tail: Time after the cause that still belongs to an event, in [s].
+        blow: Least level of an impact, in [rad/s].
+        acceleration: Least value of a high acceleration, in [rad/s²].
+        periods: Least number of periods of an oscillation.
+        margin: Unlabelled time around all that is not ok, in [s].
         shortest: Shortest ok block, in [s].
     """
 
@@ -81,14 +80,14 @@ RULE = Rule()
 
 @dataclass(frozen=True)
 class Trace:
-    """What an event left in the motion.
+    """The effect of an event on the motion.
 
     Attributes:
         event: The event.
-        labelled: Time that carries its label, in [s].
-        peak: Its largest loudness, in [rad/s].
+        labelled: Time with its label, in [s].
+        peak: Its highest level, in [rad/s].
         acceleration: Fastest change of a joint's deviation, in [rad/s²].
-        background: Loudest of the time that it was held against, in [rad/s].
+        background: Highest level of its background, in [rad/s].
     """
 
     event: Event
@@ -98,7 +97,7 @@ class Trace:
     background: float
 
     def record(self) -> dict[str, Any]:
-        """Give the trace as plain data."""
+        """The trace as plain data."""
         event = asdict(self.event)
         return event | {
             "labelled": round(self.labelled, 6),
@@ -122,12 +121,12 @@ def deviation(
         velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
         twin: Those of the twin, shape (samples, joints), in [rad/s].
         rate: Sample rate, in [Hz].
-        band: Frequencies to look at alone, in [Hz].
+        band: Pass band, in [Hz], in place of the high-pass.
         rule: The labelling rule.
 
     Returns:
-        The difference after a causal filter of first order (a high-pass, or the band's), which
-        moves nothing ahead of its cause, shape (samples, joints), in [rad/s].
+        The difference after a causal filter of first order (a high-pass, or a band-pass), shape
+        (samples, joints), in [rad/s].
     """
     from scipy.signal import butter, sosfilt
 
@@ -141,45 +140,47 @@ def deviation(
 def annotate(
     velocity: Array, twin: Array, events: Sequence[Event], *, rate: float, rule: Rule = RULE
 ) -> tuple[tuple[Block, ...], tuple[Trace, ...]]:
-    """Label a run by the rule that this module states.
+    """Labels of a run by the rule of this module.
 
     Args:
         velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
         twin: Those of the twin, shape (samples, joints), in [rad/s].
-        events: What the simulator knows to have gone wrong.
+        events: The events of the simulation.
         rate: Sample rate, in [Hz].
         rule: The labelling rule.
 
     Returns:
-        The blocks, in order, and what each event left.
+        The blocks, in order, and the effect of each event.
     """
     events = _independent(events)
     fast = deviation(velocity, twin, rate=rate, rule=rule)
-    loudness = _loudness(fast, rate, rule)
+    broadband = _level(fast, rate, rule)
     samples, blocks, traces = len(fast), [], []
     busy = np.zeros(samples, dtype=bool)
-    for first, end in _spans(loudness > rule.felt, round(rule.gap * rate)):
+    for first, end in _spans(broadband > rule.felt, round(rule.gap * rate)):
         busy[first:end] = True
     acting = np.zeros(samples, dtype=bool)
     starts = [round(event.start * rate) for event in events] + [samples]
     for event, first, following in zip(events, starts, starts[1:], strict=False):
         end = min(round((event.stop + rule.tail) * rate), following, samples)
-        heard, level = fast, loudness
+        filtered, level = fast, broadband
         if "band" in event.facts:
-            heard = deviation(velocity, twin, rate=rate, band=event.facts["band"], rule=rule)
-            level = _loudness(heard, rate, rule)
+            filtered = deviation(velocity, twin, rate=rate, band=event.facts["band"], rule=rule)
+            level = _level(filtered, rate, rule)
         until = max(0, first - round(rule.smoothing * rate))  # the average looks ahead
         earlier = slice(max(0, until - round(rule.before * rate)), until)
         background = float(level[earlier][~acting[earlier]].max(initial=0.0))
         least = max(rule.felt, background if event.label == "oscillations" else 0.0)
-        felt = _spans(level > least, round(rule.gap * rate))
-        change = np.abs(np.diff(heard[first:end], axis=0, prepend=heard[first : first + 1]))
+        significant = _spans(level > least, round(rule.gap * rate))
+        change = np.abs(np.diff(filtered[first:end], axis=0, prepend=filtered[first : first + 1]))
         change = change.max(axis=1, initial=0.0) * rate
         own = [
             (a, b)
-            for a, b in _clipped(felt, first, end)
+            for a, b in _clipped(significant, first, end)
             if level[a:b].max() > rule.contrast * background
-            and _bears_out(event.label, heard[a:b], level[a:b], change[a - first : b - first], rule)
+            and _confirms(
+                event.label, filtered[a:b], level[a:b], change[a - first : b - first], rule
+            )
         ]
         blocks += [Block(a / rate, b / rate, event.label) for a, b in own]
         for a, b in [*own, (first, round(event.stop * rate))]:
@@ -205,7 +206,7 @@ def annotate(
 
 
 def _independent(events: Sequence[Event]) -> list[Event]:
-    """Sort events, and leave out those that begin while the cause of another one acts."""
+    """Events in order, without those that start while the cause of another one acts."""
     kept: list[Event] = []
     for event in sorted(events, key=lambda event: event.start):
         if not kept or event.start >= kept[-1].stop:
@@ -213,30 +214,30 @@ def _independent(events: Sequence[Event]) -> list[Event]:
     return kept
 
 
-def _loudness(fast: Array, rate: float, rule: Rule) -> Array:
-    """Root mean square over a moving window of the deviation's norm, shape (samples,)."""
+def _level(fast: Array, rate: float, rule: Rule) -> Array:
+    """Moving root mean square of the norm of the deviation, shape (samples,)."""
     power = uniform_filter1d(np.square(fast).sum(axis=1), round(rule.smoothing * rate))
     return np.asarray(np.sqrt(np.maximum(power, 0)), dtype=np.float64)
 
 
-def _bears_out(label: str, fast: Array, loudness: Array, change: Array, rule: Rule) -> bool:
-    """Tell whether a felt stretch is what its event promised."""
+def _confirms(label: str, fast: Array, level: Array, change: Array, rule: Rule) -> bool:
+    """Whether a significant stretch meets the condition of its class."""
     if label == "impact":
-        return bool(loudness.max() >= rule.blow)
+        return bool(level.max() >= rule.blow)
     if label == "highaccelerations":
         return bool(change.max() >= rule.acceleration)
-    return _swings(fast) >= 2 * rule.periods
+    return _sign_changes(fast) >= 2 * rule.periods
 
 
-def _swings(fast: Array) -> int:
-    """Count how often the joint that deviates most changes sides, ripples near zero left out."""
+def _sign_changes(fast: Array) -> int:
+    """Number of sign changes of the joint that deviates most, small values left out."""
     joint = fast[:, np.argmax(np.square(fast).sum(axis=0))]
-    side = np.sign(joint[np.abs(joint) > 0.3 * np.sqrt(np.mean(joint**2))])
-    return int(np.count_nonzero(np.diff(side)))
+    sign = np.sign(joint[np.abs(joint) > 0.3 * np.sqrt(np.mean(joint**2))])
+    return int(np.count_nonzero(np.diff(sign)))
 
 
 def _spans(mask: Mask, bridge: int) -> list[Span]:
-    """List where a mask is true, gaps of up to ``bridge`` samples closed."""
+    """Spans in which a mask is true, gaps of up to ``bridge`` samples closed."""
     edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
     spans: list[Span] = []
     for first, end in edges.reshape(-1, 2).tolist():
@@ -248,5 +249,5 @@ def _spans(mask: Mask, bridge: int) -> list[Span]:
 
 
 def _clipped(spans: Sequence[Span], first: int, end: int) -> list[Span]:
-    """Cut spans to those parts that lie in a range."""
+    """Parts of spans that lie in a range."""
     return [(max(a, first), min(b, end)) for a, b in spans if a < end and b > first]

@@ -9,7 +9,7 @@ from scenarios.robots import ROBOTS
 
 @lru_cache(maxsize=8)
 def limbs(name: str) -> Mapping[str, tuple[str, ...]]:
-    """List the driven joints from the base to each effector of a robot.
+    """Driven joints from the base to each effector of a robot.
 
     Args:
         name: A name in ``scenarios.ROBOTS``.

@@ -1,4 +1,4 @@
-"""The loop that moves a robot: a tick of control, then ten samples of drives and physics."""
+"""The simulation loop: one tick of control, then ten samples of drives and physics."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -9,9 +9,9 @@ import numpy as np
 
 from noisemodel.types import Array
 from scenarios.clock import STEPS, TICK
+from scenarios.collision import set_collision
 from scenarios.drives import Drives
 from scenarios.errors import DivergedError, FallenError
-from scenarios.touching import put
 
 FASTEST = 50.0
 """A joint that is faster than this has diverged, in [rad/s] or [m/s]."""
@@ -34,13 +34,13 @@ _VELOCITY = np.hstack(
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What the joints are to do from one tick to the next.
+    """Reference of the joints from one tick to the next.
 
     Attributes:
         position: At the two ticks, shape (2, joints), in [rad].
         velocity: At the two ticks, shape (2, joints), in [rad/s].
-        planned: Velocity that the plan alone asks for, at the two ticks, shape (2, joints).
-        torque: What the model predicts to need, shape (joints,), in [N m].
+        planned: Velocity of the plan alone, at the two ticks, shape (2, joints).
+        torque: Feed-forward torque of the model, shape (joints,), in [N m].
         lift: Movement of the joints per height of each effector, shape (effectors, joints),
             in [rad/m].
     """
@@ -53,7 +53,7 @@ class Reference:
 
 
 class Control(Protocol):
-    """Anything that turns a plan and the sensors into references."""
+    """A controller: from a plan and the sensors to references."""
 
     def tick(self, number: int, sensors: Array) -> Reference:
         """Advance by one tick, with the mean of each sensor over the tick before."""
@@ -66,7 +66,7 @@ class Control(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A robot in its world, ready to be moved.
+    """A robot in its environment, ready to be simulated.
 
     Attributes:
         model: The ``mujoco.MjModel``; its actuators are the joints, the last ones of its
@@ -74,9 +74,9 @@ class Scene:
         start: True configuration at first, as MuJoCo has it.
         control: The robot's controller.
         effectors: How many effectors there are.
-        settling: Ticks before the recording, in which the robot comes to rest.
+        settling: Ticks before the recording during which the robot comes to rest.
         noise: Standard deviation of each sensor's noise per tick, shape (sensors,).
-        changes: Boxes that come or go: geoms, and whether they are there, by ticks of the
+        changes: Boxes that appear or vanish: geoms, and whether they are present, by ticks of the
             recording.
     """
 
@@ -91,15 +91,15 @@ class Scene:
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """What was recorded, before rounding.
+    """The recorded signals, before rounding.
 
     Attributes:
         position: As the drives report it, shape (samples, joints), in [rad].
         velocity: As the drives report it, shape (samples, joints), in [rad/s].
-        position_desired: What the drives follow, shape (samples, joints), in [rad].
-        velocity_desired: What the drives follow, shape (samples, joints), in [rad/s].
+        position_desired: Reference of the drives, shape (samples, joints), in [rad].
+        velocity_desired: Reference of the drives, shape (samples, joints), in [rad/s].
         planned: Velocities of the plan alone, shape (samples, joints), in [rad/s].
-        commanded: Velocities that the controller asks for, shape (samples, joints), in [rad/s].
+        commanded: Velocities that the controller demands, shape (samples, joints), in [rad/s].
         torque: Of the drives, shape (samples, joints), in [N m].
         contact: True contact force of each effector, shape (samples, effectors), in [N].
         base_pose: True pose of a floating base, as MuJoCo has it (quaternion w, x, y, z),
@@ -121,12 +121,12 @@ class Motion:
 
     @classmethod
     def empty(cls, samples: int, joints: int, effectors: int, *, floating: bool) -> Self:
-        """Make room for a recording."""
+        """Zeros for a recording."""
         base = [7, 6] if floating else [0, 0]
         return cls(*(np.zeros((samples, width)) for width in [*[joints] * 7, effectors, *base]))
 
     def since(self, sample: int) -> "Motion":
-        """Leave out what came before a sample."""
+        """The signals from a sample on."""
         return Motion(*(getattr(self, field.name)[sample:] for field in fields(self)))
 
 
@@ -138,21 +138,21 @@ def record(
     sensor_error: Array,
     overlay: Array | None = None,
 ) -> Motion:
-    """Move a robot.
+    """Simulate a robot.
 
     Args:
-        scene: The robot in its world.
+        scene: The robot in its environment.
         drives: The robot's drives.
-        encoder_error: What the encoders are off by, shape (samples, joints), in [rad].
-        sensor_error: Added to what the sensors tell the controller, shape (ticks, sensors).
-        overlay: Heights of the effectors and their rates, added to what the drives follow,
-            shape (samples, effectors, 2), in [m] and [m/s].
+        encoder_error: Error of the encoders, shape (samples, joints), in [rad].
+        sensor_error: Added to the sensor values of the controller, shape (ticks, sensors).
+        overlay: Heights of the effectors and their rates, added to the reference of the
+            drives, shape (samples, effectors, 2), in [m] and [m/s].
 
     Returns:
-        What was recorded once the robot had come to rest.
+        The signals from when the robot has come to rest.
 
     Raises:
-        DivergedError: If a joint is too fast, or its position is no number any more.
+        DivergedError: If a joint is too fast, or its position is not a number.
         FallenError: If the robot fell.
     """
     model, control = scene.model, scene.control
@@ -163,13 +163,13 @@ def record(
     motion = Motion.empty(samples, joints, scene.effectors, floating=base > 0)
     joint_position, joint_velocity = data.qpos[-joints:], data.qvel[-joints:]
     base_pose, base_velocity = data.qpos[:base], data.qvel[:-joints]
-    effector_force, heard = data.sensordata[: scene.effectors], data.sensordata
-    told = np.zeros((STEPS, model.nsensordata))
+    effector_force, sensed = data.sensordata[: scene.effectors], data.sensordata
+    readings = np.zeros((STEPS, model.nsensordata))
     sensors = np.zeros(model.nsensordata)
     for tick, error in enumerate(sensor_error):
         now = slice(tick * STEPS, (tick + 1) * STEPS)
-        for geom, there in scene.changes.get(tick - scene.settling, ()):
-            put(model, geom, there=there)
+        for geom, present in scene.changes.get(tick - scene.settling, ()):
+            set_collision(model, geom, present=present)
         reference = control.tick(tick, sensors + error)
         ends = np.concatenate((reference.position, reference.velocity))
         targets, rates = _POSITION @ ends, _VELOCITY @ ends
@@ -188,11 +188,11 @@ def record(
             if base:
                 motion.base_pose[sample], motion.base_velocity[sample] = base_pose, base_velocity
             mujoco.mj_step(model, data)
-            told[step], motion.contact[sample] = heard, effector_force
-        sensors = told.mean(axis=0)
+            readings[step], motion.contact[sample] = sensed, effector_force
+        sensors = readings.mean(axis=0)
         time = (tick + 1 - scene.settling) * TICK
         fastest = np.abs(joint_velocity).max()
-        if not fastest < FASTEST:  # also true of no number
+        if not fastest < FASTEST:  # also true of NaN
             raise DivergedError(time, f"a joint moved at {fastest:.3g} rad/s")
         if control.fallen(sensors):
             raise FallenError(time)

@@ -1,4 +1,4 @@
-"""What robots do in the scenarios when nothing is wrong, as data.
+"""The motions of the scenarios, as data.
 
 Each family plans its own: ``scenarios.arm``, ``scenarios.humanoid``, ``scenarios.quadruped``. A
 motion that is equal makes an equal plan of an equal seed, so that runs with different defects
@@ -16,11 +16,11 @@ class Picks:
     """An arm comes down on a table, presses, and goes up again.
 
     Attributes:
-        way: How it moves: "straight" from place to place, in a "curve", in all "directions"
+        way: Its path: "straight" from place to place, in a "curve", in all "directions"
             without ever touching, or up and down on one "spot".
         hover: Height over the table at which it slows down, in [m].
-        force: What it presses with, in [N].
-        duration: How long a run lasts unless told otherwise, in [s].
+        force: Contact force, in [N].
+        duration: Default duration of a run, in [s].
     """
 
     way: str = "straight"
@@ -34,14 +34,14 @@ class Walk:
     """A humanoid walks.
 
     Attributes:
-        way: Where it goes: "straight", in a "curve", in other "directions" (sideways or
+        way: Its path: "straight", in a "curve", in other "directions" (sideways or
             backward), or on the "spot".
         height: How high the feet are lifted, in [m].
         single: Time on one foot, in [s].
         double: Time on both, in [s].
         jitter: By which share each step's time on one foot varies.
         drop: Height of a platform that it walks down from, in [m]; 0 on flat ground.
-        duration: How long a run lasts unless told otherwise, in [s].
+        duration: Default duration of a run, in [s].
     """
 
     way: str = "straight"
@@ -58,12 +58,12 @@ class Trot:
     """A quadruped trots.
 
     Attributes:
-        way: Where it goes: "straight", in a "curve", in other "directions" (sideways or
+        way: Its path: "straight", in a "curve", in other "directions" (sideways or
             backward), or on the "spot" (turning or not).
-        height: How high the feet are lifted, as a share of the robot's usual height.
-        period: Time of a cycle, as a share of the robot's usual period.
+        height: How high the feet are lifted, as a share of the robot's nominal height.
+        period: Time of a cycle, as a share of the robot's nominal period.
         jitter: By which share each cycle's time varies.
-        duration: How long a run lasts unless told otherwise, in [s].
+        duration: Default duration of a run, in [s].
     """
 
     way: str = "straight"
@@ -74,4 +74,4 @@ class Trot:
 
 
 Motion: TypeAlias = Picks | Walk | Trot
-"""What a robot of some family does."""
+"""A motion of any family."""

@@ -1,6 +1,6 @@
 """A MuJoCo model made from a Pinocchio model: same joints, same order, same inertias.
 
-Only effectors and boxes touch; meshes are never read, so robots load whose meshes MuJoCo cannot.
+Only effectors and boxes collide; meshes are never read, so robots load whose meshes MuJoCo cannot.
 """
 
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ import numpy as np
 
 from noisemodel import RobotError
 from noisemodel.joints import Joint, table_of
+from scenarios.collision import add_boxes, add_effector, quaternion
 from scenarios.errors import UnsupportedModelError
 from scenarios.physics import Physics
 from scenarios.sensing import add_sensors
 from scenarios.shapes import Box, Effector
-from scenarios.touching import add_boxes, add_effector, quaternion
 
 TYPES = {
     "revolute": mujoco.mjtJoint.mjJNT_HINGE,
@@ -27,14 +27,14 @@ TYPES = {
 def build(
     model: Any, physics: Physics, *, effectors: Sequence[Effector] = (), boxes: Sequence[Box] = ()
 ) -> Any:
-    """Generate a MuJoCo model with one torque actuator per joint.
+    """MuJoCo model with one torque actuator per joint.
 
     Args:
         model: A ``pinocchio.Model``, any tree of revolute, continuous and prismatic joints, its
             root fixed or floating; every moving body has a mass.
-        physics: What the Pinocchio model does not say.
-        effectors: What of the robot touches.
-        boxes: Shapes of the world.
+        physics: Properties that the Pinocchio model lacks.
+        effectors: Parts of the robot that touch the world.
+        boxes: Obstacles and ground.
 
     Returns:
         A compiled ``mujoco.MjModel``; actuators are in joint order, sensors as `sensors_of` has

@@ -1,8 +1,8 @@
-"""Runs as NoisyTest 0.0.1 reads them: a ``.log`` of its noise, a ``.toml`` of its blocks.
+"""Files of NoisyTest 0.0.1: a ``.log`` of the noise of a run, a ``.toml`` of its blocks.
 
-Its reader skips lines that begin with ``#`` and one line more, so that the first sample is lost to
-it; it takes one blank between two numbers, and only floats among the times of blocks. It learns
-from a folder ``training`` and measures on a folder ``validation``, 10 kHz both.
+Its reader skips lines that begin with ``#`` and one line more, so that the first sample is
+lost; it requires one blank between two numbers, and floats as times of blocks. It trains on a
+folder ``training`` and validates on a folder ``validation``, both at 10 kHz.
 """
 
 import json
@@ -18,7 +18,7 @@ from scenarios.errors import SampleError
 from scenarios.sample import digest
 
 RATE = 10_000.0
-"""NoisyTest knows no other sample rate, in [Hz]."""
+"""The only sample rate of NoisyTest, in [Hz]."""
 VALIDATION = 4
 """One seed in so many is for validation."""
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
@@ -32,11 +32,11 @@ CONFIG = {
     "model": {"arguments": {"regularization": 1.1, "kernel_gamma": 5.7e-4}},
     "feature_preprocessor": {"arguments": {"fft_stride_length": 834}},
 }
-"""A configuration for it: our classes, and the paper's optimum for its RBF kernel."""
+"""A configuration: these classes, and the optimum of the paper for the RBF kernel."""
 
 
 def part(seed: int) -> str:
-    """Say whether runs of a seed are for "training" or "validation"."""
+    """The folder of a seed: "training" or "validation"."""
     return "validation" if seed % VALIDATION == VALIDATION - 1 else "training"
 
 
@@ -44,7 +44,7 @@ def write_config(folder: Path) -> None:
     """Write ``noisytest-config.json``, which NoisyTest takes with ``--config``.
 
     Args:
-        folder: Where to; a file that exists is replaced.
+        folder: The folder; an existing file is replaced.
 
     Raises:
         OutputError: If it cannot be written.
@@ -53,8 +53,8 @@ def write_config(folder: Path) -> None:
         temporary.write_text(json.dumps(CONFIG, indent=2) + "\n", encoding="ascii")
 
 
-def lacking(folder: Path) -> tuple[str, ...]:
-    """Say which classes have no block in a folder's ``training``.
+def missing_classes(folder: Path) -> tuple[str, ...]:
+    """Classes without a block in the folder ``training``.
 
     Raises:
         SampleError: If a ``.toml`` is damaged.
@@ -65,7 +65,7 @@ def lacking(folder: Path) -> tuple[str, ...]:
 
 
 def write(run: Run, log: Path) -> None:
-    """Write a run's simplified noise, and its blocks beside it; files that exist are replaced.
+    """Write the simplified noise of a run and its blocks; existing files are replaced.
 
     Args:
         run: A run as ``scenarios.simulate`` makes it.
@@ -86,16 +86,16 @@ def write(run: Run, log: Path) -> None:
 
 
 def read(log: Path) -> tuple[tuple[Block, ...], float]:
-    """Read what the ``.toml`` of a run says.
+    """Blocks and duration of a run, from its ``.toml``.
 
     Args:
         log: The ``.log``.
 
     Returns:
-        The blocks, and how long the run lasts, in [s].
+        The blocks, and the duration of the run, in [s].
 
     Raises:
-        SampleError: If it cannot be read, or is none of ours.
+        SampleError: If it cannot be read, or was not written by `write`.
     """
     path = log.with_suffix(".toml")
     try:
@@ -113,24 +113,7 @@ def read(log: Path) -> tuple[tuple[Block, ...], float]:
         raise SampleError(path, f"damaged ({' '.join(str(error).split())})") from error
 
 
-def annotations(blocks: Sequence[Block]) -> str:
-    """Labelled stretches as NoisyTest has them beside each of its logs.
-
-    Both numbers of a range are written with a decimal point: NoisyTest's TOML reader takes no mixed
-    ones.
-
-    Args:
-        blocks: Stretches with their labels.
-
-    Returns:
-        TOML: ``chunk_ranges`` and ``chunk_labels`` in a table ``data``.
-    """
-    ranges = "".join(f"    [{float(each.start)!r}, {float(each.stop)!r}],\n" for each in blocks)
-    labels = "".join(f"    {json.dumps(each.label, ensure_ascii=False)},\n" for each in blocks)
-    return f"[data]\nchunk_ranges = [\n{ranges}]\nchunk_labels = [\n{labels}]\n"
-
-
-def _simulation(run: Run) -> str:
-    """The recipe to make the run again, as a JSON text in TOML."""
+def _annotations(run: Run) -> str:
+    """The blocks, and the recipe to reproduce the run, as TOML."""
     recipe = json.dumps({**run.meta, "robot": run.robot, "sha256": digest(run)}, sort_keys=True)
     return f"\n[simulation]\nrecipe = {json.dumps(recipe)}\n"  # JSON's escapes are TOML's too

@@ -6,7 +6,7 @@ from noisemodel.types import Array
 
 
 def minimum_jerk(share: Array) -> Array:
-    """Path over time of the smoothest movement from rest to rest, both from 0 to 1.
+    """Minimum-jerk path from rest to rest, over time from 0 to 1.
 
     Flash and Hogan, The coordination of arm movements, J. Neuroscience 1985.
     """

@@ -1,4 +1,4 @@
-"""What a robot and its world are made of, beyond what a URDF says."""
+"""Physical properties of a simulation that a URDF lacks."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Physics:
-    """What a URDF does not say.
+    """Physical properties that a URDF lacks.
 
     Attributes:
         timestep: In [s].

@@ -12,7 +12,7 @@ from scenarios.errors import UnsupportedModelError
 
 
 class Reducible(Protocol):
-    """What a robot has to say of its joints; robots of every family do."""
+    """The joints of a robot; robots of every family have them."""
 
     @property
     def name(self) -> str:
@@ -24,17 +24,17 @@ class Reducible(Protocol):
 
     @property
     def held(self) -> Mapping[str, float]:
-        """Joints that are held elsewhere than at 0, and where, in [rad] or [m]."""
+        """Positions of the locked joints that are not at 0, in [rad] or [m]."""
 
 
 def reduced_model(robot: Reducible) -> Any:
-    """Read a robot's Pinocchio model, all joints locked that it does not move.
+    """Pinocchio model of a robot, with all other joints locked.
 
     Args:
         robot: The robot.
 
     Returns:
-        A ``pinocchio.Model``; every call gives the same one.
+        A ``pinocchio.Model``; every call returns the same one.
 
     Raises:
         UnsupportedModelError: If the URDF lacks a joint.

@@ -1,4 +1,4 @@
-"""What all robots that can be simulated have in common, and their list."""
+"""The robots that can be simulated."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -14,4 +14,4 @@ Simulated: TypeAlias = Arm | Humanoid | Quadruped
 _ROBOTS: tuple[Simulated, ...] = (TALOS, G1, GO2, SOLO12, ANYMAL, PANDA, UR5, UR10)
 
 ROBOTS: Mapping[str, Simulated] = MappingProxyType({robot.name: robot for robot in _ROBOTS})
-"""What can be simulated, by name."""
+"""The robots that can be simulated, by name."""

@@ -1,11 +1,11 @@
-"""One compact sample: a run's noise signals, its blocks, and the recipe to make it again.
+"""A sample: the noise signals of a run, its blocks, and the recipe to reproduce it.
 
 A sample file is an archive of plain arrays: ``format`` ("noise-sample/3"), ``robot``, ``rate`` in
 [Hz], ``block_start``, ``block_stop`` and ``block_label`` as in a run file, ``meta`` (a JSON object:
 the run's own, and the ``sha256`` of its arrays), and each signal under its name, float32, of shape
-(samples,). What signals there are is said in `scenarios.signals`. Noise cannot be lowered to
-another rate as velocities can, so that the norms of the run lowered to 1 kHz are there as well,
-as ``lowered_<name>``, and its joints' velocities at that rate as ``desired_joints`` and
+(samples,). `scenarios.signals` defines the signals. Noise cannot be decimated as velocities can:
+the file also has the norms of the run decimated to 1 kHz as ``lowered_<name>``, and the velocities
+of its joints at that rate as ``desired_joints`` and
 ``measured_joints``, float32, of shape (joints, samples).
 """
 
@@ -25,10 +25,10 @@ from scenarios.errors import SampleError, ScenarioError
 from scenarios.signals import WHOLE, Signals, joints, norms, signals, with_error
 
 FORMAT = "noise-sample/3"
-LOWERED = 1000.0
+DECIMATED = 1000.0
 """The second rate of the signals, in [Hz]."""
 CLOSE = 1e-3
-"""Rates that differ by less are the same."""
+"""Relative difference below which rates are equal."""
 PREFIX = "lowered_"
 DAMAGE = (
     OSError,
@@ -39,27 +39,27 @@ DAMAGE = (
     zipfile.BadZipFile,
     *runfile.DAMAGE,
 )
-"""What reading raises if a file is damaged, or another one than it seems."""
+"""Errors that reading raises if a file is damaged or of another kind."""
 RECIPE = frozenset(("scenario", "seed", "duration", "sha256"))
-"""What ``meta`` cannot lack if the run is to be made again."""
+"""Keys of ``meta`` that are needed to reproduce the run."""
 KEPT = ("desired_joints", "measured_joints")
-"""What is kept joint by joint: the error is their difference."""
+"""The stored signals by joint: the error is their difference."""
 _FACTS = ("format", "robot", "rate", "meta", "block_start", "block_stop", "block_label", *KEPT)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sample:
-    """What is kept of a simulated run.
+    """The noise signals of a simulated run.
 
     Attributes:
         robot: A name in ``scenarios.ROBOTS``.
         rate: Sample rate, in [Hz].
         signals: Noise signals by name, each of shape (samples,).
-        decimated: Norms of the run decimated to ``LOWERED``, as a slower logger has them.
+        decimated: Norms of the run decimated to ``DECIMATED``, as a slower logger has them.
         blocks: Annotated stretches.
         meta: The recipe, and the hash of the run's arrays.
-        joints: Desired, measured and error velocities of the lowered run, each of shape
-            (joints, samples); none where the rate is another one.
+        joints: Desired, measured and error velocities of the decimated run, each of shape
+            (joints, samples); none at another rate.
     """
 
     robot: str
@@ -72,8 +72,8 @@ class Sample:
 
     @classmethod
     def of(cls, run: Run) -> Self:
-        """Keep of a simulated run what a sample has."""
-        slower = decimated(run, LOWERED)
+        """The sample of a simulated run."""
+        slower = decimated(run, DECIMATED)
         return cls(
             robot=str(run.robot),
             rate=run.rate,
@@ -86,7 +86,7 @@ class Sample:
 
     @property
     def name(self) -> str:
-        """Robot, scenario and seed, as in the file's name."""
+        """Robot, scenario and seed, as in the path of its file."""
         return f"{self.robot}/{self.meta['scenario']}-{self.meta['seed']:03d}"
 
     @property
@@ -96,29 +96,29 @@ class Sample:
         return np.hypot(self.signals["measured"], self.signals["desired"])
 
     def at(self, rate: float) -> Self:
-        """Take the signals of another rate.
+        """The sample at another rate.
 
         Args:
-            rate: The rate of the sample, or ``LOWERED``, in [Hz].
+            rate: The rate of the sample, or ``DECIMATED``, in [Hz].
 
         Returns:
-            The sample with the signals that it keeps at that rate; without joints if it is its own.
+            The sample with its signals of that rate; without joints at its own rate.
 
         Raises:
-            ScenarioError: If it keeps none of that rate.
+            ScenarioError: If it has none of that rate.
         """
         if abs(rate / self.rate - 1) < CLOSE:
             return replace(self, joints={})
-        if abs(rate / LOWERED - 1) < CLOSE:
-            return replace(self, rate=LOWERED, signals=self.decimated)
+        if abs(rate / DECIMATED - 1) < CLOSE:
+            return replace(self, rate=DECIMATED, signals=self.decimated)
         raise ScenarioError(
-            f"{self.name}: keeps its noise at {self.rate:g} Hz and {LOWERED:g} Hz and no"
-            f" velocities, so that it cannot be brought to {rate:g} Hz; scenarios.again makes its"
-            " run again"
+            f"{self.name}: keeps its noise at {self.rate:g} Hz and {DECIMATED:g} Hz and no"
+            f" velocities, so that it cannot be decimated to {rate:g} Hz; scenarios.reproduce"
+            " simulates its run again"
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the sample, whole or not at all.
+        """Write the sample atomically.
 
         Args:
             path: The file to write, ``*.npz``.
@@ -145,19 +145,19 @@ class Sample:
 
         Args:
             path: A sample file.
-            only: Names of the signals to read; all unless given.
+            only: Names of the signals to read; by default all.
 
         Returns:
             The sample.
 
         Raises:
-            SampleError: If the file cannot be read, is no sample, or lacks a signal.
+            SampleError: If the file cannot be read, is not a sample, or lacks a signal.
         """
         path = Path(path)
         if not path.is_file():
             raise SampleError(path, "there is no such file")
         if not zipfile.is_zipfile(path):
-            raise SampleError(path, "no sample, or cut off: it is no whole archive")
+            raise SampleError(path, "not a sample, or truncated: not a complete archive")
         try:
             with np.load(path, allow_pickle=False) as archive:
                 return cls(**_fields(path, archive, only))
@@ -168,7 +168,7 @@ class Sample:
 
 
 def is_sample(path: str | Path) -> bool:
-    """Tell whether a file says of itself that it is a sample, of whatever version."""
+    """Whether a file is a sample, of any version."""
     if not zipfile.is_zipfile(path):
         return False
     try:
@@ -179,7 +179,7 @@ def is_sample(path: str | Path) -> bool:
 
 
 def digest(run: Run) -> str:
-    """Hash the arrays of a run: names, shapes, every bit of every signal, and the blocks."""
+    """SHA-256 of the arrays of a run: names, shapes, every bit of every signal, and the blocks."""
     arrays = {
         "time": run.time,
         "velocity": run.velocity,

@@ -1,4 +1,4 @@
-"""What a simulated robot can sense, and where it stands in the vector of all sensors."""
+"""The sensors of a simulated robot, and their slices in the vector of all sensors."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,7 +15,7 @@ BASE_SENSORS = {
     "centre.place": "SUBTREECOM",
     "centre.velocity": "SUBTREELINVEL",
 }
-"""What a floating robot knows of its base and of its centre of mass, in the world's axes: positions
+"""Sensors of the floating base and of the centre of mass, in the world's axes: positions
 in [m], the quaternion (w, x, y, z), velocities in [m/s], the angular velocity in [rad/s]."""
 
 
@@ -24,7 +24,7 @@ def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> N
 
     Args:
         spec: The ``mujoco.MjSpec``, with a site on each effector.
-        effectors: What of the robot touches.
+        effectors: Parts of the robot that touch the world.
         root: The base's body, if it floats.
     """
     for effector in effectors:
@@ -42,16 +42,16 @@ def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> N
 
 
 def sensors_of(model: Any) -> dict[str, slice]:
-    """Find the sensors of a model that `scenarios.mujoco_model.build` made.
+    """Slices of the sensors of a model from `scenarios.mujoco_model.build`.
 
     Args:
         model: The ``mujoco.MjModel``.
 
     Returns:
-        Where each sensor's values are, by name: ``<frame>.touch`` of each effector, its contact
-        force in [N]; ``<frame>.force`` and ``<frame>.torque`` of each sole, what the sole bears in
-        [N] and [N m], in the sole's axes, with MuJoCo's
-        sign: negate them for what the ground does to the foot. Floating robots have
+        Slice of each sensor in the vector of all, by name: ``<frame>.touch`` of each effector, its
+        contact force in [N]; ``<frame>.force`` and ``<frame>.torque`` of each sole, the load of the
+        sole in [N] and [N m], in the sole's axes, with MuJoCo's sign: negate them for the force of
+        the ground on the foot. Floating robots have
         ``<frame>.place`` of each effector in [m], and those of ``BASE_SENSORS``.
     """
     return {

@@ -1,4 +1,4 @@
-"""The shapes that touch one another in a simulation."""
+"""The shapes that collide in a simulation."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -12,8 +12,8 @@ class Box:
         centre: x, y, z of its centre, in [m].
         half: Half of its edge lengths, in [m].
         yaw: How far it is turned about the vertical, in [rad].
-        since: When it comes to be, in [s]: what lies where a foot stands would be inside of it.
-        until: When it is gone, in [s].
+        since: When it appears, in [s]: a box where a foot stands would intersect the foot.
+        until: When it vanishes, in [s].
     """
 
     centre: tuple[float, float, float]
@@ -49,7 +49,7 @@ class Rod:
 
     @property
     def patch(self) -> tuple[float, float]:
-        """Half of the extent of what touches, in [m]."""
+        """Half of the extent of the contact area, in [m]."""
         return (self.radius, self.radius)
 
 
@@ -89,9 +89,9 @@ class Ball:
 
     @property
     def patch(self) -> tuple[float, float]:
-        """Half of the extent of what touches, in [m]."""
+        """Half of the extent of the contact area, in [m]."""
         return (self.radius, self.radius)
 
 
 Effector: TypeAlias = Rod | Sole | Ball
-"""What a robot touches the world with."""
+"""A part of a robot that touches the world."""

@@ -1,4 +1,4 @@
-"""The noise signals that a sample keeps of a run."""
+"""The noise signals of a run that a sample has."""
 
 from collections.abc import Mapping
 from functools import lru_cache
@@ -20,7 +20,7 @@ WHOLE = ("measured", "desired", "error")
 
 
 def signals(run: Run) -> Signals:
-    """Reduce a simulated run to noise signals.
+    """Noise signals of a simulated run.
 
     Args:
         run: A run as ``scenarios.simulate`` makes it.
@@ -33,10 +33,10 @@ def signals(run: Run) -> Signals:
 
 
 def norms(run: Run) -> Signals:
-    """Reduce a run to the norms of its velocities, in [rad/s].
+    """Norms of the velocities of a run, in [rad/s].
 
     Args:
-        run: A run as ``scenarios.simulate`` makes it, or one that was lowered.
+        run: A run as ``scenarios.simulate`` makes it, or a decimated one.
 
     Returns:
         ``measured`` (a floating base's six count too), ``desired`` and ``error``, their
@@ -56,10 +56,10 @@ def norms(run: Run) -> Signals:
 
 
 def joints(run: Run) -> Signals:
-    """Take the velocities of a run joint by joint.
+    """Velocities of a run by joint.
 
     Args:
-        run: A run as ``scenarios.simulate`` makes it, lowered.
+        run: A decimated run of ``scenarios.simulate``.
 
     Returns:
         As `with_error`, of all joints.
@@ -70,7 +70,7 @@ def joints(run: Run) -> Signals:
 
 
 def with_error(desired: NDArray[np.float32], measured: NDArray[np.float32]) -> Signals:
-    """Name what goes joint by joint.
+    """Velocities by joint, with their error.
 
     Args:
         desired: Velocities, shape (joints, samples), in [rad/s].
@@ -91,7 +91,7 @@ def _single(found: Mapping[str, Array]) -> Signals:
 
 
 def _power(run: Run) -> dict[str, Array]:
-    """Compute the total sound power; extended noise is the sum of both (paper, Sec. II-A)."""
+    """Total sound power; extended noise is the sum of both (paper, Sec. II-A)."""
     robot, surface = _surface(str(run.robot))
     desired = robot.desired(run)
     if surface is None or desired is None:

@@ -1,4 +1,4 @@
-"""From a robot, a scenario and a seed to a labelled run."""
+"""Labelled runs, from a robot, a scenario and a seed."""
 
 from dataclasses import asdict, dataclass
 from functools import lru_cache
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from scenarios.loop import Motion, Scene
 
 RECIPE = 2
-"""Version of all that makes a run; one more whenever a seed gives another run than before."""
+"""Version of the simulation; it increases whenever a seed gives another run than before."""
 SHORTEST = 3.0
-"""Time in which every defect can act, in [s]."""
+"""Least duration, in which every defect can act, in [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """One run as it was simulated, not yet labelled."""
+    """One simulated run without labels."""
 
     motion: "Motion"
     events: tuple[Event, ...]
@@ -49,31 +49,31 @@ class Trial:
 
 
 def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | None = None) -> Run:
-    """Simulate a robot at 10 kHz in a scenario, and label what can be felt.
+    """Labelled run of a robot in a scenario, simulated at 10 kHz.
 
     The run without the defect and with the same seed, its twin, is simulated too; labels follow
-    from the difference by the rule in `scenarios.labels`. The twin is a run in which the robot
-    does the same with nothing wrong; scenarios in which it does the same share it.
+    from the difference by the rule in `scenarios.labels`. Scenarios with the same motion share
+    their twin.
 
     Args:
         robot: A name in ``scenarios.ROBOTS``.
         scenario: A name in ``scenarios.SCENARIOS``, or its number.
-        seed: Draws the motion, what is imperfect about the robot, and the defect; at least 0.
-        duration: How long the run shall last, in [s]; the motion's own unless given.
+        seed: Random seed of the motion, the imperfections and the defect; at least 0.
+        duration: Duration of the run, in [s]; by default that of the motion.
 
     Returns:
-        The run; the same call gives the same run, bit for bit. Stages ``planned`` and
-        ``commanded`` are the velocities before and after feedback; ``meta`` tells what was
-        drawn, and what each event left in the motion.
+        The run; equal arguments give equal runs, bit for bit. Stages ``planned`` and
+        ``commanded`` are the velocities before and after feedback; ``meta`` has the
+        drawn values, and the effect of each event on the motion.
 
     Raises:
-        ScenarioError: If the robot or the scenario is not known, one has no meaning on the
-            other, the seed is negative, or the duration too short.
+        ScenarioError: If the robot or the scenario is not known, the robot does not have the
+            scenario, the seed is negative, or the duration too short.
         MissingSimulatorError: If MuJoCo is not installed.
         SimulationError: If the simulation diverged, or the robot fell.
     """
-    line, machine = look_up(robot, scenario)
-    case = line.cases[machine.family]
+    entry, simulated = look_up(robot, scenario)
+    case = entry.cases[simulated.family]
     duration = case.motion.duration if duration is None else duration
     if seed < 0:
         raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
@@ -87,21 +87,21 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
 
     try:
         twin = _twin(robot, Case(case.motion), seed, duration)
-        trial = twin if line.healthy else _try(machine, case, seed, duration)
+        trial = twin if entry.healthy else _trial(simulated, case, seed, duration)
     except DivergedError as error:
-        raise SimulationError(robot, line.name, seed, error.time, error.problem) from error
+        raise SimulationError(robot, entry.name, seed, error.time, error.problem) from error
     blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, trial.events, rate=RATE)
     motion = trial.motion
-    held = [joint for joint, angle in machine.held.items() if angle]
+    held = [joint for joint, angle in simulated.held.items() if angle]
     still = np.zeros((len(motion.velocity), len(held)))
-    posture = still + [machine.held[joint] for joint in held]
+    posture = still + [simulated.held[joint] for joint in held]
 
     def whole(signal: Array, others: Array = still) -> Any:
         return np.hstack((signal, others)).astype(np.float32)
 
     return Run(
         time=times(len(motion.velocity), STEP),
-        joint_names=(*machine.drives.joints, *held),
+        joint_names=(*simulated.drives.joints, *held),
         velocity=whole(motion.velocity),
         position=whole(motion.position, posture),
         velocity_desired=whole(motion.velocity_desired),
@@ -113,8 +113,8 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
         blocks=blocks,
         meta={
             "source": "simulation",
-            "scenario": line.name,
-            "number": line.number,
+            "scenario": entry.name,
+            "number": entry.number,
             "seed": int(seed),
             "duration": float(duration),
             "recipe": RECIPE,
@@ -133,45 +133,45 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
 
 
 def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
-    """Find a scenario and a robot that go together.
+    """A scenario and a robot by their names.
 
     Args:
         robot: A name in ``scenarios.ROBOTS``.
         scenario: A name in ``scenarios.SCENARIOS``, or its number.
 
     Returns:
-        Both.
+        The scenario and the robot.
 
     Raises:
-        ScenarioError: If one is not known, or has no meaning on the other.
+        ScenarioError: If one is not known, or the robot does not have the scenario.
     """
     if robot not in ROBOTS:
         raise UnsimulatedRobotError(robot, ROBOTS)
-    numbers = {str(line.number): name for name, line in SCENARIOS.items()}
+    numbers = {str(entry.number): name for name, entry in SCENARIOS.items()}
     name = numbers.get(str(scenario), str(scenario))
     if name not in SCENARIOS:
         raise UnknownScenarioError(name, SCENARIOS)
-    machine, line = ROBOTS[robot], SCENARIOS[name]
-    if machine.family not in line.cases:
-        suited = [name for name, other in SCENARIOS.items() if machine.family in other.cases]
+    simulated, entry = ROBOTS[robot], SCENARIOS[name]
+    if simulated.family not in entry.cases:
+        suited = [name for name, other in SCENARIOS.items() if simulated.family in other.cases]
         raise UnsuitedScenarioError(name, robot, suited)
-    return line, machine
+    return entry, simulated
 
 
 @lru_cache(maxsize=1)
 def _twin(robot: str, healthy: Case, seed: int, duration: float) -> Trial:
-    """Simulate the run without a defect; scenarios of one motion and seed share it."""
-    return _try(ROBOTS[robot], healthy, seed, duration)
+    """Run without the defect; scenarios of one motion and seed share it."""
+    return _trial(ROBOTS[robot], healthy, seed, duration)
 
 
-def _try(robot: Simulated, case: Case, seed: int, duration: float) -> Trial:
-    """Simulate one run; each kind of chance has a stream of its own, so twins differ in one."""
+def _trial(robot: Simulated, case: Case, seed: int, duration: float) -> Trial:
+    """One run; each kind of randomness has its own stream, so that twins differ in one only."""
     family = import_module(f"scenarios.{robot.family}.scene")
     streams = np.random.SeedSequence(seed).spawn(4)
-    motion, machine, sensors, defect = (np.random.default_rng(stream) for stream in streams)
+    motion, robot_rng, sensors, defect = (np.random.default_rng(stream) for stream in streams)
     plan: Plan = family.plan(robot, case.motion, motion, duration)
     imperfections = Imperfections.draw(
-        machine,
+        robot_rng,
         len(robot.drives.joints),
         bodies=family.bodies(robot),
         payload=robot.payload,
@@ -179,13 +179,13 @@ def _try(robot: Simulated, case: Case, seed: int, duration: float) -> Trial:
     )
     faults = case.defect.draw(defect, plan)
     scene = family.scene(robot, plan, faults, imperfections)
-    moved = _move(robot, scene, plan, faults, imperfections, sensors)
+    recorded = _record(robot, scene, plan, faults, imperfections, sensors)
     return Trial(
-        moved, faults.events + unplanned(moved.contact, plan.contacts), faults, imperfections
+        recorded, faults.events + unplanned(recorded.contact, plan.contacts), faults, imperfections
     )
 
 
-def _move(
+def _record(
     robot: Simulated,
     scene: "Scene",
     plan: Plan,
@@ -193,24 +193,24 @@ def _move(
     imperfections: Imperfections,
     rng: np.random.Generator,
 ) -> "Motion":
-    """Give the robot its drives and its sensors' errors, and let it move."""
+    """Record the scene with the drives of the robot and the errors of its sensors."""
     from scenarios.drives import Drives
     from scenarios.loop import record
     from scenarios.sensing import sensors_of
 
-    given = robot.drives
-    joints = len(given.joints)
+    nominal = robot.drives
+    joints = len(nominal.joints)
     drives = Drives(
         scene.start[-joints:],
-        stiffness=np.array(given.stiffness) * imperfections.stiffness,
-        damping=np.array(given.damping) * imperfections.damping,
-        limit=np.array(given.torque),
+        stiffness=np.array(nominal.stiffness) * imperfections.stiffness,
+        damping=np.array(nominal.damping) * imperfections.damping,
+        limit=np.array(nominal.torque),
         offset=faults.offsets(joints),
         imperfections=imperfections,
         step=STEP,
     )
-    moving = len(plan.time)
-    ticks = scene.settling + moving
+    recording = len(plan.time)
+    ticks = scene.settling + recording
     sensor_error = scene.noise * rng.standard_normal((ticks, len(scene.noise)))
     where = sensors_of(scene.model)
     for name, signal in faults.sensors.items():
@@ -218,7 +218,7 @@ def _move(
     overlay = None
     if faults.overlay is not None:
         overlay = np.zeros((ticks * STEPS, scene.effectors, 2))
-        overlay[scene.settling * STEPS :] = faults.overlay(times(moving * STEPS, STEP))
+        overlay[scene.settling * STEPS :] = faults.overlay(times(recording * STEPS, STEP))
     noise = rng.standard_normal((ticks * STEPS, joints))
     return record(
         scene,
@@ -230,10 +230,10 @@ def _move(
 
 
 def _base(motion: "Motion") -> dict[str, Any]:
-    """Turn a floating base from MuJoCo's conventions to Pinocchio's; nothing if it is fixed."""
+    """Pose and velocity of a floating base in Pinocchio's conventions; empty if it is fixed."""
     if not motion.base_pose.size:
         return {}
-    from scenarios.base import pinocchio_base
+    from scenarios.floatingbase import pinocchio_base
 
     pose, velocity = pinocchio_base(motion.base_pose, motion.base_velocity)
     return {"base_pose": pose.astype(np.float32), "base_velocity": velocity.astype(np.float32)}

@@ -1,7 +1,7 @@
-"""The scenarios, as data: what a robot does, what goes wrong, and which labels may come of it.
+"""The scenarios, as data: motions, defects, and the classes that their runs may have.
 
-Numbers 1 to 24 are those of the paper's table (Sygulla & Rixen, Table I), with a humanoid's
-parameters as there; what follows was added. Where a family has an equivalent, it stands beside.
+Numbers 1 to 24 are those of the paper's table (Sygulla & Rixen, Table I), with its
+parameters for humanoids; the others were added. Other families have equivalents where possible.
 """
 
 from collections.abc import Mapping
@@ -19,11 +19,11 @@ class Scenario:
     """One line of the table.
 
     Attributes:
-        number: Its number; up to 24 the paper's.
-        name: What it is called.
-        description: What happens, in one sentence.
-        labels: The classes that its runs may contain.
-        cases: What it is for each family of robots on which it has a meaning.
+        number: Its number; up to 24 that of the paper.
+        name: Its name.
+        description: One sentence.
+        labels: The classes that its runs may have.
+        cases: Motion and defect for each family of robots that has it.
     """
 
     number: int
@@ -34,47 +34,47 @@ class Scenario:
 
     @property
     def families(self) -> tuple[str, ...]:
-        """The families of robots on which it has a meaning."""
+        """The families of robots that have it."""
         return tuple(self.cases)
 
     @property
     def healthy(self) -> bool:
-        """Whether nothing goes wrong in it."""
+        """Whether it has no failure."""
         return self.labels == ("ok",)
 
 
 _OK = ("ok",)
-_BLOW = ("ok", "impact", "highaccelerations")
+_IMPACT = ("ok", "impact", "highaccelerations")
 _FAST = ("ok", "highaccelerations", "oscillations", "impact")
-_SWING = ("ok", "oscillations", "impact")
+_OSCILLATION = ("ok", "oscillations", "impact")
 
 _LINES = (
     (1, "straight", "Nothing is wrong: straight ahead, or from place to place.", _OK),
     (2, "curve", "Nothing is wrong: in a curve.", _OK),
     (3, "directions", "Nothing is wrong: sideways, backward, or any way.", _OK),
     (4, "spot", "Nothing is wrong: on the spot.", _OK),
-    (5, "obstacle-full", "An undetected obstacle under the whole foot.", _BLOW),
-    (6, "obstacle-heel", "An undetected obstacle under the heel.", _BLOW),
-    (7, "obstacle-toe", "An undetected obstacle under the toe.", _BLOW),
-    (8, "obstacle-left", "An undetected obstacle under the left side of a foot.", _BLOW),
-    (9, "obstacle-right", "An undetected obstacle under the right side of a foot.", _BLOW),
-    (10, "decalibrated", "An encoder is off.", _BLOW),
+    (5, "obstacle-full", "An undetected obstacle under the whole foot.", _IMPACT),
+    (6, "obstacle-heel", "An undetected obstacle under the heel.", _IMPACT),
+    (7, "obstacle-toe", "An undetected obstacle under the toe.", _IMPACT),
+    (8, "obstacle-left", "An undetected obstacle under the left side of a foot.", _IMPACT),
+    (9, "obstacle-right", "An undetected obstacle under the right side of a foot.", _IMPACT),
+    (10, "decalibrated", "An encoder is off.", _IMPACT),
     *(
         (
             11 + index,
             multisine(low, high),
             f"Sines of {low} to {high} Hz are superposed on the height of feet or tool.",
-            _SWING,
+            _OSCILLATION,
         )
         for index, (low, high) in enumerate(BANDS)
     ),
-    (20, "early-height", "Repeated early contact, at varied heights of the motion.", _BLOW),
-    (21, "early-duration", "Repeated early contact, at varied durations of the motion.", _BLOW),
+    (20, "early-height", "Repeated early contact, at varied heights of the motion.", _IMPACT),
+    (21, "early-duration", "Repeated early contact, at varied durations of the motion.", _IMPACT),
     (22, "platform", "Ground that is not there: a partial contact at an edge, a step down.", _FAST),
     (23, "force-jump", "The signal of a force sensor jumps.", _FAST),
     (24, "torque-jump", "The signal of a torque sensor, or of an attitude, jumps.", _FAST),
-    (25, "limit-cycle", "Force control with too high gains becomes a limit cycle.", _SWING),
-    (26, "faint-oscillation", "Sines in any of the bands, of 0.01 to 2 mm.", _SWING),
+    (25, "limit-cycle", "Force control with too high gains becomes a limit cycle.", _OSCILLATION),
+    (26, "faint-oscillation", "Sines in any of the bands, of 0.01 to 2 mm.", _OSCILLATION),
     (27, "reference-jump", "The planned motion jumps by millimetres.", _FAST),
 )
 

@@ -1,4 +1,4 @@
-"""Which runs make a data set, and in which order."""
+"""The runs of a data set, and their order."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,20 +12,20 @@ from scenarios.simulation import look_up
 from scenarios.table import SCENARIOS
 
 Choice: TypeAlias = Mapping[str, tuple[str, ...]]
-"""Scenarios of each robot, by names."""
+"""Names of the scenarios of each robot."""
 
-LEAST = 20
-"""So many runs have to be known before it is said that too many fall."""
+LEAST_RUNS = 20
+"""Number of runs from which too many falls are an error."""
 
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """A run that a data set is to have.
+    """A run of a data set.
 
     Attributes:
         robot: A name in ``scenarios.ROBOTS``.
-        scenario: A name in ``scenarios.SCENARIOS`` that has a meaning on it.
-        seed: The seed.
+        scenario: A name in ``scenarios.SCENARIOS`` that the robot has.
+        seed: The random seed.
     """
 
     robot: str
@@ -34,19 +34,19 @@ class Task:
 
     @property
     def name(self) -> str:
-        """Robot, scenario and seed, as samples are called."""
+        """Robot, scenario and seed: the name of its sample."""
         return f"{self.robot}/{self.scenario}-{self.seed:03d}"
 
 
 def choose(
     robots: Sequence[str], scenarios: Sequence[str] = (), *, healthy: bool = False
 ) -> dict[str, tuple[str, ...]]:
-    """Look up which scenarios each robot is to go through.
+    """Scenarios of each robot.
 
     Args:
         robots: Names in ``scenarios.ROBOTS``.
-        scenarios: Names or numbers; all unless given. Robots pass over what they have not.
-        healthy: Whether to keep only those in which nothing goes wrong.
+        scenarios: Names or numbers; by default all. A robot skips those that it does not have.
+        healthy: Whether to keep only scenarios without a failure.
 
     Returns:
         Scenarios of each robot, in the order of the table.
@@ -61,7 +61,7 @@ def choose(
         chosen[robot] = tuple(name for name in names if SCENARIOS[name].healthy or not healthy)
         if not chosen[robot]:
             of_list = f"of {', '.join(scenarios)} " if scenarios else ""
-            ok = " in which nothing goes wrong" if healthy else ""
+            ok = " without a failure" if healthy else ""
             everything = ", ".join(_suited(robot, tuple(SCENARIOS)))
             raise DatasetError(
                 f"no scenario {of_list}is left for {robot!r}{ok}; it has {everything}"
@@ -70,17 +70,17 @@ def choose(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Wish:
-    """What a data set is to have: some seeds, or some hours.
+class DatasetSpec:
+    """The size of a data set: a number of seeds, or of hours.
 
     Attributes:
         choice: Scenarios of each robot.
         first: The first seed.
         seeds: How many seeds; 8 unless hours are given.
-        hours: Time that all runs are to last together, in [h].
+        hours: Total duration of all runs, in [h].
 
     Raises:
-        DatasetError: If both are given, or a number cannot be.
+        DatasetError: If both are given, or a number is out of range.
     """
 
     choice: Choice
@@ -92,24 +92,24 @@ class Wish:
         """Check the numbers."""
         if self.seeds is not None and self.hours is not None:
             raise DatasetError(
-                f"{self.seeds} seeds and {self.hours:g} hours are asked for; name one of them"
+                f"{self.seeds} seeds and {self.hours:g} hours; expected one of the two"
             )
         if self.first < 0:
             raise DatasetError(f"the first seed is {self.first}, expected 0 or more")
         if self.seeds is not None and self.seeds < 1:
-            raise DatasetError(f"{self.seeds} seeds are asked for, expected 1 or more")
+            raise DatasetError(f"{self.seeds} seeds, expected 1 or more")
         if self.hours is not None and not 0 < self.hours < float("inf"):
-            raise DatasetError(f"{self.hours:g} hours are asked for, expected more than 0")
+            raise DatasetError(f"{self.hours:g} hours, expected more than 0")
 
     def tasks(self, *, duration: float | None = None, fallen: Collection[Task] = ()) -> list[Task]:
-        """List the runs, seed by seed.
+        """The runs, seed by seed.
 
         Args:
-            duration: How long each run lasts, in [s]; as its motion says unless given.
-            fallen: Runs that are known to fill no time.
+            duration: Duration of each run, in [s]; by default that of its motion.
+            fallen: Runs that fell and do not count towards the hours.
 
         Raises:
-            DatasetError: If a robot falls more often than not, so that no time is filled.
+            DatasetError: If a robot falls in more than half of its runs.
         """
         if self.hours is None:
             last = self.first + (8 if self.seeds is None else self.seeds)
@@ -127,16 +127,16 @@ class Wish:
     def _fill(
         self, robot: str, seconds: float, duration: float | None, fallen: set[Task]
     ) -> list[Task]:
-        """List the runs of as many seeds as it takes to fill a time."""
+        """The runs of as many seeds as a duration takes."""
         tasks: list[Task] = []
         filled, lost = 0.0, 0
         for seed in count(self.first):
             if filled >= seconds:
                 break
-            if lost > len(tasks) / 2 and len(tasks) >= LEAST:
+            if lost > len(tasks) / 2 and len(tasks) >= LEAST_RUNS:
                 raise DatasetError(
                     f"{robot} fell in {lost} of {len(tasks)} runs, so that {seconds:.0f} s cannot"
-                    " be filled; take other scenarios"
+                    " be reached; take other scenarios"
                 )
             for task in self._seed(robot, seed):
                 tasks.append(task)
@@ -147,14 +147,14 @@ class Wish:
         return tasks
 
 
-def together(tasks: Iterable[Task]) -> list[tuple[Task, ...]]:
-    """Put runs together that share their twin: one robot, one seed, one motion.
+def grouped_by_twin(tasks: Iterable[Task]) -> list[tuple[Task, ...]]:
+    """Runs in groups that share their twin: one robot, one seed, one motion.
 
     Args:
         tasks: Runs.
 
     Returns:
-        Groups of them, in the order of their first runs.
+        The groups, in the order of their first runs.
     """
     groups: dict[object, list[Task]] = {}
     for task in tasks:
@@ -167,7 +167,7 @@ def _motion(task: Task) -> Motion:
 
 
 def _suited(robot: str, scenarios: Sequence[str]) -> tuple[str, ...]:
-    """Names of those scenarios that have a meaning on a robot, in the order of the table."""
+    """Names of those scenarios that a robot has, in the order of the table."""
     names = set()
     for scenario in scenarios:
         try:

@@ -1,4 +1,4 @@
-"""Inverse kinematics of a whole robot on a floating base, square and exact.
+"""Inverse kinematics of a whole robot on a floating base, by square Newton steps.
 
 The equations, in this order, all in the world's axes: for each effector the place of its point,
 and, if it is a sole, its turn; then the centre of mass; then the turn of the base. A biped with
@@ -17,15 +17,15 @@ from scenarios.shapes import Effector, Sole
 
 
 class WholeBody:
-    """Follows targets with one Newton step per call.
+    """Inverse kinematics with one Newton step per call.
 
     Args:
         model: A ``pinocchio.Model`` on a free-flyer.
-        effectors: What it stands on.
+        effectors: The parts that it stands on.
         start: Configuration to start from, shape (nq,).
 
     Attributes:
-        configuration: The configuration that it has come to, as Pinocchio has it, shape (nq,).
+        configuration: The present configuration, as Pinocchio has it, shape (nq,).
         inverse: Inverse Jacobian of the last step: velocities, as Pinocchio has them, per rates of
             the equations, shape (nv, nv).
 
@@ -57,14 +57,14 @@ class WholeBody:
     def follow(
         self, places: Array, turns: Sequence[Array], centre: Array, base: Array, *, steps: int = 1
     ) -> Array:
-        """Step towards targets; one step is enough for those that have moved by millimetres.
+        """Configuration after Newton steps; one is enough for targets that moved by millimetres.
 
         Args:
             places: Of the effectors' points, shape (effectors, 3), in [m].
-            turns: Rotation matrix of each sole, shape (3, 3); those of balls are not looked at.
+            turns: Rotation matrix of each sole, shape (3, 3); those of balls are ignored.
             centre: Of mass, shape (3,), in [m].
             base: Rotation matrix of the base, shape (3, 3).
-            steps: How many Newton steps are taken.
+            steps: Number of Newton steps.
 
         Returns:
             The new configuration, shape (nq,).
@@ -91,11 +91,11 @@ class WholeBody:
         return self.configuration
 
     def hold(self, bearing: Array) -> Array:
-        """Find the torques that hold the robot still while the ground bears it.
+        """Torques that hold the robot still under ground forces.
 
         Args:
-            bearing: What the ground does to each effector's point, in the order of the equations:
-                force, in [N], and, for a sole, torque, in [N m].
+            bearing: Ground force on each effector's point, in the order of the equations: force, in
+                [N], and, for a sole, torque, in [N m].
 
         Returns:
             Torques of the joints, shape (joints,), in [N m].
@@ -116,7 +116,7 @@ class WholeBody:
 
 
 def _add_point(model: Any, effector: Effector) -> int:
-    """Add an effector's point as a frame."""
+    """Add the point of an effector as a frame; its index."""
     if not model.existFrame(effector.frame):
         known = ", ".join(frame.name for frame in model.frames)
         raise UnsupportedModelError(
@@ -132,5 +132,5 @@ def _add_point(model: Any, effector: Effector) -> int:
 
 
 def _turn(rotation: Array, wanted: Array) -> Array:
-    """Turn that leads from one rotation to another, in the world's axes, shape (3,), in [rad]."""
+    """Rotation vector from one rotation to another, in the world's axes, shape (3,), in [rad]."""
     return np.asarray(rotation @ pin.log3(rotation.T @ wanted))

@@ -25,7 +25,7 @@ def test_humanoids_have_all_scenarios():
     assert set(HUMANOID) == set(SCENARIOS)
 
 
-def test_talos_meets_what_the_paper_names():
+def test_faults_of_talos_have_the_sizes_of_the_paper():
     tops = [box.top for box in drawn("early-height").boxes]
     assert tops == pytest.approx([0.02] * len(tops))
     for name, axis, size in (("force-jump", 2, 400.0), ("torque-jump", 0, 30.0)):
@@ -39,7 +39,7 @@ def test_talos_meets_what_the_paper_names():
         assert abs(felt[axis]) == pytest.approx(size)
 
 
-def test_a_smaller_robot_meets_smaller_faults():
+def test_a_smaller_robot_has_smaller_faults():
     high, low = (drawn("early-height", robot).boxes[0].top for robot in (TALOS, G1))
     assert low == pytest.approx(G1.size * high)
     for name, power in (("force-jump", 3), ("torque-jump", 4)):
@@ -50,7 +50,7 @@ def test_a_smaller_robot_meets_smaller_faults():
 @pytest.mark.parametrize(
     ("side", "axis", "sign"), [("heel", 0, -1), ("toe", 0, 1), ("left", 1, 1), ("right", 1, -1)]
 )
-def test_an_obstacle_lies_under_the_named_part_of_a_sole_alone(side, axis, sign):
+def test_an_obstacle_lies_only_under_the_named_part_of_a_sole(side, axis, sign):
     plan = plan_of()
     (box,) = drawn(f"obstacle-{side}").boxes
     (contact,) = [one for one in plan.contacts if one.approach == box.since and one.start > 0]

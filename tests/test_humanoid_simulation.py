@@ -133,7 +133,7 @@ def test_the_drives_stay_far_from_their_limits(straight):
     assert error.std() < 0.02
 
 
-def test_an_obstacle_is_met_early_and_felt_as_an_impact(obstacle):
+def test_an_obstacle_is_an_early_contact_and_an_impact(obstacle):
     (event, *_) = obstacle.meta["events"]
     assert event["label"] == "impact"
     assert event["facts"]["force"] > 300
@@ -147,7 +147,7 @@ def test_runs_are_the_same_until_the_obstacle_is_met(straight, obstacle):
     np.testing.assert_array_equal(obstacle.velocity[:onset], straight.velocity[:onset])
 
 
-def test_an_obstacle_is_answered_by_the_controller_and_was_not_planned(straight, obstacle):
+def test_an_obstacle_changes_the_command_and_not_the_plan(straight, obstacle):
     planned, commanded = (
         np.abs(obstacle.stages[stage] - straight.stages[stage]).max()
         for stage in ("planned", "commanded")
@@ -174,7 +174,7 @@ def test_humanoids_walk_every_way_without_an_event(robot, way):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["full", "heel", "toe", "left", "right"])
-def test_obstacles_under_any_part_of_a_sole_are_felt(side):
+def test_obstacles_under_any_part_of_a_sole_are_impacts(side):
     run = scenarios.simulate("talos", f"obstacle-{side}", 2)
     assert "impact" in {block.label for block in run.blocks}
 
@@ -186,7 +186,7 @@ def test_too_high_gains_end_in_oscillations():
 
 
 @pytest.mark.slow
-def test_a_platform_that_is_left_with_a_partial_contact_is_felt():
+def test_a_partial_contact_at_the_edge_of_a_platform_is_labelled():
     run = scenarios.simulate("talos", "platform", 2)
     assert {"ok", "highaccelerations"} <= {block.label for block in run.blocks}
     assert run.base_pose[-1, 2] == pytest.approx(run.base_pose[0, 2] - 0.06, abs=0.02)

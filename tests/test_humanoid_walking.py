@@ -66,7 +66,7 @@ def test_feet_start_and_land_softly(way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_the_foot_in_the_air_bears_nothing_and_the_other_one_all(way):
+def test_the_foot_in_the_air_bears_no_weight_and_the_other_one_all(way):
     plan = plan_of(way)
     assert (plan.left[plan.swinging == 0] == 0).all()
     assert (plan.left[plan.swinging == 1] == 1).all()
@@ -118,7 +118,7 @@ def test_a_platform_is_left_over_its_edge(robot):
         assert (toe[resting] < edge).all()
 
 
-def test_contacts_tell_when_feet_stand_and_when_they_are_high_in_the_air():
+def test_contacts_state_when_feet_stand_and_when_they_are_highest():
     plan = plan_of()
     standing = [contact for contact in plan.contacts if contact.start <= 0]
     assert sorted(contact.effector for contact in standing) == [0, 1]

@@ -1,4 +1,4 @@
-"""The commands that simulate: one run, or a data set that can be stopped and goes on."""
+"""`inspector simulate`: one run, or a data set that resumes."""
 
 import json
 import os
@@ -111,7 +111,7 @@ def test_one_run_is_made_by_name_or_number(inspector, simulated, tmp_path, comma
     assert Run.load(output).meta["seed"] == 3
 
 
-def test_a_data_set_is_made_and_told_and_not_made_twice(inspector, simulated, tmp_path):
+def test_a_data_set_is_made_once_and_its_statistics_are_printed(inspector, simulated, tmp_path):
     simulated.falls.add(("obstacle-toe", 5))
     call = many("--seeds", 2, "--first-seed", 4, "--scenarios", "1,7", "-o", tmp_path)
     status, out, err = inspector(*call)
@@ -125,7 +125,7 @@ def test_a_data_set_is_made_and_told_and_not_made_twice(inspector, simulated, tm
     assert len(simulated.calls) == 4
 
 
-def test_hours_of_ok_motion_are_made_and_falls_made_up_for(inspector, simulated, tmp_path):
+def test_hours_of_ok_motion_are_reached_in_spite_of_falls(inspector, simulated, tmp_path):
     simulated.falls.add(("curve", 0))
     call = many("--only", "ok", "--hours", 100 / 3600, "--duration", 5, "-o", tmp_path, "--json")
     status, out, _ = inspector(*call)
@@ -136,7 +136,7 @@ def test_hours_of_ok_motion_are_made_and_falls_made_up_for(inspector, simulated,
     assert upright["curve"] == {"upright": 5, "runs": 6}
 
 
-def test_noisytests_form_tells_which_classes_it_lacks(inspector, simulated, tmp_path):
+def test_the_format_of_noisytest_names_its_missing_classes(inspector, simulated, tmp_path):
     status, _, err = inspector(
         *many("--seeds", 4, "--scenarios", 1, "--format", "noisytest", "-o", tmp_path)
     )
@@ -154,14 +154,14 @@ def test_noisytests_form_tells_which_classes_it_lacks(inspector, simulated, tmp_
         (["--scenarios", "1,dance"], "no scenario 'dance'"),
         (["--scenarios", "99"], "no scenario '99'"),
         (["--scenarios", "torque-jump"], "no scenario of torque-jump is left for 'panda'"),
-        (["--scenarios", "7", "--only", "ok"], "is left for 'panda' in which nothing goes wrong"),
-        (["--seeds", "0"], "0 seeds are asked for"),
+        (["--scenarios", "7", "--only", "ok"], "is left for 'panda' without a failure"),
+        (["--seeds", "0"], "0 seeds, expected 1 or more"),
         (["--first-seed", "-1"], "the first seed is -1"),
-        (["--seeds", "1", "--hours", "1"], "name one of them"),
+        (["--seeds", "1", "--hours", "1"], "expected one of the two"),
         (["--duration", "1"], "duration 1 s: expected at least 3 s"),
     ],
 )
-def test_what_cannot_be_is_one_line_and_begins_nothing(
+def test_wrong_settings_are_one_line_and_simulate_nothing(
     inspector, simulated, tmp_path, arguments, problem
 ):
     status, out, err = inspector(*many(*arguments, "-o", tmp_path / "data"))
@@ -171,24 +171,24 @@ def test_what_cannot_be_is_one_line_and_begins_nothing(
     assert simulated.calls == []
 
 
-def test_outputs_that_cannot_be_are_one_line(inspector, simulated, tmp_path):
+def test_wrong_outputs_are_one_line(inspector, simulated, tmp_path):
     (tmp_path / "file").write_text("precious")
     status, _, err = inspector(*many("-o", tmp_path / "file"))
     assert (status, err.count("\n")) == (3, 1)
     assert "file: is a file; name a folder" in err
     status, _, err = inspector(*many("-o", tmp_path))
     assert (status, err.count("\n")) == (3, 1)
-    assert "holds something else" in err
+    assert "holds other files" in err
     assert (tmp_path / "file").read_text() == "precious"
 
 
-def test_a_damaged_sample_is_named_and_made_again_if_told(inspector, simulated, tmp_path):
+def test_a_damaged_sample_is_named_and_replaced_with_overwrite(inspector, simulated, tmp_path):
     call = many("--seeds", 2, "--scenarios", 1, "-o", tmp_path)
     inspector(*call)
     (tmp_path / "panda/straight-001.npz").write_bytes(b"PK")
     status, _, err = inspector(*call)
     assert (status, err.count("\n")) == (3, 1)
-    assert "straight-001.npz: no sample, or cut off" in err
+    assert "straight-001.npz: not a sample, or truncated" in err
     status, out, _ = inspector(*call, "--overwrite")
     assert status == 0
     assert "2 runs" in out
@@ -204,7 +204,7 @@ def test_without_the_simulator_one_line_says_what_to_install(inspector, tmp_path
     assert not (tmp_path / "r.npz").exists()
 
 
-def test_a_model_learns_from_a_folder_of_samples(inspector, simulated, tmp_path):
+def test_a_model_is_trained_on_a_folder_of_samples(inspector, simulated, tmp_path):
     data, model = tmp_path / "data", tmp_path / "m.npz"
     inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
     status, out, _ = inspector("train", data, "-o", model)
@@ -219,7 +219,7 @@ def test_a_model_learns_from_a_folder_of_samples(inspector, simulated, tmp_path)
     assert np.array(json.loads(out)["confusion"]).sum() == 2 * 7
 
 
-def test_a_sample_without_a_block_is_passed_over(simulated, inspector, tmp_path):
+def test_a_sample_without_a_block_is_skipped(simulated, inspector, tmp_path):
     data, model = tmp_path / "data", tmp_path / "m.npz"
     inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
     one = data / "panda/straight-002.npz"
@@ -231,7 +231,7 @@ def test_a_sample_without_a_block_is_passed_over(simulated, inspector, tmp_path)
     assert (status, found["runs"], np.array(found["confusion"]).sum()) == (0, 3, 2 * 2 * 7)
 
 
-def test_samples_and_their_runs_are_heard_alike(simulated, inspector, tmp_path):
+def test_samples_and_their_runs_have_equal_signals(simulated, inspector, tmp_path):
     inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
     stub("panda", "straight", 0, 7.0).save(tmp_path / "run.npz")
     sample, run = recordings([tmp_path / "data", tmp_path / "run.npz"], 10_000.0)
@@ -242,7 +242,7 @@ def test_samples_and_their_runs_are_heard_alike(simulated, inspector, tmp_path):
     assert sample.sha256 == Sample.load(tmp_path / "data/panda/straight-000.npz").meta["sha256"]
 
 
-def test_samples_cannot_be_lowered_to_another_rate(simulated, inspector, tmp_path):
+def test_samples_cannot_be_decimated_to_another_rate(simulated, inspector, tmp_path):
     inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
     status, _, err = inspector("train", tmp_path / "data", "--rate", 500, "-o", tmp_path / "m.npz")
     assert (status, err.count("\n")) == (3, 1)
@@ -250,7 +250,7 @@ def test_samples_cannot_be_lowered_to_another_rate(simulated, inspector, tmp_pat
 
 
 @pytest.mark.slow
-def test_a_data_set_that_is_killed_goes_on_where_it_was(tmp_path):
+def test_a_data_set_that_is_killed_resumes(tmp_path):
     data = tmp_path / "data"
     call = [
         *(sys.executable, "-m", "inspector"),

@@ -15,7 +15,7 @@ def plan(robot=GO2, seed=2, **motion):
     return scene.plan(robot, Trot(**motion), np.random.default_rng(seed), 5.0)
 
 
-def test_every_scenario_of_the_table_has_a_meaning_on_quadrupeds():
+def test_quadrupeds_have_every_scenario_of_the_table():
     assert set(SCENARIOS) == set(QUADRUPED)
 
 

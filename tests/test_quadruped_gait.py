@@ -28,7 +28,7 @@ def test_pairs_swing_in_turn_and_never_together(timing):
     assert 5.5 - 0.55 <= timing[-1].touch <= 5.5
 
 
-def test_cycles_vary_as_much_as_they_are_told(timing):
+def test_cycles_vary_by_the_given_share(timing):
     cycles = np.diff([beat.begin for beat in timing[::2]])
     assert cycles.min() >= 0.45
     assert cycles.max() <= 0.55
@@ -37,7 +37,7 @@ def test_cycles_vary_as_much_as_they_are_told(timing):
     assert np.mean(stands) / cycles.mean() == pytest.approx(DUTY, abs=0.02)
 
 
-def test_the_feet_share_the_weight_and_none_bears_in_the_air(timing):
+def test_the_feet_share_the_weight_and_feet_in_the_air_bear_none(timing):
     load, share = loads(TIME, timing), swings(TIME, timing)
     np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
     assert load.min() == 0

@@ -40,14 +40,14 @@ def trot():
     """A healthy trot of Go2, and its plan."""
     rng = np.random.default_rng(np.random.SeedSequence(SEED).spawn(1)[0])
     plan = scene.plan(GO2, Trot(), rng, SHORT)
-    return simulation._try(GO2, Case(Trot()), SEED, SHORT), plan
+    return simulation._trial(GO2, Case(Trot()), SEED, SHORT), plan
 
 
 @pytest.fixture(scope="module")
 def stumble():
     """The same trot over an obstacle."""
     case = QUADRUPED["obstacle-full"]
-    return simulation._try(GO2, case, SEED, SHORT)
+    return simulation._trial(GO2, case, SEED, SHORT)
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
@@ -88,7 +88,7 @@ def test_the_feet_bear_the_weight(trot):
     assert borne == pytest.approx(weight, rel=5e-3)
 
 
-def test_the_trot_goes_where_it_is_told(trot):
+def test_the_trot_follows_its_plan(trot):
     trial, plan = trot
     way = trial.motion.base_pose[::10, :2] - trial.motion.base_pose[0, :2]
     planned = plan.centre[:, :2] - plan.centre[0, :2]
@@ -192,7 +192,7 @@ def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["go2", "solo12", "anymal"])
 @pytest.mark.parametrize("name", FAILURE)
-def test_a_scenario_keeps_its_promise_on_every_quadruped(robot, name):
+def test_a_scenario_has_its_failure_on_every_quadruped(robot, name):
     if (robot, name) == ("anymal", "decalibrated"):
         pytest.skip("every step of ANYmal differs from its twin's then, impacts do not stand out")
     run = scenarios.simulate(robot, name, 1)

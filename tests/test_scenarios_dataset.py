@@ -1,4 +1,4 @@
-"""A data set is made run by run: what is missing, once, and never half."""
+"""A data set is simulated run by run: each missing run once, written atomically."""
 
 import errno
 import json
@@ -12,19 +12,19 @@ import pytest
 import scenarios
 from noisemodel import Block, Run, runfile
 from scenarios import dataset, folder
-from scenarios.balance import Balance
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.sample import Sample
-from scenarios.tasks import Task, Wish, choose, together
+from scenarios.statistics import Statistics
+from scenarios.tasks import DatasetSpec, Task, choose, grouped_by_twin
 
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
-ALL = Wish(choice=choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2).tasks()
+ALL = DatasetSpec(choice=choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2).tasks()
 
 
 @pytest.fixture
 def simulated(monkeypatch):
-    """Let nothing be simulated, and list what would have been; "fall" holds runs that fall."""
+    """Replace the simulation; `calls` lists its calls, `falls` has the runs that fall."""
     calls, falls = [], set()
 
     def simulate(robot, scenario, seed, *, duration=None):
@@ -40,7 +40,7 @@ def simulated(monkeypatch):
 
 
 def stub(task: Task, duration: float) -> Run:
-    """A run of nonsense, a second of which is recorded."""
+    """A random run of one second."""
     generator = np.random.default_rng(task.seed)
     joints = scenarios.ROBOTS[task.robot].drives.joints
     signal = generator.normal(size=(10_000, len(joints))).astype(np.float32)
@@ -60,16 +60,16 @@ def files(path) -> set[str]:
     return {file.relative_to(path).as_posix() for file in path.rglob("*") if file.is_file()}
 
 
-def test_robots_pass_over_scenarios_that_they_do_not_have():
+def test_robots_skip_scenarios_that_they_do_not_have():
     choice = choose(["talos", "panda"], ["straight", "torque-jump", "1"])
     assert choice == {"talos": ("straight", "torque-jump"), "panda": ("straight",)}
 
 
-def test_healthy_scenarios_alone_can_be_chosen():
+def test_scenarios_without_a_failure_can_be_chosen():
     assert choose(["panda"], healthy=True) == {"panda": ("straight", "curve", "directions", "spot")}
 
 
-def test_what_cannot_be_chosen_is_one_line():
+def test_unknown_robots_and_scenarios_are_refused():
     with pytest.raises(scenarios.UnsimulatedRobotError, match="robot 'baxter' cannot be simulated"):
         choose(["panda", "baxter"])
     with pytest.raises(scenarios.UnknownScenarioError, match="no scenario 'tow'.*obstacle-toe"):
@@ -82,7 +82,7 @@ def test_what_cannot_be_chosen_is_one_line():
     ):
         choose(["talos", "panda"], ["torque-jump"])
     with pytest.raises(
-        scenarios.DatasetError, match="no scenario of 7 is left for 'panda' in which nothing goes"
+        scenarios.DatasetError, match="no scenario of 7 is left for 'panda' without a failure"
     ):
         choose(["panda"], ["7"], healthy=True)
     with pytest.raises(scenarios.DatasetError, match="no robot is named; there are talos"):
@@ -92,21 +92,21 @@ def test_what_cannot_be_chosen_is_one_line():
 @pytest.mark.parametrize(
     ("numbers", "problem"),
     [
-        ({"seeds": 0}, "0 seeds are asked for, expected 1 or more"),
+        ({"seeds": 0}, "0 seeds, expected 1 or more"),
         ({"first": -1}, "the first seed is -1, expected 0 or more"),
-        ({"hours": 0.0}, "0 hours are asked for, expected more than 0"),
+        ({"hours": 0.0}, "0 hours, expected more than 0"),
         ({"hours": float("nan")}, "nan hours"),
-        ({"seeds": 2, "hours": 1.0}, "2 seeds and 1 hours are asked for; name one of them"),
+        ({"seeds": 2, "hours": 1.0}, "2 seeds and 1 hours; expected one of the two"),
     ],
 )
-def test_numbers_that_cannot_be_are_refused(numbers, problem):
+def test_numbers_out_of_range_are_refused(numbers, problem):
     with pytest.raises(scenarios.DatasetError, match=problem):
-        Wish(choice={"panda": ("straight",)}, **numbers)
+        DatasetSpec(choice={"panda": ("straight",)}, **numbers)
 
 
-def test_runs_that_share_their_twin_are_made_together():
-    tasks = Wish(choice=choose(["panda", "ur5"]), seeds=2).tasks()
-    groups = together(tasks)
+def test_runs_that_share_their_twin_are_one_group():
+    tasks = DatasetSpec(choice=choose(["panda", "ur5"]), seeds=2).tasks()
+    groups = grouped_by_twin(tasks)
     assert sorted(task for group in groups for task in group) == sorted(tasks)
     assert len(set(tasks)) == len(tasks)
     twins = set()
@@ -118,10 +118,10 @@ def test_runs_that_share_their_twin_are_made_together():
     assert max(map(len, groups)) > 10
 
 
-def test_hours_are_filled_evenly_over_robots_and_no_further():
+def test_hours_are_divided_evenly_between_robots():
     choice = choose(["panda", "ur5"], healthy=True)
     seconds = {}
-    for task in Wish(choice=choice, hours=0.2, first=5).tasks():
+    for task in DatasetSpec(choice=choice, hours=0.2, first=5).tasks():
         assert task.seed >= 5
         motion = scenarios.SCENARIOS[task.scenario].cases["arm"].motion
         seconds.setdefault(task.robot, []).append(motion.duration)
@@ -129,19 +129,19 @@ def test_hours_are_filled_evenly_over_robots_and_no_further():
         assert 360 <= sum(mine) < 360 + sum(mine[:4])
 
 
-def test_a_run_that_fell_fills_no_time():
+def test_a_run_that_fell_does_not_count_towards_the_hours():
     choice = choose(["panda"], healthy=True)
-    wish = Wish(choice=choice, hours=100 / 3600)
-    tasks = wish.tasks(duration=5.0)
+    spec = DatasetSpec(choice=choice, hours=100 / 3600)
+    tasks = spec.tasks(duration=5.0)
     assert len(tasks) == 20
-    more = wish.tasks(duration=5.0, fallen=tasks[:1])
+    more = spec.tasks(duration=5.0, fallen=tasks[:1])
     assert more[: len(tasks)] == tasks
     assert len(more) == 24
     with pytest.raises(scenarios.DatasetError, match="panda fell in 20 of 20 runs, so that 100 s"):
-        wish.tasks(duration=5.0, fallen=more)
+        spec.tasks(duration=5.0, fallen=more)
 
 
-def test_all_is_made_once_and_nothing_is_redone(simulated, tmp_path):
+def test_every_run_is_simulated_once(simulated, tmp_path):
     place = Folder.opened(tmp_path / "data")
     made = list(make(place, ALL))
     assert sorted(made) == sorted(ALL) == sorted(simulated.calls)
@@ -153,7 +153,7 @@ def test_all_is_made_once_and_nothing_is_redone(simulated, tmp_path):
     assert Sample.load(place.path / "panda/curve-001.npz").name == "panda/curve-001"
 
 
-def test_what_was_stopped_goes_on_where_it_was(simulated, tmp_path):
+def test_a_data_set_that_was_interrupted_resumes(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     assert len(list(islice(make(place, ALL), 4))) == 4
     assert len(place.kept()) == 4
@@ -161,7 +161,7 @@ def test_what_was_stopped_goes_on_where_it_was(simulated, tmp_path):
     assert sorted(simulated.calls) == sorted(ALL)
 
 
-def test_a_run_that_fell_is_recorded_counted_and_not_redone(simulated, tmp_path):
+def test_a_run_that_fell_is_recorded_and_not_simulated_again(simulated, tmp_path):
     fallen = Task("panda", "obstacle-toe", 1)
     simulated.falls.add(fallen)
     place = Folder.opened(tmp_path)
@@ -171,13 +171,13 @@ def test_a_run_that_fell_is_recorded_counted_and_not_redone(simulated, tmp_path)
     assert (record["time"], record["problem"], record["seed"]) == (1.25, "it fell", 1)
     assert record["recipe"] == folder.RECIPE
     assert list(make(place, ALL)) == []
-    balance = Balance.of(place)
-    assert balance.upright["panda"]["obstacle-toe"] == (1, 2)
-    assert balance.upright["ur5"]["obstacle-toe"] == (2, 2)
-    assert "1 of which fell" in str(balance)
+    statistics = Statistics.of(place)
+    assert statistics.upright["panda"]["obstacle-toe"] == (1, 2)
+    assert statistics.upright["ur5"]["obstacle-toe"] == (2, 2)
+    assert "1 of which fell" in str(statistics)
 
 
-def test_frames_are_counted_that_lie_whole_in_a_block_and_one_for_a_shorter_block(
+def test_complete_frames_of_a_block_count_and_one_for_a_shorter_block(
     simulated, tmp_path, monkeypatch
 ):
     lengths = (0.39, 0.4, 0.4999, 0.5, 1.25)
@@ -186,28 +186,28 @@ def test_frames_are_counted_that_lie_whole_in_a_block_and_one_for_a_shorter_bloc
     monkeypatch.setattr(Folder, "read", lambda *_: (blocks, 7.0))
     place = Folder.opened(tmp_path)
     list(make(place, ALL[:1]))
-    amount = Balance.of(place).amounts["panda"]["ok"]
+    amount = Statistics.of(place).amounts["panda"]["ok"]
     assert amount.blocks == 5
     assert amount.seconds == pytest.approx(sum(lengths))
     assert amount.frames == 1 + 1 + 1 + 2 + 9
 
 
-def test_the_tables_are_data_too(simulated, tmp_path):
+def test_statistics_are_plain_data_too(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     list(make(place, ALL))
-    balance = json.loads(json.dumps(Balance.of(place).as_dict()))
-    assert balance["upright"]["panda"]["curve"] == {"upright": 2, "runs": 2}
-    assert balance["classes"]["ur5"]["ok"] == {"blocks": 6, "seconds": 3.0, "frames": 12}
-    assert balance["cpu"]["panda"]["simulated"] == 42.0
-    assert balance["cpu"]["panda"]["seconds"] > 0
-    assert balance["bytes"] == sum((tmp_path / name).stat().st_size for name in files(tmp_path))
+    statistics = json.loads(json.dumps(Statistics.of(place).as_dict()))
+    assert statistics["upright"]["panda"]["curve"] == {"upright": 2, "runs": 2}
+    assert statistics["classes"]["ur5"]["ok"] == {"blocks": 6, "seconds": 3.0, "frames": 12}
+    assert statistics["cpu"]["panda"]["simulated"] == 42.0
+    assert statistics["cpu"]["panda"]["seconds"] > 0
+    assert statistics["bytes"] == sum((tmp_path / name).stat().st_size for name in files(tmp_path))
 
 
-def test_an_empty_data_set_has_empty_tables(tmp_path):
-    assert "0 runs" in str(Balance.of(Folder.opened(tmp_path)))
+def test_an_empty_data_set_has_empty_statistics(tmp_path):
+    assert "0 runs" in str(Statistics.of(Folder.opened(tmp_path)))
 
 
-def test_lines_of_times_that_are_damaged_are_passed_over(simulated, tmp_path):
+def test_damaged_lines_of_processor_times_are_skipped(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     list(make(place, ALL))
     with (tmp_path / "times.csv").open("a") as times:
@@ -225,7 +225,7 @@ def test_lines_of_times_that_are_damaged_are_passed_over(simulated, tmp_path):
         ({"format": "noise-dataset/2"}, 'made with format "noise-dataset/2"'),
     ],
 )
-def test_a_folder_that_was_made_in_another_way_is_refused(tmp_path, change, problem):
+def test_a_folder_with_other_settings_is_refused(tmp_path, change, problem):
     Folder.opened(tmp_path)
     made = json.loads((tmp_path / "dataset.json").read_text())
     (tmp_path / "dataset.json").write_text(json.dumps({**made, **change}))
@@ -233,16 +233,16 @@ def test_a_folder_that_was_made_in_another_way_is_refused(tmp_path, change, prob
         Folder.opened(tmp_path)
 
 
-def test_outputs_that_are_no_folder_for_a_data_set_are_refused(tmp_path):
+def test_outputs_that_cannot_hold_a_data_set_are_refused(tmp_path):
     (tmp_path / "notes.txt").write_text("precious")
     with pytest.raises(scenarios.DatasetError, match=r"notes\.txt: is a file; name a folder"):
         Folder.opened(tmp_path / "notes.txt")
-    with pytest.raises(scenarios.DatasetError, match="holds something else"):
+    with pytest.raises(scenarios.DatasetError, match="holds other files"):
         Folder.opened(tmp_path)
     with pytest.raises(scenarios.DatasetError, match="cannot be made"):
         Folder.opened(tmp_path / "notes.txt" / "data")
-    with pytest.raises(scenarios.DatasetError, match="no form 'csv' of data sets; there are samp"):
-        Folder.opened(tmp_path / "data", form="csv")
+    with pytest.raises(scenarios.DatasetError, match="no format 'csv' of data sets; there are"):
+        Folder.opened(tmp_path / "data", format_name="csv")
     with pytest.raises(scenarios.DatasetError, match="duration 1 s: expected at least 3 s"):
         Folder.opened(tmp_path / "data", duration=1.0)
     (tmp_path / "odd").mkdir()
@@ -252,7 +252,7 @@ def test_outputs_that_are_no_folder_for_a_data_set_are_refused(tmp_path):
     assert files(tmp_path) == {"notes.txt", "odd/dataset.json"}
 
 
-def test_a_full_disk_is_one_line_and_leaves_nothing_half(simulated, tmp_path, monkeypatch):
+def test_a_full_disk_is_one_line_and_leaves_no_partial_file(simulated, tmp_path, monkeypatch):
     place = Folder.opened(tmp_path)
     written = []
     pack = runfile._pack
@@ -267,7 +267,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half(simulated, tmp_path, mo
     monkeypatch.setattr(runfile, "_pack", full)
     with pytest.raises(
         scenarios.DatasetError,
-        match=r"-000\.npz: cannot be written \(No space left on device\); started again, it",
+        match=r"-000\.npz: cannot be written \(No space left on device\); the same command resumes",
     ):
         list(make(place, ALL))
     assert len(place.kept()) == 3
@@ -277,7 +277,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing_half(simulated, tmp_path, mo
     assert len(list(make(place, ALL))) == len(ALL) - 3
 
 
-def test_what_a_killed_run_left_is_removed_when_it_is_made_again(simulated, tmp_path):
+def test_temporary_files_of_a_killed_process_are_removed(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     (tmp_path / "panda").mkdir()
     (tmp_path / "panda" / ".straight-000.npz.x1y2z3").write_bytes(b"half")
@@ -286,14 +286,15 @@ def test_what_a_killed_run_left_is_removed_when_it_is_made_again(simulated, tmp_
     assert not [name for name in files(tmp_path) if "x1y2z3" in name]
 
 
-def test_a_damaged_sample_is_named_and_made_again_only_if_told(simulated, tmp_path):
+def test_a_damaged_sample_is_replaced_only_with_overwrite(simulated, tmp_path):
     place = Folder.opened(tmp_path)
     list(make(place, ALL))
     path = tmp_path / "ur5/curve-001.npz"
     whole = path.read_bytes()
     path.write_bytes(whole[:5000])
     with pytest.raises(
-        scenarios.SampleError, match=r"ur5/curve-001\.npz: no sample, or cut off.*--overwrite makes"
+        scenarios.SampleError,
+        match=r"ur5/curve-001\.npz: not a sample, or.*--overwrite replaces",
     ):
         place.clear(overwrite=False)
     assert path.stat().st_size == 5000
@@ -303,7 +304,7 @@ def test_a_damaged_sample_is_named_and_made_again_only_if_told(simulated, tmp_pa
     assert len(simulated.calls) == len(ALL) + 1
 
 
-def test_without_mujoco_nothing_is_begun_but_a_finished_set_is_read(
+def test_without_mujoco_nothing_is_simulated_but_a_complete_data_set_is_read(
     simulated, tmp_path, monkeypatch
 ):
     place = Folder.opened(tmp_path)
@@ -328,7 +329,7 @@ def test_samples_of_other_robots_are_not_mistaken(simulated, tmp_path):
 
 @pytest.mark.slow
 def test_several_processes_make_the_same_files_as_one(tmp_path):
-    tasks = Wish(choice=choose(["panda"], ["2", "3", "7"]), seeds=1).tasks()
+    tasks = DatasetSpec(choice=choose(["panda"], ["2", "3", "7"]), seeds=1).tasks()
     places = [Folder.opened(tmp_path / str(jobs), duration=3.0) for jobs in (1, 2)]
     for jobs, place in enumerate(places, start=1):
         assert sorted(make(place, tasks, jobs=jobs)) == sorted(tasks)
@@ -338,10 +339,10 @@ def test_several_processes_make_the_same_files_as_one(tmp_path):
 
 
 @pytest.mark.slow
-def test_what_goes_wrong_in_another_process_is_one_line_here(tmp_path):
+def test_an_error_in_another_process_is_one_line(tmp_path):
     place = replace(Folder.opened(tmp_path), duration=1.0)
-    tasks = Wish(choice=choose(["panda"], ["2", "3"]), seeds=1).tasks()
+    tasks = DatasetSpec(choice=choose(["panda"], ["2", "3"]), seeds=1).tasks()
     with pytest.raises(
-        scenarios.DatasetError, match="duration 1 s: expected at least 3 s; started"
+        scenarios.DatasetError, match="duration 1 s: expected at least 3 s; the same command"
     ):
         list(make(place, tasks, jobs=2))

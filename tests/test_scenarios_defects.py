@@ -52,7 +52,7 @@ def test_the_same_seed_draws_the_same_faults(name, plan):
 
 
 @pytest.mark.parametrize("name", ARM)
-def test_a_defect_announces_only_labels_that_its_scenario_lists(name, plan):
+def test_events_of_a_defect_have_labels_of_its_scenario(name, plan):
     faults = ARM[name].defect.draw(np.random.default_rng(0), plan)
     assert {event.label for event in faults.events} <= set(SCENARIOS[name].labels)
 

@@ -55,13 +55,13 @@ def test_a_steady_turn_is_reported_with_its_speed():
     assert speeds[-1] == pytest.approx(0.7, rel=1e-6)
 
 
-def test_positions_come_in_whole_counts():
+def test_positions_are_whole_counts():
     count = 2 * np.pi / 2**22
     position, _ = drives().read(np.array([10.4 * count]), np.zeros(1))
     assert position[0] == pytest.approx(10 * count, rel=1e-9)
 
 
-def test_encoder_noise_does_not_drown_slow_motion():
+def test_encoder_noise_does_not_mask_slow_motion():
     drive, rng = drives(encoder_bits=21), np.random.default_rng(0)
     speeds = [drive.read(np.zeros(1), 1e-6 * rng.standard_normal(1))[1][0] for _ in range(5000)]
     assert 1e-5 < np.std(speeds) < 3e-3
@@ -149,7 +149,7 @@ def test_the_tool_sinks_at_gain_times_force_while_nothing_pushes_back():
     assert sunk == pytest.approx(1e-3 * 20 * ticks * TICK, rel=0.01)
 
 
-def test_the_tool_stays_while_the_force_is_as_wanted():
+def test_the_tool_stays_while_the_force_is_as_desired():
     ticks = 100
     _, model = tool_control(plan_from(np.zeros((ticks, 3)), np.nan))
     here = tip(model, np.array(PANDA.rest))

@@ -6,13 +6,13 @@ import pinocchio as pin
 import pytest
 
 from noisemodel import Robot
-from scenarios.base import pinocchio_base
+from scenarios.collision import box_changes, set_collision
 from scenarios.errors import UnsupportedModelError
+from scenarios.floatingbase import pinocchio_base
 from scenarios.mujoco_model import build
 from scenarios.physics import Physics
 from scenarios.sensing import sensors_of
 from scenarios.shapes import Ball, Box, Rod, Sole
-from scenarios.touching import changes_of, put
 
 ODD = """<robot name="odd"><link name="base"/>
 <link name="a"><inertial><origin xyz="0.1 0 0.2" rpy="0.3 0 0"/><mass value="2"/>
@@ -97,7 +97,7 @@ def test_actuators_are_the_joints_in_pinocchio_order(model):
     assert built.nq == built.nv == model.nv
 
 
-def test_a_rod_touches_with_its_tip_and_feels_the_weight_that_rests_on_it():
+def test_a_rod_touches_with_its_tip_and_its_sensor_measures_the_weight_on_it():
     urdf = """<robot name="lift"><link name="base"/><link name="tool"><inertial>
       <mass value="2"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>
       </inertial></link><joint name="slide" type="prismatic"><parent link="base"/>
@@ -119,7 +119,7 @@ def test_a_rod_touches_with_its_tip_and_feels_the_weight_that_rests_on_it():
     assert data.sensordata[0] == pytest.approx(2 * 9.81, rel=1e-3)
 
 
-def test_a_floating_base_falls_freely_and_is_known_to_its_sensors():
+def test_a_floating_base_falls_freely_and_its_sensors_measure_it():
     model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
     model.inertias[1] = pin.Inertia.FromSphere(3.0, 0.1)
     built = build(model, physics(model.nv - 6), effectors=(Ball("a", radius=0.01),))
@@ -140,7 +140,7 @@ def test_a_floating_base_falls_freely_and_is_known_to_its_sensors():
     np.testing.assert_allclose(data.sensordata[where["base.turn"]], data.qpos[3:7])
 
 
-def test_the_base_is_told_in_pinocchios_words():
+def test_the_base_is_converted_to_pinocchios_conventions():
     rng = np.random.default_rng(3)
     model = pin.buildModelFromXML(ODD, pin.JointModelFreeFlyer())
     model.inertias[1] = pin.Inertia.FromSphere(3.0, 0.1)
@@ -161,7 +161,7 @@ def test_the_base_is_told_in_pinocchios_words():
     np.testing.assert_allclose(ours.oMi[1].translation, theirs.qpos[:3], rtol=0, atol=1e-12)
 
 
-def test_a_sole_feels_the_weight_that_it_bears():
+def test_a_sole_measures_the_weight_that_it_bears():
     urdf = """<robot name="block"><link name="base"><inertial><mass value="4"/>
       <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
       <link name="foot"><inertial><mass value="1"/>
@@ -188,7 +188,7 @@ def test_a_sole_feels_the_weight_that_it_bears():
     assert data.sensordata[where["foot.place"]][2] == pytest.approx(0, abs=1e-3)
 
 
-def test_boxes_come_and_go():
+def test_boxes_appear_and_vanish():
     boxes = (
         Box((0, 0, 0), (1, 1, 1)),
         Box((0, 0, 0), (1, 1, 1), since=0.5, until=0.8),
@@ -196,16 +196,16 @@ def test_boxes_come_and_go():
     model = pin.buildModelFromXML(ODD)
     built = build(model, physics(model.nv), boxes=boxes)
     late = built.geom("box1").id
-    assert changes_of(built, boxes) == {500: [(late, True)], 800: [(late, False)]}
+    assert box_changes(built, boxes) == {500: [(late, True)], 800: [(late, False)]}
     assert (built.geom_contype[late], built.geom_contype[built.geom("box0").id]) == (0, 2)
-    put(built, late, there=True)
+    set_collision(built, late, present=True)
     assert built.geom_contype[late] == 2
 
 
-def test_an_effector_without_its_frame_is_answered_with_what_there_is():
+def test_an_effector_without_its_frame_is_refused_with_the_known_frames():
     model = pin.buildModelFromXML(ODD)
     with pytest.raises(
-        UnsupportedModelError, match="no frame 'sole' to touch with; it has .*slide"
+        UnsupportedModelError, match="no frame 'sole' for an effector; it has .*slide"
     ):
         build(model, physics(model.nv), effectors=(Ball("sole", radius=0.01),))
 

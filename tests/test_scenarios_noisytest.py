@@ -1,4 +1,4 @@
-"""Runs go out in NoisyTest's form, and come back the same."""
+"""Runs in the file format of NoisyTest are read as they were written."""
 
 import csv
 import json
@@ -15,7 +15,7 @@ from noisemodel import Block, Run
 from scenarios import dataset, noisytest
 from scenarios.dataset import make
 from scenarios.folder import Folder
-from scenarios.tasks import Wish, choose
+from scenarios.tasks import DatasetSpec, choose
 
 META = {
     "scenario": "obstacle-toe",
@@ -41,7 +41,7 @@ def run() -> Run:
     )
 
 
-def test_a_run_comes_back_as_it_went_out(run, tmp_path):
+def test_a_run_is_read_as_it_was_written(run, tmp_path):
     noisytest.write(run, tmp_path / "panda.log")
     (read,) = models.noisytest.read_folder(tmp_path, rate=noisytest.RATE)
     np.testing.assert_allclose(
@@ -65,7 +65,7 @@ def test_frames_of_a_folder_are_those_of_its_runs(run, tmp_path):
     np.testing.assert_allclose(read.frames, direct.frames, atol=2e-6)  # in single precision
 
 
-def test_noisytests_own_reader_would_understand_the_log(run, tmp_path):
+def test_the_log_follows_the_rules_of_noisytests_reader(run, tmp_path):
     """It skips lines with # and one more, then takes one blank between two numbers."""
     noisytest.write(run, tmp_path / "panda.log")
     with (tmp_path / "panda.log").open(newline="") as file:
@@ -106,8 +106,8 @@ def test_one_seed_of_four_is_for_validation(run, tmp_path, monkeypatch):
         return replace(run, meta={**META, "scenario": scenario, "seed": seed})
 
     monkeypatch.setattr(dataset, "simulate", simulate)
-    place = Folder.opened(tmp_path, form="noisytest")
-    tasks = Wish(choice=choose(["panda"], ["1"]), seeds=8).tasks()
+    place = Folder.opened(tmp_path, format_name="noisytest")
+    tasks = DatasetSpec(choice=choose(["panda"], ["1"]), seeds=8).tasks()
     assert len(list(make(place, tasks))) == 8
     assert list(make(place, tasks)) == []
     parts = {
@@ -117,7 +117,7 @@ def test_one_seed_of_four_is_for_validation(run, tmp_path, monkeypatch):
     assert parts["validation"] == ["panda-straight-003", "panda-straight-007"]
     assert len(parts["training"]) == 6
     assert sorted(place.kept()) == tasks
-    assert noisytest.lacking(tmp_path) == ("highaccelerations", "oscillations")
+    assert noisytest.missing_classes(tmp_path) == ("highaccelerations", "oscillations")
 
 
 def test_another_rate_than_noisytests_is_refused(run, tmp_path):

@@ -1,4 +1,4 @@
-"""A sample keeps a run's noise, and the recipe by which the run comes back bit for bit."""
+"""A sample has the noise of a run, and the recipe to reproduce it bit for bit."""
 
 import json
 import subprocess
@@ -19,7 +19,7 @@ META = {"scenario": "straight", "seed": 3, "duration": 0.02, "recipe": 1}
 
 
 def random_run(robot: str = "solo12", *, samples: int = SAMPLES) -> Run:
-    """A run of nonsense with all that a simulated one has."""
+    """A random run with all signals of a simulated one."""
     generator = np.random.default_rng(0)
     joints = scenarios.ROBOTS[robot].drives.joints
 
@@ -128,7 +128,7 @@ def test_a_sample_is_read_as_it_was_written(tmp_path):
         np.testing.assert_array_equal(read.signals[name], signal)
 
 
-def test_a_sample_has_the_norms_of_the_lowered_run_too(tmp_path):
+def test_a_sample_has_the_norms_of_the_decimated_run_too(tmp_path):
     run = random_run()
     Sample.of(run).save(tmp_path / "a.npz")
     slower = nm.decimated(run, 1000.0)
@@ -150,7 +150,7 @@ def test_a_sample_gives_its_noise_at_either_rate_and_at_no_other():
         sample.at(500.0)
 
 
-def test_a_sample_keeps_joints_at_the_lower_rate_alone(tmp_path):
+def test_a_sample_has_joints_only_at_the_lower_rate(tmp_path):
     run = random_run()
     Sample.of(run).save(tmp_path / "a.npz")
     for only in (None, ("error",)):
@@ -198,24 +198,24 @@ def test_a_file_that_exists_is_kept(tmp_path):
     assert (tmp_path / "a.npz").read_text() == "precious"
 
 
-def test_a_simulated_run_comes_back_bit_for_bit(simulated, tmp_path):
+def test_a_simulated_run_is_reproduced_bit_for_bit(simulated, tmp_path):
     Sample.of(simulated).save(tmp_path / "a.npz")
-    run = scenarios.again(Sample.load(tmp_path / "a.npz"))
+    run = scenarios.reproduce(Sample.load(tmp_path / "a.npz"))
     assert digest(run) == digest(simulated)
     assert run.meta == simulated.meta
 
 
-def test_a_run_that_comes_out_another_way_names_recipe_and_versions(simulated, monkeypatch):
-    module = sys.modules["scenarios.again"]
+def test_a_run_that_cannot_be_reproduced_names_recipe_and_versions(simulated, monkeypatch):
+    module = sys.modules["scenarios.reproduction"]
     monkeypatch.setattr(module, "simulate", lambda *_, **__: simulated)
     sample = Sample.of(simulated)
     made = {**sample.meta, "sha256": "0" * 64, "recipe": 1, "versions": {"mujoco": "1.2.3"}}
     with pytest.raises(
         scenarios.ChangedRunError,
-        match=r"panda/obstacle-toe-001 comes out another way.* with recipe 1 \(mujoco 1\.2\.3\),"
+        match=r"panda/obstacle-toe-001 cannot be reproduced.* with recipe 1 \(mujoco 1\.2\.3\),"
         r" here is recipe \d+ \(mujoco \d.*numpy",
     ):
-        scenarios.again(replace(sample, meta=made))
+        scenarios.reproduce(replace(sample, meta=made))
 
 
 def damaged(sample, path, **changes):
@@ -242,7 +242,7 @@ def damaged(sample, path, **changes):
         ({"error": np.array([{}])}, "damaged"),
     ],
 )
-def test_a_file_that_is_no_whole_sample_is_one_line(tmp_path, changes, problem):
+def test_an_incomplete_sample_is_one_line(tmp_path, changes, problem):
     damaged(Sample.of(random_run("panda")), tmp_path / "a.npz", **changes)
     with pytest.raises(scenarios.SampleError, match=r"a\.npz: " + problem) as caught:
         Sample.load(tmp_path / "a.npz")
@@ -253,7 +253,7 @@ def test_a_file_that_is_cut_off_or_flipped_is_named(tmp_path):
     Sample.of(random_run()).save(tmp_path / "a.npz")
     whole = (tmp_path / "a.npz").read_bytes()
     (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(scenarios.SampleError, match=r"cut\.npz: no sample, or cut off"):
+    with pytest.raises(scenarios.SampleError, match=r"cut\.npz: not a sample, or truncated"):
         Sample.load(tmp_path / "cut.npz")
     middle = len(whole) // 2
     flipped = whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :]
@@ -264,7 +264,7 @@ def test_a_file_that_is_cut_off_or_flipped_is_named(tmp_path):
         Sample.load(tmp_path / "gone.npz")
 
 
-def test_samples_are_told_from_runs(tmp_path):
+def test_samples_are_distinguished_from_runs(tmp_path):
     run = random_run()
     run.save(tmp_path / "run.npz")
     Sample.of(run).save(tmp_path / "sample.npz")

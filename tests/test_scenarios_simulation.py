@@ -65,7 +65,7 @@ def test_a_healthy_robot_is_ok_all_the_time(runs, seed):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["panda", "ur5", "ur10"])
-def test_full_runs_of_every_arm_keep_the_promise_too(robot):
+def test_full_runs_of_every_arm_contain_their_failure_too(robot):
     for name, failure in FAILURE.items():
         assert failure in labels(scenarios.simulate(robot, name, 1)), name
     for name in HEALTHY:
@@ -175,7 +175,7 @@ def with_defect(monkeypatch, defect):
     monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "special": line})
 
 
-def test_a_defect_that_leaves_no_trace_yields_no_failure(monkeypatch):
+def test_a_defect_without_an_effect_yields_no_failure(monkeypatch):
     with_defect(monkeypatch, Multisine(bands=((20, 30),), amplitude=(1e-7, 1e-7)))
     run = scenarios.simulate("panda", "special", 10, duration=SHORT)
     (event,) = run.meta["events"]
@@ -184,14 +184,14 @@ def test_a_defect_that_leaves_no_trace_yields_no_failure(monkeypatch):
     assert not any(block.start < event["start"] + 0.1 < block.stop for block in run.blocks)
 
 
-def test_a_plate_that_nobody_touches_changes_nothing(runs, monkeypatch):
+def test_a_plate_without_contact_changes_nothing(runs, monkeypatch):
     with_defect(monkeypatch, Obstacles(height=(1e-4, 1e-4), half=(1e-4, 1e-4), offset=(9.0, 9.0)))
     run = scenarios.simulate("panda", "special", 10, duration=SHORT)
     assert labels(run) == {"ok"}
     assert run.meta["events"] == []
 
 
-def test_a_run_that_diverges_is_no_sample(monkeypatch, tmp_path):
+def test_a_run_that_diverges_is_refused(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     panda = scenarios.ROBOTS["panda"]
     nervous = replace(panda, drives=replace(panda.drives, damping=(-200.0,) * 7))
@@ -205,7 +205,7 @@ def test_a_run_that_diverges_is_no_sample(monkeypatch, tmp_path):
     assert list(tmp_path.iterdir()) == []  # MuJoCo leaves no log either
 
 
-def test_unknown_names_are_answered_with_what_there_is():
+def test_unknown_names_are_refused_with_the_known_ones():
     with pytest.raises(
         scenarios.UnknownScenarioError,
         match=r"no scenario 'sport' \(did you mean 'spot'\?\); there are straight, curve",
@@ -223,7 +223,7 @@ def test_a_scenario_of_another_family_is_refused(monkeypatch):
     monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "lame": lame})
     with pytest.raises(
         scenarios.UnsuitedScenarioError,
-        match="scenario 'lame' has no meaning on 'panda'; it has straight, curve",
+        match="scenario 'lame' does not exist for 'panda'; it has straight, curve",
     ):
         scenarios.simulate("panda", "lame", 0)
 

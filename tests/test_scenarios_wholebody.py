@@ -47,7 +47,7 @@ def reached(robot, configuration):
     return soles, pin.centerOfMass(model, data, configuration), data.oMi[1].rotation
 
 
-def test_soles_centre_of_mass_and_base_come_to_where_they_are_to_be(robot):
+def test_soles_centre_of_mass_and_base_reach_their_targets(robot):
     places = np.array([[0.05, robot.apart + 0.02, 0.03], [-0.04, -robot.apart, 0.0]])
     turn, base = pin.rpy.rpyToMatrix(0.05, -0.1, 0.2), pin.rpy.rpyToMatrix(0.0, 0.02, 0.1)
     shift = np.array([0.01, -0.02, -0.03])
@@ -114,7 +114,7 @@ def test_too_many_joints_are_refused():
         WholeBody(model, [Sole("rleg6_body", (0.1, 0.05))], pin.neutral(model))
 
 
-def test_a_frame_that_is_not_there_is_named():
+def test_a_missing_frame_is_named():
     model = reduced_model(TALOS)
     with pytest.raises(UnsupportedModelError, match="no frame 'paw' to stand on; it has .*sole"):
         WholeBody(model, [Sole("paw", (0.1, 0.05))], pin.neutral(model))

@@ -120,24 +120,24 @@ def dataset(
 
     from inspector.progress import progress
     from scenarios import noisytest
-    from scenarios.balance import Balance
     from scenarios.dataset import make
     from scenarios.folder import Folder
-    from scenarios.tasks import Wish, choose
+    from scenarios.statistics import Statistics
+    from scenarios.tasks import DatasetSpec, choose
 
     choice = choose(_listed(robots), _listed(scenarios), healthy=only is Only.OK)
-    wish = Wish(choice=choice, first=first_seed, seeds=seeds, hours=hours)
-    folder = Folder.opened(output, form=form, duration=duration)
+    spec = DatasetSpec(choice=choice, first=first_seed, seeds=seeds, hours=hours)
+    folder = Folder.opened(output, format_name=form, duration=duration)
     folder.clear(overwrite=overwrite)
-    while missing := folder.missing(wish.tasks(duration=duration, fallen=folder.fallen())):
+    while missing := folder.missing(spec.tasks(duration=duration, fallen=folder.fallen())):
         for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
             pass
     if form is Form.NOISYTEST:
         noisytest.write_config(output)
-        if lacking := noisytest.lacking(output):
+        if lacking := noisytest.missing_classes(output):
             typer.echo(f"NoisyTest cannot train without blocks of {', '.join(lacking)}", err=True)
-    balance = Balance.of(folder)
-    typer.echo(dumps(balance.as_dict(), indent=2) if as_json else f"{output}: {balance}")
+    statistics = Statistics.of(folder)
+    typer.echo(dumps(statistics.as_dict(), indent=2) if as_json else f"{output}: {statistics}")
 
 
 def _listed(names: str) -> list[str]:

@@ -11,9 +11,9 @@ from scenarios.clock import TICK
 from scenarios.loop import Reference
 
 HIGHEST_ACCELERATION = 30.0
-"""The feed-forward does not answer jumps of the reference, in [rad/s²]."""
+"""Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²]."""
 FURTHEST = 0.03
-"""How far force control may move the tool, in [m]."""
+"""Largest offset of the tool by force control, in [m]."""
 
 
 class ToolControl:
@@ -24,7 +24,7 @@ class ToolControl:
         frame: Name of the tool's frame.
         point: The tip in the frame's axes, shape (3,), in [m].
         rest: Joint positions at first, shape (joints,), in [rad].
-        plan: What the tool is to do.
+        plan: Plan of the motion.
         gain: Speed of the tool per error of the contact force at each tick, shape (ticks,),
             in [m/(s N)].
         time_constant: Low-pass on the contact force, in [s].
@@ -61,7 +61,7 @@ class ToolControl:
             sensors: Contact force that the sensor reports, shape (1,), in [N].
 
         Returns:
-            What the joints are to do, one tick late: a velocity takes two neighbours.
+            Reference of the joints, one tick late: a velocity takes two neighbours.
         """
         tip = self._plan.position[number] + (0.0, 0.0, self._press(number, float(sensors[0])))
         joints, inverse = self._solve(tip, self._plan.yaw[number])
@@ -86,22 +86,22 @@ class ToolControl:
         return reference
 
     def fallen(self, sensors: Array) -> bool:
-        """Tell that an arm does not fall."""
+        """False: an arm does not fall."""
         return False
 
     def _press(self, number: int, force: float) -> float:
-        """Integrate the error of the contact force to a height of the tool."""
+        """Height offset of the tool: the integral of the error of the contact force, in [m]."""
         self._force += self._share * (force - self._force)
-        wanted = self._plan.force[number]
-        if np.isnan(wanted):
+        desired = self._plan.force[number]
+        if np.isnan(desired):
             self._offset = self._left * self._plan.keep[number]
         else:
-            rise = TICK * float(self._gain[number]) * (self._force - wanted)
+            rise = TICK * float(self._gain[number]) * (self._force - desired)
             self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
         return self._offset
 
     def _solve(self, tip: Array, yaw: float) -> tuple[Array, Array]:
-        """Take a Newton step to the joints that bring the tool there, and the inverse Jacobian.
+        """Joints after a Newton step towards a pose of the tool, and the inverse Jacobian.
 
         One step per tick is enough: the tool moves by a millimetre in that time.
         """

@@ -1,4 +1,4 @@
-"""Pick-like motion of a tool: over a place, down, press, up; all drawn by a seed."""
+"""Picking motion of a tool: over a place, down, press, up; drawn by a seed."""
 
 from dataclasses import dataclass, replace
 
@@ -13,18 +13,18 @@ from scenarios.paths import bump, minimum_jerk
 from scenarios.shapes import Box, Effector, Rod
 
 NEAR = 0.002
-"""Height over the table from which it presses, in [m]."""
+"""Height over the table at which force control starts, in [m]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a tool is to do, at every tick.
+    """Plan of the motion of a tool, at every tick.
 
     Attributes:
         position: Of the tool's tip, shape (ticks, 3), in [m].
         yaw: Turn of the tool about the vertical since the start, shape (ticks,), in [rad].
         force: Force to press with; NaN while force control is off, shape (ticks,), in [N].
-        keep: Share of the force control's last offset that is still kept, shape (ticks,).
+        keep: Share of the last offset of the force control that remains, shape (ticks,).
         contacts: The planned contacts.
         effectors: The tool.
         ground: The table.
@@ -45,16 +45,16 @@ class Plan:
 
     @property
     def units(self) -> Units:
-        """Those of the arms' scenarios are metres and newtons."""
+        """Metres and newtons, as the scenarios of arms have them."""
         return Units()
 
     @property
     def duration(self) -> float:
-        """How long it lasts, in [s]."""
+        """Duration, in [s]."""
         return len(self.yaw) * TICK
 
     def after(self, ticks: int) -> "Plan":
-        """Rest for some ticks before the plan begins."""
+        """The plan after some ticks of rest."""
         return replace(
             self,
             position=np.pad(self.position, ((ticks, 0), (0, 0)), "edge"),
@@ -67,7 +67,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Segment:
-    """One movement from rest to rest, straight unless it is bent."""
+    """One movement from rest to rest, straight or bent."""
 
     duration: float
     position: tuple[float, float, float]
@@ -87,16 +87,16 @@ def pick(
     reach: tuple[tuple[float, float], tuple[float, float]],
     duration: float,
 ) -> Plan:
-    """Plan picks, one after the other, until the time is over.
+    """Plan of picks, one after the other.
 
     Args:
-        motion: How the tool moves.
-        rng: Source of chance.
+        motion: The motion.
+        rng: Random number generator.
         start: Where the tip is at first, shape (3,), in [m].
         tool: The tool.
         table: Height of the table, in [m].
         reach: Ranges of x and y on the table, in [m].
-        duration: How long the plan shall last, in [s].
+        duration: Duration of the plan, in [s].
 
     Returns:
         The plan; the beginning of a plan does not depend on its duration.
@@ -161,14 +161,14 @@ def _one_pick(
 def _one_flight(
     rng: np.random.Generator, table: float, reach: tuple[tuple[float, float], tuple[float, float]]
 ) -> list[Segment]:
-    """Go somewhere over the table, in any direction."""
+    """A movement over the table in any direction."""
     position = (*_place(rng, reach), table + float(rng.uniform(0.05, 0.3)))
     pause = Segment(float(rng.uniform(0.02, 0.3)), position, 0.0)
     return [Segment(float(rng.uniform(0.5, 1.3)), position, 0.0), pause]
 
 
 def _sample(segments: list[Segment]) -> tuple[list[Array], list[Array], list[Array], list[Array]]:
-    """Sample position, yaw, force and keep, segment by segment."""
+    """Samples of position, yaw, force and keep, segment by segment."""
     positions, yaws, forces, keeps = [], [], [], []
     here, turned = np.array(segments[0].position), 0.0
     for segment in segments:

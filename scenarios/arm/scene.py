@@ -1,4 +1,4 @@
-"""An arm, its table and its controller, ready to be moved."""
+"""Scene of an arm, its table and its controller."""
 
 from dataclasses import replace
 from typing import Any
@@ -11,6 +11,7 @@ from scenarios.arm.control import ToolControl
 from scenarios.arm.picking import Plan, pick
 from scenarios.arm.robots import Arm
 from scenarios.clock import STEP
+from scenarios.collision import box_changes
 from scenarios.faults import Faults
 from scenarios.imperfections import Imperfections, real_model
 from scenarios.loop import Scene
@@ -18,20 +19,19 @@ from scenarios.motions import Picks
 from scenarios.mujoco_model import build
 from scenarios.physics import Physics
 from scenarios.reduced import reduced_model
-from scenarios.touching import changes_of
 
 SETTLING = 300
-"""Ticks before the recording, in which the arm comes to rest under its unknown load."""
+"""Ticks before the recording during which the arm comes to rest under its unknown load."""
 
 
 def plan(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> Plan:
-    """Plan the motion of one run.
+    """Plan of the motion of one run.
 
     Args:
         arm: The arm.
-        motion: What it is to do.
-        rng: Source of chance.
-        duration: How long the run shall last, in [s].
+        motion: Plan of the motion.
+        rng: Random number generator.
+        duration: Duration of the run, in [s].
 
     Returns:
         The plan.
@@ -52,13 +52,13 @@ def plan(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> 
 
 
 def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
-    """Set up one run.
+    """Scene of one run.
 
     Args:
         arm: The arm.
-        plan: What it is to do.
-        faults: What is wrong.
-        imperfections: What is imperfect about it anyway.
+        plan: Plan of the motion.
+        faults: The faults to inject.
+        imperfections: The imperfections of the robot.
 
     Returns:
         The scene; it begins when the arm has come to rest.
@@ -83,7 +83,7 @@ def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) ->
         effectors=1,
         settling=SETTLING,
         noise=np.array([imperfections.force_noise]),
-        changes=changes_of(world, boxes),
+        changes=box_changes(world, boxes),
     )
 
 
@@ -98,7 +98,7 @@ def _tip(arm: Arm) -> Array:
 
 
 def _world(arm: Arm, model: Any, boxes: tuple[Any, ...], imperfections: Imperfections) -> Any:
-    """Build the robot as it really is, its table and what lies on it."""
+    """MuJoCo model of the real robot, its table and the objects on it."""
     physics = Physics(
         timestep=STEP,
         armature=np.array(arm.drives.armature),
@@ -111,5 +111,5 @@ def _world(arm: Arm, model: Any, boxes: tuple[Any, ...], imperfections: Imperfec
 
 
 def bodies(arm: Arm) -> int:
-    """How many moving bodies an arm has."""
+    """Number of moving bodies of an arm."""
     return int(reduced_model(arm).njoints) - 1

@@ -1,7 +1,7 @@
-"""What can be wrong with a robot or its world: settings, from which a seed draws faults.
+"""Defects of a robot or its world: settings from which a seed draws faults.
 
-A defect acts in one of five places: ground, encoder, planned motion, sensors, gains. None knows
-what robot it harms: all that it sees of the plan is its time, its ground and its contacts.
+A defect acts in one of five places: ground, encoder, planned motion, sensors, gains. It depends on
+the plan only by time, ground and contacts, not on the robot.
 """
 
 from scenarios.defects.edge import Overhang, StepDown

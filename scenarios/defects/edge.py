@@ -1,4 +1,4 @@
-"""What can be wrong with edges of the ground."""
+"""Defects at edges of the ground."""
 
 from dataclasses import dataclass, replace
 
@@ -11,10 +11,10 @@ from scenarios.faults import Faults
 
 @dataclass(frozen=True)
 class Overhang:
-    """The edge of a platform is nearer than planned: its last contact is a partial one.
+    """An edge of a platform nearer than planned: the last contact on it is partial.
 
     Attributes:
-        share: How much of the effector's length has no ground under it.
+        share: Share of the effector's length without ground under it.
     """
 
     share: Range
@@ -40,10 +40,10 @@ class Overhang:
 
 @dataclass(frozen=True)
 class StepDown:
-    """The ground ends at an edge across the way; what follows is deeper.
+    """A step down at an edge across the path.
 
     Attributes:
-        depth: How much deeper, in [m].
+        depth: Height of the step, in [m].
         when: When the first foot steps over the edge, as a share of the run.
     """
 
@@ -64,7 +64,7 @@ class StepDown:
         first = late[0] if late else int(over[-1])
         reached, next_one = furthest[first - 1], furthest[first]
         between = np.unique(ways[(reached <= ways) & (ways <= next_one)])
-        widest = int(np.argmax(np.diff(between)))  # other feet are not to meet the edge either
+        widest = int(np.argmax(np.diff(between)))  # other feet must not meet the edge either
         edge = float(between[widest : widest + 2].mean())
         ground = []
         for box in plan.ground:

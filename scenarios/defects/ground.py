@@ -1,4 +1,4 @@
-"""What can be wrong with the ground."""
+"""Defects of the ground."""
 
 from dataclasses import dataclass, replace
 
@@ -13,16 +13,16 @@ from scenarios.shapes import Box
 
 @dataclass(frozen=True)
 class Obstacles:
-    """Boxes on the ground, unknown to the controller, where effectors come down.
+    """Boxes on the ground, unknown to the controller, where effectors touch down.
 
     Attributes:
-        height: How high a box is, in [m].
+        height: Height of a box, in [m].
         half: Half of its edge lengths along and across the effector, in [m].
-        offset: Where its middle is, as a share of half the effector's own extent, along and
+        offset: Offset of its centre, as a share of half the extent of the effector, along and
             across.
-        effectors: Those that it may meet, by index; all if there are none.
-        share: How many of the contacts have one; the first one always has.
-        most: At most so many have one; they are drawn from all but the last.
+        effectors: Indices of the effectors that it may meet; empty for all.
+        share: Share of the contacts with a box; the first one always has one.
+        most: Largest number of boxes, drawn from all contacts but the last.
     """
 
     height: Range
@@ -69,12 +69,12 @@ class Obstacles:
 
 @dataclass(frozen=True)
 class GivingWay:
-    """A box that an effector presses on gives way: what was ground is deeper at once.
+    """Ground that gives way under an effector: a box that vanishes.
 
     Attributes:
-        depth: How much deeper, in [m].
+        depth: Height of the box, in [m].
         half: Half of its edge lengths, in [m].
-        after: When it gives way, after the start of a contact, in [s].
+        after: When it vanishes, after the start of a contact, in [s].
     """
 
     depth: Range

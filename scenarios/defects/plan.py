@@ -1,4 +1,4 @@
-"""What a defect is, and what it sees of a robot's plan."""
+"""The interface of defects, and of the plan that they depend on."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ from scenarios.faults import Faults
 from scenarios.shapes import Box, Effector
 
 Range: TypeAlias = tuple[float, float]
-"""Between which values a seed draws."""
+"""Limits between which a seed draws."""
 
 
 @dataclass(frozen=True)
 class Units:
-    """What a robot's size makes of the sizes of what goes wrong.
+    """Units that scale defects to the size of a robot.
 
     Attributes:
-        length: In [m]; a speed of so many lengths a second grows with it too.
+        length: In [m]; speeds in lengths per second scale with it too.
         force: In [N].
         torque: In [N m].
     """
@@ -31,7 +31,7 @@ class Units:
 
 
 class Plan(Protocol):
-    """What a robot is to do, as far as it matters to what goes wrong."""
+    """Plan of a motion, as far as defects depend on it."""
 
     @property
     def time(self) -> Array:
@@ -40,7 +40,7 @@ class Plan(Protocol):
 
     @property
     def duration(self) -> float:
-        """How long it lasts, in [s]."""
+        """Duration, in [s]."""
         ...
 
     @property
@@ -50,22 +50,22 @@ class Plan(Protocol):
 
     @property
     def effectors(self) -> tuple[Effector, ...]:
-        """What touches."""
+        """The effectors."""
         ...
 
     @property
     def ground(self) -> tuple[Box, ...]:
-        """What it stands on."""
+        """The ground."""
         ...
 
     @property
     def units(self) -> Units:
-        """The robot's own units."""
+        """The units of the robot."""
         ...
 
 
 class Defect(Protocol):
-    """Settings from which faults are drawn."""
+    """Settings from which a seed draws faults."""
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
         """Draw the faults of one run."""
@@ -74,7 +74,7 @@ class Defect(Protocol):
 
 @dataclass(frozen=True)
 class NoDefect:
-    """A robot as good as robots are."""
+    """No defect: only the imperfections of every robot."""
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
         """Draw no faults."""
@@ -82,7 +82,7 @@ class NoDefect:
 
 
 def begun(plan: Plan, effectors: Sequence[int] = ()) -> list[Contact]:
-    """List the contacts that begin during the run, those of some effectors or of all."""
+    """Contacts that start during the run, of some effectors or of all."""
     return [
         contact
         for contact in plan.contacts

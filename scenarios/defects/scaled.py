@@ -1,4 +1,4 @@
-"""Defects that are as large as the robot."""
+"""Defects that scale with the size of the robot."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -12,11 +12,11 @@ from scenarios.faults import Faults
 
 @dataclass(frozen=True)
 class Scaled:
-    """A defect whose settings are in units of the robot's own.
+    """A defect with settings in the units of the robot.
 
     Attributes:
         defect: The defect, its settings pairs of numbers.
-        units: "length", "force" or "torque", by the settings that are in that unit.
+        units: "length", "force" or "torque", by the names of the settings in that unit.
     """
 
     defect: Any

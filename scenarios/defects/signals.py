@@ -1,4 +1,4 @@
-"""What can be wrong with encoders, sensors, gains, and the motion that is asked for."""
+"""Defects of encoders, sensors, gains and the planned motion."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -13,12 +13,12 @@ from scenarios.faults import Faults, pulses, ramps, sines, step
 
 @dataclass(frozen=True)
 class Decalibration:
-    """An encoder that is off.
+    """An encoder with an offset.
 
     Attributes:
         joints: Index of the joint, or of several to draw from.
-        angle: What the encoder reads too much, in [rad].
-        either: Whether it may as well be too little.
+        angle: The offset, in [rad].
+        either: Whether the offset may have either sign.
     """
 
     joints: tuple[int, ...]
@@ -40,8 +40,8 @@ class ReferenceJumps:
 
     Attributes:
         every: Mean time between two jumps, in [s].
-        distance: How far a jump goes, in [m].
-        speed: How fast: the velocity jumps to it and back to where it was, in [m/s].
+        distance: Distance of a jump, in [m].
+        speed: Speed during a jump, in [m/s].
     """
 
     every: float = 1.4
@@ -80,16 +80,16 @@ class ReferenceJumps:
 
 @dataclass(frozen=True)
 class SensorJumps:
-    """Jumps of a force sensor's signal while its effector bears load.
+    """Jumps of the signal of a force sensor during contacts.
 
     Attributes:
         size: Size of a jump, either way, in [N], [N m] or [rad].
         sensor: Which of the effector's sensors: "touch", "force", "torque"; or one of the base,
             such as "base.turn".
-        axes: The values that jump, of so many.
-        hold: How long it lasts, in [s].
+        axes: Whether each value of the sensor jumps.
+        hold: Duration of a jump, in [s].
         after: When the jumps of one contact begin, after its start, in [s].
-        share: How many of the contacts have jumps; the first one always has.
+        share: Share of the contacts with jumps; the first one always has them.
     """
 
     size: Range
@@ -143,9 +143,9 @@ class ForceGain:
     """Gains of the force control that are too high, so that it becomes a limit cycle.
 
     Attributes:
-        factor: What the gains are multiplied by.
-        start: From when on, as a share of the run.
-        contacts: Whether it can only be felt while a contact is planned.
+        factor: Factor on the gains.
+        start: When it starts, as a share of the run.
+        contacts: Whether it has an effect only during planned contacts.
     """
 
     factor: Range
@@ -177,10 +177,10 @@ class Multisine:
 
     Attributes:
         bands: The bands to choose from, in [Hz].
-        amplitude: Of the one sine that would carry as much power, in [m].
-        fastest: Speed that lowers the amplitude of high bands, in [m/s]: the paper's 2 mm at
-            900 Hz would be 11 m/s, which no drive follows and nobody overlooks.
-        start: When it sets in, as a share of the run.
+        amplitude: Of one sine of equal power, in [m].
+        fastest: Upper limit of the speed, which reduces the amplitude in high bands, in [m/s]: the
+            2 mm of the paper at 900 Hz would be 11 m/s, which no drive follows.
+        start: When it starts, as a share of the run.
         stop: When it ends, as a share of the run.
     """
 

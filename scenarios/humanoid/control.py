@@ -7,39 +7,39 @@ import pinocchio as pin
 
 from noisemodel.types import Array
 from scenarios.clock import TICK
-from scenarios.humanoid.balance import Balance
 from scenarios.humanoid.plan import Plan
+from scenarios.humanoid.stabilizer import Stabilizer
 from scenarios.humanoid.walking import GRAVITY
 from scenarios.loop import Reference
 from scenarios.wholebody import WholeBody
 
 LOWEST = 0.25
-"""A base that is so far below its plan has fallen, in [m]."""
+"""Distance below its plan at which a base has fallen, in [m]."""
 LEVEL = 0.8
-"""A base whose own vertical axis points upwards by less than this has fallen."""
+"""Vertical component of the base's own z axis below which it has fallen."""
 
 
 class WalkControl:
-    """Follows a plan with a stabilizer and whole-body inverse kinematics.
+    """Controller with a stabilizer and whole-body inverse kinematics.
 
     Args:
-        body: The robot as its controller knows it, standing as the plan begins.
-        balance: The stabilizer.
-        plan: What the robot is to do.
-        weight: Of the robot as it is known, in [N].
-        where: Where each sensor's values are.
+        body: The nominal robot, standing as the plan starts.
+        stabilizer: The stabilizer.
+        plan: Plan of the motion.
+        weight: Weight of the nominal robot, in [N].
+        where: Slice of each sensor.
     """
 
     def __init__(
         self,
         body: WholeBody,
-        balance: Balance,
+        stabilizer: Stabilizer,
         plan: Plan,
         *,
         weight: float,
         where: Mapping[str, slice],
     ) -> None:
-        self._body, self._balance = body, balance
+        self._body, self._stabilizer = body, stabilizer
         self._places, self._yaws = plan.places, plan.yaws.tolist()
         self._centre, self._heading = plan.centre, plan.heading.tolist()
         self._rates, self._bearing, self._weight = _rates(plan), bearing(plan), weight
@@ -54,13 +54,13 @@ class WalkControl:
         """Advance by one tick.
 
         Args:
-            number: Which tick it is.
-            sensors: What the sensors report.
+            number: Index of the tick.
+            sensors: Values of the sensors.
 
         Returns:
-            What the joints are to do, one tick late: a velocity takes two neighbours.
+            Reference of the joints, one tick late: a velocity takes two neighbours.
         """
-        heights, tilts = self._balance.step(number, sensors)
+        heights, tilts = self._stabilizer.step(number, sensors)
         places = self._places[number].copy()
         places[:, 2] += heights
         turns = [
@@ -84,14 +84,14 @@ class WalkControl:
         return reference
 
     def fallen(self, sensors: Array) -> bool:
-        """Tell whether the base has come down or lies on its side."""
+        """Whether the base is too low or too much tilted."""
         _, x, y, _ = sensors[self._turn].tolist()
         height = float(sensors[self._place][2] - self._centre[self._number, 2])
         return bool(height < self._lowest or 1 - 2 * (x * x + y * y) < LEVEL)
 
 
 def _rates(plan: Plan) -> Array:
-    """Rates of all equations of `WholeBody` that the plan asks for, shape (ticks, 18)."""
+    """Planned rates of all equations of `WholeBody`, shape (ticks, 18)."""
     ticks = len(plan.centre)
     soles = np.zeros((ticks, 2, 6))
     soles[:, :, :3] = np.gradient(plan.places, TICK, axis=0)
@@ -103,10 +103,10 @@ def _rates(plan: Plan) -> Array:
 
 
 def bearing(plan: Plan) -> Array:
-    """Find what the ground is to do to the soles, per weight of the robot.
+    """Planned ground forces on the soles, per weight of the robot.
 
     Args:
-        plan: What the robot is to do.
+        plan: Plan of the motion.
 
     Returns:
         Force, and torque about the sole's middle in [m], of each sole, shape (ticks, 12).

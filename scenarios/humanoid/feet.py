@@ -1,4 +1,4 @@
-"""What the feet of a walk do: their ways through the air, their contacts, and what they meet."""
+"""Feet of a walk: their paths, their contacts, and the ground."""
 
 from collections.abc import Sequence
 
@@ -13,17 +13,17 @@ from scenarios.paths import minimum_jerk
 from scenarios.shapes import Box
 
 TOP = 0.45
-"""When a swinging foot is highest, as a share of its swing."""
+"""Time at which a swinging foot is highest, as a share of its swing."""
 EARLY = 0.13
-"""How early a foot may touch, as a share of its swing; it is down to some millimetres by then."""
+"""How early a foot may touch down, as a share of its swing: its height is a few millimetres."""
 BRIM = 0.01
-"""How far a platform goes on before the last toe on it, in [m]."""
+"""Distance from the last toe on a platform to its edge, in [m]."""
 NOBODY = -1
 """The foot in the air while both are on the ground."""
 
 
 def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, Array, Integers]:
-    """Sample the ways of the soles.
+    """Sampled paths of the soles.
 
     Args:
         robot: The humanoid, its feet side by side at x = 0.
@@ -44,8 +44,8 @@ def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, A
         share = (time[first:end] - step.start) / (step.stop - step.start)
         before, after = places[first, step.foot].copy(), np.array(step.place)
         turned = yaws[first, step.foot]
-        # Forwards, it leaves a little later and arrives earlier than in height: it lands straight,
-        # and its heel is past an edge before it comes down.
+        # The horizontal movement starts later and ends earlier than the vertical one: the foot
+        # lands vertically, and its heel is past an edge before it descends.
         arrival = 0.9 if after[2] >= before[2] else 0.8
         ahead = minimum_jerk(np.clip((share - 0.05) / (arrival - 0.05), 0, 1))
         path = before + ahead[:, None] * (after - before)
@@ -62,7 +62,7 @@ def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, A
 
 
 def contacts(robot: Humanoid, steps: Sequence[Step], duration: float) -> tuple[Contact, ...]:
-    """List when each foot stands where.
+    """Planned contacts of the feet.
 
     Args:
         robot: The humanoid, its feet side by side at x = 0.
@@ -87,7 +87,7 @@ def contacts(robot: Humanoid, steps: Sequence[Step], duration: float) -> tuple[C
 
 
 def ground(robot: Humanoid, steps: Sequence[Step]) -> tuple[Box, ...]:
-    """Put a floor under the last step, and a platform under the first ones if they are higher.
+    """Floor under the last step, and platform under the first ones if they are higher.
 
     Args:
         robot: The humanoid, walking straight ahead if there is a platform.

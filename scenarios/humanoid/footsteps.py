@@ -1,4 +1,4 @@
-"""Footsteps of a humanoid: which foot goes where, and when; all drawn by a seed."""
+"""Footsteps of a humanoid: foot, place and time; drawn by a seed."""
 
 from dataclasses import dataclass
 
@@ -8,25 +8,25 @@ from scenarios.humanoid.robots import Humanoid
 from scenarios.motions import Walk
 
 REST = (0.6, 1.0)
-"""How long it stands before it walks, in [s]."""
+"""Time of standing before the walk, in [s]."""
 CLOSE = 0.6
-"""How long the weight takes from the last foot to the middle of both, in [s]."""
+"""Time in which the weight moves from the last foot to the middle of both, in [s]."""
 STAND = 0.3
-"""How long it stands at least at the end, in [s]."""
+"""Least time of standing at the end, in [s]."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """One foot goes somewhere.
+    """One step of one foot.
 
     Attributes:
         foot: 0 for the left foot, 1 for the right one.
         place: x, y, z of its sole afterwards, in [m].
         yaw: Its direction afterwards, in [rad].
-        shift: When the weight begins to leave it, in [s].
+        shift: When the weight starts to shift to the other foot, in [s].
         start: When it is to leave the ground, in [s].
         stop: When it is to touch the ground, in [s].
-        height: How far it is lifted, in [m].
+        height: Height of its swing, in [m].
     """
 
     foot: int
@@ -41,13 +41,13 @@ class Step:
 def footsteps(
     robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: float
 ) -> tuple[Step, ...]:
-    """Draw the footsteps of a walk.
+    """Footsteps of a walk.
 
     Args:
         robot: The humanoid, its feet side by side at x = 0.
-        motion: How it walks.
-        rng: Source of chance.
-        duration: How long the run shall last, in [s].
+        motion: The motion.
+        rng: Random number generator.
+        duration: Duration of the run, in [s].
 
     Returns:
         The steps; the last one brings the feet side by side, in time to stand at the end.
@@ -84,7 +84,7 @@ def footsteps(
 
 
 def _advance(robot: Humanoid, motion: Walk, rng: np.random.Generator) -> tuple[float, float, float]:
-    """Draw by how much the body advances per step: along, across, and in direction."""
+    """Advance of the body per step: along, across, and in direction."""
     along, across, turn = robot.stride
     size = float(rng.uniform(0.85, 0.95) if motion.drop else rng.uniform(0.45, 0.8))
     sign = float(rng.choice((-1.0, 1.0)))

@@ -1,4 +1,4 @@
-"""What a humanoid is to do, at every tick."""
+"""Plan of the motion of a humanoid, at every tick."""
 
 from dataclasses import dataclass, replace
 
@@ -14,7 +14,7 @@ from scenarios.shapes import Box, Effector
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a humanoid is to do, at every tick.
+    """Plan of the motion of a humanoid, at every tick.
 
     Attributes:
         places: Of the soles, shape (ticks, feet, 3), in [m].
@@ -25,8 +25,8 @@ class Plan:
         rate: Natural frequency of the inverted pendulum, in [rad/s].
         contacts: The planned contacts.
         effectors: Left and right sole.
-        ground: What it plans to stand on.
-        size: Of the robot, relative to that for which scenarios name theirs.
+        ground: The planned ground.
+        size: Size of the robot, relative to that which the scenarios are defined for.
     """
 
     places: Array
@@ -47,12 +47,12 @@ class Plan:
 
     @property
     def units(self) -> Units:
-        """What is 1 for a robot of size 1, if all are of one shape and one density."""
+        """Units of 1 for a robot of size 1, for equal shape and density."""
         return Units(length=self.size, force=self.size**3, torque=self.size**4)
 
     @property
     def duration(self) -> float:
-        """How long it lasts, in [s]."""
+        """Duration, in [s]."""
         return len(self.zmp) * TICK
 
     @property
@@ -62,7 +62,7 @@ class Plan:
 
     @property
     def left(self) -> Array:
-        """Share of the weight that the left foot is to bear, shape (ticks,)."""
+        """Planned share of the weight on the left foot, shape (ticks,)."""
         left, right = self.places[:, 0, :2], self.places[:, 1, :2]
         apart = left - right
         share = ((self.zmp - right) * apart).sum(axis=1) / np.square(apart).sum(axis=1)
@@ -70,7 +70,7 @@ class Plan:
         return np.asarray(np.where(self.swinging < 0, share, self.swinging == 1))
 
     def after(self, ticks: int) -> "Plan":
-        """Rest for some ticks before the plan begins."""
+        """The plan after some ticks of rest."""
 
         def later(signal: Array) -> Array:
             return np.concatenate((np.repeat(signal[:1], ticks, axis=0), signal))

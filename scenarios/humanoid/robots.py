@@ -14,10 +14,10 @@ class Gains:
         capture: Shift of the zero-moment point per error of the capture point.
         integral: Its rate per error, in [1/s].
         tilt: Rate of a sole's tilt per error of its torque, in [rad/(s N m)].
-        level: Rate at which soles become level again, in [1/s].
+        level: Rate at which soles return to level, in [1/s].
         height: Rate of the feet's difference in height per error of the difference of their
             forces, in [m/(s N)].
-        even: Rate at which that difference goes away, in [1/s].
+        even: Rate at which that difference decays, in [1/s].
         filter: Time constant of the low-pass on forces and torques, in [s].
     """
 
@@ -42,12 +42,12 @@ class Humanoid:
         centre: Height of the centre of mass over the soles, in [m].
         apart: Half of the distance between the feet, in [m].
         stride: Longest step forwards and sideways, in [m], and its turn, in [rad].
-        pace: Duration of its steps, relative to those that a motion asks for.
+        pace: Duration of its steps, relative to that of the motion.
         gains: Of its stabilizer.
         carrier: Frame that carries the payload.
-        payload: Largest mass that nobody told the controller of, in [kg].
+        payload: Largest mass that the controller does not know, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
-        size: Its height, relative to that for which scenarios name the sizes of what goes wrong.
+        size: Its size, relative to that which the defects of the scenarios are defined for.
         held: Positions of the locked joints that are not at zero, by name.
     """
 
@@ -68,7 +68,7 @@ class Humanoid:
 
     @property
     def family(self) -> str:
-        """The kind of robot: what its scenarios can ask of it."""
+        """The family of robots, which decides on the scenarios."""
         return "humanoid"
 
 

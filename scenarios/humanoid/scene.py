@@ -1,4 +1,4 @@
-"""A humanoid, its ground and its controller, ready to be moved."""
+"""Scene of a humanoid, its ground and its controller."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,12 +8,13 @@ import pinocchio as pin
 
 from noisemodel.types import Array
 from scenarios.clock import STEP
+from scenarios.collision import box_changes
 from scenarios.faults import Faults
-from scenarios.humanoid.balance import Balance
 from scenarios.humanoid.control import WalkControl
 from scenarios.humanoid.footsteps import footsteps
 from scenarios.humanoid.plan import Plan
 from scenarios.humanoid.robots import Humanoid
+from scenarios.humanoid.stabilizer import Stabilizer
 from scenarios.humanoid.walking import GRAVITY, walk
 from scenarios.imperfections import Imperfections, real_model
 from scenarios.loop import Scene
@@ -22,23 +23,22 @@ from scenarios.mujoco_model import build
 from scenarios.physics import Physics
 from scenarios.reduced import reduced_model
 from scenarios.sensing import sensors_of
-from scenarios.touching import changes_of
 from scenarios.wholebody import WholeBody
 
 SETTLING = 500
-"""Ticks before the recording, in which the robot comes to rest on its feet."""
+"""Ticks before the recording during which the robot comes to rest on its feet."""
 LEVER = 0.05
 """Noise of torque sensors per noise of force sensors, in [m]."""
 
 
 def plan(robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: float) -> Plan:
-    """Plan the motion of one run.
+    """Plan of the motion of one run.
 
     Args:
         robot: The humanoid.
-        motion: How it is to walk.
-        rng: Source of chance.
-        duration: How long the run shall last, in [s].
+        motion: The motion.
+        rng: Random number generator.
+        duration: Duration of the run, in [s].
 
     Returns:
         The plan.
@@ -47,13 +47,13 @@ def plan(robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: floa
 
 
 def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
-    """Set up one run.
+    """Scene of one run.
 
     Args:
         robot: The humanoid.
-        plan: What it is to do.
-        faults: What is wrong.
-        imperfections: What is imperfect about it anyway.
+        plan: Plan of the motion.
+        faults: The faults to inject.
+        imperfections: The imperfections of the robot.
 
     Returns:
         The scene; it begins when the robot stands still.
@@ -63,30 +63,30 @@ def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfecti
     world = _world(robot, model, boxes, imperfections)
     where = sensors_of(world)
     strength = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge") * imperfections.force_gain
-    asked = _shifted(plan, faults).after(SETTLING)
-    body = standing(robot, model, asked)
+    shifted = _shifted(plan, faults).after(SETTLING)
+    body = standing(robot, model, shifted)
     weight = float(pin.computeTotalMass(model)) * GRAVITY
-    balance = Balance(
-        asked, robot.effectors, robot.gains, strength=strength, weight=weight, where=where
+    stabilizer = Stabilizer(
+        shifted, robot.effectors, robot.gains, strength=strength, weight=weight, where=where
     )
     return Scene(
         model=world,
         start=_mujoco_start(body.configuration, faults.offsets(len(robot.drives.joints))),
-        control=WalkControl(body, balance, asked, weight=weight, where=where),
+        control=WalkControl(body, stabilizer, shifted, weight=weight, where=where),
         effectors=len(robot.effectors),
         settling=SETTLING,
         noise=_noise(robot, world.nsensordata, where, imperfections),
-        changes=changes_of(world, boxes),
+        changes=box_changes(world, boxes),
     )
 
 
 def bodies(robot: Humanoid) -> int:
-    """How many moving bodies a humanoid has."""
+    """Number of moving bodies of a humanoid."""
     return int(reduced_model(robot).njoints) - 1
 
 
 def standing(robot: Humanoid, model: Any, plan: Plan) -> WholeBody:
-    """Stand as a plan begins."""
+    """The robot, standing as a plan starts."""
     start = pin.neutral(model)
     start[2], start[7:] = robot.centre, robot.rest
     body = WholeBody(model, robot.effectors, start)
@@ -104,7 +104,7 @@ def _shifted(plan: Plan, faults: Faults) -> Plan:
 def _world(
     robot: Humanoid, model: Any, boxes: tuple[Any, ...], imperfections: Imperfections
 ) -> Any:
-    """Build the robot as it really is, and what it really stands on."""
+    """MuJoCo model of the real robot and the real ground."""
     drives = robot.drives
     physics = Physics(
         timestep=STEP,
@@ -117,7 +117,7 @@ def _world(
 
 
 def _mujoco_start(configuration: Array, offsets: Array) -> Array:
-    """Give a configuration as MuJoCo has it, such that the encoders read it."""
+    """Configuration, as MuJoCo has it, at which the encoders read the given one."""
     place, (x, y, z, w), joints = configuration[:3], configuration[3:7], configuration[7:]
     return np.concatenate((place, (w, x, y, z), joints - offsets))
 
@@ -125,7 +125,7 @@ def _mujoco_start(configuration: Array, offsets: Array) -> Array:
 def _noise(
     robot: Humanoid, sensors: int, where: dict[str, slice], imperfections: Imperfections
 ) -> Array:
-    """Standard deviations of the sensors; what the robot knows of its base is exact."""
+    """Standard deviations of the sensors; those of the base are exact."""
     noise = np.zeros(sensors)
     for sole in robot.effectors:
         noise[where[f"{sole.frame}.force"]] = imperfections.force_noise

@@ -1,4 +1,4 @@
-"""The plan of a walk: from footsteps to the zero-moment point, and to the centre of mass."""
+"""Plan of a walk: from footsteps to the zero-moment point and the centre of mass."""
 
 from collections.abc import Sequence
 
@@ -19,16 +19,16 @@ SMOOTH = 0.06
 DESCENT = 0.3
 """Time over which the movement of the centre of mass in height is smoothed, in [s]."""
 BESIDE = 0.005
-"""How far the zero-moment point lies inside of the middle of a sole, in [m]."""
+"""Inward offset of the zero-moment point from the centre of a sole, in [m]."""
 
 
 def walk(robot: Humanoid, steps: Sequence[Step], duration: float) -> Plan:
-    """Plan a walk over footsteps.
+    """Plan of a walk over footsteps.
 
     Args:
         robot: The humanoid, its feet side by side at x = 0.
         steps: The footsteps.
-        duration: How long the plan shall last, in [s].
+        duration: Duration of the plan, in [s].
 
     Returns:
         The plan.
@@ -54,7 +54,7 @@ def walk(robot: Humanoid, steps: Sequence[Step], duration: float) -> Plan:
 
 
 def centre_of_mass(zmp: Array, rate: float) -> Array:
-    """Find the motion of the centre of mass that belongs to a zero-moment point.
+    """Motion of the centre of mass for a zero-moment point.
 
     Args:
         zmp: Zero-moment point at each tick, at rest at both ends, shape (ticks, 2), in [m].
@@ -73,7 +73,7 @@ def centre_of_mass(zmp: Array, rate: float) -> Array:
 
 
 def _zero_moment_point(robot: Humanoid, steps: Sequence[Step], time: Array) -> Array:
-    """Move the zero-moment point from foot to foot, and to the middle of both at the end."""
+    """Zero-moment point: from foot to foot, and to the middle of both at the end."""
     standing = [(0.0, robot.apart, 0.0), (0.0, -robot.apart, 0.0)]  # x, y, yaw of each foot
     knots, points = [0.0], [(0.0, 0.0)]
     for step in steps:
@@ -81,7 +81,7 @@ def _zero_moment_point(robot: Humanoid, steps: Sequence[Step], time: Array) -> A
         x, y, yaw = standing[other]
         inward = BESIDE if other == 1 else -BESIDE
         point = (x - float(np.sin(yaw)) * inward, y + float(np.cos(yaw)) * inward)
-        # Smoothing makes it begin earlier and end later; in the air, a foot must bear nothing.
+        # Smoothing makes it start earlier and end later; a foot in the air must not bear load.
         knots += [step.shift + SMOOTH / 2, step.start - SMOOTH / 2]
         points += [points[-1], point]
         standing[step.foot] = (*step.place[:2], step.yaw)
@@ -106,7 +106,7 @@ def _lower_foot(steps: Sequence[Step], time: Array) -> Array:
 
 
 def _smooth(signal: Array, span: float) -> Array:
-    """Average over a time with a bell-shaped weight, along axis 0."""
+    """Moving average with a Hann window, along axis 0."""
     half = round(span / TICK / 2)
     weight = np.hanning(2 * half + 3)[1:-1]
     weight /= weight.sum()

@@ -1,8 +1,8 @@
-"""The scenarios of quadrupeds that trot, with faults large enough to matter to them.
+"""The scenarios of quadrupeds that trot, with faults large enough to have an effect.
 
 Lengths are shares of the height of the robot's centre of mass (Go2's: 0.3 m), forces shares of
-its weight. A quadruped has round feet: what is met under heel or toe of a humanoid's foot is met
-under its hind or front feet.
+its weight. A quadruped has round feet: obstacles under heel or toe of a humanoid are under
+its hind or front feet.
 """
 
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""The controller of a trot: plan, attitude and foot forces to joint references, once per tick."""
+"""Controller of a trot: from plan, attitude and foot forces to joint references."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ import pinocchio as pin
 from noisemodel.types import Array
 from scenarios.clock import TICK
 from scenarios.loop import Reference
-from scenarios.quadruped.feeling import Feeling
+from scenarios.quadruped.estimation import StateEstimate
 from scenarios.quadruped.feet import Feet
 from scenarios.quadruped.robots import Quadruped
 from scenarios.quadruped.standing import Standing
@@ -16,18 +16,18 @@ from scenarios.quadruped.trotting import Plan
 from scenarios.wholebody import WholeBody
 
 HIGHEST_ACCELERATION = 1500.0
-"""The feed-forward does not answer jumps of the reference, in [rad/s²] and [m/s²]."""
+"""Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²] and [m/s²]."""
 
 
 class TrotControl:
-    """Follows a plan; the base leans against its tilt, and the feet keep the balance.
+    """Controller with attitude feedback of the base and foot placement.
 
     Args:
         robot: The robot.
         model: The ``pinocchio.Model`` that the controller has.
-        standing: How it stands at first.
-        plan: What it is to do.
-        sensors: Where each sensor's values are.
+        standing: The robot before the motion.
+        plan: Plan of the motion.
+        sensors: Slice of each sensor.
         gain: Scale of the feedback of forces at each tick, shape (ticks,).
     """
 
@@ -45,7 +45,7 @@ class TrotControl:
         self._model.armature = np.array([*[0.0] * 6, *robot.drives.armature])
         self._data = self._model.createData()
         self._body = WholeBody(model, robot.feet, standing.configuration)
-        self._feeling = Feeling(robot, sensors)
+        self._estimate = StateEstimate(robot, sensors)
         self._feet = Feet(robot, standing, plan, gain)
         self._plan, self._rates = plan, _rates(plan)
         self._lean = robot.attitude_gain
@@ -56,11 +56,11 @@ class TrotControl:
         """Advance by one tick.
 
         Args:
-            number: Which tick it is.
-            sensors: What the sensors say, as `scenarios.sensing.sensors_of` has it.
+            number: Index of the tick.
+            sensors: Values of the sensors, as `scenarios.sensing.sensors_of` has them.
 
         Returns:
-            What the joints are to do, one tick late: a velocity takes two neighbours.
+            Reference of the joints, one tick late: a velocity takes two neighbours.
         """
         before, here, after = self._configurations = [
             *self._configurations[1:],
@@ -79,22 +79,24 @@ class TrotControl:
         return reference
 
     def fallen(self, sensors: Array) -> bool:
-        """Tell whether the robot is too low or too much tilted."""
-        return self._feeling.fallen(sensors, self._plan.size)
+        """Whether the robot is too low or too much tilted."""
+        return self._estimate.fallen(sensors, self._plan.size)
 
     def _configuration(self, number: int, sensors: Array) -> Array:
-        """Go where the plan and the feedback want the robot to be."""
-        plan, feeling = self._plan, self._feeling
+        """Configuration by plan and feedback."""
+        plan, estimate = self._plan, self._estimate
         centre, yaw = plan.centre[number].copy(), float(plan.yaw[number])
         velocity = self._rates[number, _CENTRE]
-        feeling.hear(sensors, place=centre[:2], velocity=velocity, yaw=yaw)
-        centre[:2] += feeling.home
+        estimate.update(sensors, place=centre[:2], velocity=velocity, yaw=yaw)
+        centre[:2] += estimate.position_correction
         lean = -self._lean
-        base = pin.rpy.rpyToMatrix(lean * feeling.roll, lean * feeling.pitch, yaw + feeling.turn)
-        return self._body.follow(self._feet.places(number, feeling), (), centre, base)
+        base = pin.rpy.rpyToMatrix(
+            lean * estimate.roll, lean * estimate.pitch, yaw + estimate.yaw_correction
+        )
+        return self._body.follow(self._feet.places(number, estimate), (), centre, base)
 
     def _torque(self, number: int, configuration: Array, velocity: Array) -> Array:
-        """What the model needs to move like that while the feet bear their planned loads."""
+        """Feed-forward torque for a motion under the planned loads of the feet."""
         highest = HIGHEST_ACCELERATION
         acceleration = (velocity - self._velocity) / TICK
         acceleration = np.minimum(np.maximum(acceleration, -highest), highest)
@@ -104,7 +106,7 @@ class TrotControl:
 
 
 _CENTRE = slice(-6, -4)
-"""Where the horizontal velocity of the centre of mass is among the planned rates."""
+"""Slice of the horizontal velocity of the centre of mass in the planned rates."""
 
 
 def _rates(plan: Plan) -> Array:

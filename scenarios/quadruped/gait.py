@@ -1,4 +1,4 @@
-"""The timing of a trot: diagonal pairs of feet swing in turn, and all four bear in between."""
+"""Timing of a trot: diagonal pairs of feet swing in turn, with all four loaded in between."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,18 +8,18 @@ import numpy as np
 from noisemodel.types import Array
 
 PAIRS = (0, 1, 1, 0)
-"""Which pair each foot belongs to: front left with rear right, front right with rear left."""
+"""Pair of each foot: front left with rear right, front right with rear left."""
 DUTY = 0.62
 """Share of a cycle in which a foot is on the ground."""
 
 
 @dataclass(frozen=True)
 class Beat:
-    """One pair of feet swings once.
+    """One swing of one pair of feet.
 
     Attributes:
-        pair: Which pair.
-        begin: From when on the weight goes over to the other pair, in [s].
+        pair: Index of the pair.
+        begin: When the weight starts to shift to the other pair, in [s].
         lift: When the feet leave the ground, in [s].
         touch: When they touch it again, in [s].
     """
@@ -33,14 +33,14 @@ class Beat:
 def beats(
     rng: np.random.Generator, *, begin: float, end: float, period: float, jitter: float
 ) -> tuple[Beat, ...]:
-    """Time a trot.
+    """Beats of a trot.
 
     Args:
-        rng: Source of chance.
-        begin: When it begins, in [s].
+        rng: Random number generator.
+        begin: Start, in [s].
         end: When all feet have to be on the ground again, in [s].
         period: Mean time of a cycle, in [s].
-        jitter: By which share each cycle's time varies.
+        jitter: Relative variation of the period of each cycle.
 
     Returns:
         Two beats per cycle, one per pair.
@@ -58,7 +58,7 @@ def beats(
 
 
 def loads(time: Array, timing: Sequence[Beat]) -> Array:
-    """Share of the weight that each foot is to bear, shape (times, feet); rows add up to 1.
+    """Planned share of the weight on each foot, shape (times, feet); rows add up to 1.
 
     Args:
         time: Shape (times,), in [s].
@@ -76,7 +76,7 @@ def loads(time: Array, timing: Sequence[Beat]) -> Array:
 
 
 def swings(time: Array, timing: Sequence[Beat]) -> Array:
-    """Share of its swing that each foot has done, shape (times, feet); 1 on the ground.
+    """Completed share of the swing of each foot, shape (times, feet); 1 on the ground.
 
     Args:
         time: Shape (times,), in [s].

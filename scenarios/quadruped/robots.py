@@ -15,15 +15,15 @@ class Quadruped:
         drives: Its drives, in the order of the URDF's joints.
         feet: Its feet: front left, front right, rear left, rear right.
         rest: Joint positions when it stands, in [rad].
-        period: Usual time of a cycle, in which each foot steps once, in [s].
-        height: How high the feet are usually lifted, in [m].
+        period: Nominal time of a cycle, in which each foot steps once, in [s].
+        height: Nominal height of a swing, in [m].
         speed: Highest speed ahead, in [m/s].
         turning: Highest speed of turning, in [rad/s].
-        attitude_gain: By which share of its measured tilt the base is tilted the other way.
+        attitude_gain: Tilt of the base against its measured tilt, as a share of it.
         attitude_filter: Time constant of the low-pass on the attitude, in [s].
         force_gain: Speed of a foot per error of its contact force, in [m/(s N)].
         force_filter: Time constant of the low-pass on the contact forces, in [s].
-        payload: Largest mass on its back that nobody told the controller of, in [kg].
+        payload: Largest mass on its back that the controller does not know, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         held: Positions of the locked joints that are not at zero, by name.
     """
@@ -46,12 +46,12 @@ class Quadruped:
 
     @property
     def family(self) -> str:
-        """The kind of robot: what its scenarios can ask of it."""
+        """The family of robots, which decides on the scenarios."""
         return "quadruped"
 
     @property
     def effectors(self) -> tuple[Ball, ...]:
-        """What it touches the world with."""
+        """The parts that touch the world."""
         return self.feet
 
 

@@ -1,4 +1,4 @@
-"""A quadruped, its ground and its controller, ready to be moved."""
+"""Scene of a quadruped, its ground and its controller."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from noisemodel.types import Array
 from scenarios.clock import STEP
+from scenarios.collision import box_changes
 from scenarios.faults import Faults
 from scenarios.imperfections import Imperfections, real_model
 from scenarios.loop import Scene
@@ -21,10 +22,9 @@ from scenarios.quadruped.trotting import Plan, trot
 from scenarios.reduced import reduced_model
 from scenarios.sensing import sensors_of
 from scenarios.shapes import Box
-from scenarios.touching import changes_of
 
 SETTLING = 400
-"""Ticks before the recording, in which the robot comes to rest under its unknown load."""
+"""Ticks before the recording during which the robot comes to rest under its unknown load."""
 ATTITUDE_NOISE = 1e-4
 """Standard deviation of the measured attitude per tick, in [rad]."""
 VELOCITY_NOISE = 5e-3
@@ -32,13 +32,13 @@ VELOCITY_NOISE = 5e-3
 
 
 def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: float) -> Plan:
-    """Plan the motion of one run.
+    """Plan of the motion of one run.
 
     Args:
         robot: The robot.
-        motion: What it is to do.
-        rng: Source of chance.
-        duration: How long the run shall last, in [s].
+        motion: Plan of the motion.
+        rng: Random number generator.
+        duration: Duration of the run, in [s].
 
     Returns:
         The plan.
@@ -47,13 +47,13 @@ def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: flo
 
 
 def scene(robot: Quadruped, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
-    """Set up one run.
+    """Scene of one run.
 
     Args:
         robot: The robot.
-        plan: What it is to do.
-        faults: What is wrong.
-        imperfections: What is imperfect about it anyway.
+        plan: Plan of the motion.
+        faults: The faults to inject.
+        imperfections: The imperfections of the robot.
 
     Returns:
         The scene; it begins when the robot has come to rest.
@@ -82,12 +82,12 @@ def scene(robot: Quadruped, plan: Plan, faults: Faults, imperfections: Imperfect
         effectors=len(robot.feet),
         settling=SETTLING,
         noise=noise,
-        changes=changes_of(world, boxes),
+        changes=box_changes(world, boxes),
     )
 
 
 def bodies(robot: Quadruped) -> int:
-    """How many moving bodies a quadruped has, its base being one."""
+    """Number of moving bodies of a quadruped, with its base."""
     return int(reduced_model(robot).njoints) - 1
 
 
@@ -100,7 +100,7 @@ def _shifted(plan: Plan, faults: Faults) -> Plan:
 def _world(
     robot: Quadruped, model: Any, boxes: tuple[Box, ...], imperfections: Imperfections
 ) -> Any:
-    """Build the robot as it really is, and the ground."""
+    """MuJoCo model of the real robot and the ground."""
     physics = Physics(
         timestep=STEP,
         armature=np.array(robot.drives.armature),
@@ -112,7 +112,7 @@ def _world(
 
 
 def _start(robot: Quadruped, model: Any, standing: Standing, faults: Faults) -> Array:
-    """Configuration whose encoders read the standing one, its lowest foot on the ground."""
+    """Configuration at which the encoders read the standing one, lowest foot on the ground."""
     configuration = standing.configuration.copy()
     configuration[7:] -= faults.offsets(len(configuration) - 7)
     data = model.createData()

@@ -1,4 +1,4 @@
-"""How a quadruped stands before it trots."""
+"""Standing posture of a quadruped before a trot."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -35,13 +35,13 @@ class Standing:
 
 
 def stand(robot: Quadruped) -> Standing:
-    """Let a robot stand with its joints near their rest positions.
+    """Standing posture with the joints near their rest positions.
 
     Args:
         robot: The robot.
 
     Returns:
-        How it stands; every call gives the same.
+        The posture; every call returns the same.
     """
     return _stand(robot.name, robot.rest, robot.feet, reduced_model(robot))
 

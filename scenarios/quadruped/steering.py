@@ -1,4 +1,4 @@
-"""Where a trot goes: velocities that are asked for, a new one now and then."""
+"""Path of a trot: a sequence of velocity commands."""
 
 import numpy as np
 
@@ -16,26 +16,26 @@ HOLD = (1.5, 3.0)
 def steer(
     time: Array, way: str, robot: Quadruped, rng: np.random.Generator, *, start: float, stop: float
 ) -> tuple[Array, Array]:
-    """Draw commands, and follow them from rest to rest.
+    """Path and direction of the body by random commands, from rest to rest.
 
     Args:
         time: Shape (times,), in [s].
         way: As `scenarios.motions.Trot` has it.
         robot: The robot.
-        rng: Source of chance.
-        start: When it begins to move, in [s].
-        stop: When it is at rest again, in [s].
+        rng: Random number generator.
+        start: Start of the motion, in [s].
+        stop: End of the motion, in [s].
 
     Returns:
-        Way of the body over the ground, shape (times, 2), in [m], and its direction, shape
+        Path of the body over the ground, shape (times, 2), in [m], and its direction, shape
         (times,), in [rad].
     """
     velocity = np.zeros((len(time), 3))  # ahead, to the left, turning
     now, before = start, np.zeros(3)
     while now < stop - 2 * CHANGE:
-        wanted = _command(way, robot, rng)
-        velocity += _onset(time, now) * (wanted - before)
-        now, before = now + float(rng.uniform(*HOLD)), wanted
+        command = _command(way, robot, rng)
+        velocity += _onset(time, now) * (command - before)
+        now, before = now + float(rng.uniform(*HOLD)), command
     velocity -= _onset(time, stop - CHANGE) * before
     ahead, aside, turning = velocity.T
     yaw = np.cumsum(turning) * TICK
@@ -45,7 +45,7 @@ def steer(
 
 
 def _onset(time: Array, start: float) -> Array:
-    """From 0 to 1, shape (times, 1)."""
+    """Smooth step from 0 to 1, shape (times, 1)."""
     return minimum_jerk(np.clip((time - start) / CHANGE, 0, 1))[:, None]
 
 

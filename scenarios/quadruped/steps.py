@@ -1,4 +1,4 @@
-"""The steps of one foot: where it comes down, how it gets there, and when it may touch."""
+"""Steps of one foot: footholds, paths and contacts."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -14,15 +14,15 @@ from scenarios.quadruped.gait import Beat
 TOP = 0.4
 """Share of a swing after which the foot is highest."""
 ACROSS = 0.8
-"""Share of a swing after which the foot is over the place where it comes down."""
+"""Share of a swing after which the foot is over its next foothold."""
 NEAR = 0.8
-"""Share of a swing after which it is no surprise if the foot touches."""
+"""Share of a swing after which a contact is planned."""
 LANDING = 0.1
 """Speed at which a foot is to touch the ground, in heights of its swing per time of its descent."""
 
 
 class Foothold(NamedTuple):
-    """Where a foot stands, in [m], and the direction of the body then, in [rad]."""
+    """Place of a foot, in [m], and the direction of the body, in [rad]."""
 
     x: float
     y: float
@@ -30,12 +30,12 @@ class Foothold(NamedTuple):
 
 
 def progress(share: Array) -> Array:
-    """Share of its way over the ground that a foot has gone after a share of its swing."""
+    """Completed share of the path of a foot after a share of its swing."""
     return minimum_jerk(np.minimum(1, share / ACROSS))
 
 
 def height(share: Array) -> Array:
-    """Height of a foot after a share of its swing, 1 at the top: up, and softly down."""
+    """Height of a foot after a share of its swing, 1 at the top."""
     up = minimum_jerk(np.minimum(1, share / TOP))
     left = np.clip((1 - share) / (1 - TOP), 0, 1)
     # From rest to the ground at the landing speed, without acceleration at either end.
@@ -46,14 +46,14 @@ def height(share: Array) -> Array:
 def footholds(
     beats: Sequence[Beat], hip: Array, *, way: Array, yaw: Array, stop: float
 ) -> list[Foothold]:
-    """Place a foot where it is under its hip in the middle of the time in which it will stand.
+    """Footholds: under the hip in the middle of each stance.
 
-    That is the neutral point of Raibert, Legged Robots That Balance, 1986.
+    This is the neutral point of Raibert, Legged Robots That Balance, 1986.
 
     Args:
         beats: Those in which the foot swings, in order.
         hip: Where the foot stands at first, shape (2,), in [m].
-        way: Way of the body at every tick, shape (ticks, 2), in [m].
+        way: Path of the body at every tick, shape (ticks, 2), in [m].
         yaw: Direction of the body at every tick, shape (ticks,), in [rad].
         stop: When the body is at rest, in [s].
 
@@ -72,16 +72,16 @@ def footholds(
 
 
 def path(time: Array, beats: Sequence[Beat], places: Sequence[Foothold], progress: Array) -> Array:
-    """Go from foothold to foothold.
+    """Path of a foot from foothold to foothold.
 
     Args:
         time: Shape (times,), in [s].
         beats: Those in which the foot swings, in order.
         places: Where it stands at first, and after each beat.
-        progress: Share of its way that it has gone in its swing, shape (times,).
+        progress: Completed share of its path in its swing, shape (times,).
 
     Returns:
-        Way of the foot over the ground, shape (times, 2), in [m].
+        Path of the foot over the ground, shape (times, 2), in [m].
     """
     stands = np.array(places)[:, :2]
     begun = np.searchsorted([beat.lift for beat in beats], time, side="right")
@@ -90,10 +90,10 @@ def path(time: Array, beats: Sequence[Beat], places: Sequence[Foothold], progres
 
 
 def contacts(foot: int, beats: Sequence[Beat], places: Sequence[Foothold]) -> list[Contact]:
-    """List when and where a foot may touch.
+    """Planned contacts of a foot.
 
     Args:
-        foot: Which foot.
+        foot: Index of the foot.
         beats: Those in which it swings, in order.
         places: Where it stands at first, and after each beat.
 

@@ -1,4 +1,4 @@
-"""A trot over flat ground: where the body goes, and where the feet come down."""
+"""Plan of a trot over flat ground: the path of the body and the feet."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,16 +23,15 @@ REST = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """What a quadruped is to do, at every tick.
+    """Plan of the motion of a quadruped, at every tick.
 
     Attributes:
         centre: Centre of mass, shape (ticks, 3), in [m].
         yaw: Direction of the body, shape (ticks,), in [rad].
         feet: Centres of the feet, shape (ticks, feet, 3), in [m].
         swing: Whether each foot is in the air, shape (ticks, feet).
-        progress: Share of its way over the ground that each foot has gone in its swing; 1 while
-            it stands, shape (ticks, feet).
-        load: Share of the weight that each foot is to bear, shape (ticks, feet).
+        progress: Completed share of the path of each foot; 1 in stance, shape (ticks, feet).
+        load: Planned share of the weight on each foot, shape (ticks, feet).
         contacts: The planned contacts, in the order of time.
         effectors: The feet.
         ground: The floor.
@@ -64,11 +63,11 @@ class Plan:
 
     @property
     def duration(self) -> float:
-        """How long it lasts, in [s]."""
+        """Duration, in [s]."""
         return len(self.yaw) * TICK
 
     def after(self, ticks: int) -> "Plan":
-        """Rest for some ticks before the plan begins."""
+        """The plan after some ticks of rest."""
 
         def rested(signal: Any) -> Any:
             return np.concatenate((np.repeat(signal[:1], ticks, axis=0), signal))
@@ -92,14 +91,14 @@ def trot(
     rng: np.random.Generator,
     duration: float,
 ) -> Plan:
-    """Plan a trot from rest to rest.
+    """Plan of a trot from rest to rest.
 
     Args:
         robot: The robot.
-        standing: How it stands before.
-        motion: How it trots.
-        rng: Source of chance.
-        duration: How long the plan shall last, in [s].
+        standing: The robot before the motion.
+        motion: The motion.
+        rng: Random number generator.
+        duration: Duration of the plan, in [s].
 
     Returns:
         The plan; until the robot stops, it does not depend on the duration.

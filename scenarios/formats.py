@@ -1,4 +1,4 @@
-"""The forms in which a data set keeps its runs: samples of our own, and NoisyTest's files."""
+"""The file formats of a data set: samples, and the files of NoisyTest."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -12,18 +12,18 @@ from scenarios.tasks import Task
 
 
 @dataclass(frozen=True)
-class Form:
-    """In which form runs are kept.
+class Format:
+    """A file format of runs.
 
     Attributes:
-        suffix: Of the files.
-        place: Path of a run in the folder, without its suffix.
-        write: Writes a run, whole or not at all; replaces what is there.
-        read: Reads a run's blocks, and how long it lasts, in [s].
+        suffix: Suffix of the files.
+        stem: Path of a run in the folder, without its suffix.
+        write: Writes a run atomically; replaces an existing file.
+        read: Reads the blocks of a run, and its duration, in [s].
     """
 
     suffix: str
-    place: Callable[[Task], str]
+    stem: Callable[[Task], str]
     write: Callable[[Run, Path], None]
     read: Callable[[Path], tuple[tuple[Block, ...], float]]
 
@@ -37,14 +37,14 @@ def _read_sample(path: Path) -> tuple[tuple[Block, ...], float]:
     return sample.blocks, float(sample.meta["duration"])
 
 
-def _noisytest_place(task: Task) -> str:
+def _noisytest_stem(task: Task) -> str:
     return f"{noisytest.part(task.seed)}/{task.name.replace('/', '-')}"
 
 
-FORMS: Mapping[str, Form] = MappingProxyType(
+FORMATS: Mapping[str, Format] = MappingProxyType(
     {
-        "samples": Form(".npz", lambda task: task.name, _write_sample, _read_sample),
-        "noisytest": Form(".log", _noisytest_place, noisytest.write, noisytest.read),
+        "samples": Format(".npz", lambda task: task.name, _write_sample, _read_sample),
+        "noisytest": Format(".log", _noisytest_stem, noisytest.write, noisytest.read),
     }
 )
 """By name."""

@@ -1,4 +1,4 @@
-"""The full run of a sample, made again bit for bit."""
+"""The full run of a sample, reproduced bit for bit."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -9,8 +9,8 @@ from scenarios.sample import Sample, digest
 from scenarios.simulation import simulate
 
 
-def again(sample: Sample) -> Run:
-    """Make the run of a sample again.
+def reproduce(sample: Sample) -> Run:
+    """Simulate the run of a sample again.
 
     Args:
         sample: A sample.
@@ -19,7 +19,7 @@ def again(sample: Sample) -> Run:
         The run that it was made of, with all its signals, bit for bit.
 
     Raises:
-        ChangedRunError: If the run is another one, as other versions make it.
+        ChangedRunError: If the run differs, as it may with other versions of the software.
         ScenarioError: As ``simulate`` does.
     """
     recipe = sample.meta

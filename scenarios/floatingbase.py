@@ -6,7 +6,7 @@ from noisemodel.types import Array
 
 
 def pinocchio_base(pose: Array, velocity: Array) -> tuple[Array, Array]:
-    """Change the order of quaternions, and the axes of linear velocities.
+    """Pose and velocity of a floating base as Pinocchio has them.
 
     Args:
         pose: Position and quaternion (w, x, y, z), shape (samples, 7).

@@ -1,4 +1,4 @@
-"""What touches in a simulation: effectors of the robot, boxes of the world that come and go."""
+"""Collision geometry of a MuJoCo model: effectors of the robot, boxes that appear and vanish."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,17 +15,17 @@ from scenarios.shapes import Ball, Box, Effector, Rod, Sole
 
 SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
 ROBOT, WORLD = 1, 2
-"""Contact groups: the robot touches the world, never itself."""
+"""Contact groups: the robot collides with the world, never with itself."""
 
 
 def add_effector(
     spec: Any, bodies: Sequence[Any], model: Any, effector: Effector, physics: Physics
 ) -> None:
-    """Add the shape of an effector, and a place that feels all of its contacts."""
+    """Add the geom of an effector, and a site that encloses all of its contacts."""
     if not model.existFrame(effector.frame):
         known = ", ".join(frame.name for frame in model.frames)
         raise UnsupportedModelError(
-            f"the robot has no frame {effector.frame!r} to touch with; it has {known}"
+            f"the robot has no frame {effector.frame!r} for an effector; it has {known}"
         )
     frame = model.frames[model.getFrameId(effector.frame)]
     body = bodies[frame.parentJoint]
@@ -45,7 +45,7 @@ def add_effector(
 
 
 def add_boxes(spec: Any, boxes: Sequence[Box], physics: Physics) -> None:
-    """Add the boxes of the world, all of them there."""
+    """Add the boxes of the world, all of them present."""
     for number, box in enumerate(boxes):
         spec.worldbody.add_geom(
             name=_box(number),
@@ -57,26 +57,26 @@ def add_boxes(spec: Any, boxes: Sequence[Box], physics: Physics) -> None:
         )
 
 
-def put(model: Any, geom: int, *, there: bool) -> None:
-    """Let a box be touched, or not."""
-    model.geom_contype[geom], model.geom_conaffinity[geom] = (WORLD, ROBOT) if there else (0, 0)
+def set_collision(model: Any, geom: int, *, present: bool) -> None:
+    """Enable or disable the collisions of a geom."""
+    model.geom_contype[geom], model.geom_conaffinity[geom] = (WORLD, ROBOT) if present else (0, 0)
 
 
-def changes_of(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, bool]]]:
-    """Take away the boxes that are not there yet, and list which come and go.
+def box_changes(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, bool]]]:
+    """Disable the boxes that are not present at first; the changes of all boxes.
 
     Args:
         model: The ``mujoco.MjModel``, made with these boxes.
         boxes: The boxes.
 
     Returns:
-        Geoms and whether they are there from then on, by ticks.
+        Geoms and whether they are present from then on, by ticks.
     """
     changes: dict[int, list[tuple[int, bool]]] = {}
     for number, box in enumerate(boxes):
         geom = model.geom(_box(number)).id
         if box.since > 0:
-            put(model, geom, there=False)
+            set_collision(model, geom, present=False)
             changes.setdefault(round(box.since / TICK), []).append((geom, True))
         if box.until < np.inf:
             changes.setdefault(round(box.until / TICK), []).append((geom, False))
@@ -84,7 +84,7 @@ def changes_of(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, bo
 
 
 def quaternion(rotation: Array) -> list[float]:
-    """Turn a rotation matrix into a quaternion in MuJoCo's order: w, x, y, z."""
+    """Quaternion of a rotation matrix in MuJoCo's order: w, x, y, z."""
     q = pin.Quaternion(rotation)
     return [q.w, q.x, q.y, q.z]
 
@@ -103,7 +103,7 @@ def _surface(own: int, other: int, physics: Physics) -> dict[str, Any]:
 
 
 def _solid(effector: Effector) -> tuple[Any, list[float], Array, list[float]]:
-    """Geometry of an effector: type, size and middle, and the size of what surrounds contacts."""
+    """Geometry of an effector: type, size and centre of its geom, and the size of its site."""
     if isinstance(effector, Rod):  # MuJoCo leaves the round ends out of a capsule's length
         half = effector.length / 2
         size = [effector.radius, half - effector.radius, 0.0]

@@ -1,4 +1,4 @@
-"""What a quadruped makes of its sensors: filtered errors against its plan."""
+"""State estimate of a quadruped: low-passed sensors, and corrections towards its plan."""
 
 from math import asin, atan2, cos, sin
 
@@ -8,27 +8,27 @@ from noisemodel.types import Array
 from scenarios.clock import TICK
 from scenarios.quadruped.robots import Quadruped
 
-HOMING = 1.0
-"""Speed of correction per distance from the planned way, in [1/s]."""
+POSITION_GAIN = 1.0
+"""Rate of the correction per distance from the planned path, in [1/s]."""
 VELOCITY_FILTER = 0.05
 """Time constant of the low-pass on the measured velocity, in [s]."""
 LOWEST, STEEPEST = 0.5, 0.7
-"""The robot has fallen at this share of its height, or when it tilts by more, in [rad]."""
+"""Share of its height below which, and tilt above which, in [rad], the robot has fallen."""
 
 
-class Feeling:
-    """Follows the sensors, tick by tick.
+class StateEstimate:
+    """State estimate, updated once per tick.
 
     Args:
         robot: The robot.
-        sensors: Where each sensor's values are.
+        sensors: Slice of each sensor.
 
     Attributes:
         roll: Low-passed, in [rad].
         pitch: Low-passed, in [rad].
         slip: Low-passed velocity of the centre of mass less the planned one, shape (2,), in [m/s].
-        home: How the way is corrected so that the robot comes back to its plan, shape (2,), in [m].
-        turn: How its direction is corrected, in [rad].
+        position_correction: Correction of the path towards the plan, shape (2,), in [m].
+        yaw_correction: Correction of the direction towards the plan, in [rad].
         force: Low-passed contact forces, shape (feet,), in [N].
     """
 
@@ -37,17 +37,17 @@ class Feeling:
         self._tilt_share = _share(robot.attitude_filter)
         self._force_share = _share(robot.force_filter)
         self._slip_share = _share(VELOCITY_FILTER)
-        self.roll = self.pitch = self.turn = 0.0
-        self.slip, self.home = np.zeros(2), np.zeros(2)
+        self.roll = self.pitch = self.yaw_correction = 0.0
+        self.slip, self.position_correction = np.zeros(2), np.zeros(2)
         self.force = np.zeros(len(robot.feet))
 
-    def hear(self, sensors: Array, *, place: Array, velocity: Array, yaw: float) -> None:
-        """Take in what the sensors say.
+    def update(self, sensors: Array, *, place: Array, velocity: Array, yaw: float) -> None:
+        """Update the estimate with the sensors of one tick.
 
         Args:
-            sensors: As `scenarios.sensing.sensors_of` has it.
-            place: Where the centre of mass is planned to be, shape (2,), in [m].
-            velocity: How fast it is planned to be, shape (2,), in [m/s].
+            sensors: Values of the sensors, as `scenarios.sensing.sensors_of` has them.
+            place: Planned position of the centre of mass, shape (2,), in [m].
+            velocity: Its planned velocity, shape (2,), in [m/s].
             yaw: The planned direction of the body, in [rad].
         """
         w, x, y, z = sensors[self._where["base.turn"]].tolist()
@@ -56,19 +56,21 @@ class Feeling:
         off = yaw - atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
         self.roll += self._tilt_share * (roll - self.roll)
         self.pitch += self._tilt_share * (pitch - self.pitch)
-        self.turn += TICK * HOMING * atan2(sin(off), cos(off))
-        self.home += TICK * HOMING * (place - sensors[self._where["centre.place"]][:2])
+        self.yaw_correction += TICK * POSITION_GAIN * atan2(sin(off), cos(off))
+        self.position_correction += (
+            TICK * POSITION_GAIN * (place - sensors[self._where["centre.place"]][:2])
+        )
         slip = sensors[self._where["centre.velocity"]][:2] - velocity
         self.slip += self._slip_share * (slip - self.slip)
         self.force += self._force_share * (sensors[: len(self.force)] - self.force)
 
     def fallen(self, sensors: Array, height: float) -> bool:
-        """Tell whether the robot is too low for its height, or too much tilted."""
+        """Whether the robot is too low for its height, or too much tilted."""
         _, x, y, _ = sensors[self._where["base.turn"]].tolist()
         low = float(sensors[self._where["centre.place"]][2]) < LOWEST * height
         return low or 1 - 2 * (x * x + y * y) < cos(STEEPEST)
 
 
 def _share(time_constant: float) -> float:
-    """How far a low-pass goes in one tick."""
+    """Gain of a first-order low-pass per tick."""
     return TICK / (time_constant + TICK)

@@ -1,9 +1,9 @@
-"""The stabilizer: what feet have to do so that a walking robot does not fall.
+"""The stabilizer: heights and tilts of the soles that keep a walking robot upright.
 
 After Kajita et al., Biped walking stabilization based on linear inverted pendulum tracking, IROS
 2010, and Caron et al., Stair climbing stabilization of the HRP-4 humanoid robot, ICRA 2019: the
-error of the capture point moves the zero-moment point; the weight that each sole has to bear
-follows; soles give way until they bear it. Points of the plane are complex numbers here.
+error of the capture point moves the zero-moment point; the load of each sole follows; soles
+comply until they bear it. Points of the plane are complex numbers here.
 """
 
 from cmath import rect
@@ -20,29 +20,29 @@ from scenarios.humanoid.robots import Gains
 from scenarios.shapes import Sole
 
 INSIDE = 0.77
-"""How far from its middle a sole is pressed on at most, as a share of its half extent."""
+"""Largest offset of the zero-moment point in a sole, as a share of its half extent."""
 STEEPEST = 0.25
 """Largest tilt of a sole, in [rad]."""
 FURTHEST = 0.04
-"""Largest height by which a foot leaves its plan, in [m]."""
+"""Largest deviation of a foot from its plan in height, in [m]."""
 DRIFT = 0.05
 """Largest integral of the capture point's error, in [m s]."""
 TOUCH = 30.0
-"""A sole that bears more has touched the ground, in [N]."""
+"""Force above which a sole is in contact, in [N]."""
 FLAT = 5.0
-"""Rate at which a sole in the air goes back to its plan, in [1/s]."""
+"""Rate at which a sole in the air returns to its plan, in [1/s]."""
 
 
-class Balance:
-    """Turns plan and sensors into heights and tilts of the soles, once per tick.
+class Stabilizer:
+    """Heights and tilts of the soles from plan and sensors, once per tick.
 
     Args:
-        plan: What the robot is to do.
+        plan: Plan of the motion.
         soles: Left and right sole.
         gains: Of the stabilizer.
         strength: Scale of the gains of the force control at each tick, shape (ticks,).
-        weight: Of the robot as it is known, in [N].
-        where: Where each sensor's values are.
+        weight: Weight of the nominal robot, in [N].
+        where: Slice of each sensor.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Balance:
     ) -> None:
         self._gains, self._strength, self._rate = gains, strength.tolist(), plan.rate
         self._share = TICK / (gains.filter + TICK)
-        # A sole that bears the whole robot at its edge feels no larger torques.
+        # Torques of a sole that bears the whole robot at its edge.
         self._most = [
             (weight * across, weight * along) for along, across in (sole.patch for sole in soles)
         ]
@@ -82,48 +82,50 @@ class Balance:
         """Advance by one tick.
 
         Args:
-            number: Which tick it is.
-            sensors: What the sensors report.
+            number: Index of the tick.
+            sensors: Values of the sensors.
 
         Returns:
             Height of each sole over its plan, in [m], and its tilts about its own x and y axes,
             in [rad].
         """
-        told = sensors.tolist()
-        felt = [
-            (-told[bearing], _within(-told[turning], x), _within(-told[turning + 1], y))
+        values = sensors.tolist()
+        measured = [
+            (-values[bearing], _within(-values[turning], x), _within(-values[turning + 1], y))
             for bearing, turning, (x, y) in zip(
                 self._bearing, self._turning, self._most, strict=True
             )
         ]
         zmp = self._zmp[number]
-        if number:  # nothing is known before the first tick
-            zmp += self._correction(number, told)
-        wanted = self._wanted(number, zmp, felt[0][0] + felt[1][0])
+        if number:  # there are no sensor values before the first tick
+            zmp += self._correction(number, values)
+        desired = self._desired(number, zmp, measured[0][0] + measured[1][0])
         gains, strength, swinging = self._gains, self._strength[number], self._swinging[number]
         for foot, (error, tilt) in enumerate(zip(self._errors, self._tilts, strict=True)):
             for axis in (0, 1, 2):
-                error[axis] += self._share * (felt[foot][axis] - wanted[foot][axis] - error[axis])
+                error[axis] += self._share * (
+                    measured[foot][axis] - desired[foot][axis] - error[axis]
+                )
             for axis in (0, 1):
                 rate = strength * gains.tilt * error[1 + axis] - gains.level * tilt[axis]
-                if not wanted[foot][0] > 0 and felt[foot][0] < TOUCH:
+                if not desired[foot][0] > 0 and measured[foot][0] < TOUCH:
                     rate = -FLAT * tilt[axis]
                 tilt[axis] = _within(tilt[axis] + TICK * rate, STEEPEST)
         # The foot that bears too little goes down, the other one up.
         rate = strength * gains.height * (self._errors[0][0] - self._errors[1][0])
-        flying = swinging >= 0 and felt[swinging][0] < TOUCH
+        flying = swinging >= 0 and measured[swinging][0] < TOUCH
         self._height += TICK * (rate - (FLAT if flying else gains.even) * self._height)
         self._height = _within(self._height, 2 * FURTHEST)
         return [self._height / 2, -self._height / 2], self._tilts
 
-    def _correction(self, number: int, told: list[float]) -> complex:
+    def _correction(self, number: int, values: list[float]) -> complex:
         """Shift of the zero-moment point by the error of the capture point, in [m]."""
         left, places = self._left(number, self._zmp[number]), self._places[number]
-        w, x, y, z = told[self._turn : self._turn + 4]
+        w, x, y, z = values[self._turn : self._turn + 4]
         heading = atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        # Seen from the feet, which stand where they stand.
-        feet = [_point(told, start) for start in self._standing]
-        real = _point(told, self._centre) + _point(told, self._moving) / self._rate
+        # Relative to the feet, whose places are fixed.
+        feet = [_point(values, start) for start in self._standing]
+        real = _point(values, self._centre) + _point(values, self._moving) / self._rate
         real -= left * feet[0] + (1 - left) * feet[1]
         real *= rect(1.0, self._heading[number] - heading)
         error = left * places[0] + (1 - left) * places[1] + real - self._capture[number]
@@ -131,22 +133,22 @@ class Balance:
         self._drift *= min(1.0, DRIFT / (abs(self._drift) + 1e-9))
         return self._gains.capture * error + self._gains.integral * self._drift
 
-    def _wanted(self, number: int, zmp: complex, borne: float) -> list[tuple[float, float, float]]:
-        """What each sole is to bear of all that both bear: force, torques about x and y."""
+    def _desired(self, number: int, zmp: complex, borne: float) -> list[tuple[float, float, float]]:
+        """Desired load of each sole: force, torques about x and y."""
         left, places = self._left(number, zmp), self._places[number]
         beside = zmp - left * places[0] - (1 - left) * places[1]
-        wanted = []
+        desired = []
         for share, yaw, reach in zip(
             (left, 1 - left), self._yaws[number], self._reach, strict=True
         ):
             point = beside * rect(1.0, -yaw)
             along, across = _within(point.real, reach[0]), _within(point.imag, reach[1])
             load = share * borne
-            wanted.append((load, load * across, -load * along))
-        return wanted
+            desired.append((load, load * across, -load * along))
+        return desired
 
     def _left(self, number: int, zmp: complex) -> float:
-        """Which share of the weight the left foot bears if the zero-moment point is there."""
+        """Share of the weight on the left foot for a zero-moment point."""
         if self._swinging[number] >= 0:
             return float(self._swinging[number] == 1)
         left, right = self._places[number]
@@ -156,12 +158,12 @@ class Balance:
 
 
 def _points(signal: Array) -> Any:
-    """Turn x and y, the first of the last axis, into lists of complex numbers."""
+    """X and y, the first of the last axis, as lists of complex numbers."""
     return (signal[..., 0] + 1j * signal[..., 1]).tolist()
 
 
-def _point(told: list[float], start: int) -> complex:
-    return complex(told[start], told[start + 1])
+def _point(values: list[float], start: int) -> complex:
+    return complex(values[start], values[start + 1])
 
 
 def _within(value: float, limit: float) -> float:

@@ -1,4 +1,4 @@
-"""What a data set holds: who stayed upright, how much of each class, and what it cost."""
+"""Statistics of a data set: runs upright, amounts of each class, processor time."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -16,13 +16,13 @@ FRAME, HOP = 0.4, 0.1
 
 @dataclass(frozen=True)
 class Amount:
-    """How much there is of a class.
+    """Amount of a class.
 
     Attributes:
         blocks: Annotated stretches.
-        seconds: How long they last together, in [s].
-        frames: Frames that lie whole in one of them; one for each that is shorter, which is padded
-            to a frame for training (paper, Sec. III-A).
+        seconds: Their total duration, in [s].
+        frames: Frames completely inside of one of them; a shorter one counts as one frame, to which
+            it is padded for training (paper, Sec. III-A).
     """
 
     blocks: int = 0
@@ -39,11 +39,11 @@ class Amount:
 
 @dataclass(frozen=True)
 class Cost:
-    """What the runs of a robot cost.
+    """Processor time of the runs of a robot.
 
     Attributes:
         seconds: Processor time, in [s].
-        simulated: How long those runs last together, in [s]; runs that fell are left out of both.
+        simulated: Total duration of those runs, in [s]; both leave out runs that fell.
     """
 
     seconds: float = 0.0
@@ -51,15 +51,15 @@ class Cost:
 
 
 @dataclass(frozen=True)
-class Balance:
-    """What a data set holds.
+class Statistics:
+    """Statistics of a data set.
 
     Attributes:
         upright: Runs in which each robot stayed upright, and all of its runs, by robot and
             scenario.
-        amounts: How much there is of each class, by robot and class.
-        costs: What the runs cost, by robot.
-        motion: How long all runs last together, in [s].
+        amounts: Amount of each class, by robot and class.
+        costs: Processor time, by robot.
+        motion: Total duration of all runs, in [s].
         size: Of all files, in bytes.
     """
 
@@ -71,7 +71,7 @@ class Balance:
 
     @classmethod
     def of(cls, folder: Folder) -> Self:
-        """Count what a folder holds.
+        """Statistics of a folder.
 
         Raises:
             SampleError: If a file is damaged.
@@ -104,7 +104,7 @@ class Balance:
         return cls(upright, amounts, costs, motion, size)
 
     def as_dict(self) -> dict[str, Any]:
-        """Give all numbers as plain data."""
+        """All numbers as plain data."""
         return {
             "format": "noise-balance/1",
             "upright": {
@@ -160,6 +160,6 @@ class Balance:
 
 def _amount(block: Block) -> Amount:
     seconds = block.stop - block.start
-    # Blocks begin and stop on samples, which floats meet but nearly.
+    # Blocks start and stop on samples, up to rounding.
     frames = 1 + int(max(seconds - FRAME, 0.0) / HOP + 1e-6)
     return Amount(1, seconds, frames)
