@@ -49,16 +49,16 @@ _FAST = ("ok", "highaccelerations", "oscillations", "impact")
 _OSCILLATION = ("ok", "oscillations", "impact")
 
 _LINES = (
-    (1, "straight", "Nothing is wrong: straight ahead, or from place to place.", _OK),
-    (2, "curve", "Nothing is wrong: in a curve.", _OK),
-    (3, "directions", "Nothing is wrong: sideways, backward, or any way.", _OK),
-    (4, "spot", "Nothing is wrong: on the spot.", _OK),
+    (1, "straight", "No defect: straight ahead, or from place to place.", _OK),
+    (2, "curve", "No defect: in a curve.", _OK),
+    (3, "directions", "No defect: sideways, backward, or in any direction.", _OK),
+    (4, "spot", "No defect: on the spot.", _OK),
     (5, "obstacle-full", "An undetected obstacle under the whole foot.", _IMPACT),
     (6, "obstacle-heel", "An undetected obstacle under the heel.", _IMPACT),
     (7, "obstacle-toe", "An undetected obstacle under the toe.", _IMPACT),
     (8, "obstacle-left", "An undetected obstacle under the left side of a foot.", _IMPACT),
     (9, "obstacle-right", "An undetected obstacle under the right side of a foot.", _IMPACT),
-    (10, "decalibrated", "An encoder is off.", _IMPACT),
+    (10, "decalibrated", "An encoder has an offset.", _IMPACT),
     *(
         (
             11 + index,
@@ -70,7 +70,7 @@ _LINES = (
     ),
     (20, "early-height", "Repeated early contact, at varied heights of the motion.", _IMPACT),
     (21, "early-duration", "Repeated early contact, at varied durations of the motion.", _IMPACT),
-    (22, "platform", "Ground that is not there: a partial contact at an edge, a step down.", _FAST),
+    (22, "platform", "Missing ground: a partial contact at an edge, a step down.", _FAST),
     (23, "force-jump", "The signal of a force sensor jumps.", _FAST),
     (24, "torque-jump", "The signal of a torque sensor, or of an attitude, jumps.", _FAST),
     (25, "limit-cycle", "Force control with too high gains becomes a limit cycle.", _OSCILLATION),

@@ -18,11 +18,11 @@ _PICKS = Picks()
 
 ARM: Mapping[str, Case] = {
     "straight": Case(_PICKS, description="Picks from a table."),
-    "curve": Case(Picks(way="curve"), description="Picks from a table, swinging round between."),
+    "curve": Case(Picks(way="curve"), description="Picks from a table, on curved paths."),
     "directions": Case(
-        Picks(way="directions"), description="Moves over the table, touching nothing."
+        Picks(way="directions"), description="Moves over the table without contact."
     ),
-    "spot": Case(Picks(way="spot"), description="Presses on one spot, again and again."),
+    "spot": Case(Picks(way="spot"), description="Presses repeatedly on one spot."),
     "obstacle-full": Case(
         _PICKS,
         Obstacles((0.014, 0.025), (0.05, 0.05), share=0.7),
@@ -51,7 +51,7 @@ ARM: Mapping[str, Case] = {
     "decalibrated": Case(
         _PICKS,
         Decalibration((1,), (-0.05, -0.03)),
-        "A shoulder encoder is off, so that the tool hits the table before it should.",
+        "A shoulder encoder has an offset, so that the tool hits the table too early.",
     ),
     **{
         multisine(*band): Case(_PICKS, Multisine((band,), (0.0005, 0.002), fastest=1.0))
@@ -65,12 +65,12 @@ ARM: Mapping[str, Case] = {
     "early-duration": Case(
         Picks(way="spot"),
         Obstacles((0.02, 0.02), (0.05, 0.05)),
-        "A plate of 2 cm on the spot where it presses again and again.",
+        "A plate of 2 cm on the spot on which it presses repeatedly.",
     ),
     "platform": Case(
         Picks(force=(50.0, 70.0)),
         GivingWay((0.004, 0.015), (0.05, 0.05), (0.3, 0.5)),
-        "What the tool presses on gives way.",
+        "The surface under the tool gives way.",
     ),
     "force-jump": Case(_PICKS, SensorJumps((80.0, 160.0))),
     "limit-cycle": Case(_PICKS, ForceGain((5.0, 9.0))),

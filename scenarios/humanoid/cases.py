@@ -43,7 +43,7 @@ HUMANOID: Mapping[str, Case] = {
     "decalibrated": Case(
         _WALK,
         Decalibration(_RIGHT_ANKLE, (0.05, 0.05), either=True),
-        "An encoder of the right ankle is off by 0.05 rad.",
+        "An encoder of the right ankle has an offset of 0.05 rad.",
     ),
     **{
         multisine(*band): Case(_WALK, Multisine((band,), (0.002, 0.002), fastest=_FASTEST))

@@ -45,7 +45,7 @@ QUADRUPED: Mapping[str, Case] = {
     "straight": Case(_TROT, description="Trots straight ahead."),
     "curve": Case(Trot(way="curve"), description="Trots in curves."),
     "directions": Case(Trot(way="directions"), description="Trots sideways and backward."),
-    "spot": Case(Trot(way="spot"), description="Trots on the spot, turning now and then."),
+    "spot": Case(Trot(way="spot"), description="Trots on the spot, with turns."),
     "obstacle-full": Case(_TROT, _obstacles(_ANY), "Boxes under any foot."),
     "obstacle-heel": Case(_TROT, _obstacles(_HIND), "Boxes under hind feet."),
     "obstacle-toe": Case(_TROT, _obstacles(_FRONT), "Boxes under front feet."),
@@ -54,7 +54,7 @@ QUADRUPED: Mapping[str, Case] = {
     "decalibrated": Case(
         _TROT,
         Decalibration((_FRONT_LEFT_KNEE,), (-0.15, -0.1)),
-        "A knee encoder is off, so that the leg is longer than it seems.",
+        "A knee encoder has an offset, so that the leg is longer than measured.",
     ),
     **{multisine(*band): Case(_TROT, _sines(band)) for band in BANDS},
     "early-height": Case(
@@ -92,7 +92,7 @@ QUADRUPED: Mapping[str, Case] = {
     "limit-cycle": Case(
         _TROT,
         ForceGain((25.0, 40.0), start=(0.2, 0.4), contacts=False),
-        "The gain by which feet give way to forces is too high.",
+        "The gain of the compliance of the feet is too high.",
     ),
     "faint-oscillation": Case(_TROT, _sines(*BANDS, amplitude=(0.00003, 0.0067))),
     "reference-jump": Case(
