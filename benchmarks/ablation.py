@@ -1,10 +1,10 @@
-"""Say what each step of the classifier is worth: leave one out, or put another in its place.
+"""Ablation of the classifier: measures without a step, or with another one in its place.
 
     python -m benchmarks.ablation data/ [--rate 1000] [--folds 3] [--seeds 8] [--only whole,svm]
 
-Only the training part of a data set is looked at. Groups of runs are dealt into folds; each variant
-learns from all folds but one and hears that one from end to end, in turn. Samples keep the extended
-noise as it is at 10 kHz alone, so that its variants take `--rate 10000`.
+Only the training part of a data set is read. Groups of runs are split into folds; each variant is
+trained on all folds but one and measured on that one, in turn. Samples have the extended noise at
+10 kHz only, so that its variants require `--rate 10000`.
 """
 
 import argparse
@@ -58,8 +58,8 @@ def main() -> None:
     arguments.add_argument("data", type=Path, nargs="+")
     arguments.add_argument("--rate", type=float, default=1000.0)
     arguments.add_argument("--folds", type=int, default=3)
-    arguments.add_argument("--seeds", type=int, help="of each robot, the first; all unless said")
-    arguments.add_argument("--only", default="", help="parts of variants' names, by commas")
+    arguments.add_argument("--seeds", type=int, help="first ones of each robot; by default all")
+    arguments.add_argument("--only", default="", help="parts of names of variants, by commas")
     options = arguments.parse_args()
     chosen = {
         name: variant
@@ -73,10 +73,10 @@ def main() -> None:
     print(f"{len(read)} runs in {len({models.group_of(one.name) for one in read})} groups")
     print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|", flush=True)
     for name, variant in chosen.items():
-        begun = time.process_time()
+        start = time.process_time()
         profile = replace(variant.at(options.rate), **CHANGES.get(name, {}))
         found = _measure(read, profile, options.folds)
-        print(f"| {name} | {found} | {time.process_time() - begun:.0f} |", flush=True)
+        print(f"| {name} | {found} | {time.process_time() - start:.0f} |", flush=True)
 
 
 def _recordings(paths: Sequence[Path], rate: float, *, power: bool) -> list[models.Recording]:
@@ -90,23 +90,23 @@ def _recordings(paths: Sequence[Path], rate: float, *, power: bool) -> list[mode
 
 
 def _power(path: Path) -> np.ndarray:
-    """The root of what the surfaces of all links radiate, measured and desired together."""
+    """Root of the sound power of all links, measured plus desired motion."""
     signals = Sample.load(path, only=("power", "power_desired")).signals
     return np.sqrt(signals["power"] + signals["power_desired"])
 
 
 def _measure(read: Sequence[models.Recording], profile: models.Profile, count: int) -> str:
-    """Learn and hear in turn; the cells of a row of the table."""
+    """Measures by cross-validation, as the cells of a row of the table."""
     examples = Examples.read(read, profile)
-    heard: list[Predictions] = []
+    predictions: list[Predictions] = []
     for train, test in folds([models.group_of(one.name) for one in read], count):
         names = {read[item].name for item in train}
         rows = np.array([run in names for run in examples.runs.tolist()])
         hashes = {name: examples.hashes[name] for name in names}
         part = Examples(examples.features[rows], examples.labels[rows], examples.runs[rows], hashes)
         classifier = models.Classifier.train(part, profile)
-        heard += [predict(classifier, read[item]) for item in test]
-    found = measure(heard)
+        predictions += [predict(classifier, read[item]) for item in test]
+    found = measure(predictions)
     shares = [
         found.frames.balanced_accuracy,
         found.frames.failure_recall,

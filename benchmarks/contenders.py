@@ -1,8 +1,8 @@
-"""Ways to decide on a frame: ours, scikit-learn's on our features, and aeon's on the samples.
+"""Classifiers of frames: ours, those of scikit-learn on our features, those of aeon on samples.
 
-Conventions: to train is to turn annotated frames into a function that decides on frames. All grade
-alike: a class for each frame, and a failure score, which ranks frames by how surely something is
-wrong. aeon's see the samples in one of `VIEWS`.
+Conventions: training turns annotated frames into a function that classifies frames. All return a
+class for each frame, and a failure score that ranks frames by confidence in a failure. Those of
+aeon take the samples through one of `TRANSFORMS`.
 """
 
 from collections.abc import Callable, Iterator
@@ -21,24 +21,24 @@ from models.estimators.estimator import ESTIMATORS
 from models.features import feature_count, standard
 
 RATE = 1000.0
-"""Of the frames, in [Hz]."""
+"""Rate of the frames, in [Hz]."""
 
-Answer = tuple[np.ndarray, np.ndarray]
-"""Class called, as an index, and failure score, larger if more certain; shape (frames,) each."""
-Decide = Callable[[np.ndarray], Answer]
-Train = Callable[[models.Dataset], Decide]
+Prediction = tuple[np.ndarray, np.ndarray]
+"""Predicted class, as an index, and failure score; shape (frames,) each."""
+Classify = Callable[[np.ndarray], Prediction]
+Train = Callable[[models.Dataset], Classify]
 
 
 @dataclass(frozen=True)
 class Contender:
-    """A way to decide.
+    """A classifier in the comparison.
 
     Attributes:
-        signals: What it hears, in a word.
-        name: What it is called.
-        profile: Whose frames it sees.
-        train: Learns from them.
-        needs_aeon: Whether it is of aeon; some of it is compiled at first use, which is not timed.
+        signals: Its signals, in a word.
+        name: Its name.
+        profile: The profile that cuts its frames.
+        train: Trains it.
+        needs_aeon: Whether it is of aeon, which compiles code at first use; this is not timed.
     """
 
     signals: str
@@ -48,19 +48,19 @@ class Contender:
     needs_aeon: bool = False
 
 
-def loudness(frames: np.ndarray) -> np.ndarray:
-    """Compress amplitudes as our features do: far below 10⁻³ rad/s, all is the same."""
+def log_amplitude(frames: np.ndarray) -> np.ndarray:
+    """Logarithm of amplitudes with a floor of 10⁻³ rad/s, as our features have it."""
     return np.log(np.abs(frames) + 1e-3)
 
 
-VIEWS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+TRANSFORMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "as they are": lambda frames: frames,
     "differences": partial(np.diff, axis=-1),
     "arcsinh": lambda frames: np.arcsinh(frames / 1e-2),
-    "logarithm": loudness,
-    "differences of logarithms": lambda frames: np.diff(loudness(frames), axis=-1),
+    "logarithm": log_amplitude,
+    "differences of logarithms": lambda frames: np.diff(log_amplitude(frames), axis=-1),
 }
-"""What is made of the samples before aeon sees them."""
+"""Transforms of the samples for the classifiers of aeon."""
 
 
 def targets(dataset: models.Dataset) -> np.ndarray:
@@ -68,30 +68,30 @@ def targets(dataset: models.Dataset) -> np.ndarray:
     return np.array([models.CLASSES.index(label) for label in dataset.labels.tolist()])
 
 
-def described(frames: np.ndarray, profile: models.Profile) -> np.ndarray:
-    """Our features, a few frames at a time, shape (frames, features)."""
+def features_of(frames: np.ndarray, profile: models.Profile) -> np.ndarray:
+    """Our features, computed 64 frames at a time, shape (frames, features)."""
     parts = np.split(frames, range(64, len(frames), 64))
     return np.concatenate([models.features(part, profile) for part in parts])
 
 
-def on_features(profile: models.Profile, learnt: Callable[..., Decide]) -> Train:
-    """Let something decide on our features; it learns from them and the frames that they are of."""
+def on_features(profile: models.Profile, learnt: Callable[..., Classify]) -> Train:
+    """Training of a classifier on our standardised features."""
 
-    def train(dataset: models.Dataset) -> Decide:
-        plain = described(dataset.frames, profile)
+    def train(dataset: models.Dataset) -> Classify:
+        plain = features_of(dataset.frames, profile)
         mean, scale = standard(plain, profile)
         decide = learnt((plain - mean) / scale, dataset)
-        return lambda frames: decide((described(frames, profile) - mean) / scale)
+        return lambda frames: decide((features_of(frames, profile) - mean) / scale)
 
     return train
 
 
-def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -> Decide:
-    """Let a machine of our own learn: networks, trees, or support vectors."""
+def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -> Classify:
+    """Train an estimator of ours: networks, trees, or support vectors."""
     groups = np.array([models.group_of(run) for run in dataset.runs.tolist()])
     estimator = ESTIMATORS[profile.estimator].fit(scaled, targets(dataset), groups, profile)
 
-    def decide(scaled: np.ndarray) -> Answer:
+    def decide(scaled: np.ndarray) -> Prediction:
         decisions = estimator.decision(scaled)
         if profile.estimator != "svm":
             return estimator.choose(decisions), 1.0 - estimator.score(decisions)[:, 0]
@@ -102,34 +102,34 @@ def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -
     return decide
 
 
-def theirs(make: Callable[[], Any], scaled: np.ndarray, dataset: models.Dataset) -> Decide:
-    """Let a classifier of scikit-learn learn."""
-    return partial(answer, make().fit(scaled, targets(dataset)))
+def theirs(make: Callable[[], Any], scaled: np.ndarray, dataset: models.Dataset) -> Classify:
+    """Train a classifier of scikit-learn."""
+    return partial(predict, make().fit(scaled, targets(dataset)))
 
 
 def on_samples(view: Callable[[np.ndarray], np.ndarray], make: Callable[[], Any]) -> Train:
-    """Let a classifier of aeon decide on the samples."""
+    """Training of a classifier of aeon on transformed samples."""
 
-    def seen(frames: np.ndarray) -> np.ndarray:
+    def transformed(frames: np.ndarray) -> np.ndarray:
         several = frames if frames.ndim == 3 else frames[:, None]
         return np.ascontiguousarray(view(several), dtype=np.float32)
 
-    def train(dataset: models.Dataset) -> Decide:
-        estimator = make().fit(seen(dataset.frames), targets(dataset))
-        return lambda frames: answer(estimator, seen(frames))
+    def train(dataset: models.Dataset) -> Classify:
+        estimator = make().fit(transformed(dataset.frames), targets(dataset))
+        return lambda frames: predict(estimator, transformed(frames))
 
     return train
 
 
-def answer(estimator: Any, seen: np.ndarray) -> Answer:
-    """Call the class of the highest grade; a failure is the more certain, the less `ok` has."""
-    grades = getattr(estimator, "predict_proba", None) or estimator.decision_function
-    graded = grades(seen)
-    return graded.argmax(axis=1), -graded[:, 0]
+def predict(estimator: Any, inputs: np.ndarray) -> Prediction:
+    """Class of the highest score; the failure score is the negative score of `ok`."""
+    scoring = getattr(estimator, "predict_proba", None) or estimator.decision_function
+    scores = scoring(inputs)
+    return scores.argmax(axis=1), -scores[:, 0]
 
 
 def minirocket() -> Any:
-    """Make aeon's MiniRocket with ridge regression, its usual head, that chooses its penalty."""
+    """MiniRocket of aeon with its default head: ridge regression with a cross-validated penalty."""
     from aeon.transformations.collection.convolution_based import MiniRocket
 
     penalties = np.logspace(-3.0, 6.0, 10)
@@ -138,7 +138,7 @@ def minirocket() -> Any:
 
 
 def quant() -> Any:
-    """Make aeon's QUANT: quantiles of intervals, and extra trees."""
+    """QUANT of aeon: quantiles of intervals, and extra trees."""
     from aeon.classification.interval_based import QUANTClassifier
 
     return QUANTClassifier(random_state=0)
@@ -152,14 +152,14 @@ ON_FEATURES: dict[str, Callable[[], Any]] = {
     ),
 }
 ON_SAMPLES = {"MiniRocket": (minirocket, "logarithm"), "QUANT": (quant, "logarithm")}
-"""aeon's, and the view that each has unless all are asked for; a choice that was not tuned."""
+"""Classifiers of aeon, and the default transform of each, which was not tuned."""
 
 
 def contenders(*, views: bool) -> Iterator[Contender]:
-    """List who takes part.
+    """All classifiers of the comparison.
 
     Args:
-        views: Whether aeon's see the samples in each way, and not in the usual one alone.
+        views: Whether those of aeon take part with each transform, not only with the default one.
     """
     for signals, settings in (("three", models.GENERAL), ("noise", models.SCALAR)):
         profile = settings.at(RATE)
@@ -176,7 +176,7 @@ def contenders(*, views: bool) -> Iterator[Contender]:
         )
         for name, make in ON_FEATURES.items():
             yield Contender(signals, name, profile, on_features(profile, partial(theirs, make)))
-        for name, (make, usual) in ON_SAMPLES.items():
-            for view in VIEWS if views else (usual,):
-                train = on_samples(VIEWS[view], make)
+        for name, (make, default) in ON_SAMPLES.items():
+            for view in TRANSFORMS if views else (default,):
+                train = on_samples(TRANSFORMS[view], make)
                 yield Contender(signals, f"{name}, {view}", profile, train, needs_aeon=True)

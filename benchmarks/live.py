@@ -4,9 +4,9 @@
 
 Velocities, desired velocities and positions of TALOS's joints go through `LiveSession`, in chunks
 of 20 ms and one by one, and as CSV through `inspector live`, from a file and from a pipe into which
-20 ms are written at a time, when they are due; into a file, and to a server that receives as a
-viewer does. What starting costs is left out: of a pipe by waiting for it, of a file by what twice
-the motion takes more, which on a busy machine is off by some percent.
+20 ms are written at a time, in real time; into a file, and to a server that receives as a
+viewer does. The start-up time is left out: of a pipe by waiting, of a file by the difference to
+twice the motion, which has an error of a few percent on a busy machine.
 """
 
 import argparse
@@ -35,7 +35,7 @@ ROBOT = "talos"
 
 
 def motion(seconds: float, rate: float, joints: int) -> dict[str, np.ndarray]:
-    """Swing every joint, noisily."""
+    """Sinusoidal motion of every joint, with noise."""
     time, random = np.arange(round(seconds * rate)) / rate, np.random.default_rng(0)
     phase = 2 * np.pi * random.uniform(0.1, 0.6, joints) * time[:, None]
     desired = 0.5 * np.cos(phase)
@@ -51,15 +51,15 @@ def motion(seconds: float, rate: float, joints: int) -> dict[str, np.ndarray]:
 def through_session(
     signals: dict[str, np.ndarray], rate: float, names: tuple[str, ...], chunk: int, **sink: str
 ) -> tuple[float, str]:
-    """CPU of one core per second of motion, and what the session said at its end."""
+    """CPU of one core per second of motion, and the summary of the session."""
     with LiveSession(rate, robot=ROBOT, joint_names=names, **sink) as session:
         first = {name: values[:chunk] for name, values in signals.items()}
         session.push(**first)
-        begun, samples = time.process_time(), len(signals["time"])
+        start_time, samples = time.process_time(), len(signals["time"])
         for start in range(chunk, samples, chunk):
             piece = start if chunk == 1 else slice(start, start + chunk)
             session.push(**{name: values[piece] for name, values in signals.items()})
-    return (time.process_time() - begun) / (samples / rate), str(session.summary)
+    return (time.process_time() - start_time) / (samples / rate), str(session.summary)
 
 
 def through_csv(
@@ -85,31 +85,31 @@ def through_csv(
 
 
 def feed(command: list[str], stream: BinaryIO, rows: int) -> float:
-    """Write rows into a command's standard input, 20 ms at a time, when they are due.
+    """Write rows into a command's standard input, 20 ms at a time, in real time.
 
     Returns:
-        CPU that they took, once the command had begun, in [s].
+        CPU time after the start-up of the command, in [s].
     """
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     process = subprocess.Popen(command, stdin=subprocess.PIPE, **quiet)
     assert process.stdin is not None
     process.stdin.write(b"".join(islice(stream, rows)))
     process.stdin.flush()
-    begun = when_idle(process.pid)
+    start = when_idle(process.pid)
     due = time.monotonic()
     while lines := b"".join(islice(stream, rows)):
         process.stdin.write(lines)
         process.stdin.flush()
         due += 0.02
         time.sleep(max(0.0, due - time.monotonic()))
-    used = when_idle(process.pid) - begun
+    used = when_idle(process.pid) - start
     process.stdin.close()
     assert process.wait() == 0
     return used
 
 
 def when_idle(process: int) -> float:
-    """Wait until a process has nothing to do, and say how much CPU it took so far, in [s]."""
+    """CPU time of a process once it is idle, in [s]."""
     used = [-1, 0]
     while used[-1] != used[-2] or used[-1] == 0:
         time.sleep(1.0)
@@ -120,7 +120,7 @@ def when_idle(process: int) -> float:
 
 @contextmanager
 def receiver() -> Iterator[str]:
-    """Run what receives recordings as a viewer does, without a window."""
+    """Port of a server that receives recordings as a viewer does, without a window."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
@@ -151,9 +151,9 @@ def main() -> None:
         for where, sink in (("file", {"save": file}), ("server", {"connect": port})):
             for chunk in (round(0.02 * rate), 1):
                 more = {"overwrite": True} if where == "file" else {}
-                share, said = through_session(signals, rate, names, chunk, **sink, **more)
+                share, summary = through_session(signals, rate, names, chunk, **sink, **more)
                 print(f"LiveSession, {chunk:4} samples at a time, to a {where:7} {share:6.1%}")
-            print(said)
+            print(summary)
             flags = ["--overwrite"] if where == "file" else []
             option = [item for key, value in sink.items() for item in (f"--{key}", value)]
             for source, share in through_csv(signals, rate, names, Path(name), *option, *flags):

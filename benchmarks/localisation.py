@@ -1,13 +1,13 @@
-"""Measure how often failures are localised in the right stage, limb and band.
+"""Accuracy of the fault localisation: stage, limb, joints and band.
 
     python benchmarks/localisation.py build/localisation [--robots talos,go2,panda] [--seeds 3,4]
 
-Simulates runs whose defects are known, into a folder; those that are there are not simulated
-again. The stage of each event that became a label is compared with the one in which the
-defect acts, the first three links with the limb on which it acts: the leg whose foot met
-something, whose sensor or plan jumped, or that was shaken alone; arms have one limb. Events
-without a limb of their own are left out of that column. The band is compared with that of
-oscillations that were commanded in one: right if they overlap.
+Simulates runs whose defects are known, into a folder; existing runs are not simulated
+again. For each event that became a label, the localised stage is compared with the one in which the
+defect acts, the first three links with the limb on which it acts: the leg whose foot had the
+contact, whose sensor or plan jumped, or that alone oscillated; arms have one limb. Events without
+a limb of their own are left out of that column. The localised band is compared with that of
+commanded oscillations: correct if they overlap.
 """
 
 import argparse
@@ -49,11 +49,11 @@ ACTS = {
 }
 """The stage in which each cause acts; jumps of sensors act in the commanded one."""
 LATE = 0.15
-"""How long after its cause a label may begin, in [s]."""
+"""Largest delay of a label after its cause, in [s]."""
 
 
 def run_of(folder: Path, robot: str, scenario: str, seed: int, seconds: float) -> nm.Run | None:
-    """Load a run, or simulate it; None if the robot has no such scenario, or falls."""
+    """A run, loaded or simulated; None if the robot has no such scenario, or falls."""
     path = folder / f"{robot}-{scenario}-{seed}.npz"
     if not path.exists():
         try:
@@ -65,7 +65,7 @@ def run_of(folder: Path, robot: str, scenario: str, seed: int, seconds: float) -
 
 
 def labelled(run: nm.Run) -> Iterator[tuple[dict[str, Any], nm.Block]]:
-    """Pair the events that left a label with the first block that they left."""
+    """Events that became a label, each with its first block."""
     for event in run.meta["events"]:
         for block in run.blocks:
             near = event["start"] - 0.02 <= block.start < event["stop"] + LATE
@@ -75,7 +75,7 @@ def labelled(run: nm.Run) -> Iterator[tuple[dict[str, Any], nm.Block]]:
 
 
 def limb_of(robot: str, event: dict[str, Any]) -> tuple[str, ...]:
-    """Joints of the limb on which an event acts; nothing if it acts on more than one."""
+    """Joints of the limb on which an event acts; empty if it acts on more than one."""
     parts, facts = limbs(robot), event["facts"]
     if not parts:
         return ROBOTS[robot].drives.joints
@@ -96,9 +96,9 @@ def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:
     return {name for name, index in carried if known.joints[index - 1].name in joints}
 
 
-def decide(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Localisation, dict[str, bool]]]:
-    """Cause and localisation of each event, and whether stage, limb and band are right."""
-    robot, known = str(run.robot), localise(run, ())
+def check(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str, bool]]]:
+    """For each event: cause, localisation, and whether stage, limb and band are correct."""
+    robot, known = str(run.robot), origins(run, ())
     for event, block in labelled(run):
         found = known[block]
         marks = {"stage": found.stage == ACTS.get(event["cause"], "commanded")}
@@ -116,7 +116,7 @@ def decide(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Localisation, d
 
 
 def main() -> None:
-    """Simulate, compare, and print."""
+    """Simulate, localise, compare and print."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("folder", type=Path)
     arguments.add_argument("--robots", default="talos,go2,panda")
@@ -133,7 +133,7 @@ def main() -> None:
                 run = run_of(options.folder, robot, scenario, int(seed), options.seconds)
                 if run is None:
                     continue
-                for cause, found, marks in decide(run, link_noise(run)):
+                for cause, found, marks in check(run, link_noise(run)):
                     if options.each:
                         print(
                             f"{robot}-{scenario}-{seed} {cause}: {found.stage} {found.band}", marks

@@ -1,7 +1,7 @@
 """Time the import of a ROS 2 bag, and measure its memory: 60 joints at 1 kHz with jitter.
 
-Run from the checkout: ``python -m benchmarks.logs [megabytes]``. The bag is written first, by
-rosbags, then read by a process of its own on one core; CPU time, and the process's peak memory.
+Run from the checkout: ``python -m benchmarks.logs [megabytes]``. rosbags writes the bag
+first; a process of its own then reads it on one core; CPU time, and peak memory of the process.
 """
 
 import argparse
@@ -22,15 +22,15 @@ from rosbags.typesys import Stores, get_typestore
 JOINTS = tuple(f"left_joint_number_{number}" for number in range(60))
 STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
 MESSAGE = 3100
-"""Bytes of a message in a bag, about."""
+"""Approximate size of a message in a bag, in [bytes]."""
 
 
 def main() -> None:
     """Print for each storage size, rate and memory of reading, and of the whole command."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("megabytes", nargs="?", type=int, default=150, help="size of the bag")
-    parser.add_argument("--read", type=Path, help="read this bag, and print what it took")
-    parser.add_argument("--save", action="store_true", help="write a run file, too")
+    parser.add_argument("--read", type=Path, help="read this bag, and print CPU time and memory")
+    parser.add_argument("--save", action="store_true", help="also write a run file")
     arguments = parser.parse_args()
     if arguments.read:
         read(arguments.read, save=arguments.save)
@@ -42,8 +42,8 @@ def main() -> None:
             size = sum(file.stat().st_size for file in bag.iterdir()) / 1e6
             for save in ([], ["--save"]):
                 command = [sys.executable, "-m", "benchmarks.logs", "--read", str(bag), *save]
-                said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-                seconds, memory = map(float, said.split())
+                printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+                seconds, memory = map(float, printed.split())
                 what = "read and saved" if save else "read"
                 print(
                     f"{storage:8} {size:6.0f} MB {what:15} {seconds:6.2f} s CPU"
@@ -52,7 +52,7 @@ def main() -> None:
 
 
 def write(bag: Path, storage: StoragePlugin, samples: int) -> None:
-    """Write a bag of joint states, their stamps off by up to a tenth of a step."""
+    """Write a bag of joint states, with a jitter of up to a tenth of a step."""
     store = get_typestore(Stores.ROS2_HUMBLE)
     header, stamp = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
     state = store.types["sensor_msgs/msg/JointState"]

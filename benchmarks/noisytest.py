@@ -2,18 +2,19 @@
 
     python benchmarks/noisytest.py FOLDER [--original PYTHON] [--repeats 5] [--json FILE]
 
-FOLDER holds NoisyTest's `training`, `validation` and `noisytest-config.json`. PYTHON is that of an
-environment that has the original; without one, our side is timed alone. The original asks for a
-package that Python 3.7 and later cannot have, so that it is installed without what it asks for:
+FOLDER holds NoisyTest's `training`, `validation` and `noisytest-config.json`. PYTHON is the
+interpreter of an environment with the original; without one, only our side is timed. The original
+requires a package that Python 3.7 and later cannot install, so that it is installed without its
+dependencies:
 
     python -m venv original
     original/bin/pip install --no-deps noisytest==0.0.1
     original/bin/pip install tensorflow scikit-learn toml
 
-Each side lives in a process of its own, begun anew for each repeat, and the two take turns at each
-task, so that a machine that slows down slows both. Given are medians of CPU time, of all threads
-(TensorFlow takes as many as it likes, BLAS has one), and of wall time; imports are apart. Both
-sides take their settings from the configuration, and what they answer is compared.
+Each side is a process of its own, started anew for each repeat, and the two take turns at each
+task, so that a slower machine affects both. Printed are medians of CPU time, of all threads
+(TensorFlow chooses their number, BLAS has one), and of wall time; imports are separate. Both sides
+take their settings from the configuration, and their results are compared.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from statistics import median
 from typing import Any, TypeAlias
 
 Found: TypeAlias = dict[str, dict[str, list[dict[str, Any]]]]
-"""What came of each repeat, by side and task: ``cpu`` and ``wall``, in [s], and ``answer``."""
+"""Results of each repeat, by side and task: ``cpu`` and ``wall``, in [s], and ``answer``."""
 
 SIDE = Path(__file__).resolve().parent / "noisytestside.py"
 TASKS = {
@@ -39,16 +40,16 @@ TASKS = {
     "point": "a point of the grid by itself",
     "points": "a point of the grid as `inspector tune` does it",
 }
-"""What is timed, as the table calls it."""
+"""The timed tasks, by their titles in the table."""
 INSTEAD = {"hop, stream": "hop", "hop, scalar": "hop", "points": "point"}
-"""What the original does where it knows no other way."""
+"""The task of the original that replaces one that it does not have."""
 
 
 class Peer:
-    """A side at work in a process of its own."""
+    """A process that does the tasks of one side."""
 
     def __init__(self, python: str, side: str, folder: Path) -> None:
-        """Begin it, without this file's folder on its path."""
+        """Start it, without the folder of this file on its path."""
         command = [python, "-I" if side == "original" else "-P", str(SIDE), side, str(folder)]
         self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115
         self._process = subprocess.Popen(
@@ -59,22 +60,22 @@ class Peer:
             text=True,
             env=os.environ | {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"},
         )
-        self.began = self._told()
-        self.tasks: list[str] = self.began["answer"]
+        self.startup = self._result()
+        self.tasks: list[str] = self.startup["answer"]
 
     def do(self, task: str) -> dict[str, Any]:
-        """Have it do a task."""
+        """Result of a task."""
         assert self._process.stdin
         self._process.stdin.write(f"{task}\n")
         self._process.stdin.flush()
-        return self._told()
+        return self._result()
 
     def end(self) -> None:
-        """Let it end."""
+        """End the process."""
         self._process.communicate()
         self._errors.close()
 
-    def _told(self) -> dict[str, Any]:
+    def _result(self) -> dict[str, Any]:
         assert self._process.stdout
         line = self._process.stdout.readline()
         if not line:
@@ -84,21 +85,21 @@ class Peer:
 
 
 def race(pythons: dict[str, str], folder: Path, repeats: int) -> Found:
-    """Let the sides take turns.
+    """Results of all tasks; the sides take turns.
 
     Args:
         pythons: The Python of each side.
         folder: The files.
-        repeats: How often.
+        repeats: Number of repeats.
 
     Returns:
-        What came of it.
+        The results.
     """
     found: Found = {side: {} for side in pythons}
     for _ in range(repeats):
         peers = {side: Peer(python, side, folder) for side, python in pythons.items()}
         for side, peer in peers.items():
-            found[side].setdefault("import", []).append(peer.began)
+            found[side].setdefault("import", []).append(peer.startup)
         for task in ("train", "prepare", *list(TASKS)[1:]):
             for side, peer in peers.items():
                 if task in peer.tasks:
@@ -109,7 +110,7 @@ def race(pythons: dict[str, str], folder: Path, repeats: int) -> Found:
 
 
 def table(found: Found) -> str:
-    """Write medians, and how many times as long the original takes, in Markdown."""
+    """Medians and their ratios, as a table in Markdown."""
     lines = [
         "| | NoisyTest 0.0.1: CPU | wall | ours: CPU | wall | ratio of CPU | of wall |",
         "|---|---|---|---|---|---|---|",
@@ -126,14 +127,14 @@ def table(found: Found) -> str:
 
 
 def agreement(found: Found) -> str:
-    """Say whether both sides answered the same."""
+    """Agreement of the results of both sides, in words."""
     sides = found["original"], found["ours"]
     trained = [side["train"][0]["answer"] for side in sides]
     labels = [side["file"][0]["answer"] for side in sides]
     same = sum(one == other for one, other in zip(*labels, strict=False))
     return (
         f"subset accuracy {trained[0]:.4f} and {trained[1]:.4f}; of {len(labels[0])} and"
-        f" {len(labels[1])} frames of the file, {same} are called the same"
+        f" {len(labels[1])} frames of the file, {same} have the same class"
     )
 
 
@@ -151,9 +152,9 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     arguments.add_argument("folder", type=Path)
-    arguments.add_argument("--original", help="Python of an environment that has NoisyTest")
+    arguments.add_argument("--original", help="Python of an environment with NoisyTest")
     arguments.add_argument("--repeats", type=int, default=5)
-    arguments.add_argument("--json", type=Path, help="where to keep each repeat")
+    arguments.add_argument("--json", type=Path, help="file for the results of each repeat")
     given = arguments.parse_args()
     pythons = {"original": given.original} if given.original else {}
     found = race({**pythons, "ours": sys.executable}, given.folder, given.repeats)

@@ -1,9 +1,9 @@
-"""One side of `noisytest.py`: does the tasks that are named on standard input, and times them.
+"""One side of `noisytest.py`: does the tasks named on standard input, and times them.
 
     python -I benchmarks/noisytestside.py original FOLDER
 
-It knows NoisyTest 0.0.1 and ours, and imports the one that is asked for. The folder of this file
-must not be on the path (``-I``, ``-P``): a module there has the name of the original's package.
+It has tasks for NoisyTest 0.0.1 and for ours, and imports only the one given. The folder of this
+file must not be on the path (``-I``, ``-P``): a module there has the name of its package.
 """
 
 import json
@@ -20,14 +20,14 @@ HOPS = 100
 POINTS = 3
 """Points of the grid that are trained and measured by themselves."""
 TIMES = {"hop": HOPS, "hop, stream": HOPS, "hop, scalar": HOPS, "point": POINTS}
-"""How often a task is done in one go."""
+"""Repetitions of a task per call."""
 
 
 class Original:
-    """NoisyTest 0.0.1, driven by its own pipeline as its command line drives it."""
+    """NoisyTest 0.0.1, through its own pipeline, as its command line uses it."""
 
     def __init__(self, folder: Path) -> None:
-        """Import what its commands import."""
+        """Import the modules that its commands import."""
         os.environ["TF_CPP_MIN_LOG_LEVEL"] = "3"
         from copy import deepcopy
 
@@ -39,7 +39,7 @@ class Original:
             self._pipeline = DefaultPipeline(config)
 
     def tasks(self) -> dict[str, Callable[[], Any]]:
-        """Name what can be done."""
+        """The tasks, by name."""
         return {
             "train": self._train,
             "prepare": self._prepare,
@@ -69,7 +69,7 @@ class Original:
             self._pipeline.model.predict(features)
 
     def _point(self, count: int = POINTS) -> float:
-        for _ in range(count):  # learning changes its input, so that its search copies it too
+        for _ in range(count):  # training changes its input, so that its search copies it too
             error = self._pipeline.learn(*self._copied(self._sets))
         return float(error.subset_accuracy)
 
@@ -78,7 +78,7 @@ class Ours:
     """The profile that follows NoisyTest decision by decision."""
 
     def __init__(self, folder: Path) -> None:
-        """Import what training and labelling import."""
+        """Import the modules that training and labelling import."""
         import sklearn.svm  # noqa: F401
 
         import models
@@ -87,7 +87,7 @@ class Ours:
         self._profile = models.noisytest.profile_from_config(folder / "noisytest-config.json")
 
     def tasks(self) -> dict[str, Callable[[], Any]]:
-        """Name what can be done."""
+        """The tasks, by name."""
         return {
             "train": self._train,
             "prepare": self._prepare,
@@ -129,7 +129,7 @@ class Ours:
             self._classifier.predict(self._windows[index % len(self._windows)][None])
 
     def _push(self, classifier: Any) -> None:
-        """Push hops; the few before the first frame is full, cost less."""
+        """Push hops; those before the first complete frame cost less."""
         stream, hop = self._models.Stream(classifier), classifier.profile.hop
         for index in range(HOPS):
             first = index * hop % (len(self._noise) - hop)
@@ -142,7 +142,7 @@ class Ours:
         return float(self._classifier.metrics["validation"]["subset_accuracy"])
 
     def _points(self) -> int:
-        """Do all points of the paper's grid that share the stride; say how many."""
+        """Measure all points of the paper's grid with one stride; their number."""
         from models.tuning.grid import Grid
         from models.tuning.search import measure
         from models.tuning.trial import Trial
@@ -153,27 +153,27 @@ class Ours:
 
 
 def serve(side: type[Original] | type[Ours], folder: Path) -> None:
-    """Do what is asked for, line by line.
+    """Do the tasks named on standard input, line by line.
 
     Args:
-        side: Whose tasks.
+        side: The side that does them.
         folder: NoisyTest's ``training``, ``validation`` and configuration.
     """
-    say, sys.stdout = sys.stdout, sys.stderr  # a library may print
+    output, sys.stdout = sys.stdout, sys.stderr  # a library may print
 
-    def tell(begun: tuple[float, float], times: int, answer: Any) -> None:
-        wall, cpu = time.perf_counter() - begun[0], time.process_time() - begun[1]
-        print(json.dumps({"wall": wall / times, "cpu": cpu / times, "answer": answer}), file=say)
-        say.flush()
+    def report(started: tuple[float, float], times: int, answer: Any) -> None:
+        wall, cpu = time.perf_counter() - started[0], time.process_time() - started[1]
+        print(json.dumps({"wall": wall / times, "cpu": cpu / times, "answer": answer}), file=output)
+        output.flush()
 
-    begun = time.perf_counter(), time.process_time()
+    started = time.perf_counter(), time.process_time()
     tasks = side(folder).tasks()
-    tell(begun, 1, sorted(tasks))
+    report(started, 1, sorted(tasks))
     for line in sys.stdin:
         name = line.strip()
-        begun = time.perf_counter(), time.process_time()
+        started = time.perf_counter(), time.process_time()
         answer = tasks[name]()
-        tell(begun, answer if name == "points" else TIMES.get(name, 1), answer)
+        report(started, answer if name == "points" else TIMES.get(name, 1), answer)
 
 
 if __name__ == "__main__":

@@ -1,22 +1,21 @@
-"""The paper's three tables, and beside them what models make of simulated runs.
+"""The three tables of the paper, with the measures of models on simulated runs.
 
     python benchmarks/paper.py --training DATA --test DATA … --output build/paper
         [--part test] [--from 10] [--good DATA …] [--seeds 8] [--profiles general …]
         [--models FILE …] [--limit RUNS] [--jobs 2]
 
-Profiles are trained on the training part of a data set; since libsvm's time grows with the square
-of the frames, they can do with the first seeds of each robot. A profile that the output has a model
-of is not trained again. All models, those that ship too, are measured on the same runs: by frames
-that are cut from annotated blocks, as the paper does, and by false alarms in whole runs. Of the
-test, what is held out by hash counts, and of that the seeds that nobody has looked at. Hours of
-good motion (`--good`) count for false alarms alone: among shares of all frames, they would make
-every error small.
+Profiles are trained on the training part of a data set; since the time of libsvm grows with the
+square of the frames, `--seeds` limits the seeds of each robot. A profile with a model in the output
+is not trained again. All models, also the shipped ones, are measured on the same runs: by frames of
+annotated blocks, as in the paper, and by false alarms in whole runs. The test set is what is held
+out by hash, from the seed `--from` on. Hours of good motion (`--good`) count for false alarms only:
+as a part of all frames they would make every error small.
 
-The third table is the paper's question whether a model serves another robot: the same models hear
-fewer joints, in the paper LOLA's knees and ankles. Samples keep norms of whole limbs, and of our
-walkers the legs alone are driven, so that both legs of TALOS have 98 % of the power of its noise;
-one leg has half of it, and another course in time. Of Go2 it is the two feet that swing together,
-since front and hind legs sound alike. A failure at a foot that is left out counts all the same.
+The third table is the question of the paper whether a model serves another robot: the same models
+get fewer joints, in the paper the knees and ankles of LOLA. Samples have norms of whole limbs, and
+only the legs of our walkers are driven, so that both legs of TALOS have 98 % of the power of its
+noise; one leg has half of it, with another course in time. For Go2 it is two feet that swing
+together, since front and hind legs are similar. Failures at a foot that is left out count too.
 """
 
 import argparse
@@ -48,11 +47,11 @@ PROFILES = (
     *("scalar", "general"),
 )
 HALF = {"talos": ("left_sole_link",), "go2": ("FL_foot", "RR_foot")}
-"""Limbs that are heard for the third table; of an arm there is but one."""
+"""Limbs of the third table; an arm has only one."""
 
 
 class Printed(NamedTuple):
-    """What the paper prints of a model, in percent of all frames."""
+    """The measures of a model in the paper, in percent of all frames."""
 
     false_negative: tuple[float, ...]
     false_positive: tuple[float, ...]
@@ -70,28 +69,28 @@ FRAMES = np.array([129, 11, 12, 39])
 
 
 class Score(NamedTuple):
-    """What a model is worth on some runs."""
+    """The measures of a model on some runs."""
 
     frames: models.Assessment
-    """Of these, by frames of their blocks."""
+    """On the test set, by frames of blocks."""
     alarms: models.Assessment
-    """Of these and hours of good motion, by alarms."""
+    """On the test set and the good motion, by alarms."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """A model, measured.
+    """The measures of a model.
 
     Attributes:
-        name: What it is called.
-        learnt: How many runs it was trained on.
+        name: Its name.
+        trained_on: Number of runs that it was trained on.
         whole: On all runs.
-        reduced: On those of robots with limbs, all joints heard, and half of the limbs; nothing
-            for a linear kernel, of which the paper does not ask it.
+        reduced: On those of robots with limbs, with all joints and with half of the limbs; empty
+            for a linear kernel, as in the paper.
     """
 
     name: str
-    learnt: int
+    trained_on: int
     whole: Score
     reduced: tuple[Score, ...]
 
@@ -107,13 +106,11 @@ def main() -> None:
     arguments.add_argument("--part", type=Part, choices=Part, default=Part.TEST, help="of the test")
     arguments.add_argument("--from", type=int, default=0, dest="first", help="seed of the test")
     arguments.add_argument("--good", type=Path, nargs="*", default=[], help="measured whole")
-    arguments.add_argument(
-        "--seeds", type=int, help="of each robot, to learn from; all if not said"
-    )
+    arguments.add_argument("--seeds", type=int, help="of each robot, to train on; by default all")
     arguments.add_argument("--profiles", nargs="*", choices=PROFILES, default=PROFILES)
     arguments.add_argument("--models", type=Path, nargs="*", default=sorted(SHIPPED.glob("*.npz")))
-    arguments.add_argument("--limit", type=int, help="runs to learn from and to measure, at most")
-    arguments.add_argument("--jobs", type=int, default=1, help="models at once")
+    arguments.add_argument("--limit", type=int, help="most runs to train on and to measure")
+    arguments.add_argument("--jobs", type=int, default=1, help="parallel models")
     given = arguments.parse_args()
     known = spread(first_seeds(files([given.training], Part.TRAINING), given.seeds), given.limit)
     fresh = [path for path in files(given.test, given.part) if seed_of(path) >= given.first]
@@ -122,30 +119,30 @@ def main() -> None:
     work = partial(measured, known=known, test=test, good=good, folder=given.output)
     found = list(each(work, [*given.models, *given.profiles], jobs=given.jobs))
     print(tables(found[len(given.models) :] + found[: len(given.models)]))
-    print(f"\nRuns learnt from: {', '.join(f'{one.name} {one.learnt}' for one in found)}.")
+    print(f"\nRuns trained on: {', '.join(f'{one.name} {one.trained_on}' for one in found)}.")
 
 
 def files(folders: Sequence[Path], part: Part) -> list[Path]:
-    """List the samples of a part."""
+    """The samples of a part."""
     every = [path for folder in folders for path in sorted(folder.rglob("*.npz"))]
     if part is Part.ALL:
         return every
-    wanted = part is Part.TEST
-    return [path for path in every if models.held_out(models.group_of(name_of(path))) == wanted]
+    test = part is Part.TEST
+    return [path for path in every if models.held_out(models.group_of(name_of(path))) == test]
 
 
 def name_of(path: Path) -> str:
-    """Name the recording that a sample becomes."""
+    """Name of the recording of a sample."""
     return f"{path.parent.name}/{path.stem}"
 
 
 def seed_of(path: Path) -> int:
-    """Read the seed of a sample from its name."""
+    """Seed of a sample, from its name."""
     return int(path.stem.rpartition("-")[2])
 
 
 def first_seeds(paths: Sequence[Path], count: int | None) -> list[Path]:
-    """Keep the samples of so many seeds of each robot, the lowest."""
+    """The samples of the lowest seeds of each robot."""
     seeds: dict[str, set[int]] = {}
     for path in paths:
         seeds.setdefault(path.parent.name, set()).add(seed_of(path))
@@ -154,7 +151,7 @@ def first_seeds(paths: Sequence[Path], count: int | None) -> list[Path]:
 
 
 def spread(paths: Sequence[Path], limit: int | None) -> list[Path]:
-    """Keep so many samples at most, from all over the list."""
+    """At most so many samples, evenly from the list."""
     count = len(paths) if limit is None else min(limit, len(paths))
     return [paths[index * len(paths) // count] for index in range(count)]
 
@@ -167,38 +164,40 @@ def measured(
     good: Sequence[Path],
     folder: Path,
 ) -> Measured:
-    """Measure a model; of a profile, train it first."""
+    """Measures of a model; a profile is trained first."""
     path = job if isinstance(job, Path) else trained(job, known, folder)
     classifier, reduced = models.Classifier.load(path), ()
     every = [*test, *good]
     names = {name_of(one) for one in test}
-    heard = listened(classifier, recordings.recordings(every, classifier.rate))
+    found = predictions(classifier, recordings.recordings(every, classifier.rate))
     if classifier.profile.kernel != "linear":
         limbed = [one for one in every if one.parent.name in HALF]
-        half = listened(classifier, halved(limbed, classifier.rate))
+        half = predictions(classifier, halved(limbed, classifier.rate))
         same = {one.name for one in half}
-        reduced = scored([one for one in heard if one.name in same], names), scored(half, names)
+        reduced = scored([one for one in found if one.name in same], names), scored(half, names)
     name = path.stem if isinstance(job, str) else f"{path.stem}, as shipped"
-    return Measured(name, len(classifier.runs), scored(heard, names), reduced)
+    return Measured(name, len(classifier.runs), scored(found, names), reduced)
 
 
-def listened(classifier: models.Classifier, found: Iterable[models.Recording]) -> list[Predictions]:
-    """Let a model hear what it was not trained on; of equal recordings, the first."""
-    heard: dict[str, Predictions] = {}
-    for recording in found:
+def predictions(
+    classifier: models.Classifier, read: Iterable[models.Recording]
+) -> list[Predictions]:
+    """Predictions for recordings that the model was not trained on; of equal ones, the first."""
+    found: dict[str, Predictions] = {}
+    for recording in read:
         models.check_apart(classifier.runs, {recording.name: recording.sha256})
-        if recording.sha256 not in heard:
-            heard[recording.sha256] = predict(classifier, recording)
-    return list(heard.values())
+        if recording.sha256 not in found:
+            found[recording.sha256] = predict(classifier, recording)
+    return list(found.values())
 
 
-def scored(heard: Sequence[Predictions], test: Collection[str]) -> Score:
-    """Measure by frames on the test alone, and by alarms on all."""
-    return Score(measure([one for one in heard if one.name in test]), measure(heard))
+def scored(found: Sequence[Predictions], test: Collection[str]) -> Score:
+    """Measures by frames on the test set, and by alarms on all."""
+    return Score(measure([one for one in found if one.name in test]), measure(found))
 
 
 def trained(profile: str, paths: Sequence[Path], folder: Path) -> Path:
-    """Train a profile, or find the model that was trained before."""
+    """Model of a profile, trained unless it exists."""
     path = folder / f"{profile}.npz"
     if not path.exists():
         training.train(paths, profile, RATE, path)
@@ -208,7 +207,7 @@ def trained(profile: str, paths: Sequence[Path], folder: Path) -> Path:
 
 
 def halved(paths: Sequence[Path], rate: float) -> Iterator[models.Recording]:
-    """Read samples as half of their limbs sound."""
+    """Recordings of half of the limbs of samples."""
     for path in paths:
         sample = Sample.load(path).at(rate)
         limbs = {
@@ -221,7 +220,7 @@ def halved(paths: Sequence[Path], rate: float) -> Iterator[models.Recording]:
 
 
 def tables(found: Sequence[Measured]) -> str:
-    """Write the three tables, in Markdown."""
+    """The three tables, in Markdown."""
     linear = [(one.name, one.whole) for one in found if not one.reduced]
     others = [(one.name, one.whole) for one in found if one.reduced]
     halves = [
@@ -234,11 +233,11 @@ def tables(found: Sequence[Measured]) -> str:
 
 
 def printed(title: str) -> str:
-    """Write a row of what the paper prints, and of what follows for the frames in question."""
+    """Row of the measures in the paper, and of those that follow from them."""
     table = PAPER[title]
     missed = (np.array(table.false_negative) / 100.0 * FRAMES.sum()).round()
-    unheard = round(table.false_positive[0] / 100.0 * FRAMES.sum())
-    recall, balanced = 1.0 - unheard / FRAMES[1:].sum(), (1.0 - missed / FRAMES).mean()
+    missed_failures = round(table.false_positive[0] / 100.0 * FRAMES.sum())
+    recall, balanced = 1.0 - missed_failures / FRAMES[1:].sum(), (1.0 - missed / FRAMES).mean()
     return _row(
         f"*the paper, {title}*",
         *(" / ".join(f"{share:.1f}" for share in side) for side in table[:2]),
@@ -247,7 +246,7 @@ def printed(title: str) -> str:
 
 
 def row(name: str, score: Score) -> str:
-    """Write a row of what was measured."""
+    """Row of our measures."""
     frames = score.frames.frames
     errors = (frames.false_negative_errors, frames.false_positive_errors)
     shares = (

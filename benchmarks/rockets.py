@@ -1,15 +1,15 @@
-"""Hold ours against other classifiers on the same frames: scikit-learn's, and aeon's.
+"""Compare ours with classifiers of scikit-learn and of aeon, on the same frames.
 
     python -m benchmarks.rockets FOLDER [--seeds 8] [--every 2] [--only WORD] [--views]
 
 FOLDER is a data set of `inspector simulate dataset`. Of each robot, the first seeds that are not
-held out for the last test are taken; one half of these groups is learnt from, and the other half
-measured, at 1 kHz. All see the same frames of 0.4 s, cut as our profiles cut them: *three* signals
-(desired, measured, error), or the *noise* alone. scikit-learn's classifiers look at our features;
-those of aeon at the logarithm of the samples, since our features are logarithms too (`--views`
-shows them in other ways). The kernel machine's and the logistic regression's settings are the best
-of a few on these groups, dealt otherwise; no other was tuned here. Intervals come from drawing
-whole groups. All times are CPU times, on one core.
+in the test set are taken; one half of these groups is for training, the other half for
+measuring, at 1 kHz. All get the same frames of 0.4 s of our profiles: *three* signals
+(desired, measured, error), or the *noise* only. The classifiers of scikit-learn get our features;
+those of aeon the logarithm of the samples, since our features are logarithms too (`--views` takes
+other transforms). The settings of the support vectors and of the logistic regression are the best
+of a few on these groups, split otherwise; no other was tuned here. Intervals are bootstrapped over
+groups. All times are CPU times, on one core.
 """
 
 import argparse
@@ -36,14 +36,14 @@ from models.evaluation.assessment import percent
 from models.evaluation.intervals import Resampling
 
 SHARES = (0.001, 0.01)
-"""Shares of the `ok` frames that may be called a failure: 36 and 360 in an hour."""
+"""False-positive rates of `ok` frames: 36 and 360 frames in an hour."""
 ALONE = 200
-"""Frames that are decided on one by one."""
+"""Number of frames that are classified one by one."""
 WARM = 97
-"""Every so many frames are trained on before, for what is compiled then."""
+"""One of so many frames is for the warm-up, in which code is compiled."""
 ADVICE = (
     "MiniRocket and QUANT come from aeon and torch, which are not both installed: run this in an"
-    " environment of its own (aeon asks for an older NumPy) after `pip install aeon torch`"
+    " environment of its own (aeon requires an older NumPy) after `pip install aeon torch`"
 )
 
 HEAD = (
@@ -54,11 +54,11 @@ HEAD = (
 
 
 def files(folder: Path, seeds: int) -> tuple[list[Path], list[Path]]:
-    """List the samples to learn from, and those to measure by.
+    """The samples to train on, and those to measure on.
 
     Args:
         folder: A data set.
-        seeds: How many of each robot, half of them for each side.
+        seeds: Seeds of each robot, half of them for each side.
     """
     groups = {
         path: models.group_of(f"{path.parent.name}/{path.stem}")
@@ -75,26 +75,26 @@ def files(folder: Path, seeds: int) -> tuple[list[Path], list[Path]]:
 
 
 def framed(paths: Sequence[Path], profile: models.Profile, *, training: bool) -> models.Dataset:
-    """Cut frames from samples; of those that are equal bit for bit, the first counts."""
+    """Frames of samples; of equal samples, the first counts."""
     found = {one.sha256: one for one in (of_sample(path, RATE) for path in reversed(paths))}
     return models.Dataset.of(reversed(found.values()), profile, training=training)
 
 
 def thinned(dataset: models.Dataset, every: int) -> models.Dataset:
-    """Keep every so many frames."""
+    """One of so many frames."""
     kept = {name: getattr(dataset, name)[::every] for name in ("frames", "labels", "runs")}
     return replace(dataset, **kept)
 
 
 def row(contender: Contender, known: models.Dataset, test: models.Dataset) -> str:
-    """Let one learn and decide; its row of the table."""
+    """Row of the table of one classifier."""
     if contender.needs_aeon:
         contender.train(thinned(known, WARM))(known.frames[:1])
     decide, learning = timed(lambda: contender.train(known))
-    (called, scores), deciding = timed(lambda: decide(test.frames))
+    (predicted, scores), deciding = timed(lambda: decide(test.frames))
     some = test.frames[:: max(len(test) // ALONE, 1), None]
     alone = median(timed(lambda frame=frame: decide(frame))[1] for frame in some)
-    names = np.array((*models.CLASSES, models.UNKNOWN))[called]
+    names = np.array((*models.CLASSES, models.UNKNOWN))[predicted]
     frames = models.Evaluation.of(test.labels, names, models.CLASSES)
     failure = test.labels != models.CLASSES[0]
     cells = [
@@ -114,14 +114,14 @@ def row(contender: Contender, known: models.Dataset, test: models.Dataset) -> st
 
 
 def timed(work: Callable[[], Any]) -> tuple[Any, float]:
-    """Do some work; its result, and the CPU time that it took, in [s]."""
+    """Result of a call, and its CPU time, in [s]."""
     start = time.process_time()
     result = work()
     return result, time.process_time() - start
 
 
 def found(test: models.Dataset, scores: np.ndarray, share: float) -> str:
-    """Failure frames that lie above a threshold; at most this share of the `ok` frames does."""
+    """Recall of failure frames at a threshold with at most this share of `ok` frames above."""
     failure = test.labels != models.CLASSES[0]
     quiet = np.sort(scores[~failure])[::-1]
     above = failure & (scores > quiet[int(share * len(quiet))])
@@ -136,15 +136,15 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     arguments.add_argument("folder", type=Path)
     arguments.add_argument("--seeds", type=int, default=8, help="of each robot")
-    arguments.add_argument("--every", type=int, default=2, help="so many frames, learn from one")
-    arguments.add_argument("--only", default="", help="part of the names of those who take part")
-    arguments.add_argument("--views", action="store_true", help="show aeon's samples in each way")
+    arguments.add_argument("--every", type=int, default=2, help="train on one of so many frames")
+    arguments.add_argument("--only", default="", help="part of the names of classifiers")
+    arguments.add_argument("--views", action="store_true", help="take each transform for aeon")
     given = arguments.parse_args()
     everyone = list(contenders(views=given.views))
     chosen = [one for one in everyone if given.only in one.name]
     if not chosen:
         names = ", ".join(dict.fromkeys(one.name for one in everyone))
-        raise SystemExit(f"nobody is called {given.only!r}; there are {names}")
+        raise SystemExit(f"no classifier {given.only!r}; there are {names}")
     if any(one.needs_aeon for one in chosen) and not all(map(find_spec, ("aeon", "torch"))):
         raise SystemExit(ADVICE)
     known, test = files(given.folder, given.seeds)
@@ -155,7 +155,7 @@ def main() -> None:
         for one in chosen:
             if one.profile == profile:
                 print(row(one, *sides), flush=True)
-    for side, name in zip(sides, ("learnt from", "measured"), strict=True):
+    for side, name in zip(sides, ("training", "measured"), strict=True):
         counts = ", ".join(f"{(side.labels == each).sum()} {each}" for each in models.CLASSES)
         groups = sorted({models.group_of(run) for run in side.hashes})
         print(f"\n{name}: {len(side.hashes)} runs, {', '.join(groups)}; frames: {counts}")

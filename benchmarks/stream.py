@@ -1,12 +1,11 @@
-"""Time labels of a noise signal that comes in, on one core.
+"""Time the labels of a streamed noise signal, on one core.
 
     python benchmarks/stream.py [--seconds 20] [--turns 9]
 
-For each model that ships (with 12 joints, where it listens to them) and several sizes of chunks:
-how much faster than real time signals are taken, and how long it takes from the sample that
-completes a frame to the frame's label. Rows take turns, since a machine with other work to do is
-half as fast for seconds at a time: given are the medians over all turns and, behind a slash, those
-of the best turn.
+For each shipped model (with 12 joints, if it takes joints) and several chunk sizes: the ratio to
+real time, and the latency from the sample that completes a frame to its label. Rows take turns,
+since a busy machine is half as fast for seconds at a time: printed are the medians over all turns
+and, after a slash, those of the best turn.
 """
 
 import argparse
@@ -24,7 +23,7 @@ from models.signals import by_joint
 
 MODELS = Path(__file__).parents[1] / "assets" / "models"
 JOINTS = 12
-"""As many as a quadruped has."""
+"""Number of joints, that of a quadruped."""
 
 
 def measure(
@@ -32,17 +31,18 @@ def measure(
 ) -> tuple[float, ...]:
     """Push signals by name, shape (samples,) or (joints, samples).
 
-    CPU time in all, then the median and the 99th percentile for a label, in [s].
+    Returns:
+        Total CPU time, then the median and the 99th percentile of the latency, in [s].
     """
     stream, wall = models.Stream(classifier, joints=JOINTS), []
     count = next(iter(signals.values())).shape[-1]
-    begun = time.process_time()
+    start_cpu = time.process_time()
     for first in range(0, count, chunk):
         samples = {name: each[..., first : first + chunk] for name, each in signals.items()}
         start = time.perf_counter()
         if len(stream.push(samples)):
             wall.append(time.perf_counter() - start)
-    whole = time.process_time() - begun
+    whole = time.process_time() - start_cpu
     return whole, *np.percentile(wall, [50, 99])
 
 
@@ -66,17 +66,17 @@ def main() -> None:
                 some = {signal: each[..., :part] for signal, each in signals.items()}
                 whole, *times = measure(classifier, some, chunk)
                 found[name, chunk].append((part / rate / whole, *(1e3 * each for each in times)))
-            begun = time.process_time()
+            start_cpu = time.process_time()
             classifier.classify(signals, rate)
-            ratio = options.seconds / (time.process_time() - begun)
+            ratio = options.seconds / (time.process_time() - start_cpu)
             found[name, "whole"].append((ratio, np.nan, np.nan))
     print(f"{'model':14} {'chunk':>6} {'x real time':>12} {'label: median, 99 % [ms]':>30}")
     for (name, chunk), turns in found.items():
         ratio, *times = np.median(turns, axis=0)
         most, *least = np.max(turns, axis=0)[0], *np.min(turns, axis=0)[1:]
         print(f"{name:14} {chunk:>6} {ratio:5.0f} / {most:4.0f}", end="")
-        for usual, best in zip(times, least, strict=True):
-            print("" if np.isnan(best) else f" {usual:7.3f} / {best:5.3f}", end="")
+        for typical, best in zip(times, least, strict=True):
+            print("" if np.isnan(best) else f" {typical:7.3f} / {best:5.3f}", end="")
         print()
 
 

@@ -1,7 +1,7 @@
 """Time link_twists against the loop over Pinocchio that it replaces, on TALOS.
 
-Run from the checkout: ``python -m benchmarks.twists [samples]``. One process; the writings take
-turns, so that a machine that slows down slows all of them; CPU time.
+Run from the checkout: ``python -m benchmarks.twists [samples]``. One process; the variants take
+turns, so that a slower machine affects all of them; CPU time.
 """
 
 import argparse
@@ -19,22 +19,22 @@ REPEATS = 5
 
 
 def main() -> None:
-    """Print the medians and what they say."""
+    """Print medians and ratios."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("samples", nargs="?", type=int, default=100_000, help="states of TALOS")
     samples = parser.parse_args().samples
     robot = Robot.load("talos")
     q, v = states(robot, samples)
-    writings: dict[str, Callable[[Robot, Array, Array], Array]] = {
+    variants: dict[str, Callable[[Robot, Array, Array], Array]] = {
         "link_twists": link_twists,
         "loop, twist by twist": loop_by_twist,
         "loop, sample by sample": loop_by_sample,
     }
-    times: dict[str, list[float]] = {name: [] for name in writings}
+    times: dict[str, list[float]] = {name: [] for name in variants}
     for _ in range(REPEATS):
-        for name, writing in writings.items():
+        for name, variant in variants.items():
             start = time.process_time()
-            writing(robot, q, v)
+            variant(robot, q, v)
             times[name].append(time.process_time() - start)
     ours = median(times["link_twists"])
     print(f"{samples} states of {robot.name}, nq {robot.nq}, nv {robot.nv}, median of {REPEATS}")
@@ -43,7 +43,7 @@ def main() -> None:
 
 
 def states(robot: Robot, samples: int) -> tuple[Array, Array]:
-    """Draw configurations, shape (samples, nq), and velocities, shape (samples, nv)."""
+    """Random configurations, shape (samples, nq), and velocities, shape (samples, nv)."""
     random = np.random.default_rng(0)
     q = random.uniform(-1.0, 1.0, (samples, robot.nq))
     q[:, 3:7] /= np.linalg.norm(q[:, 3:7], axis=1, keepdims=True)
@@ -51,7 +51,7 @@ def states(robot: Robot, samples: int) -> tuple[Array, Array]:
 
 
 def loop_by_twist(robot: Robot, q: Array, v: Array) -> Array:
-    """Write each link's twist into the result by itself."""
+    """Twists of all links, written one by one."""
     model, data = robot.model, robot.model.createData()
     twists = np.empty((len(q), model.njoints, 6))
     for sample in range(len(q)):
@@ -62,7 +62,7 @@ def loop_by_twist(robot: Robot, q: Array, v: Array) -> Array:
 
 
 def loop_by_sample(robot: Robot, q: Array, v: Array) -> Array:
-    """Gather a sample's twists in a list, which becomes an array."""
+    """Twists of all links, written sample by sample."""
     model, data = robot.model, robot.model.createData()
     twists = np.empty((len(q), model.njoints, 6))
     for sample in range(len(q)):

@@ -1,12 +1,12 @@
-"""Leave one robot out: what models make of a robot that they have never met.
+"""Leave one robot out: the measures of models on an unseen robot.
 
     python -m benchmarks.unseen DATA … --output build/unseen
         [--profiles general noisytest-rbf] [--robots go2] [--seeds 10] [--rate 1000]
 
-Each profile learns from the training part of all robots but one, and is measured on what is held
-out of that one. Profiles of NoisyTest and of the paper exist at 10 kHz alone; since libsvm's time
-grows with the square of the frames, they can do with the first seeds of each robot. A model that
-the output has is not trained again.
+Each profile is trained on the training part of all robots but one, and measured on the test part of
+that one. Profiles of NoisyTest and of the paper exist at 10 kHz only; since the time of libsvm
+grows with the square of the frames, `--seeds` limits the seeds of each robot. Existing models in
+the output are not trained again.
 """
 
 import argparse
@@ -23,11 +23,11 @@ from inspector.training.part import Part
 from models.evaluation.assessment import number, percent
 
 BUDGET = 20.0
-"""False alarms per hour that are borne."""
+"""False-alarm budget, per hour."""
 HEAD = (
-    *("profile", "left out", "runs learnt from", "runs measured, groups"),
+    *("profile", "left out", "runs trained on", "runs measured, groups"),
     *("failure recall at ≤ 20 per h", "failures found at ≤ 20 per h"),
-    *("as it is: found", "false alarms per hour", "balanced accuracy"),
+    *("at its threshold: found", "false alarms per hour", "balanced accuracy"),
 )
 
 
@@ -39,10 +39,8 @@ def main() -> None:
     arguments.add_argument("data", type=Path, nargs="+")
     arguments.add_argument("--output", type=Path, required=True, help="folder of the models")
     arguments.add_argument("--profiles", nargs="*", default=["general"])
-    arguments.add_argument("--robots", nargs="*", help="to leave out, in turn; all unless said")
-    arguments.add_argument(
-        "--seeds", type=int, help="of each robot, to learn from; all unless said"
-    )
+    arguments.add_argument("--robots", nargs="*", help="to leave out, in turn; by default all")
+    arguments.add_argument("--seeds", type=int, help="of each robot, to train on; by default all")
     arguments.add_argument("--rate", type=float, default=10_000.0)
     given = arguments.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
@@ -59,7 +57,7 @@ def main() -> None:
 def measured(
     profile: str, robot: str, path: Path, known: Sequence[Path], data: Sequence[Path], rate: float
 ) -> str:
-    """Train what is not there yet, measure it on another robot, and write a row of the table."""
+    """Row of the table of a model, trained unless it exists, on an unseen robot."""
     if not path.exists():
         training.train(known, profile, rate, path)
     classifier = models.Classifier.load(path)

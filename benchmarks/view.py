@@ -1,12 +1,12 @@
-"""Time `inspector view --save` and its neighbours, each as a process of its own.
+"""Time `inspector view --save` and other commands, each as a process of its own.
 
     python benchmarks/view.py [--repeats 5]
 
 The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints without a robot; both
 float32, with positions, velocities measured and desired. The log: 10 s of a noise in NoisyTest's
-two columns. Modules are compiled beforehand, as they are once a program has been called. Least and
-median CPU times are printed, the size of each recording, and how many points its lines have in the
-views that are open at first, and at most, whichever tabs are chosen.
+two columns. Modules are compiled beforehand. Printed are least and median CPU times, the size of
+each recording, and the number of points of its lines in the views that are open at first, and at
+most for any choice of tabs.
 """
 
 import argparse
@@ -30,11 +30,11 @@ ROWS = {
     "links": ["/power/links/**"],
     "joints": ["/score/**", "/joints/*", "/detail/*"],
 }
-"""Rows of the layout; the first of each is in front, unless there is none of it."""
+"""Rows of the layout; the first existing tab of each is in front."""
 
 
 def moving(rate: float, seconds: float, names: tuple[str, ...], robot: str | None) -> Run:
-    """Move every joint smoothly, with a vibration in the middle."""
+    """Run with a smooth motion of every joint, and a vibration in the middle."""
     generator = np.random.default_rng(0)
     instants = np.arange(round(rate * seconds)) / rate
     phase = 2 * np.pi * generator.uniform(0.1, 0.6, len(names)) * instants[:, None]
@@ -52,7 +52,7 @@ def moving(rate: float, seconds: float, names: tuple[str, ...], robot: str | Non
 
 
 def measure(command: list[str], repeats: int) -> tuple[float, float, float]:
-    """Run a command several times; least and median CPU time and median wall time in [s]."""
+    """Least and median CPU time and median wall time of a command, in [s]."""
     cpu, wall = [], []
     environment = os.environ | {"PYTHONDONTWRITEBYTECODE": ""}
     for _ in range(repeats + 1):
@@ -61,12 +61,12 @@ def measure(command: list[str], repeats: int) -> tuple[float, float, float]:
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         cpu.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
         wall.append(time.perf_counter() - start)
-    # The first one compiles modules and warms up.
+    # The first repeat compiles modules.
     return min(cpu[1:]), statistics.median(cpu[1:]), statistics.median(wall[1:])
 
 
 def points(recording: Path) -> tuple[int, int]:
-    """Count the points of lines: in the views that are open at first, and at most."""
+    """Number of points of lines in the views that are open at first, and at most."""
     count: dict[str, int] = {}
     for chunk in RrdReader(recording).store().stream():
         batch = chunk.to_record_batch()
@@ -81,7 +81,7 @@ def points(recording: Path) -> tuple[int, int]:
 
 
 def _totals(count: dict[str, int], tab: str) -> list[int]:
-    """Points of a tab, or of each one that a star stands for: a limb's signal, a moment."""
+    """Points of a tab, or of each one that matches a star: the signal of a limb, a moment."""
     stem = tab.rstrip("*")
     paths = [path for path in count if path == tab or (stem != tab and path.startswith(stem))]
     if not paths or not tab.endswith("/*"):

@@ -1,4 +1,4 @@
-"""What the benchmarks print beside other people's figures."""
+"""The tables of the benchmarks."""
 
 import json
 import subprocess
@@ -31,7 +31,7 @@ def paper():
 
 
 def sample(robot, scenario, seed):
-    """A sample of calm motion, and of failures that are beyond doubt."""
+    """A sample of good motion, and of obvious failures."""
     random = np.random.default_rng([seed, len(scenario), len(robot)])
     time = np.arange(40_000) / RATE
     part = (time // 1.0).astype(int)
@@ -68,22 +68,20 @@ def data(tmp_path_factory):
     ("title", "recall", "balanced"),
     [("linear", "82.3%", "66.8%"), ("RBF", "93.5%", "63.4%")],
 )
-def test_the_papers_shares_of_all_frames_are_told_in_frames_of_failures(
-    paper, title, recall, balanced
-):
+def test_the_papers_shares_of_all_frames_become_recalls_of_failures(paper, title, recall, balanced):
     assert f"| {recall} | {balanced} |" in paper.printed(title)
 
 
 def test_half_of_the_limbs_has_their_norm(paper, data):
     path = data / "go2" / "straight-000.npz"
-    (heard,) = paper.halved([path], RATE)
+    (recording,) = paper.halved([path], RATE)
     kept = Sample.load(path).signals
     both = np.hypot(kept["error_FL_foot"], kept["error_RR_foot"])
-    np.testing.assert_allclose(heard.signal["error"], both, rtol=1e-6)
-    assert heard.name == "go2/straight-000"
+    np.testing.assert_allclose(recording.signal["error"], both, rtol=1e-6)
+    assert recording.name == "go2/straight-000"
 
 
-def test_profiles_learn_from_the_first_seeds_that_are_not_held_out(paper, data):
+def test_profiles_are_trained_on_the_first_seeds_of_the_training_part(paper, data):
     known = paper.first_seeds(paper.files([data], paper.Part.TRAINING), 3)
     names = [paper.name_of(path) for path in known]
     assert names == [
@@ -111,10 +109,10 @@ def test_the_three_tables_are_filled(paper, data, tmp_path, monkeypatch, capsys)
     assert "paper-linear, half" not in out
     assert "of 3 runs in 3 groups; false alarms" in out  # go2's seed 7, talos's 7 and 9
     assert "ok motion of 4 runs in 4 groups." in out
-    assert "Runs learnt from: paper-linear 6, noisytest-rbf 6." in out
+    assert "Runs trained on: paper-linear 6, noisytest-rbf 6." in out
 
 
-def test_the_robot_that_is_left_out_is_measured_and_not_learnt_from(
+def test_the_robot_that_is_left_out_is_measured_and_not_trained_on(
     paper, data, tmp_path, monkeypatch, capsys
 ):
     from benchmarks import unseen
@@ -129,7 +127,7 @@ def test_the_robot_that_is_left_out_is_measured_and_not_learnt_from(
     assert {models.group_of(run).rpartition("-")[0] for run in learnt} == {"panda", "talos"}
 
 
-def test_a_model_of_other_runs_is_not_taken_for_ours(paper, data, tmp_path):
+def test_a_model_of_other_runs_is_refused(paper, data, tmp_path):
     paths = paper.files([data], paper.Part.TRAINING)
     paper.trained("paper-linear", paths[:2], tmp_path)
     with pytest.raises(SystemExit, match="trained on other runs; remove it"):
@@ -147,7 +145,7 @@ def test_our_side_is_timed_without_the_original(lola, tmp_path):
     assert all(each["cpu"] > 0.0 for task in found.values() for each in task)
 
 
-def test_a_python_without_the_original_is_told_from_one_that_has_it(lola):
+def test_a_python_without_the_original_is_refused(lola):
     command = [sys.executable, ROOT / "benchmarks" / "noisytest.py", lola]
     done = subprocess.run(
         [*command, "--original", sys.executable], capture_output=True, text=True, check=False

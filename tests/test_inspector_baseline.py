@@ -9,7 +9,7 @@ import pytest
 from commandline import call
 
 import models
-from inspector.training.baseline import learn
+from inspector.training.baseline import train
 from noisemodel import Block, Run
 
 RATE = 1000.0
@@ -47,7 +47,7 @@ def folder(tmp_path_factory):
     return folder
 
 
-def test_what_departs_from_good_runs_is_a_finding(folder):
+def test_an_anomaly_against_good_runs_is_a_finding(folder):
     tested = [folder / "test" / "bad.npz", folder / "test" / "fine.npz"]
     status, out, _ = call("classify", *tested, "--model", folder / "robot.npz", "--format", "json")
     bad, fine = json.loads(out)["runs"]
@@ -77,25 +77,25 @@ def test_a_baseline_is_measured_by_failures_of_any_name(folder):
     assert measured["classes"] == ["ok", "anomaly"]
 
 
-def test_only_what_is_annotated_ok_is_learnt(folder, tmp_path):
+def test_only_blocks_annotated_ok_are_trained_on(folder, tmp_path):
     inputs = [folder / "good0.npz", folder / "test" / "bad.npz"]
-    learnt = learn(inputs, tmp_path / "model.npz")
-    assert "of 1 run that somebody annotated, what is annotated `ok` alone" in str(learnt)
-    assert learnt.limit.hours * 3600 == pytest.approx(6.0 + 2.5 + 1.5, abs=0.2)
+    trained = train(inputs, tmp_path / "model.npz")
+    assert "of 1 run that somebody annotated, what is annotated `ok` alone" in str(trained)
+    assert trained.limit.hours * 3600 == pytest.approx(6.0 + 2.5 + 1.5, abs=0.2)
 
 
-def test_runs_without_desired_motion_are_heard_by_their_noise(tmp_path):
+def test_runs_without_desired_motion_have_the_scalar_profile(tmp_path):
     for seed in range(2):
         run_of(seed, desired=False).save(tmp_path / f"run{seed}.npz")
-    learnt = learn([tmp_path], tmp_path / "model.npz")
-    assert learnt.classifier.profile.signals == (models.NOISE,)
+    trained = train([tmp_path], tmp_path / "model.npz")
+    assert trained.classifier.profile.signals == (models.NOISE,)
 
 
-def test_faster_runs_are_lowered_if_a_rate_is_asked_for(tmp_path):
+def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
     run_of(0).save(tmp_path / "slow.npz")
     run_of(1, rate=2000.0).save(tmp_path / "fast.npz")
-    learnt = learn([tmp_path], tmp_path / "model.npz", rate=1000.0)
-    assert (learnt.classifier.rate, learnt.runs) == (1000.0, 2)
+    trained = train([tmp_path], tmp_path / "model.npz", rate=1000.0)
+    assert (trained.classifier.rate, trained.runs) == (1000.0, 2)
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_faster_runs_are_lowered_if_a_rate_is_asked_for(tmp_path):
         ),
     ],
 )
-def test_runs_that_do_not_belong_together_are_refused(tmp_path, odd, said):
+def test_runs_of_different_robots_or_rates_are_refused(tmp_path, odd, said):
     run_of(0, robot="panda").save(tmp_path / "a.npz")
     odd.save(tmp_path / "b.npz")
     status, out, err = call("baseline", tmp_path, "-o", tmp_path / "model.npz")

@@ -14,12 +14,12 @@ from models.evaluation.assessment import measure
 
 def run(path, seed, *, label="oscillations"):
     time = np.arange(20_000) / 10_000
-    calm = 1 + 0.01 * np.random.default_rng(seed).normal(size=20_000)
-    calm[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
+    signal = 1 + 0.01 * np.random.default_rng(seed).normal(size=20_000)
+    signal[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
     np.savez(
         path,
         time=time,
-        velocity=calm[:, None],
+        velocity=signal[:, None],
         block_start=[0.0, 1.0],
         block_stop=[1.0, 2.0],
         block_label=["ok", label],
@@ -42,7 +42,7 @@ def folder(tmp_path_factory):
     return path
 
 
-def test_a_model_is_measured_and_told(folder):
+def test_the_measures_of_a_model_are_printed(folder):
     status, out, err = call("evaluate", folder / "model.npz", folder / "test")
     assert (status, err) == (0, "")
     assert "6 runs in 6 groups" in out
@@ -77,7 +77,7 @@ def test_runs_that_it_was_trained_on_are_refused_in_one_line(folder):
     assert list(json.loads(out)["seen"]) == ["known1"]
 
 
-def test_what_exists_is_not_written_over(folder, tmp_path):
+def test_existing_files_are_not_replaced(folder, tmp_path):
     there = tmp_path / "there"
     there.write_text("kept")
     for option in ("-o", "--picture"):
@@ -93,7 +93,7 @@ def test_what_exists_is_not_written_over(folder, tmp_path):
     ("name", "problem"),
     [("bare.npz", "has no annotated blocks"), ("odd.npz", "label 'rattle' is no class")],
 )
-def test_runs_that_cannot_be_measured_by_are_refused(folder, tmp_path, name, problem):
+def test_runs_without_valid_annotations_are_refused(folder, tmp_path, name, problem):
     run(tmp_path / "odd.npz", 9, label="rattle")
     time = np.arange(20_000) / 10_000
     np.savez(tmp_path / "bare.npz", time=time, velocity=np.ones((20_000, 1)))
@@ -127,7 +127,7 @@ def sure(name, blocks, random):
     return predicted(name, blocks, called, scores=scores)
 
 
-def test_pictures_show_what_there_is_and_leave_out_what_is_not(tmp_path, monkeypatch):
+def test_pictures_leave_out_measures_that_do_not_exist(tmp_path, monkeypatch):
     pytest.importorskip("matplotlib")
     from matplotlib.figure import Figure
 

@@ -37,7 +37,7 @@ def write_log(folder, number, classes=("ok", "impact", "oscillations")):
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """A folder to train on and one to measure by."""
+    """A training and a validation folder."""
     folder = tmp_path_factory.mktemp("data")
     for number in range(4):
         write_log(folder / "training", number)
@@ -55,7 +55,7 @@ def tune(data, output, *more, grid=GRID):
 
 @pytest.fixture(scope="module")
 def whole(data, tmp_path_factory):
-    """Results that came without a pause, and what was printed."""
+    """Results of a search without interruption, and its output."""
     output = tmp_path_factory.mktemp("whole") / "tuned.jsonl"
     status, out, err = tune(data, output)
     assert (status, err) == (0, "")
@@ -68,7 +68,7 @@ def lines(path):
 
 @pytest.fixture
 def counted(monkeypatch):
-    """Lists the points that are measured."""
+    """The points that are measured."""
     points = []
 
     def measure(profiles, trial):
@@ -79,7 +79,7 @@ def counted(monkeypatch):
     return points
 
 
-def test_each_point_has_a_line_after_that_of_the_question(whole):
+def test_each_point_has_a_line_after_the_header(whole):
     question, *points = lines(whole[0])
     assert question["format"] == "noise-tuning/1"
     assert question["grid"] == {
@@ -93,7 +93,7 @@ def test_each_point_has_a_line_after_that_of_the_question(whole):
     assert all(0.0 <= point["balanced_accuracy"] <= 1.0 for point in points)
 
 
-def test_the_best_points_are_printed_under_each_other(whole):
+def test_the_best_points_are_printed_as_a_table(whole):
     output, out = whole
     points = lines(output)[1:]
     best = min(points, key=lambda point: (-point["balanced_accuracy"], point["log_loss"]))
@@ -139,7 +139,7 @@ def test_the_best_point_is_the_one_that_is_trained(data, whole, tmp_path):
         assert metrics[name] == pytest.approx(best[name], abs=1e-9)
 
 
-def test_what_is_done_is_not_done_again(data, whole, tmp_path, counted):
+def test_points_with_results_are_not_measured_again(data, whole, tmp_path, counted):
     output = tmp_path / "tuned.jsonl"
     output.write_bytes(whole[0].read_bytes())
     status, out, _ = tune(data, output)
@@ -149,7 +149,7 @@ def test_what_is_done_is_not_done_again(data, whole, tmp_path, counted):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 0.65, 0.999])
-def test_tuning_that_was_cut_off_goes_on_to_the_same_bytes(data, whole, tmp_path, counted, share):
+def test_an_interrupted_search_resumes_to_the_same_bytes(data, whole, tmp_path, counted, share):
     output, content = tmp_path / "tuned.jsonl", whole[0].read_bytes()
     output.write_bytes(content[: int(share * len(content))])
     there = max(output.read_bytes().count(b"\n") - 1, 0)
@@ -158,13 +158,13 @@ def test_tuning_that_was_cut_off_goes_on_to_the_same_bytes(data, whole, tmp_path
     assert output.read_bytes() == content
 
 
-def test_two_jobs_come_to_the_same(data, whole, tmp_path):
+def test_two_jobs_give_the_same_results(data, whole, tmp_path):
     output = tmp_path / "tuned.jsonl"
     assert tune(data, output, "-j", 2)[0] == 0
     assert lines(output) == lines(whole[0])
 
 
-def test_killed_tuning_goes_on_where_it_was(data, whole, tmp_path, counted):
+def test_a_killed_search_resumes(data, whole, tmp_path, counted):
     output = tmp_path / "tuned.jsonl"
     words = ("tune", data / "training", "--validation", data / "validation", *OPTIONS, *GRID)
     command = [sys.executable, "-m", "inspector", *map(str, words), "-o", str(output)]
@@ -180,13 +180,13 @@ def test_killed_tuning_goes_on_where_it_was(data, whole, tmp_path, counted):
     assert lines(output) == lines(whole[0])
 
 
-def test_another_criterion_takes_no_new_work(data, whole, counted):
+def test_another_criterion_measures_no_point_again(data, whole, counted):
     status, out, _ = tune(data, whole[0], "--criterion", "log-loss")
     points = lines(whole[0])[1:]
     best = min(points, key=lambda point: point["log_loss"])
     assert (status, counted) == (0, [])
     assert f"{best['log_loss']:.4f}" in out.splitlines()[4]
-    assert "the log-loss decides" not in out
+    assert "the log-loss breaks ties" not in out
 
 
 def test_without_a_validation_set_recordings_are_folded(data, tmp_path):
@@ -198,7 +198,7 @@ def test_without_a_validation_set_recordings_are_folded(data, tmp_path):
     assert lines(output)[0]["number_of_folds"] == 2
 
 
-def test_a_part_of_the_recordings_can_be_meant(data, tmp_path):
+def test_a_part_of_the_recordings_can_be_selected(data, tmp_path):
     held_out = [f"walk{n}" for n in range(4) if models.held_out(f"walk{n}")]
     options = (*OPTIONS, *GRID, "--folds", 2, "--part", "training", "-o", tmp_path / "a.jsonl")
     assert call("tune", data / "training", *options)[0] == 0
@@ -238,7 +238,7 @@ def refused(data, output, *more, grid=GRID):
         (("--grid", "floor=1e-3"), "holds results of another grid (floor was not in it)"),
     ],
 )
-def test_results_of_another_question_are_refused(data, whole, tmp_path, more, reason):
+def test_results_of_another_grid_are_refused(data, whole, tmp_path, more, reason):
     output = tmp_path / "tuned.jsonl"
     output.write_bytes(whole[0].read_bytes())
     assert reason in refused(data, output, *more)

@@ -117,5 +117,5 @@ def test_what_to_install_is_said_before_anything_is_read(rockets, monkeypatch):
 
 def test_who_takes_part_is_said_if_nobody_has_the_name(rockets, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["", "no such folder", "--only", "perceptron"])
-    with pytest.raises(SystemExit, match="nobody is called 'perceptron'; there are our trees"):
+    with pytest.raises(SystemExit, match="no classifier 'perceptron'; there are our trees"):
         rockets.main()

@@ -33,9 +33,9 @@ def baseline(
     overwrite: Overwrite = False,
 ) -> None:
     """Train a baseline on good runs only, to find anomalies."""
-    from inspector.training.baseline import learn
+    from inspector.training.baseline import train
 
-    learnt = learn(
+    trained = train(
         inputs,
         output,
         alarms=alarms,
@@ -44,5 +44,5 @@ def baseline(
         part=part,
         overwrite=overwrite,
     )
-    typer.echo(str(learnt))
+    typer.echo(str(trained))
     typer.echo(f"{output}: written; classify --model {output} finds anomalies against these runs")

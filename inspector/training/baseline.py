@@ -34,7 +34,7 @@ class Source(NamedTuple):
     """Their names; empty if there is only a noise."""
 
 
-def learn(
+def train(
     inputs: Sequence[Path],
     output: Path,
     *,
@@ -80,9 +80,9 @@ def learn(
     except models.RecordingError as error:
         hint = "; --profile scalar takes the noise alone" if "no signal" in str(error) else ""
         raise InspectorError(f"{error}{hint}") from error
-    learnt = models.learn_baseline(good, chosen, alarms=alarms)
-    learnt.classifier.save(output, overwrite=overwrite)
-    return learnt
+    baseline = models.learn_baseline(good, chosen, alarms=alarms)
+    baseline.classifier.save(output, overwrite=overwrite)
+    return baseline
 
 
 def _files(inputs: Sequence[Path]) -> Iterator[Path]:
