@@ -82,9 +82,8 @@ class Feet:
         turned = estimate.yaw_correction * lever[:, ::-1] * (-1.0, 1.0)  # of a small angle
         upright = self._lean * plan.size * np.array((estimate.pitch, -estimate.roll))
         undecided = swing & (progress < DECIDED)
-        self._right[undecided] = (estimate.position_correction + balance + turned + upright)[
-            undecided
-        ]
+        target = estimate.position_correction + balance + turned + upright
+        self._right[undecided] = target[undecided]
         return np.asarray(self._left + progress[:, None] * (self._right - self._left))
 
     def _compliance(self, number: int, estimate: StateEstimate) -> Array:
