@@ -20,7 +20,7 @@ from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import recordings
 from inspector.training.training import train
-from noisemodel import Block, Run
+from noisemodel import Run
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.simulation import RECIPE

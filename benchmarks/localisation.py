@@ -96,9 +96,9 @@ def links_of(robot: str, joints: tuple[str, ...]) -> set[str]:
     return {name for name, index in carried if known.joints[index - 1].name in joints}
 
 
-def check(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Origin, dict[str, bool]]]:
+def check(run: nm.Run, links: LinkNoise) -> Iterator[tuple[str, Localisation, dict[str, bool]]]:
     """For each event: cause, localisation, and whether stage, limb and band are correct."""
-    robot, known = str(run.robot), origins(run, ())
+    robot, known = str(run.robot), localise(run, ())
     for event, block in labelled(run):
         found = known[block]
         marks = {"stage": found.stage == ACTS.get(event["cause"], "commanded")}

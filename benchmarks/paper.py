@@ -31,7 +31,6 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
-from inspector.parallel import each
 from inspector.training import recordings, training
 from inspector.training.part import Part
 from models.evaluation.assessment import measure, number, percent

@@ -113,7 +113,24 @@ def read(log: Path) -> tuple[tuple[Block, ...], float]:
         raise SampleError(path, f"damaged ({' '.join(str(error).split())})") from error
 
 
-def _annotations(run: Run) -> str:
-    """The blocks, and the recipe to reproduce the run, as TOML."""
+def annotations(blocks: Sequence[Block]) -> str:
+    """Labelled stretches as NoisyTest has them beside each of its logs.
+
+    Both numbers of a range are written with a decimal point: NoisyTest's TOML reader takes no mixed
+    ones.
+
+    Args:
+        blocks: Stretches with their labels.
+
+    Returns:
+        TOML: ``chunk_ranges`` and ``chunk_labels`` in a table ``data``.
+    """
+    ranges = "".join(f"    [{float(each.start)!r}, {float(each.stop)!r}],\n" for each in blocks)
+    labels = "".join(f"    {json.dumps(each.label, ensure_ascii=False)},\n" for each in blocks)
+    return f"[data]\nchunk_ranges = [\n{ranges}]\nchunk_labels = [\n{labels}]\n"
+
+
+def _simulation(run: Run) -> str:
+    """The recipe to reproduce the run, as a JSON text in TOML."""
     recipe = json.dumps({**run.meta, "robot": run.robot, "sha256": digest(run)}, sort_keys=True)
     return f"\n[simulation]\nrecipe = {json.dumps(recipe)}\n"  # JSON's escapes are TOML's too

@@ -38,9 +38,9 @@ def classify(
     labels_format: Annotated[
         str, typer.Option(help="Format of these files: noisytest, csv or audacity.")
     ] = "audacity",
-    origins: Annotated[
+    localise: Annotated[
         bool,
-        typer.Option("--origins", help="Add the fault localisation of each finding to the JSON."),
+        typer.Option("--localise", help="Add the localisation of each finding to the JSON."),
     ] = False,
     unknown: Annotated[
         OnUnknown,

@@ -33,8 +33,8 @@ def compare(
 
     The exit status is 3 if nothing could be compared.
     """
-    from inspector.comparison import comparing, output
-    from inspector.comparison.table import table
+    import noisemodel as nm
+    from inspector.comparison.output import Outputs
     from inspector.progress import progress
 
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]

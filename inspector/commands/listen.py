@@ -34,7 +34,7 @@ def listen(
     overwrite: Overwrite = False,
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
-    from inspector.sound import listening
+    from inspector.sound import sonification
     from noisemodel import Run
 
     settings = sonification.Settings(kind, joint, link, speed)

@@ -145,4 +145,4 @@ def _check(source: Source, first: Source) -> None:
 
 def _signals(recording: models.Recording) -> dict[str, models.types.Real]:
     """Signals by name, without the error if the desired motion is the measured one."""
-    return models.signals.telling(models.signals.named(recording.signal))
+    return models.signals.without_zero_error(models.signals.named(recording.signal))

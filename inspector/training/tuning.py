@@ -81,7 +81,7 @@ class Tuned:
     profiles: Sequence[models.Profile]
     measures: Sequence[Measures]
     untuned: models.Profile
-    reference: Asked
+    reference: Validation
     trial: Trial
 
     def ranked(self, criterion: Criterion) -> list[int]:
@@ -156,7 +156,7 @@ class Tuned:
             others = f"the same, in {len(splits)} folds"
         return (
             f"{len(self.grid)} points of {self.search.profile}, trained on"
-            f" {self.reference.learnt} frames of {trained} recordings, measured on"
+            f" {self.reference.training_frames} frames of {trained} recordings, measured on"
             f" {len(self.reference.truth)} frames of {others}"
         )
 
@@ -243,7 +243,7 @@ def tune(
         "number_of_folds": None if validation else search.folds,
         "software": versions(),
     }
-    reference = ask([base], trial)  # first: data that cannot be trained on leave no file
+    reference = validate([base], trial)  # first: data that cannot be trained on leave no file
     with opened(output, facts, points, overwrite=overwrite) as results:
         done = len(results.measures)
         batches = _batches(points[done:], profiles[done:], BATCHES * jobs)
