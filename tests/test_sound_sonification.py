@@ -232,7 +232,7 @@ def test_a_link_sounds_at_the_frequency_of_the_joints_that_move_it(arm):
     [
         (Settings(kind="paper"), "'paper' has no signed signals to play; there are simplified"),
         (Settings(joint="knee"), "no joint 'knee' in the run; it has joint1, joint2"),
-        (Settings(link="knee"), "no link 'knee' with a surface; there are link1, link2"),
+        (Settings(link="knee"), "no link 'knee' that makes noise; there are link1, link2"),
         (Settings(kind="normal", joint="joint1"), "of links, not of joints"),
         (Settings(link="link1", joint="joint1"), "name no joint with it"),
         (Settings(kind="simplified", link="link1"), "of the kinds normal and rms"),
