@@ -14,7 +14,8 @@ From frames to findings, the same for every estimator that gives probabilities:
    of them: one event, which says that it is out of distribution.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,9 @@ ANOMALY = "anomaly"
 
 CONFIRM = 2
 """Frames of evidence in a stretch that make it a finding."""
+
+_ARRAYS = ("start", "stop", "label", "scores", "above_threshold", "novel")
+"""Fields of `Labels` with an entry for each frame."""
 
 
 @dataclass(frozen=True)
@@ -172,6 +176,22 @@ class Labels:
             float(self.stop[frames[-1]]),
             float(self.scores[frames][:, columns].max()),
             self.novel is not None and bool(self.novel[frames].any()),
+        )
+
+    @staticmethod
+    def concatenated(parts: Sequence["Labels"]) -> "Labels":
+        """Join labels of one model that follow each other, one or more."""
+        arrays = {name: [getattr(part, name) for part in parts] for name in _ARRAYS}
+        joined = {
+            name: np.concatenate(each) for name, each in arrays.items() if each[0] is not None
+        }
+        return replace(parts[0], **joined)
+
+    def part(self, frames: slice) -> "Labels":
+        """Take the labels of some frames."""
+        arrays = {name: getattr(self, name) for name in _ARRAYS}
+        return replace(
+            self, **{name: each[frames] for name, each in arrays.items() if each is not None}
         )
 
     def to_arrow(self) -> "pyarrow.Table":

@@ -239,7 +239,10 @@ def test_the_report_states_what_changed(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert text[0].startswith("# before → after\n")
-    assert "**findings: 1 new, 0 resolved, 0 unchanged; vibration +6.0 dB**" in text[0]
+    assert (
+        "cannot-tell → cannot-tell; findings: 1 new, 0 resolved, 0 unchanged; vibration +6.0 dB"
+        in text[0]
+    )
     assert re.search(
         r"\| new \| impact \| 0.50 \| 1.00 \| -\d+\.\d \| -\d+\.\d \| \+6.0 \|", text[0]
     )

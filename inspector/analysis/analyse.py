@@ -6,7 +6,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -132,15 +132,8 @@ class Analysis:
     @property
     def headline(self) -> str:
         """The status and what it consists of, in a line."""
-        if self.status is Status.CANNOT_TELL:
-            return f"{self.status}: {self.reason}"
-        counts = Counter(event.label for event in self.findings)
-        kinds = ", ".join(f"{count} {label}" for label, count in sorted(counts.items()))
-        novel = sum(event.novel for event in self.findings)
-        parts = [f"{self.status}{f': {kinds}' if kinds else ''}"]
-        parts += [f"{novel} out of distribution"] if novel else []
-        parts += [IGNORED] if self.unknown is Unknown.IGNORE else []
-        return "; ".join(parts)
+        line = headline(self.status, self.findings, self.reason)
+        return f"{line}; {IGNORED}" if self.unknown is Unknown.IGNORE else line
 
     @property
     def message(self) -> str:
@@ -160,6 +153,24 @@ class Analysis:
 
 
 IGNORED = "unknown frames are ignored"
+
+
+def headline(status: Status, findings: Sequence[Event], reason: str = "") -> str:
+    """Write a status and what it consists of in a line."""
+    if status is Status.CANNOT_TELL:
+        return f"{status}: {reason}"
+    counts = Counter(event.label for event in findings)
+    kinds = ", ".join(f"{count} {label}" for label, count in sorted(counts.items()))
+    novel = sum(event.novel for event in findings)
+    parts = [f"{status}: {kinds}" if kinds else str(status)]
+    return "; ".join([*parts, f"{novel} out of distribution"] if novel else parts)
+
+
+def status_of(frames: int, findings: Sequence[Event]) -> Status:
+    """Take the status of so many labelled frames from their findings."""
+    if not frames:
+        return Status.CANNOT_TELL
+    return Status.FINDINGS if findings else Status.OK
 
 
 def analyse(
@@ -207,7 +218,7 @@ def analyse(
     blind = not seen.observable and not spans
     return replace(
         empty,
-        status=Status.CANNOT_TELL if blind else Status.FINDINGS if spans else Status.OK,
+        status=Status.CANNOT_TELL if blind else status_of(len(labels), spans),
         reason=" ".join(summary(seen)) if blind else "",
         labels=labels,
         model=labelled.model,
@@ -249,7 +260,7 @@ def analyse_noise(
     spans, findings = _extents(run, labels)
     return replace(
         empty,
-        status=Status.FINDINGS if spans else Status.OK,
+        status=status_of(len(labels), spans),
         labels=labels,
         model=labelled.model,
         model_sha256=library[labelled.model].sha256,

@@ -28,7 +28,7 @@ def follow(
         session_of: Begins a session, given the names of the joints.
 
     Returns:
-        What bereceived of the samples.
+        What became of the samples.
 
     Raises:
         LiveError: If there are no rows, or the first line cannot be understood.

@@ -10,12 +10,14 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from inspector.analysis.analyse import Status, headline, status_of
 from inspector.library import Library, for_robot, load_library
 from inspector.live.buffer import SampleBuffer, rows_of, widths_of
 from inspector.live.errors import LiveError
 from inspector.live.sink import Sink
 from inspector.live.warnings import Warnings
 from inspector.live.worker import Worker
+from models import Event
 from noisemodel import Robot
 from noisemodel.types import Array
 
@@ -36,6 +38,9 @@ class Summary:
         delays: From a frame's last sample to its label in the recording, of the latest labels,
             in [s].
         where: Where it was shown.
+        status: The same as that of `inspector classify` for these labels.
+        findings: From the start of the first frame of each to the end of its last.
+        reason: Why nothing can be told; empty otherwise.
     """
 
     samples: int
@@ -45,12 +50,17 @@ class Summary:
     warnings: Mapping[str, int]
     delays: Sequence[float]
     where: str
+    status: Status = Status.CANNOT_TELL
+    findings: Sequence[Event] = ()
+    reason: str = "no frame was labelled"
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
         lines = [
             f"{self.samples} samples, {self.samples / self.rate:.2f} s at {self.rate:g} Hz,"
             f" {self.where}",
+            headline(self.status, self.findings, self.reason),
+            *(f"  {finding}" for finding in self.findings),
             f"labels by {self.model}: {counts}" if counts else "no labels",
         ]
         if self.delays:
@@ -178,6 +188,8 @@ class LiveSession:
     def summary(self) -> Summary:
         """What became of the samples so far."""
         worker, buffer = self._worker, self._buffer
+        findings = worker.findings.events if worker else ()
+        frames = worker.findings.frames if worker else 0
         return Summary(
             samples=worker.samples + buffer.held if worker and buffer else 0,
             rate=self._rate,
@@ -186,6 +198,9 @@ class LiveSession:
             warnings=self._warnings.counts,
             delays=worker.delays if worker else (),
             where=self._sink.where,
+            status=status_of(frames, findings),
+            findings=findings,
+            reason=(worker.reason if worker else "") or "no frame was labelled",
         )
 
     def close(self) -> Summary:

@@ -14,6 +14,7 @@ from inspector.live.blueprint import Contents, layout
 from inspector.live.buffer import SampleBuffer
 from inspector.live.clock import Clock
 from inspector.live.drawing import Drawing
+from inspector.live.findings import Findings
 from inspector.live.labeller import NOISY, Labeller
 from inspector.live.lane import Lane
 from inspector.live.robot import LiveRobot
@@ -63,6 +64,7 @@ class Worker:
         self._labeller = Labeller(library, rate, widths)
         self._lane = Lane(self._labeller.hop, self._labeller.length)
         self._counts: Counter[str] = Counter()
+        self.findings = Findings()
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._robot = None
         if robot is not None:
@@ -89,6 +91,11 @@ class Worker:
     def model(self) -> str:
         """Name of the model that labels; empty without one."""
         return self._labeller.model
+
+    @property
+    def reason(self) -> str:
+        """Why there are no labels; empty if a model labels."""
+        return "" if self._labeller.model else self._labeller.remark
 
     @property
     def labels(self) -> Mapping[str, int]:
@@ -169,12 +176,9 @@ class Worker:
             # How far back in the stretch frames end; a lower rate lags behind.
             back = np.rint((self._labeller.elapsed - labels.stop) * self._rate).astype(int)
             shift = end - self._labeller.elapsed
-            labels = replace(
-                labels,
-                start=labels.start + shift,
-                stop=labels.stop + shift,
-                label=labels.raw,
-            )
+            labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
+            self.findings.add(labels)
+            labels = replace(labels, label=labels.raw)
             self._counts.update(labels.label.tolist())
             changes = self._lane.take(labels)
             if self._sink.alive:

@@ -24,14 +24,15 @@ def report(pair: Pair) -> str:
 
 
 def summary(pair: Pair) -> str:
-    """What changed, in a line."""
+    """The status of both runs and what changed, in a line."""
     found = changes(pair)
     count = {kind: sum(each.kind == kind for each in found) for kind in (NEW, RESOLVED, UNCHANGED)}
     events = "nothing found in either"
     if found:
         events = ", ".join(f"{number} {kind}" for kind, number in count.items())
         events = f"{'findings' if labelled(pair) else 'annotated failures'}: {events}"
-    return f"{events}; vibration {whole(pair).change:+.1f} dB"
+    statuses = f"{pair.before.status} → {pair.after.status}"
+    return f"{statuses}; {events}; vibration {whole(pair).change:+.1f} dB"
 
 
 def _parts(pair: Pair) -> Iterator[str]:
