@@ -17,7 +17,7 @@ From frames to findings, the same for every estimator that gives probabilities:
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -181,18 +181,20 @@ class Labels:
     @staticmethod
     def concatenated(parts: Sequence["Labels"]) -> "Labels":
         """Join labels of one model that follow each other, one or more."""
-        arrays = {name: [getattr(part, name) for part in parts] for name in _ARRAYS}
-        joined = {
-            name: np.concatenate(each) for name, each in arrays.items() if each[0] is not None
+        first = parts[0]
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in _ARRAYS
+            if getattr(first, name) is not None
         }
-        return replace(parts[0], **joined)
+        return replace(first, **arrays)
 
     def part(self, frames: slice) -> "Labels":
         """Take the labels of some frames."""
-        arrays = {name: getattr(self, name) for name in _ARRAYS}
-        return replace(
-            self, **{name: each[frames] for name, each in arrays.items() if each is not None}
-        )
+        arrays: dict[str, Any] = {
+            name: getattr(self, name)[frames] for name in _ARRAYS if getattr(self, name) is not None
+        }
+        return replace(self, **arrays)
 
     def to_arrow(self) -> "pyarrow.Table":
         """Give a table with a row for each frame.

@@ -1,0 +1,154 @@
+"""A fault made louder is never found less: laws of the verdict on good runs with a fault added.
+
+A tone, a blow or noise is added to one joint of a good run. Its level is that of the run in the
+band of the model, or `FLOOR` if the run is quieter there: how faint a fault a model finds is
+measured elsewhere (docs/classifier.md), that it finds a loud one is a law.
+"""
+
+import tempfile
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import noisemodel as nm
+import scenarios
+from inspector.analysis.analyse import Status, Unknown, analyse
+from inspector.assets import demo_run
+from inspector.library import load_library
+
+FLOOR = 0.3
+"""Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
+rule of the scenarios takes for felt."""
+LOUDER = (1.0, 3.0, 10.0, 100.0, 1000.0)
+KINDS = ("tone", "noise", "blow")
+SECONDS = 3.0
+
+LIBRARY = load_library()
+
+
+@cache
+def good_run(robot, rate):
+    """The first seconds of a simulated run in which nothing is wrong, at a rate."""
+    run = scenarios.simulate(robot, "straight", 9001)
+    run = run.cut(float(run.time[0]) + 1.0, float(run.time[0]) + 1.0 + SECONDS)
+    return nm.decimated(run, rate) if rate < run.rate else run
+
+
+def level_in_band(run, low, high):
+    """Root mean square of all joints between two frequencies, in [rad/s]."""
+    waves = np.fft.rfft(run.velocity.astype(np.float64), axis=0)
+    frequency = np.fft.rfftfreq(len(run.time), 1 / run.rate)
+    inside = (frequency >= low) & (frequency < high)
+    return float(np.sqrt(2 * np.sum(np.abs(waves[inside]) ** 2)) / len(run.time))
+
+
+def fault(run, kind, frequency, seed):
+    """A signal of level 1 while it lasts, shape (samples,)."""
+    time = run.time - run.time[0]
+    if kind == "blow":
+        since = np.maximum(time - 1.0, 0.0)
+        signal = np.exp(-since * frequency / 3.0) * np.sin(2 * np.pi * frequency * since)
+        lasts = (time >= 1.0) & (time < 1.1)
+        return signal / np.sqrt(np.mean(signal[lasts] ** 2))
+    during = (time >= 1.0) & (time < 2.0)
+    if kind == "tone":
+        return np.sqrt(2.0) * np.sin(2 * np.pi * frequency * time) * during
+    white = np.fft.rfft(np.random.default_rng(seed).normal(size=len(time)))
+    place = np.fft.rfftfreq(len(time), 1 / run.rate)
+    white[(place < frequency / np.sqrt(2.0)) | (place > frequency * np.sqrt(2.0))] = 0.0
+    noise = np.fft.irfft(white, len(time))
+    return noise / noise.std() * during
+
+
+def with_fault(run, joint, signal, level):
+    velocity = run.velocity.astype(np.float64)
+    velocity[:, joint] += level * signal
+    return replace(run, velocity=velocity)
+
+
+def check_the_law(robot, rate, kind, joint, frequency, seed):
+    run = good_run(robot, rate)
+    good = analyse(run, LIBRARY)
+    assert good.status is Status.OK
+    low, high = (LIBRARY[good.model].profile.edges[i] for i in (0, -1))
+    frequency = 20.0 * (min(0.9 * high, 1000.0) / 20.0) ** frequency  # from 20 Hz, in octaves
+    level = max(level_in_band(run, low, high), FLOOR)
+    signal = fault(run, kind, frequency, seed)
+    joint = joint % run.velocity.shape[1]
+    for louder in LOUDER:
+        found = analyse(with_fault(run, joint, signal, louder * level), LIBRARY)
+        assert found.status is Status.FINDINGS, f"{kind} of {louder * level:.2f} rad/s"
+        hit = [e for e in found.findings if e.start < run.time[0] + 2.4 and e.stop > run.time[0]]
+        assert hit
+
+
+FAULTS = {
+    "kind": st.sampled_from(KINDS),
+    "joint": st.integers(0, 40),
+    "frequency": st.floats(0.0, 1.0),
+    "seed": st.integers(0, 1000),
+}
+
+
+@pytest.mark.parametrize("rate", [1000.0, 10_000.0])
+@given(**FAULTS)
+@settings(max_examples=12, deadline=None)
+def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, frequency, seed):
+    check_the_law("panda", rate, kind, joint, frequency, seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", [1000.0, 2000.0, 10_000.0])
+@pytest.mark.parametrize("robot", ["panda", "go2", "talos", "ur5"])
+@given(**FAULTS)
+@settings(max_examples=30, deadline=None)
+def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
+    robot, rate, kind, joint, frequency, seed
+):
+    check_the_law(robot, rate, kind, joint, frequency, seed)
+
+
+@given(**FAULTS, faint=st.floats(0.001, 0.3))
+@settings(max_examples=12, deadline=None)
+def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency, seed, faint):
+    run = good_run("panda", 1000.0)
+    signal = fault(run, kind, 20.0 * 20.0**frequency, seed)
+    joint = joint % run.velocity.shape[1]
+    levels = faint * np.array([1.0, 2.0, 5.0, 20.0, 100.0])
+    found = [bool(analyse(with_fault(run, joint, signal, x), LIBRARY).findings) for x in levels]
+    assert found == sorted(found)
+
+
+@pytest.mark.parametrize("amplitude", [0.1, 0.3, 1.0, 3.0, 10.0, 100.0])
+@pytest.mark.parametrize("frequency", [35.0, 90.0, 180.0])
+def test_a_tone_on_one_joint_of_a_panda_is_a_finding_however_loud(frequency, amplitude):
+    run = good_run("panda", 10_000.0)
+    tone = fault(run, "tone", frequency, 0) / np.sqrt(2.0)
+    found = analyse(with_fault(run, 2, tone, amplitude), LIBRARY)
+    assert found.status is Status.FINDINGS
+    if amplitude >= 1.0:
+        assert any(event.novel for event in found.findings)
+
+
+def test_to_ignore_unknown_frames_never_adds_a_finding():
+    run = good_run("panda", 1000.0)
+    for kind in KINDS:
+        loud = with_fault(run, 1, fault(run, kind, 60.0, 0), 10.0)
+        reported = analyse(loud, LIBRARY)
+        ignoring = analyse(loud, LIBRARY, unknown=Unknown.IGNORE)
+        spans = {(span.start, span.stop) for span in reported.spans}
+        for span in ignoring.spans:
+            assert any(start <= span.start and span.stop <= stop for start, stop in spans)
+
+
+def test_the_demo_is_a_finding_whatever_file_it_is_read_from():
+    run = nm.Run.load(demo_run())
+    with tempfile.TemporaryDirectory() as folder:
+        run.save(Path(folder) / "copy.npz")
+        copy = nm.Run.load(Path(folder) / "copy.npz")
+    assert analyse(copy, LIBRARY).findings == analyse(run, LIBRARY).findings
