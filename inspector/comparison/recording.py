@@ -1,4 +1,4 @@
-"""RobotComparison noise models as a rerun recording: one above the other, on one time axis."""
+"""Comparisons of noise models as a rerun recording: one above the other, on one time axis."""
 
 import hashlib
 from pathlib import Path
