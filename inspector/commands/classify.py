@@ -52,11 +52,11 @@ def classify(
 
     Exit status:
 
-      0  quiet: no run has a finding
-      1  findings: at least one run has a failure or an anomaly
+      0  ok: no run has a finding
+      1  findings: at least one run has one
       2  wrong usage
       3  bad input: a file cannot be read
-      4  cannot tell: say, a rate too low for every model
+      4  cannot tell: say, the rate is too low for every model
     """
     from inspector import assets
     from inspector.analysis.analyse import Unknown

@@ -12,7 +12,9 @@ Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
 ModelFiles = Annotated[
     list[Path] | None,
-    typer.Option("--model", help="Use this model instead of the shipped ones; repeatable."),
+    typer.Option(
+        "--model", help="Use this model only: a file, or the name of a shipped one; repeatable."
+    ),
 ]
 
 

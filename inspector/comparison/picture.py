@@ -1,4 +1,4 @@
-"""RobotComparison noise models as a picture on paper: terms, correlation, distance by frequency."""
+"""Comparisons of noise models as a picture on paper: terms, correlation, distance by frequency."""
 
 from collections.abc import Sequence
 from importlib.util import find_spec
