@@ -146,21 +146,22 @@ def test_annotated_failures_are_matched_where_no_model_fits(tmp_path):
     assert any(remark.startswith("Both: No labels: rate of 5000 Hz") for remark in pair.remarks)
 
 
-def test_a_class_is_as_long_and_as_loud_as_its_frames(tmp_path):
+def test_a_class_is_as_long_and_as_loud_as_its_findings(tmp_path):
     pair = compared(tmp_path, panda(), panda(), robot=False)
     start = np.arange(0.0, 1.6, 0.1)
-    rattles = (start >= 0.5) & (start + 0.4 <= 1.0 + 1e-9)
-    sides = []
-    for label in (np.full(len(start), "ok"), np.where(rattles, "oscillations", "ok")):
-        scores = np.zeros((len(start), 2))
-        labels = Labels(start, start + 0.4, label, scores, ("ok", "oscillations"))
-        sides.append(dataclasses.replace(pair.before, labels=labels))
-    _, found = by_class(dataclasses.replace(pair, before=sides[0], after=sides[1]))
-    assert found.seconds == pytest.approx((0.0, 0.2))
+    labels = Labels(
+        start, start + 0.4, np.full(16, "ok"), np.zeros((16, 2)), ("ok", "oscillations")
+    )
+    events = (Event("oscillations", 0.5, 0.8, 0.9), Event("unknown", 1.2, 1.3, 0.1, novel=True))
+    before = dataclasses.replace(pair.before, labels=labels)
+    after = dataclasses.replace(before, findings=events, spans=events)
+    ok, found, unknown = by_class(dataclasses.replace(pair, before=before, after=after))
+    assert ok.seconds == pytest.approx((1.9, 1.5))
+    assert found.seconds == pytest.approx((0.0, 0.3))
+    assert unknown.seconds == pytest.approx((0.0, 0.1))
     assert np.isnan(found.level.before)
-    fast = pair.vibration[0]
-    twice = np.concatenate((fast[2500:4500], fast[3000:5000]))  # frames of 0.4 s overlap
-    assert found.level.after == pytest.approx(10 * np.log10(np.mean(twice**2)), abs=1e-6)
+    during = pair.vibration[0][2500:4000]
+    assert found.level.after == pytest.approx(10 * np.log10(np.mean(during**2)), abs=1e-6)
 
 
 def test_motions_that_have_nothing_in_common_are_laid_start_to_start():

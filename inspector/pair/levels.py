@@ -135,7 +135,9 @@ def by_class(pair: Pair) -> tuple[ClassLevel, ...]:
     if pair.before.labels is None or pair.after.labels is None:
         return ()
     found = []
-    for name in pair.before.labels.classes:
+    others = {name for _, side in pair.sides for *_, name in side.lane}
+    names = pair.before.labels.classes
+    for name in (*names, *sorted(others - set(names))):
         before, after = (
             _class_level(pair, side, fast, name)
             for (_, side), fast in zip(pair.sides, pair.vibration, strict=True)
@@ -213,15 +215,13 @@ def shared_links(pair: Pair) -> tuple[str, ...]:
 
 def _class_level(pair: Pair, side: Analysis, fast: Array, name: str) -> tuple[float, float]:
     """Duration of a class in a run in [s], and its level in [dB re 1 rad/s]."""
-    labels = side.labels
-    assert labels is not None
-    own = labels.debounced == name
-    hop = float(np.median(np.diff(labels.start))) if len(labels) > 1 else 0.0
-    first, last = _samples(pair, labels.start[own]), _samples(pair, labels.stop[own])
+    own = np.array([(start, stop) for start, stop, label in side.lane if label == name])
+    if not len(own):
+        return 0.0, float("nan")
+    first, last = _samples(pair, own[:, 0]), _samples(pair, own[:, 1])
     energy = np.concatenate(([0.0], np.cumsum(fast**2)))
     power = np.sum(energy[last] - energy[first]) / max(int(np.sum(last - first)), 1)
-    level = _noise_level(float(power)) if own.any() else float("nan")
-    return float(own.sum()) * hop, level
+    return float(np.sum(own[:, 1] - own[:, 0])), _noise_level(float(power))
 
 
 def _samples(pair: Pair, time: Array) -> NDArray[np.intp]:
