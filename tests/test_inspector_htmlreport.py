@@ -150,10 +150,10 @@ def test_gaps_and_silence_are_drawn(tmp_path):
 
 
 def test_findings_are_listed_with_their_scores(tmp_path):
-    events = (Event("impact", 1.0, 1.5, 0.9), Event("wobble", 3.0, 3.5, 0.7))
+    events = (Event("impact", 1.0, 1.5, 0.9), Event("wobble", 3.0, 3.5, 0.7, novel=True))
     words = Page(html.page(inspected(short_run(), tmp_path, findings=events, spans=events))).words
     assert "impact 1.00 1.50 0.90" in words
-    assert "wobble 3.00 3.50 0.70" in words
+    assert "wobble, out of distribution 3.00 3.50 0.70" in words
 
 
 def test_many_joints_are_cut_to_the_loudest_and_that_is_said(tmp_path):
