@@ -3,7 +3,8 @@
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from inspector.analysis.analyse import Analysis, Status, Unknown, analyse
+    from inspector.analysis.analyse import Analysis, analyse
+    from inspector.analysis.status import Status, Unknown
     from inspector.library import load_library
     from inspector.live import LiveSession
     from inspector.logs.importing import Imported

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspector.analysis.analyse import Analysis, Status, Unknown, analyse, analyse_noise
+from inspector.analysis.analyse import Analysis, analyse, analyse_noise
 from inspector.analysis.desired import without_placeholder
+from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict, exit_status
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library

@@ -5,7 +5,7 @@ from xml.etree import ElementTree as ET
 
 import pytest
 
-from inspector.analysis.analyse import Status, Unknown
+from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict, exit_status
 from inspector.localisation.localise import Localisation
 from inspector.report.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text

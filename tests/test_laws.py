@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 
 import noisemodel as nm
 import scenarios
-from inspector.analysis.analyse import Status, Unknown, analyse
+from inspector.analysis.analyse import analyse
+from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run
 from inspector.library import load_library
 

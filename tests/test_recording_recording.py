@@ -8,7 +8,8 @@ import rerun as rr
 from recordings import LANE, LINE, MOTION, check_columns, entities, read
 from rerun.chunk import RrdReader
 
-from inspector.analysis.analyse import Analysis, Status, analyse_file
+from inspector.analysis.analyse import Analysis, analyse_file
+from inspector.analysis.status import Status
 from inspector.colors import LOUDNESS
 from inspector.errors import InspectorError
 from inspector.recording.recording import NOISE_POINTS, linked, write

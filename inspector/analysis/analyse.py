@@ -8,7 +8,6 @@ import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 
@@ -17,6 +16,7 @@ import numpy as np
 import models
 import noisemodel as nm
 from inspector.analysis.desired import without_placeholder
+from inspector.analysis.status import Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.errors import InspectorError
 from inspector.library import CannotTellError, Library, label_noise, label_run, load_library
@@ -25,22 +25,6 @@ from inspector.localisation.localise import Localisation, localise
 from models import Event
 from noisemodel.links import LinkNoise, link_noise
 from noisemodel.types import Array
-
-
-class Status(StrEnum):
-    """The outcome for a run."""
-
-    OK = "ok"
-    FINDINGS = "findings"
-    CANNOT_TELL = "cannot-tell"
-    BAD_INPUT = "bad-input"
-
-
-class Unknown(StrEnum):
-    """What becomes of frames that are out of distribution and below the alarm threshold."""
-
-    FINDING = "finding"
-    IGNORE = "ignore"
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

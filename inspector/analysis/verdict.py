@@ -7,7 +7,8 @@ from pathlib import Path
 
 import models
 import noisemodel as nm
-from inspector.analysis.analyse import Analysis, Status, Unknown, analyse, analyse_noise
+from inspector.analysis.analyse import Analysis, analyse, analyse_noise
+from inspector.analysis.status import EXIT, Status, Unknown
 from inspector.errors import InspectorError
 from inspector.library import Library
 from inspector.localisation.localise import Localisation
@@ -16,9 +17,6 @@ from noisemodel.parallel import each
 
 EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
 """The errors that are told in one line; all others are bugs."""
-
-EXIT = {Status.BAD_INPUT: 3, Status.FINDINGS: 1, Status.CANNOT_TELL: 4, Status.OK: 0}
-"""Exit status of each, the worst first."""
 
 
 @dataclass(frozen=True)

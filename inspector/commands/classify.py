@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from inspector.analysis.status import Unknown
 from inspector.commands.options import ModelFiles, Overwrite
 
 
@@ -16,13 +17,6 @@ class Format(StrEnum):
     JSON = "json"
     JUNIT = "junit"
     GITHUB = "github"
-
-
-class OnUnknown(StrEnum):
-    """What becomes of frames that are out of distribution and below the alarm threshold."""
-
-    FINDING = "finding"
-    IGNORE = "ignore"
 
 
 def classify(
@@ -43,9 +37,9 @@ def classify(
         typer.Option("--localise", help="Add the localisation of each finding to the JSON."),
     ] = False,
     unknown: Annotated[
-        OnUnknown,
+        Unknown,
         typer.Option(help="Frames out of distribution, two or more: a finding, or ignored."),
-    ] = OnUnknown.FINDING,
+    ] = Unknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:
     """Classify runs and print verdicts; the exit status is the worst.
@@ -59,7 +53,6 @@ def classify(
       4  cannot tell: say, the rate is too low for every model
     """
     from inspector import assets
-    from inspector.analysis.analyse import Unknown
     from inspector.analysis.verdict import exit_status, judge_all
     from inspector.labels.findings import label_paths, write_findings
     from inspector.library import load_library
@@ -72,7 +65,7 @@ def classify(
     targets = {}
     if labels_to:
         targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)
-    judged = judge_all(runs, library, unknown=Unknown(unknown.value), localise=localise, jobs=jobs)
+    judged = judge_all(runs, library, unknown=unknown, localise=localise, jobs=jobs)
     verdicts = list(progress(judged, "classify", total=len(runs)))
     typer.echo(FORMATS[format](verdicts))
     if targets:

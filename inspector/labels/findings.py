@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from inspector.analysis.analyse import Status
+from inspector.analysis.status import Status
 from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError
 from inspector.labels.files import format_of, write_labels

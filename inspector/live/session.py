@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from inspector.analysis.analyse import Status, headline, status_of
+from inspector.analysis.analyse import headline, status_of
+from inspector.analysis.status import Status
 from inspector.library import Library, for_robot, load_library
 from inspector.live.buffer import SampleBuffer, rows_of, widths_of
 from inspector.live.errors import LiveError

@@ -5,7 +5,8 @@ import re
 from collections.abc import Callable, Sequence
 from xml.etree import ElementTree as ET
 
-from inspector.analysis.analyse import IGNORED, Status, Unknown
+from inspector.analysis.analyse import IGNORED
+from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict
 from inspector.localisation.localise import Localisation
 from inspector.report.markdown import novelty
