@@ -19,7 +19,14 @@ from inspector.analysis.desired import without_placeholder
 from inspector.analysis.status import Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.errors import InspectorError
-from inspector.library import CannotTellError, Library, label_noise, label_run, load_library
+from inspector.library import (
+    CannotTellError,
+    Labelled,
+    Library,
+    label_noise,
+    label_run,
+    load_library,
+)
 from inspector.localisation.extent import extent
 from inspector.localisation.localise import Localisation, localise
 from models import Event
@@ -194,23 +201,12 @@ def analyse(
         sha256=sha256,
     )
     try:
-        labelled = label_run(run, library)
+        found = _labelled(empty, label_run(run, library), library)
     except (CannotTellError, models.SignalError, nm.RunError) as error:
         return replace(empty, reason=str(error))
-    labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
-    spans, findings = _extents(run, labels)
-    blind = not seen.observable and not spans
-    return replace(
-        empty,
-        status=Status.CANNOT_TELL if blind else status_of(len(labels), spans),
-        reason=" ".join(summary(seen)) if blind else "",
-        labels=labels,
-        model=labelled.model,
-        model_sha256=library[labelled.model].sha256,
-        spans=spans,
-        findings=findings,
-        notes=(*notes, *([labelled.remark] if labelled.remark else [])),
-    )
+    if seen.observable or found.findings:
+        return found
+    return replace(found, status=Status.CANNOT_TELL, reason=" ".join(summary(seen)))
 
 
 def analyse_noise(
@@ -237,21 +233,9 @@ def analyse_noise(
     run = nm.Run(time=uniform, velocity=noise[:, None], joint_names=("noise",))
     empty = Analysis(name=name, status=Status.CANNOT_TELL, run=run, unknown=unknown)
     try:
-        labelled = label_noise(time, noise, library)
+        return _labelled(empty, label_noise(time, noise, library), library)
     except (CannotTellError, models.SignalError) as error:
         return replace(empty, reason=str(error))
-    labels = replace(labelled.labels, unknown_is_finding=unknown is Unknown.FINDING)
-    spans, findings = _extents(run, labels)
-    return replace(
-        empty,
-        status=status_of(len(labels), spans),
-        labels=labels,
-        model=labelled.model,
-        model_sha256=library[labelled.model].sha256,
-        spans=spans,
-        findings=findings,
-        notes=(labelled.remark,) if labelled.remark else (),
-    )
 
 
 def analyse_file(
@@ -316,6 +300,23 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
 def robot_known(run: nm.Run) -> bool:
     """Whether a run names a listed robot, or a URDF."""
     return run.robot is not None and (run.robot in nm.ROBOTS or run.robot.endswith(".urdf"))
+
+
+def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis:
+    """Add labels to an analysis, with the findings and the status that follow from them."""
+    reported = empty.unknown is Unknown.FINDING
+    labels = replace(labelled.labels, unknown_is_finding=reported)
+    spans, findings = _extents(empty.run, labels)
+    return replace(
+        empty,
+        status=status_of(len(labels), findings),
+        labels=labels,
+        model=labelled.model,
+        model_sha256=library[labelled.model].sha256,
+        spans=spans,
+        findings=findings,
+        notes=(*empty.notes, *([labelled.remark] if labelled.remark else [])),
+    )
 
 
 def _extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
