@@ -2,10 +2,9 @@
 
     python assets/build.py [--folder build] [--jobs 2]
 
-Models learn from the training part of the data set. They are measured on what is held out of it by
-hash, more seeds than they learn from, and on good motion that was simulated for nothing else; each
-gets a card beside it, with the figures. Started again, this makes what is missing of the data and
-redoes nothing of it.
+Models are trained on the training part of the data set. They are measured on what is held out by
+hash of further seeds, and on good motion that is simulated for this alone; each gets a card beside
+it, with the figures. Killed and started again, this simulates only what is missing.
 """
 
 import argparse
@@ -28,13 +27,12 @@ from scenarios.tasks import DatasetSpec, Task, choose
 
 HERE = Path(__file__).parent
 SEEDS = {"talos": 20, "go2": 40, "panda": 23, "solo12": 6, "anymal": 6}
-"""Seeds of each robot in every scenario, from 0, to learn from: but those that are held out."""
+"""Training seeds of each robot in every scenario, from 0; those that are held out are left out."""
 LOOKED_AT, LAST = 55, 90
-"""What is held out of the seeds from here to there is measured on; of the seeds below, it was seen
-while the profiles were made, and tells no more."""
+"""First test seed, and the one after the last: what is held out of them is measured on. What is
+held out of the seeds below was used while the profiles were chosen."""
 HOURS, FIRST = {"talos": 0.4, "go2": 0.4, "panda": 1.05}, 2000
-"""Good motion of each robot that is measured on, in [h], to count false alarms in, and its first
-seed."""
+"""Good motion of each robot in which false alarms are counted, in [h], and its first seed."""
 MODELS = {
     "joints-1khz": ("joints", 1000.0),
     "general-10khz": ("general", 10_000.0),
@@ -46,17 +44,18 @@ MODELS = {
 DEMO = ("panda", "obstacle-full", 100, 4.0)
 CARD = """# {name}
 
-Listens to {signals} at {rate:g} Hz, and tells {classes} apart, or says unknown.
+Classifies frames of noise at {rate:g} Hz: {classes}, or unknown.
+Input signals: {signals}.
 
-Made by `make models`: profile `{profile}`, {runs} runs of the training part of
-{seeds}, every scenario (`scenarios`, recipe {recipe});
-hashes of all of them are in the model file. Below is what it does on what is held out by hash of
-seeds {looked_at} to {last}, and in {hours:.3g} hours more of good motion: robots that it knows,
-seeds that it had not seen (docs/classifier.md says who had looked at them, and when).
+Made by `make models`: profile `{profile}`, trained on {runs} runs, the training part of
+{seeds}, in every scenario (`scenarios`, recipe {recipe});
+the model file has the hashes of all of them. The figures below are measured on what is held out by
+hash of seeds {looked_at} to {last}, and on {hours:.3g} h more of good motion: robots of the
+training set, seeds outside it (docs/classifier.md says how often this test set was used).
 
-What it does not know: any other robot, real drives (gears, friction that is not Coulomb's, belts),
-payloads, hands at work. What is unlike all of its runs it calls unknown, as far as that can be told
-from levels alone.
+Not in the training set: any other robot, real drives (gears, friction other than Coulomb's, belts),
+payloads, manipulation. Frames unlike the training set are out of distribution, as far as levels
+alone show it. Real logs and other simulators: docs/classifier.md, "Open".
 
 ```
 {report}
@@ -104,7 +103,7 @@ def wanted(task: Task, count: int) -> bool:
 
 
 def simulate(path: Path, tasks: list[Task], jobs: int) -> None:
-    """Make what is missing of a folder of samples."""
+    """Simulate what is missing of a folder of samples."""
     folder = Folder.opened(path)
     missing = folder.missing(tasks)
     for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
@@ -112,13 +111,13 @@ def simulate(path: Path, tasks: list[Task], jobs: int) -> None:
 
 
 def unseen(data: Path, good: Path, rate: float) -> Iterator[models.Recording]:
-    """Read what models are measured by."""
+    """Runs that models are measured on."""
     yield from recordings([data], rate, Part.TEST)
     yield from recordings([good], rate)
 
 
 def card(name: str, model: models.Classifier, report: str) -> str:
-    """Say of a model what it is made of, what it can, and what it cannot."""
+    """Card of a model: what it was trained on, its figures, its limits."""
     return CARD.format(
         name=name,
         signals=", ".join(model.profile.signals),
@@ -136,7 +135,7 @@ def card(name: str, model: models.Classifier, report: str) -> str:
 
 
 def demo() -> Run:
-    """Cut the demo from a run: what the inspector shows, no more."""
+    """The demo run, with no more arrays than the inspector shows."""
     robot, scenario, seed, seconds = DEMO
     run = scenarios.simulate(robot, scenario, seed)
     cut = run.cut(-np.inf, seconds)
