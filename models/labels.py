@@ -53,11 +53,15 @@ class Event:
     novel: bool = False
     """Whether one of its frames is out of distribution."""
 
+    @property
+    def novelty(self) -> str:
+        """ ", out of distribution", to be appended to a text; empty if it is not."""
+        return ", out of distribution" if self.novel else ""
+
     def __str__(self) -> str:
-        novel = ", out of distribution" if self.novel else ""
         return (
             f"{self.label} from {self.start:.2f} s to {self.stop:.2f} s"
-            f" (score {self.score:.2f}{novel})"
+            f" (score {self.score:.2f}{self.novelty})"
         )
 
 

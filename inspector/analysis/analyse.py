@@ -10,13 +10,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import models
 import noisemodel as nm
 from inspector.analysis.desired import without_placeholder
-from inspector.analysis.status import Status, Unknown
+from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.errors import InspectorError
 from inspector.library import (
@@ -28,10 +29,12 @@ from inspector.library import (
     load_library,
 )
 from inspector.localisation.extent import extent
-from inspector.localisation.localise import Localisation, localise
 from models import Event
-from noisemodel.links import LinkNoise, link_noise
 from noisemodel.types import Array
+
+if TYPE_CHECKING:
+    from inspector.localisation.localise import Localisation
+    from noisemodel.links import LinkNoise
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -70,7 +73,7 @@ class Analysis:
     notes: tuple[str, ...] = ()
     unknown: Unknown = Unknown.FINDING
     sha256: str = ""
-    links: LinkNoise | None = None
+    links: "LinkNoise | None" = None
     missing: tuple[str, ...] = ()
 
     @cached_property
@@ -79,8 +82,10 @@ class Analysis:
         return nm.simplified(self.run.motion, self.run.velocity_desired)
 
     @cached_property
-    def localisations(self) -> dict[Event | nm.Block, Localisation]:
+    def localisations(self) -> "dict[Event | nm.Block, Localisation]":
         """The localisation of each finding, and of each annotated failure."""
+        from inspector.localisation.localise import localise
+
         frame = 0.0 if self.labels is None else float(self.labels.stop[0] - self.labels.start[0])
         found = localise(self.run, self.spans, frame=frame)
         events = zip(self.spans, self.findings, strict=True)
@@ -141,9 +146,6 @@ class Analysis:
         reason = (f"No labels: {self.reason}.",) if self.labels is None else ()
         links = () if self.links is None else self.links.remarks
         return (*self.missing, *self.notes, *reason, *seen, *links)
-
-
-IGNORED = "unknown frames are ignored"
 
 
 def headline(status: Status, findings: Sequence[Event], reason: str = "") -> str:
@@ -287,6 +289,8 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
         RobotError: If the robot cannot be read, or lacks one of the run's joints.
         InspectorError: If the robot's shape cannot be had.
     """
+    from noisemodel.links import link_noise
+
     run = analysis.run
     found = replace(analysis, missing=tuple(_missing(run)))
     if not kind or not robot_known(run) or run.position is None:

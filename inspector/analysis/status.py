@@ -21,3 +21,6 @@ class Unknown(StrEnum):
 
 EXIT = {Status.BAD_INPUT: 3, Status.FINDINGS: 1, Status.CANNOT_TELL: 4, Status.OK: 0}
 """Exit status of each, the worst first."""
+
+IGNORED = "unknown frames are ignored"
+"""What outputs say where they are."""

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import models
 import noisemodel as nm
@@ -11,9 +12,11 @@ from inspector.analysis.analyse import Analysis, analyse, analyse_noise
 from inspector.analysis.status import EXIT, Status, Unknown
 from inspector.errors import InspectorError
 from inspector.library import Library
-from inspector.localisation.localise import Localisation
 from models import Event
 from noisemodel.parallel import each
+
+if TYPE_CHECKING:
+    from inspector.localisation.localise import Localisation
 
 EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
 """The errors that are told in one line; all others are bugs."""
@@ -39,7 +42,7 @@ class Verdict:
     model: str = ""
     events: tuple[Event, ...] = ()
     message: str = ""
-    localisations: Mapping[Event, Localisation] = field(default_factory=dict)
+    localisations: Mapping[Event, "Localisation"] = field(default_factory=dict)
     unknown: Unknown = Unknown.FINDING
     model_sha256: str = ""
 

@@ -54,7 +54,6 @@ def classify(
     """
     from inspector import assets
     from inspector.analysis.verdict import exit_status, judge_all
-    from inspector.labels.findings import label_paths, write_findings
     from inspector.library import load_library
     from inspector.progress import progress
     from inspector.report.formats import FORMATS
@@ -64,6 +63,8 @@ def classify(
     library = load_library(assets.model_files(model))
     targets = {}
     if labels_to:
+        from inspector.labels.findings import label_paths, write_findings
+
         targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)
     judged = judge_all(runs, library, unknown=unknown, localise=localise, jobs=jobs)
     verdicts = list(progress(judged, "classify", total=len(runs)))

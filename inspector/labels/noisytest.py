@@ -11,7 +11,6 @@ from inspector.labels.entry import Entry, EntryError, Span
 from models.errors import AnnotationError
 from models.noisytest import END, parse_annotations
 from noisemodel import Block
-from scenarios.noisytest import annotations
 
 
 def render(spans: Sequence[Span]) -> str:
@@ -29,6 +28,8 @@ def render(spans: Sequence[Span]) -> str:
                 f"label {span.label!r} stops at -1 s, the end of the recording in NoisyTest;"
                 " use another format"
             )
+    from scenarios.noisytest import annotations  # brings all scenarios
+
     return annotations([Block(span.start, span.stop, span.label) for span in spans])
 
 

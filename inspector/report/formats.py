@@ -3,14 +3,15 @@
 import json
 import re
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 from xml.etree import ElementTree as ET
 
-from inspector.analysis.analyse import IGNORED
-from inspector.analysis.status import Status, Unknown
+from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.analysis.verdict import Verdict
-from inspector.localisation.localise import Localisation
-from inspector.report.markdown import novelty
 from models import Event
+
+if TYPE_CHECKING:
+    from inspector.localisation.localise import Localisation
 
 ANNOTATIONS = 10
 """GitHub silently drops what goes beyond ten of a kind per step."""
@@ -123,7 +124,7 @@ def _localised(verdict: Verdict, event: Event) -> dict[str, object]:
     return {} if known is None else {"localisation": _localisation(known)}
 
 
-def _localisation(known: Localisation) -> dict[str, object]:
+def _localisation(known: "Localisation") -> dict[str, object]:
     """Localisation of a finding: lag in [s], band in [Hz], null where it is not known."""
     return {
         "stage": known.stage or None,
@@ -135,7 +136,7 @@ def _localisation(known: Localisation) -> dict[str, object]:
 
 
 def _sentence(event: Event) -> str:
-    return f"{event.label} from {event.start:.2f} s to {event.stop:.2f} s{novelty(event)}"
+    return f"{event.label} from {event.start:.2f} s to {event.stop:.2f} s{event.novelty}"
 
 
 def _plain(value: object) -> str:

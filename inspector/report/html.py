@@ -12,7 +12,7 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
-from inspector.report.markdown import ORIGIN, note, novelty, origin
+from inspector.report.markdown import ORIGIN, note, origin
 from inspector.sound.clip import clip, worst_time
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
@@ -213,7 +213,7 @@ def found(analysis: Analysis) -> Iterator[Table]:
     if analysis.findings:
         rows = [
             (
-                f"{event.label}{novelty(event)}",
+                f"{event.label}{event.novelty}",
                 f"{event.start:.2f}",
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",

@@ -39,7 +39,7 @@ def report(analysis: Analysis) -> str:
     if analysis.findings:
         found = [
             (
-                f"{e.label}{novelty(e)}",
+                f"{e.label}{e.novelty}",
                 f"{e.start:.2f}",
                 f"{e.stop:.2f}",
                 *origin(analysis, e, quote="`"),
@@ -65,13 +65,9 @@ def sentence(analysis: Analysis, event: Event | Block) -> str:
     stage, joints, *others = origin(analysis, event, quote="`")
     by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
     where = "; ".join(part for part in (by, *others) if part)
-    when = f"{event.start:.2f} s to {event.stop:.2f} s{novelty(event)}"
+    novel = event.novelty if isinstance(event, Event) else ""
+    when = f"{event.start:.2f} s to {event.stop:.2f} s{novel}"
     return f"{event.label}, {when}{where and f': {where}'}"
-
-
-def novelty(event: Event | Block) -> str:
-    """Say that an event is out of distribution; nothing if it is not."""
-    return ", out of distribution" if isinstance(event, Event) and event.novel else ""
 
 
 def origin(
