@@ -8,6 +8,7 @@ none. Inputs are the demo run, simulated runs of four robots (simulated once, in
 AFTER), and the stand-in for NoisyTest's data set, where `../shared/tools/standin_lola.py` is at
 hand. Compared are the simplified noise, the extended noise of each link, and, for each model that
 BEFORE ships, features, decisions and scores of all frames; of two runs also the simulated run file.
+On the stand-in, a model of each kind is trained, and its decisions and scores are compared.
 Where model files differ, AFTER also reads those of BEFORE. Labels and findings are not compared:
 the rule that makes them of scores changes from 0.1 to 0.2.
 

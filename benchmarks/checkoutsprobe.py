@@ -22,6 +22,10 @@ KINDS = ("paper", "normal")
 """Kinds of the extended noise that are computed."""
 PACKAGES = ("numpy", "scipy", "scikit-learn", "pin", "mujoco")
 """Libraries whose versions may change results."""
+ESTIMATORS = ("svm", "networks", "trees")
+"""Estimators of log-band energies that are trained."""
+RATE = 10000.0
+"""Sample rate of NoisyTest's data set, in [Hz]."""
 CHUNK = 64
 """Frames whose features are computed at once."""
 
@@ -139,17 +143,28 @@ class Probe:
                 self._classify(name, model, {"noise": noise}, valid=None)
 
     def train(self, name: str, folder: str) -> None:
-        """Train NoisyTest's profile on its data set, and decide on the validation part."""
-        profile = self.names("models.Profile.noisytest")("rbf")
-        read = self.names("models.Dataset.read")
-        classifier = self.names("models.Classifier.train")(
-            read(Path(folder, "training"), profile), profile
-        )
-        validation = read(Path(folder, "validation"), profile, training=False)
+        """Train each kind of model on NoisyTest's data set, and decide on the validation part."""
+        read, log_bands = self.names("models.Dataset.read"), self.names("models.LogBands")
+        original = self.names("models.Profile.noisytest")("rbf")
+        estimator = older("models.LogBands.estimator", self.names.renamed).rpartition(".")[2]
+        profiles = {kind: log_bands(**{estimator: kind}).at(RATE) for kind in ESTIMATORS}
+        trained = {
+            what: self.names("models.Classifier.train")(
+                read(Path(folder, "training"), profile), profile
+            )
+            for what, profile in {"noisytest-rbf": original, **profiles}.items()
+        }
+        profile = self.names("models.estimators.baseline.NOISE_ALONE").at(RATE)
+        recordings = self.names("models.noisytest.read_folder")(Path(folder, "training"))
+        good = self.names("models.GoodMotion.read")(recordings, profile)
+        learnt = self.names("models.learn_baseline")(good, profile)
+        trained["baseline"] = self.names.field("models.Learnt.classifier", learnt)
+        validation = read(Path(folder, "validation"), original, training=False)
         frames = self.names.field("models.Dataset.frames", validation)
-        decisions = self.names("models.Classifier.decision")(classifier, frames)
-        scores = self.names("models.Classifier.scores")(classifier, frames)
-        self.keep(name, "noisytest-rbf, trained", decisions=decisions, scores=scores)
+        for what, classifier in trained.items():
+            decisions = self.names("models.Classifier.decision")(classifier, frames)
+            scores = self.names("models.Classifier.scores")(classifier, frames)
+            self.keep(name, f"{what}, trained", decisions=decisions, scores=scores)
 
     def _link_noise(self, name: str, run: Any) -> None:
         """Compute the extended noise of a run that has a robot and positions."""
