@@ -236,6 +236,16 @@ def test_each_public_name_of_the_first_version_exists_or_is_listed(checkouts, pr
     assert lost == []
 
 
+def test_each_module_of_the_first_version_exists_or_is_listed(checkouts, probe, first):
+    moved = {old: new for old, new in checkouts.names() if new}
+    for package in PACKAGES:
+        for path in (first / package).rglob("*.py"):
+            parts = path.relative_to(first).with_suffix("").parts
+            inside = package == "inspector" and len(parts) > 2  # not listed, as the page says
+            if not inside and parts[-1] not in ("__init__", "__main__"):
+                probe.resolve(probe.older(".".join(parts), moved))
+
+
 def checkout_of(checkouts, folder, script):
     """A checkout whose `inspector` is a script."""
     (folder / "inspector").mkdir(parents=True)
