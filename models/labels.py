@@ -55,7 +55,7 @@ class Event:
 
     @property
     def novelty(self) -> str:
-        """ ", out of distribution", to be appended to a text; empty if it is not."""
+        """End of a text about the event: ", out of distribution", or nothing."""
         return ", out of distribution" if self.novel else ""
 
     def __str__(self) -> str:

@@ -141,7 +141,25 @@ def test_unknown_frames_that_are_ignored_raise_nothing_and_it_is_said():
     ignoring = analyse_noise(time, noise, library, unknown=Unknown.IGNORE)
     assert "unknown" not in {event.label for event in ignoring.findings}
     assert "unknown frames are ignored" in ignoring.headline
-    assert ignoring.message.startswith("Unknown frames are ignored.")
+    assert "Unknown frames are ignored." in ignoring.message
+
+
+def test_a_run_of_unknown_frames_alone_is_not_ok_when_they_are_ignored(monkeypatch):
+    from inspector.analysis import analyse as module
+
+    def unknown(run, library):
+        labels = analysed("uuuu").labels
+        return module.Labelled(
+            labels, next(iter(library)), "4 of 4 frames are out of distribution."
+        )
+
+    monkeypatch.setattr(module, "label_run", unknown)
+    assert module.analyse(moving(), LIBRARY).status is Status.FINDINGS
+    found = module.analyse(moving(), LIBRARY, unknown=Unknown.IGNORE)
+    assert found.status is Status.CANNOT_TELL
+    assert found.message == (
+        "every frame is unknown. Unknown frames are ignored. 4 of 4 frames are out of distribution."
+    )
 
 
 def test_the_headline_counts_findings_by_class_and_says_how_many_are_novel():

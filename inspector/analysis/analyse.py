@@ -134,10 +134,11 @@ class Analysis:
     @property
     def message(self) -> str:
         """What `classify` says beside the findings, in a line; may be empty."""
-        flaws = () if self.audit is None else shortcomings(self.audit)
-        ignored = (f"{IGNORED[0].upper()}{IGNORED[1:]}.",) * (self.unknown is Unknown.IGNORE)
-        seen = (self.reason,) if self.status is Status.CANNOT_TELL else flaws
-        return " ".join((*ignored, *self.notes, *seen))
+        ignored = [f"{IGNORED[0].upper()}{IGNORED[1:]}."] if self.unknown is Unknown.IGNORE else []
+        notes = [*ignored, *self.notes]
+        if self.status is Status.CANNOT_TELL:
+            return " ".join([f"{self.reason.rstrip('.')}.", *notes]) if notes else self.reason
+        return " ".join([*notes, *(() if self.audit is None else shortcomings(self.audit))])
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -311,9 +312,11 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     reported = empty.unknown is Unknown.FINDING
     labels = replace(labelled.labels, unknown_is_finding=reported)
     spans, findings = _extents(empty.run, labels)
+    known = int((labels.label != models.UNKNOWN).sum())
     return replace(
         empty,
-        status=status_of(len(labels), findings),
+        status=status_of(len(labels) if findings else known, findings),
+        reason="" if findings or known else f"every frame is {models.UNKNOWN}",
         labels=labels,
         model=labelled.model,
         model_sha256=library[labelled.model].sha256,
