@@ -8,7 +8,7 @@ annotated frames, a `Classifier` is trained on them and labels signals, `evaluat
 and `assess` whole recordings. A `Stream` labels a signal sample by sample. `learn_baseline` takes
 good runs alone.
 
-This package knows no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
+This package needs no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
 only to train.
 """
 

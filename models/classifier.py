@@ -185,10 +185,10 @@ class Classifier:
         return self.labels(self._decide(view, starts), starts, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
-        """Say what decisions on frames mean.
+        """Labels of frames from their decision values.
 
         Args:
-            decisions: Of all machines, shape (frames, machines).
+            decisions: Decision values, shape (frames, decisions).
             starts: First sample of each frame, shape (frames,).
             rate: Sample rate of the signal, in [Hz].
             start: Time of its first sample, in [s].
@@ -255,7 +255,7 @@ class Classifier:
             path: The file.
 
         Raises:
-            ModelFileError: If the file is missing, damaged, foreign, or of another version.
+            ModelFileError: If the file is missing, damaged, no model file, or of another version.
         """
         manifest, arrays = modelfile.read(path)
         profile = Profile.of(manifest["profile"])

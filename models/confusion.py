@@ -25,26 +25,29 @@ class Evaluation:
     confusion: NDArray[np.int64]
 
     @classmethod
-    def of(cls, truth: Words, called: Words, classes: Sequence[str]) -> Self:
+    def of(cls, truth: Words, predicted: Words, classes: Sequence[str]) -> Self:
         """Confusion matrix of predictions.
 
         Args:
             truth: True class of each frame, shape (frames,).
-            called: Predicted class of each frame, shape (frames,).
+            predicted: Predicted class of each frame, shape (frames,).
             classes: Names of the classes, in their order; others that occur come after them.
 
         Raises:
             DatasetError: If there are no frames, or the lengths differ.
         """
-        if len(truth) != len(called) or not len(truth):
+        if len(truth) != len(predicted) or not len(truth):
             raise DatasetError(
-                f"{len(truth)} labels and {len(called)} predictions, expected as many, one or more"
+                f"{len(truth)} labels and {len(predicted)} predictions, expected as many,"
+                " one or more"
             )
-        there = {str(each) for each in (*truth, *called)}
+        there = {str(each) for each in (*truth, *predicted)}
         names = (*classes, *sorted(there - set(classes)))
         index = {name: number for number, name in enumerate(names)}
         confusion = np.zeros((len(names), len(names)), dtype=np.int64)
-        np.add.at(confusion, ([index[str(t)] for t in truth], [index[str(c)] for c in called]), 1)
+        np.add.at(
+            confusion, ([index[str(t)] for t in truth], [index[str(c)] for c in predicted]), 1
+        )
         return cls(names, confusion)
 
     @property
@@ -54,13 +57,13 @@ class Evaluation:
 
     @property
     def false_negative_errors(self) -> Array:
-        """Frames of a class that were called another, of ALL frames, shape (classes,)."""
+        """Frames of a class that were predicted as another, of ALL frames, shape (classes,)."""
         missed: Array = (self.confusion.sum(axis=1) - self._right) / self.frames
         return missed
 
     @property
     def false_positive_errors(self) -> Array:
-        """Frames of other classes that were called this one, of ALL frames, shape (classes,)."""
+        """Frames of others that were predicted as the class, of ALL frames, shape (classes,)."""
         mistaken: Array = (self.confusion.sum(axis=0) - self._right) / self.frames
         return mistaken
 
@@ -71,18 +74,18 @@ class Evaluation:
 
     @property
     def subset_accuracy(self) -> float:
-        """Frames that were called what they are, of all frames."""
+        """Frames with the right prediction, of all frames."""
         return float(self._right.sum() / self.frames)
 
     @property
     def recall(self) -> Array:
-        """Frames of a class that were called so, of its frames; NaN if it has none."""
+        """Frames of a class that were predicted as it, of its frames; NaN if it has none."""
         recall: Array = _ratio(self._right, self.confusion.sum(axis=1))
         return recall
 
     @property
     def precision(self) -> Array:
-        """Frames called a class that are of it, of those called so; NaN if there are none."""
+        """Frames of a class, of those that were predicted as it; NaN if there are none."""
         precision: Array = _ratio(self._right, self.confusion.sum(axis=0))
         return precision
 
@@ -93,15 +96,15 @@ class Evaluation:
 
     @property
     def failure_recall(self) -> float:
-        """Failure frames that were not called `ok`, of the failure frames; NaN if none."""
+        """Failure frames that were not predicted as `ok`, of the failure frames; NaN if none."""
         failures = self.confusion[~self._ok]
         return float(_ratio(failures[:, ~self._ok].sum(), failures.sum()))
 
     @property
     def false_alarm_rate(self) -> float:
-        """`ok` frames that were not called `ok`, of the `ok` frames; NaN if there are none."""
-        quiet = self.confusion[self._ok]
-        return float(_ratio(quiet[:, ~self._ok].sum(), quiet.sum()))
+        """`ok` frames that were not predicted as `ok`, of the `ok` frames; NaN if none."""
+        ok = self.confusion[self._ok]
+        return float(_ratio(ok[:, ~self._ok].sum(), ok.sum()))
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
@@ -125,7 +128,7 @@ class Evaluation:
         }
 
     def __str__(self) -> str:
-        quiet = self.confusion[self._ok].sum() / self.frames
+        ok = self.confusion[self._ok].sum() / self.frames
         width = max(26, *(len(name) + 2 for name in self.classes))
 
         def line(title: str, cells: Sequence[object]) -> str:
@@ -151,14 +154,14 @@ class Evaluation:
                 shares("Failure recall", self.failure_recall),
                 shares("False alarm rate", self.false_alarm_rate),
                 "",
-                "Frames of (row) called (column)",
+                "Frames of (row) predicted (column)",
                 *(
                     line(name, row)
                     for name, row in zip(self.classes, self.confusion.tolist(), strict=True)
                 ),
                 "",
-                f"The paper divides by all frames: calling all of them ok would detect {quiet:.1%} "
-                "of failures by its measure, and none by failure recall.",
+                f"The paper divides by all frames: predicting ok for all of them would detect"
+                f" {ok:.1%} of failures by its measure, and none by failure recall.",
             ]
         )
 

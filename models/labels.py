@@ -3,15 +3,15 @@
 From frames to findings, the same for every estimator that gives probabilities:
 
 1. A frame whose probability of any failure is above the alarm threshold is *evidence*, whatever
-   its novelty: a fault does not become harmless by being louder than all that was learnt from.
+   its novelty: a fault does not become `ok` by being louder than all of the training set.
 2. A frame that is out of distribution and below the threshold is `unknown`, and evidence too: its
-   probabilities say nothing, so that it cannot be `ok`.
+   probabilities are not valid there, so that it cannot be `ok`.
 3. Consecutive frames that are not `ok` form a stretch. It is confirmed by two frames of evidence;
    a frame at either end of the signal or beside a gap counts twice, since the neighbour that would
    confirm it is missing. Failure frames of other stretches are `ok`, their `unknown` frames remain
    `unknown` and raise nothing.
 4. In a confirmed stretch that holds failure frames, `unknown` frames take the class of the nearest
-   of them: one event, which says that it is out of distribution.
+   of them: one event, marked as out of distribution.
 """
 
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 UNKNOWN = "unknown"
 """Label of a frame that is out of distribution and below the alarm threshold."""
 ANOMALY = "anomaly"
-"""Label that a baseline, which is learnt from good runs alone, gives a frame unlike them."""
+"""Label that a baseline, which is learnt from good runs alone, gives a frame beyond its limit."""
 
 CONFIRM = 2
 """Frames of evidence in a stretch that make it a finding."""
@@ -67,7 +67,7 @@ class Event:
 
 @dataclass(frozen=True, eq=False)
 class Labels:
-    """What a classifier says of each frame of a signal, in order of time.
+    """Predictions for each frame of a signal, in order of time.
 
     Attributes:
         start: When each frame starts, shape (frames,), in [s].
@@ -106,7 +106,7 @@ class Labels:
 
     @cached_property
     def debounced(self) -> Words:
-        """Label of each frame in the light of its neighbours, shape (frames,)."""
+        """Label of each frame after confirmation by its neighbours, shape (frames,)."""
         if self.above_threshold is None:
             return self.label
         unknown = self.label == UNKNOWN
@@ -139,7 +139,7 @@ class Labels:
     def raw(self) -> Words:
         """Label of each frame by itself, a failure only above the threshold, shape (frames,).
 
-        That is all that can be said while the frames after it are still to come.
+        No other label is possible while the frames after it are still to come.
         """
         if self.above_threshold is None:
             return self.label

@@ -39,7 +39,7 @@ class LogBands:
     stride: float = 0.025
     """Time from one Fourier transform to the next, in [s]."""
     lowest: float = 15.0
-    """Lower edge of the first band: below, a Hann window sees the mean, in [Hz]."""
+    """Lower edge of the first band: below, the mean leaks through a Hann window, in [Hz]."""
     highest: float = 5000.0
     """No band reaches beyond, in [Hz]."""
     per_octave: float = 4.0

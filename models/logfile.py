@@ -46,7 +46,7 @@ def nominal_rate(time: Array) -> float:
 
 
 def _read_fast(path: str | Path) -> Array | None:
-    """Let NumPy's compiled reader try; None if anything is odd, or merely ragged."""
+    """Array by NumPy's compiled reader; None if it fails, or the rows are ragged."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -88,14 +88,14 @@ def _check_time(path: str | Path, time: Array) -> None:
     if len(time) < 2:
         raise DataFileError(path, "has one row; a rate takes two or more")
     steps = np.diff(time)
-    usual = np.median(steps)
+    step = np.median(steps)
     # Printed times are rounded, so that half a step is no gap yet.
-    wrong = np.flatnonzero((steps <= 0) | (np.abs(steps - usual) > 0.5 * usual))
+    wrong = np.flatnonzero((steps <= 0) | (np.abs(steps - step) > 0.5 * step))
     if len(wrong):
         row = int(wrong[0])
         what = "goes backward or stands still" if steps[row] <= 0 else "is not in even steps"
         raise DataFileError(
             path,
             f"time {what} from row {row + 1} to row {row + 2}:"
-            f" {time[row]:.9g} s, then {time[row + 1]:.9g} s, where a step is {usual:.6g} s",
+            f" {time[row]:.9g} s, then {time[row + 1]:.9g} s, where a step is {step:.6g} s",
         )

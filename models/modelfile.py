@@ -111,7 +111,7 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
         The manifest and the arrays, which are finite and of the shapes that it asks for.
 
     Raises:
-        ModelFileError: If the file is missing, damaged, foreign, of another version, or
+        ModelFileError: If the file is missing, damaged, no model file, of another version, or
             contradicts itself.
     """
     try:

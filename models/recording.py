@@ -1,4 +1,4 @@
-"""A recording: noise signals with the stretches of them that someone annotated."""
+"""A recording: noise signals with their annotated blocks."""
 
 import hashlib
 from dataclasses import dataclass

@@ -33,7 +33,7 @@ def named(signals: Signals) -> Mapping[str, Real]:
 
 
 def by_joint(name: str) -> bool:
-    """Whether a signal goes joint by joint, as its name says."""
+    """Whether a signal has a row for each joint, by its name."""
     return name in JOINTS
 
 

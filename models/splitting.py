@@ -102,7 +102,7 @@ def folds(groups: Sequence[str], count: int) -> list[tuple[Index, Index]]:
 
 
 def leave_one_out(robots: Sequence[str]) -> list[tuple[str, Index, Index]]:
-    """Split by robot, to see what a model is worth on one that it never met.
+    """Split by robot, to measure a model on robots without training runs.
 
     Args:
         robots: Robot of each recording or frame, shape (items,).

@@ -80,7 +80,7 @@ def test_a_baseline_is_measured_by_failures_of_any_name(folder):
 def test_only_blocks_annotated_ok_are_trained_on(folder, tmp_path):
     inputs = [folder / "good0.npz", folder / "test" / "bad.npz"]
     trained = train(inputs, tmp_path / "model.npz")
-    assert "of 1 run that somebody annotated, what is annotated `ok` alone" in str(trained)
+    assert "of 1 run with annotations, the part annotated `ok` alone" in str(trained)
     assert trained.limit.hours * 3600 == pytest.approx(6.0 + 2.5 + 1.5, abs=0.2)
 
 

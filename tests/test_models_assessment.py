@@ -64,7 +64,7 @@ def test_measures_with_intervals_are_the_measures_without():
     frames = measure(runs).frames
     plain = Evaluation.of(
         np.concatenate([run.truth for run in runs]),
-        np.concatenate([run.called for run in runs]),
+        np.concatenate([run.predicted for run in runs]),
         CLASSES,
     )
     assert frames.evaluation.classes == (*CLASSES, "unknown")

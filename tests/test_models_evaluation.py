@@ -75,7 +75,7 @@ def test_it_prints_both_groups_and_how_they_differ():
     assert "False positive errors 10.0% 20.0% 0.0%" in lines
     assert "Failure recall 75.0%" in lines
     assert "ok 5 1 0" in lines
-    assert "calling all of them ok would detect 60.0% of failures by its measure" in text
+    assert "predicting ok for all of them would detect 60.0% of failures by its measure" in text
 
 
 def test_nothing_to_compare_is_refused():

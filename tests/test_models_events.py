@@ -153,7 +153,7 @@ def test_time_in_which_no_alarm_could_be_false_is_not_counted_as_heard():
     short = blocks((0.0, 0.3, "ok"), (0.5, 0.6, "impact"), (1.05, 1.85, "ok"))
     matched = Matched.of([predicted("a", short), predicted("b", GOOD)])
     assert matched.ok_annotated.tolist() == pytest.approx([1.1, 5.0])
-    assert matched.ok_heard.tolist() == pytest.approx([0.7, 5.0])  # frames from 1.1 s to 1.8 s
+    assert matched.ok_covered.tolist() == pytest.approx([0.7, 5.0])  # frames from 1.1 s to 1.8 s
 
 
 def test_times_may_start_anywhere():

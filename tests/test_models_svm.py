@@ -5,7 +5,7 @@ import pytest
 from sklearn.svm import SVC
 
 import models
-from models.estimators.svm import choose, fit, machine_count, score
+from models.estimators.svm import choose, fit, score, svm_count
 
 RANDOM = np.random.default_rng(3)
 CENTRES = RANDOM.standard_normal((4, 20))
@@ -20,7 +20,7 @@ def blobs(classes, frames=160):
 
 
 def theirs(features, targets, profile):
-    """scikit-learn's own machine, its weights being called "balanced"."""
+    """scikit-learn's own SVM, its weights being called "balanced"."""
     return SVC(
         C=profile.regularization,
         kernel=profile.kernel,
@@ -41,8 +41,8 @@ def one_vs_one(request):
 def test_one_vs_one_decides_as_scikit_learn(one_vs_one, classes, condense):
     features, targets = blobs(classes)
     fresh, _ = blobs(classes)
-    svc, machines = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
-    decisions = (machines.condensed() if condense else machines).decision(fresh)
+    svc, svms = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
+    decisions = (svms.condensed() if condense else svms).decision(fresh)
     np.testing.assert_allclose(decisions, svc.decision_function(fresh), atol=1e-9, rtol=0)
     chosen = choose(decisions, classes=classes, multiclass="one-vs-one")
     assert np.array_equal(chosen, svc.predict(fresh))
@@ -50,16 +50,16 @@ def test_one_vs_one_decides_as_scikit_learn(one_vs_one, classes, condense):
 
 def test_one_vs_one_has_the_scores_of_scikit_learn(one_vs_one):
     features, targets = blobs(4)
-    svc, machines = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
+    svc, svms = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
     svc.decision_function_shape = "ovr"
-    grades = score(machines.decision(features), classes=4, multiclass="one-vs-one")
+    grades = score(svms.decision(features), classes=4, multiclass="one-vs-one")
     np.testing.assert_allclose(grades, svc.decision_function(features), atol=1e-9, rtol=0)
 
 
-def test_two_classes_are_one_machine_whose_positive_side_is_the_first(one_vs_one):
+def test_two_classes_are_one_svm_whose_positive_side_is_the_first(one_vs_one):
     features, targets = blobs(2)
-    svc, machines = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
-    decisions = machines.decision(features)
+    svc, svms = theirs(features, targets, one_vs_one), fit(features, targets, one_vs_one)
+    decisions = svms.decision(features)
     np.testing.assert_allclose(decisions[:, 0], -svc.decision_function(features), atol=1e-9)
     chosen = choose(decisions, classes=2, multiclass="one-vs-one")
     assert np.array_equal(chosen, svc.predict(features))
@@ -67,7 +67,7 @@ def test_two_classes_are_one_machine_whose_positive_side_is_the_first(one_vs_one
 
 @pytest.mark.parametrize("classes", [2, 4])
 @pytest.mark.parametrize("kernel", ["linear", "rbf"])
-def test_one_vs_rest_is_a_machine_for_each_class_with_its_own_c(kernel, classes):
+def test_one_vs_rest_is_an_svm_for_each_class_with_its_own_c(kernel, classes):
     profile = replace(models.Profile.paper(kernel), gamma=0.02)
     features, targets = blobs(classes)
     decisions = fit(features, targets, profile).condensed().decision(features)
@@ -82,11 +82,11 @@ def test_one_vs_rest_is_a_machine_for_each_class_with_its_own_c(kernel, classes)
     assert score(decisions, classes=classes, multiclass="one-vs-rest") is decisions
 
 
-def test_linear_machines_condense_to_one_vector_each():
+def test_linear_svms_condense_to_one_vector_each():
     features, targets = blobs(4)
-    machines = fit(features, targets, models.Profile.noisytest("linear"))
-    assert len(machines.vectors) > 6
-    assert machines.condensed().vectors.shape == (6, 20)
+    svms = fit(features, targets, models.Profile.noisytest("linear"))
+    assert len(svms.vectors) > 6
+    assert svms.condensed().vectors.shape == (6, 20)
 
 
 def test_votes_decide_and_the_first_of_equals_wins():
@@ -97,6 +97,6 @@ def test_votes_decide_and_the_first_of_equals_wins():
     assert choose(np.zeros((1, 3)), classes=3, multiclass="one-vs-one").tolist() == [2]
 
 
-def test_there_are_as_many_machines_as_pairs_or_classes():
-    assert machine_count(4, "one-vs-one") == 6
-    assert machine_count(4, "one-vs-rest") == 4
+def test_there_are_as_many_svms_as_pairs_or_classes():
+    assert svm_count(4, "one-vs-one") == 6
+    assert svm_count(4, "one-vs-rest") == 4

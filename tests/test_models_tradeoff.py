@@ -99,7 +99,7 @@ def test_alarms_that_grow_together_are_not_cheaper_than_before_they_did():
     recordings += [graded(f"talos/blow-{seed:03d}", IMPACT, loud) for seed in range(5)]
     curve = trade_off(Matched.of(recordings)).curve()
     assert curve["false_alarms_per_hour"][-1] < curve["false_alarms_per_hour"].max()
-    hours = Matched.of(recordings).ok_heard.sum() / 3600
+    hours = Matched.of(recordings).ok_covered.sum() / 3600
     cheapest = curve["false_alarms_per_hour"][-1]
     assert cheapest == pytest.approx(5 / hours)
     last = trade_off(Matched.of(recordings)).at_budgets(

@@ -1,1 +1,1 @@
-"""Estimators: each decides on features, in NumPy, and knows how it is trained and stored."""
+"""Estimators: decision values of features, in NumPy, with training and storage of each kind."""

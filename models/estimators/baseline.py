@@ -1,7 +1,7 @@
 """The baseline: the distance of a frame from the nearest of a k-center subset of good frames.
 
 Features below all of the training set are raised to its minimum, and that minimum, silence, is
-part of the subset: a motion quieter than all others is no anomaly.
+part of the subset: a motion with less noise than all others is no anomaly.
 """
 
 from collections.abc import Mapping
@@ -93,7 +93,7 @@ class Baseline:
         return distance(features, self.good)[:, None] / limit
 
     def choose(self, decisions: Array) -> Index:
-        """Call what is beyond the limit a departure (1), and all else `ok` (0)."""
+        """Class of each frame, shape (frames,): `ok` (0), or an anomaly (1) beyond the limit."""
         beyond: Index = (decisions[:, 0] > 1.0).astype(np.intp)
         return beyond
 

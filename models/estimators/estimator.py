@@ -72,7 +72,7 @@ class Estimator(Protocol):
         """Frames that may raise an alarm, shape (frames,); None: all that are failures."""
 
     def novel(self, decisions: Array) -> Mask | None:
-        """Say which frames are out of distribution, shape (frames,); None: not measured."""
+        """Which frames are out of distribution, shape (frames,); None: not measured."""
 
     def score(self, decisions: Array) -> Array:
         """Score of each class, larger meaning more certain, shape (frames, classes)."""

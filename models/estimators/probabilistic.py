@@ -13,7 +13,7 @@ from models.types import Array, Index, Mask
 NOVELTY_LIMIT = 2.0
 """A frame is out of distribution if its novelty score exceeds this."""
 LIKELY = 0.2
-"""Probability of any failure from which a frame is called one: to miss it is the worse mistake."""
+"""Least probability of any failure of a frame that is predicted as one: misses cost more."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -89,12 +89,12 @@ class Probable(ABC):
         return chosen
 
     def above_threshold(self, decisions: Array) -> Mask:
-        """Say which frames are above the alarm threshold, whatever their novelty, (frames,)."""
+        """Which frames are above the alarm threshold, whatever their novelty, (frames,)."""
         above: Mask = decisions[:, 0] <= log1p(-self.alarm)
         return above
 
     def novel(self, decisions: Array) -> Mask:
-        """Say which frames are out of distribution, shape (frames,)."""
+        """Which frames are out of distribution, shape (frames,)."""
         novel: Mask = decisions[:, -1] > NOVELTY_LIMIT
         return novel
 

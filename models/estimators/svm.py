@@ -1,7 +1,7 @@
 """Two-class support vector machines, evaluated in NumPy, and their combination for more classes.
 
-Conventions: a positive decision value of a machine means the first of its two classes. In
-one-vs-one the machines are the pairs (0, 1), (0, 2), …, (1, 2), … of classes; in one-vs-rest there
+Conventions: a positive decision value of an SVM means the first of its two classes. In
+one-vs-one the SVMs are the pairs (0, 1), (0, 2), …, (1, 2), … of classes; in one-vs-rest there
 is one for each class, against all others.
 """
 
@@ -20,16 +20,16 @@ from models.types import Array, Index, Words
 
 @dataclass(frozen=True, eq=False)
 class SupportVectorMachines:
-    """All machines of a classifier, over the same vectors.
+    """All SVMs of a classifier, over the same vectors.
 
     Attributes:
         vectors: Support vectors, shape (vectors, features); with the linear kernel they may be
-            the machines' weights, shape (machines, features).
-        coefficients: Weight y_i alpha_i of each vector, shape (machines, vectors).
-        intercept: Bias b, shape (machines,).
+            the SVMs' weights, shape (svms, features).
+        coefficients: Weight y_i alpha_i of each vector, shape (svms, vectors).
+        intercept: Bias b, shape (svms,).
         kernel: The kernel function.
         gamma: Parameter of the RBF kernel.
-        multiclass: How the machines are combined.
+        multiclass: How the SVMs are combined.
     """
 
     DIMENSIONS: ClassVar[Mapping[str, int]] = {"vectors": 2, "coefficients": 2, "intercept": 1}
@@ -45,12 +45,12 @@ class SupportVectorMachines:
     def fit(
         cls, features: Array, targets: Index, groups: Words, profile: Profile
     ) -> "SupportVectorMachines":
-        """Train machines on all frames, whatever their groups; see `fit`."""
+        """Train SVMs on all frames, whatever their groups; see `fit`."""
         return fit(features, targets, profile).condensed()
 
     @classmethod
     def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
-        """Make machines from the arrays of a model file."""
+        """SVMs from the arrays of a model file."""
         return cls(
             **{name: arrays[name] for name in cls.DIMENSIONS},
             kernel=profile.kernel,
@@ -63,11 +63,11 @@ class SupportVectorMachines:
         arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
     ) -> dict[str, tuple[int, ...]]:
         """Expected shape of each array; there may be any number of support vectors."""
-        vectors, machines = len(arrays["vectors"]), machine_count(classes, profile.multiclass)
+        vectors, svms = len(arrays["vectors"]), svm_count(classes, profile.multiclass)
         return {
             "vectors": (vectors, features),
-            "coefficients": (machines, vectors),
-            "intercept": (machines,),
+            "coefficients": (svms, vectors),
+            "intercept": (svms,),
         }
 
     @staticmethod
@@ -92,7 +92,7 @@ class SupportVectorMachines:
         return choose(decisions, classes=self.classes, multiclass=self.multiclass)
 
     def above_threshold(self, decisions: Array) -> None:
-        """None: each frame that is called a failure counts."""
+        """None: each frame that is predicted as a failure counts."""
 
     def novel(self, decisions: Array) -> None:
         """Leave it out: support vector machines have no measure of novelty."""
@@ -112,7 +112,7 @@ class SupportVectorMachines:
             features: Feature vectors, shape (frames, features).
 
         Returns:
-            Shape (frames, machines).
+            Shape (frames, decisions).
         """
         similarity = features @ self.vectors.T
         if self.kernel == "rbf":  # K(x, y) = exp(-gamma |x - y|^2)
@@ -122,13 +122,11 @@ class SupportVectorMachines:
         return decisions
 
     def condensed(self) -> Self:
-        """The same machines, each linear one as a single weight vector."""
+        """The same SVMs, each linear one as a single weight vector."""
         if self.kernel != "linear":
             return self
-        machines = len(self.intercept)
-        return replace(
-            self, vectors=self.coefficients @ self.vectors, coefficients=np.eye(machines)
-        )
+        svms = len(self.intercept)
+        return replace(self, vectors=self.coefficients @ self.vectors, coefficients=np.eye(svms))
 
     @cached_property
     def _squares(self) -> Array:
@@ -136,8 +134,8 @@ class SupportVectorMachines:
         return squares
 
 
-def machine_count(classes: int, multiclass: Multiclass) -> int:
-    """Number of machines for so many classes."""
+def svm_count(classes: int, multiclass: Multiclass) -> int:
+    """Number of SVMs for so many classes."""
     return classes * (classes - 1) // 2 if multiclass == "one-vs-one" else classes
 
 
@@ -145,9 +143,9 @@ def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
     """Class of each frame: that of most votes of the pairs, or of the largest decision value.
 
     Args:
-        decisions: Decision values, shape (frames, machines).
+        decisions: Decision values, shape (frames, decisions).
         classes: How many classes there are.
-        multiclass: How the machines are combined.
+        multiclass: How the SVMs are combined.
 
     Returns:
         Index of a class for each frame, shape (frames,); the first of equals.
@@ -163,9 +161,9 @@ def score(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
     """Score of each class, larger meaning more certain.
 
     Args:
-        decisions: Decision values, shape (frames, machines).
+        decisions: Decision values, shape (frames, decisions).
         classes: How many classes there are.
-        multiclass: How the machines are combined.
+        multiclass: How the SVMs are combined.
 
     Returns:
         Scores, shape (frames, classes). One-vs-rest: the decision values. One-vs-one: votes, and
@@ -188,7 +186,7 @@ def _votes(decisions: Array, classes: int) -> Array:
 
 @lru_cache
 def _sides(classes: int) -> tuple[Array, Array]:
-    """First and second class of each pair, one-hot, shape (machines, classes) each."""
+    """First and second class of each pair, one-hot, shape (svms, classes) each."""
     first, second = np.array(list(combinations(range(classes), 2))).T
     unit = np.eye(classes)
     return unit[first], unit[second]
@@ -200,28 +198,28 @@ def fit(features: Array, targets: Index, profile: Profile) -> SupportVectorMachi
     Args:
         features: Feature vectors, shape (frames, features).
         targets: Class of each, as an index from 0 without a gap, shape (frames,).
-        profile: Kernel, parameters, and how the machines are combined.
+        profile: Kernel, parameters, and how the SVMs are combined.
 
     Returns:
-        The machines, with their support vectors.
+        The SVMs, with their support vectors.
     """
-    fit_machines = _one_vs_one if profile.multiclass == "one-vs-one" else _one_vs_rest
-    return fit_machines(features, targets, profile)
+    fit_all = _one_vs_one if profile.multiclass == "one-vs-one" else _one_vs_rest
+    return fit_all(features, targets, profile)
 
 
 def _one_vs_one(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
-    """Train a machine for each pair of classes, C times N / (classes N_c) for each class."""
+    """Train an SVM for each pair of classes, C times N / (classes N_c) for each class."""
     fitted = svc(profile, profile.regularization, dict(enumerate(balance(targets))))
     fitted.fit(features, targets)
     pairs = list(combinations(range(len(fitted.classes_)), 2))
     stops = np.cumsum(fitted.n_support_)
     coefficients = np.zeros((len(pairs), len(fitted.support_)))
-    for machine, (first, second) in enumerate(pairs):
+    for svm, (first, second) in enumerate(pairs):
         # libsvm keeps, for a vector of class i, one row for each other class j in their order.
         for own, other in ((first, second), (second, first)):
             columns = slice(stops[own] - fitted.n_support_[own], stops[own])
             row = other - (other > own)
-            coefficients[machine, columns] = fitted.dual_coef_[row, columns]
+            coefficients[svm, columns] = fitted.dual_coef_[row, columns]
     # With two classes, scikit-learn turns the sign so that positive means the second.
     sign = -1.0 if len(pairs) == 1 else 1.0
     return SupportVectorMachines(
@@ -235,14 +233,14 @@ def _one_vs_one(features: Array, targets: Index, profile: Profile) -> SupportVec
 
 
 def _one_vs_rest(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
-    """Train a machine for each class, with C_cls = C N / (classes N_cls) (paper, Sec. III-B)."""
+    """Train an SVM for each class, with C_cls = C N / (classes N_cls) (paper, Sec. III-B)."""
     weights = balance(targets)
     coefficients, intercept = np.zeros((len(weights), len(targets))), np.zeros(len(weights))
-    for machine, weight in enumerate(weights):
+    for svm, weight in enumerate(weights):
         fitted = svc(profile, profile.regularization * float(weight))
-        fitted.fit(features, targets == machine)
-        coefficients[machine, fitted.support_] = fitted.dual_coef_[0]
-        intercept[machine] = fitted.intercept_[0]
+        fitted.fit(features, targets == svm)
+        coefficients[svm, fitted.support_] = fitted.dual_coef_[0]
+        intercept[svm] = fitted.intercept_[0]
     used = np.flatnonzero(coefficients.any(axis=0))
     return SupportVectorMachines(
         features[used],

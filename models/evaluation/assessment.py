@@ -24,7 +24,7 @@ from models.splitting import robot_of, seen
 from models.types import Array
 
 FORMAT = "noise-evaluation/1"
-ADVICE = "measure it on other runs, or have the report say so (--seen-too)"
+ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
 BUDGETS = (5.0, 20.0, 100.0)
 """False-alarm budgets, per hour, at which recall is read from the trade-off."""
 
@@ -390,7 +390,7 @@ def _paper(assessment: Assessment) -> list[str]:
 def _confusion(assessment: Assessment) -> list[str]:
     evaluation = assessment.frames.evaluation
     width = max(len(name) for name in evaluation.classes) + 2
-    head = "Frames of row called".ljust(NAME)
+    head = "Frames of row predicted".ljust(NAME)
     return [
         head + "".join(name.rjust(width) for name in evaluation.classes),
         *(

@@ -77,7 +77,7 @@ def are_probabilities(scores: Array) -> bool:
 
 
 def reliability(matched: Matched) -> Reliability | None:
-    """Confidence and share of right predictions, over all frames whose truth is clear.
+    """Confidence and share of right predictions, over all frames with a true class.
 
     Args:
         matched: The recordings.
@@ -91,7 +91,7 @@ def reliability(matched: Matched) -> Reliability | None:
     clear = frames.truth != UNCLEAR
     column = {name: number for number, name in enumerate(matched.classes)}
     # A label that is no class, say "unknown", has no probability: it does not count.
-    named = np.array([column.get(str(name), -1) for name in frames.called], dtype=np.intp)
+    named = np.array([column.get(str(name), -1) for name in frames.predicted], dtype=np.intp)
     kept = clear & (named >= 0)
     confidence = frames.scores[kept, named[kept]]
     edges = np.linspace(0.0, 1.0, BINS + 1)
@@ -102,5 +102,5 @@ def reliability(matched: Matched) -> Reliability | None:
         total = np.bincount(cell, weights, minlength=len(matched.names) * BINS)
         return total.reshape(-1, BINS).astype(np.float64)
 
-    right = (frames.called == frames.truth)[kept].astype(np.float64)
+    right = (frames.predicted == frames.truth)[kept].astype(np.float64)
     return Reliability(edges, sums(None), sums(confidence), sums(right))

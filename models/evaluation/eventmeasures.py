@@ -17,7 +17,7 @@ LATE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class EventMeasures:
-    """How a model does by events; `eventscore` says what the words mean.
+    """Measures of a model by events; `eventscore` defines the terms.
 
     Attributes:
         found: Failures that are found, of each class.
@@ -27,12 +27,12 @@ class EventMeasures:
         delay: Median delay of those that are found, in [s].
         late_delay: Delay that a tenth of them exceed, in [s].
         false_alarms: How many.
-        false_alarms_per_hour: Of `ok` motion that was heard.
+        false_alarms_per_hour: Of `ok` motion that frames cover.
         wrong_stretches: How many.
-        wrong_stretches_per_hour: Of `ok` motion that was heard.
-        failure_recall: Frames of whole recordings that are a failure and called some failure.
-        false_alarm_rate: Frames of whole recordings that are `ok` and called a failure.
-        ok_hours: `ok` motion that was heard, in [h].
+        wrong_stretches_per_hour: Of `ok` motion that frames cover.
+        failure_recall: Failure frames of whole recordings that were predicted as any failure.
+        false_alarm_rate: `ok` frames of whole recordings that were predicted as a failure.
+        ok_hours: `ok` motion that frames cover, in [h].
         ok_hours_annotated: All `ok` motion, in [h].
     """
 
@@ -63,7 +63,7 @@ class EventMeasures:
 
 
 def measure(score: EventScore, resampling: Resampling, only: Mask | None = None) -> EventMeasures:
-    """Put numbers to events.
+    """Shares, delays and rates of events, with intervals.
 
     Args:
         score: The events.
@@ -87,9 +87,9 @@ def measure(score: EventScore, resampling: Resampling, only: Mask | None = None)
     others = sorted(set(failures.label.tolist()) - set(classes))
     of_class = {name: failures.label == name for name in (*classes, *others)}
     false, wrong = count(score.alarms.run[score.alarms.false]), score.wrong * kept
-    hours = kept * matched.ok_heard / HOUR
-    heard = score.found & kept[failures.run]
-    delay, owner = score.delay[heard], failures.run[heard]
+    hours = kept * matched.ok_covered / HOUR
+    counted = score.found & kept[failures.run]
+    delay, owner = score.delay[counted], failures.run[counted]
     return EventMeasures(
         found={name: share(score.found, own, failures.run) for name, own in of_class.items()},
         named={name: share(score.named, own, failures.run) for name, own in of_class.items()},
@@ -102,7 +102,7 @@ def measure(score: EventScore, resampling: Resampling, only: Mask | None = None)
         wrong_stretches=int(wrong.sum()),
         wrong_stretches_per_hour=resampling.rate(wrong, hours),
         failure_recall=share(flagged, failing, frames.run),
-        false_alarm_rate=share(flagged, frames.quiet, frames.run),
+        false_alarm_rate=share(flagged, frames.in_ok, frames.run),
         ok_hours=float(hours.sum()),
         ok_hours_annotated=float((kept * matched.ok_annotated).sum() / HOUR),
     )

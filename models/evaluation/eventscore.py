@@ -6,7 +6,7 @@ annotated failure is *found* if an alarm overlaps it, and *named* if a frame of 
 its *delay* is the time from its start until the first overlapping frame of an alarm is complete.
 An alarm is *false* if a frame of it lies wholly in `ok` blocks and it overlaps no failure.
 
-An alarm that runs on into a failure is not false, which a model that never falls silent profits
+An alarm that runs on into a failure is not false, which a model that flags every frame profits
 from. Therefore *wrong stretches* count too: alarms of the frames alone that lie wholly in `ok`.
 """
 
@@ -21,7 +21,7 @@ from models.types import Array, Index, Mask
 
 @dataclass(frozen=True, eq=False)
 class Alarms:
-    """Stretches of frames that are called a failure.
+    """Stretches of frames that belong to a finding.
 
     Attributes:
         run: Recording of each, shape (alarms,).
@@ -41,7 +41,7 @@ class Alarms:
 
 @dataclass(frozen=True, eq=False)
 class EventScore:
-    """How a model does by events.
+    """Found and missed failures, delays and alarms of a model.
 
     Attributes:
         matched: The recordings.
@@ -86,7 +86,7 @@ class EventScore:
 
 
 def score(matched: Matched) -> EventScore:
-    """Count events by what the model calls the frames.
+    """Events found, named and missed by the debounced predictions.
 
     Args:
         matched: The recordings.
@@ -96,21 +96,21 @@ def score(matched: Matched) -> EventScore:
     found = hit(matched, flagged)
     named = np.zeros(len(failures), dtype=bool)
     for label in np.unique(failures.label).tolist():
-        named |= (failures.label == label) & hit(matched, frames.called == label)
+        named |= (failures.label == label) & hit(matched, frames.predicted == label)
     own = np.append(np.flatnonzero(flagged), 0)  # the last one is for those that are not found
-    heard = frames.stop[own[np.searchsorted(own[:-1], failures.first)]] if len(frames) else 0.0
+    complete = frames.stop[own[np.searchsorted(own[:-1], failures.first)]] if len(frames) else 0.0
     return EventScore(
         matched,
         found,
         named,
-        np.where(found, heard - failures.start, np.nan),
+        np.where(found, complete - failures.start, np.nan),
         alarms(matched, flagged),
-        matched.by_run(alarms(matched, flagged & frames.quiet).run),
+        matched.by_run(alarms(matched, flagged & frames.in_ok).run),
     )
 
 
 def hit(matched: Matched, flagged: Mask) -> Mask:
-    """Tell which failures flagged frames overlap.
+    """Which failures flagged frames overlap.
 
     Args:
         matched: The recordings.
@@ -138,11 +138,11 @@ def alarms(matched: Matched, flagged: Mask) -> Alarms:
     apart = frames.start[after] > frames.stop[before] + matched.slack
     first = np.append(0, np.flatnonzero(apart | (frames.run[after] != frames.run[before])) + 1)
     last = np.append(first[1:], len(own)) - 1
-    quiet = np.logical_or.reduceat(frames.quiet[own], first)
+    in_ok = np.logical_or.reduceat(frames.in_ok[own], first)
     failing = np.logical_or.reduceat(frames.failing[own], first)
     return Alarms(
         frames.run[own[first]],
         frames.start[own[first]],
         frames.stop[own[last]],
-        quiet & ~failing,
+        in_ok & ~failing,
     )

@@ -24,12 +24,12 @@ class FrameScore:
         recall: Of each class.
         precision: Of each class.
         balanced_accuracy: Mean recall of the classes that occur.
-        failure_recall: Failure frames that are not called `ok`, of the failure frames.
-        false_alarm_rate: `ok` frames that are not called `ok`, of the `ok` frames.
+        failure_recall: Failure frames that are not predicted as `ok`, of the failure frames.
+        false_alarm_rate: `ok` frames that are not predicted as `ok`, of the `ok` frames.
         false_negative_errors: Of each class, as the paper counts them, of ALL frames.
         false_positive_errors: Of each class, as the paper counts them, of ALL frames.
         failure_detection_rate: The paper's: 1 less the false positive errors of `ok`.
-        subset_accuracy: Frames that are called what they are, of all frames.
+        subset_accuracy: Frames with the right prediction, of all frames.
     """
 
     evaluation: Evaluation
@@ -54,27 +54,27 @@ class FrameScore:
         return plain
 
 
-def score(heard: Sequence[Predictions], resampling: Resampling) -> FrameScore:
-    """Count the frames that were cut from annotated blocks.
+def score(predictions: Sequence[Predictions], resampling: Resampling) -> FrameScore:
+    """Measures of the frames that were cut from annotated blocks.
 
     Args:
-        heard: Recordings, with one such frame or more.
+        predictions: Recordings, with one such frame or more.
         resampling: Sets of them.
 
     Raises:
         DatasetError: If there is no frame.
     """
     evaluation = Evaluation.of(
-        np.concatenate([one.truth for one in heard]),
-        np.concatenate([one.called for one in heard]),
-        heard[0].labels.classes,
+        np.concatenate([one.truth for one in predictions]),
+        np.concatenate([one.predicted for one in predictions]),
+        predictions[0].labels.classes,
     )
     names = evaluation.classes
-    counts = _confusions(heard, names)
+    counts = _confusions(predictions, names)
     numbers = np.arange(len(names))
-    truth, called = np.meshgrid(numbers, numbers, indexing="ij")
-    right, all_frames = truth == called, np.ones(truth.shape, dtype=bool)
-    ok, called_ok = truth == names.index(OK), called == names.index(OK)
+    truth, predicted = np.meshgrid(numbers, numbers, indexing="ij")
+    right, all_frames = truth == predicted, np.ones(truth.shape, dtype=bool)
+    ok, predicted_ok = truth == names.index(OK), predicted == names.index(OK)
 
     def share(part: Mask, whole: Mask) -> Estimate:
         return resampling.share(counts[:, part].sum(axis=1), counts[:, whole].sum(axis=1))
@@ -88,39 +88,39 @@ def score(heard: Sequence[Predictions], resampling: Resampling) -> FrameScore:
     return FrameScore(
         evaluation,
         recall=each(truth, right),
-        precision=each(called, right),
+        precision=each(predicted, right),
         balanced_accuracy=_balanced(counts, resampling),
-        failure_recall=share(~ok & ~called_ok, ~ok),
-        false_alarm_rate=share(ok & ~called_ok, ok),
+        failure_recall=share(~ok & ~predicted_ok, ~ok),
+        false_alarm_rate=share(ok & ~predicted_ok, ok),
         false_negative_errors=each(truth, ~right, all_frames),
-        false_positive_errors=each(called, ~right, all_frames),
-        failure_detection_rate=share(~(called_ok & ~right), all_frames),
+        false_positive_errors=each(predicted, ~right, all_frames),
+        failure_detection_rate=share(~(predicted_ok & ~right), all_frames),
         subset_accuracy=share(right, all_frames),
     )
 
 
 def _balanced(counts: Array, resampling: Resampling) -> Estimate:
-    """Estimate the mean recall of the classes that occur."""
+    """Mean recall of the classes that occur."""
     right, frames = np.diagonal(counts, axis1=1, axis2=2), counts.sum(axis=2)
     there = np.flatnonzero(frames.sum(axis=0))
-    # A set without a frame of some class says nothing of its recall.
+    # A set without a frame of some class gives no recall of it.
     drawn = ratio(resampling.weights @ right, resampling.weights @ frames)[:, there].mean(axis=1)
     value = ratio(right.sum(axis=0), frames.sum(axis=0))[there].mean()
     return resampling.bounded(float(value), drawn, [frames[:, number] > 0 for number in there])
 
 
-def _confusions(heard: Sequence[Predictions], names: Sequence[str]) -> Array:
-    """Count the frames of each recording, shape (runs, classes, classes)."""
-    counts = np.zeros((len(heard), len(names), len(names)))
-    for number, one in enumerate(heard):
+def _confusions(predictions: Sequence[Predictions], names: Sequence[str]) -> Array:
+    """Frames of each recording by true and predicted class, shape (runs, classes, classes)."""
+    counts = np.zeros((len(predictions), len(names), len(names)))
+    for number, one in enumerate(predictions):
         if len(one.truth):
-            found = Evaluation.of(one.truth, one.called, names)
+            found = Evaluation.of(one.truth, one.predicted, names)
             counts[number] = found.confusion
     return counts
 
 
 def evaluate(classifier: Classifier, dataset: Dataset) -> Evaluation:
-    """Compare what a classifier says with what was annotated.
+    """Confusion matrix of a classifier on annotated frames.
 
     Args:
         classifier: The classifier.

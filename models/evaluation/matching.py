@@ -1,4 +1,4 @@
-"""What each frame of whole recordings is, and which frames overlap which annotated failure.
+"""True class of each frame of whole recordings, and which frames overlap which failure.
 
 A frame *is* a failure if it holds an annotated block of it whole, or is filled by it by half or
 more (by several: that which fills most); it is `ok` if it lies wholly in `ok` blocks. Any other
@@ -29,26 +29,26 @@ class Frames:
         run: Number of the recording, shape (frames,).
         start: When it starts, shape (frames,), in [s].
         stop: When it stops, shape (frames,), in [s].
-        called: What the model calls it in the light of its neighbours, shape (frames,).
+        predicted: Its predicted class, debounced, shape (frames,).
         suspect: Whether it is not `ok` by itself, shape (frames,).
         novel: Whether it is out of distribution, shape (frames,).
         flagged: Whether it belongs to a finding, shape (frames,).
-        scores: What the model says of each class, shape (frames, classes).
-        truth: What it is, `UNCLEAR` where that is not said, shape (frames,).
-        quiet: Whether it lies wholly in `ok` blocks, shape (frames,).
+        scores: Of each class, shape (frames, classes).
+        truth: Its true class, `UNCLEAR` where that is not annotated, shape (frames,).
+        in_ok: Whether it lies wholly in `ok` blocks, shape (frames,).
         failing: Whether it overlaps a failure, shape (frames,).
     """
 
     run: Index
     start: Array
     stop: Array
-    called: Words
+    predicted: Words
     suspect: Mask
     novel: Mask
     flagged: Mask
     scores: Array
     truth: Words
-    quiet: Mask
+    in_ok: Mask
     failing: Mask
 
     def __len__(self) -> int:
@@ -81,17 +81,17 @@ class Failures:
 
 @dataclass(frozen=True, eq=False)
 class Matched:
-    """Recordings, one after another, with what is true of them.
+    """Recordings, one after another, with frames matched to annotations.
 
     Attributes:
         names: Of the recordings, shape (runs,).
-        classes: What the model can call a frame.
+        classes: Of the model.
         confirms: Whether a finding takes more than one frame of evidence.
         frames: Their frames.
         failures: Their failures.
         ok_annotated: `ok` time of each recording, shape (runs,), in [s].
-        ok_heard: That part of it that quiet frames cover, shape (runs,), in [s]. In `ok` blocks
-            shorter than a frame, no false alarm could be heard.
+        ok_covered: That part of it that frames within `ok` blocks cover, shape (runs,), in [s]. In
+            `ok` blocks shorter than a frame, no false alarm is possible.
         slack: Times that differ by less are the same, in [s].
     """
 
@@ -101,20 +101,20 @@ class Matched:
     frames: Frames
     failures: Failures
     ok_annotated: Array
-    ok_heard: Array
+    ok_covered: Array
     slack: float
 
     @classmethod
-    def of(cls, heard: Sequence[Predictions]) -> Self:
-        """Match what was heard with what was annotated.
+    def of(cls, predictions: Sequence[Predictions]) -> Self:
+        """Match predictions with annotations.
 
         Args:
-            heard: Recordings, one or more.
+            predictions: Recordings, one or more.
         """
-        slack = 1.5 * max(one.step for one in heard)
+        slack = 1.5 * max(one.step for one in predictions)
         frames, failures, annotated, covered = [], [], [], []
         count = 0
-        for number, one in enumerate(heard):
+        for number, one in enumerate(predictions):
             found, bad, ok = _match(one, number, count, slack)
             frames.append(found)
             failures.append(bad)
@@ -122,9 +122,9 @@ class Matched:
             covered.append(_covered(found))
             count += len(found)
         return cls(
-            tuple(one.name for one in heard),
-            heard[0].labels.classes,
-            heard[0].labels.above_threshold is not None,
+            tuple(one.name for one in predictions),
+            predictions[0].labels.classes,
+            predictions[0].labels.above_threshold is not None,
             Frames(*_joined(frames)),
             Failures(*_joined(failures)),
             np.array(annotated, dtype=np.float64),
@@ -133,7 +133,7 @@ class Matched:
         )
 
     def by_run(self, run: Index) -> Array:
-        """Count things by the recording that each is of, shape (runs,)."""
+        """Count by recording, shape (runs,)."""
         return np.bincount(run, minlength=len(self.names)).astype(np.float64)
 
 
@@ -154,10 +154,10 @@ def _match(
     start, stop = one.labels.start, one.labels.stop
     ok = _merged([block for block in one.blocks if block.label == OK])
     bad = [block for block in one.blocks if block.label != OK]
-    quiet = _overlap(start, stop, ok).sum(axis=1) > stop - start - slack
+    in_ok = _overlap(start, stop, ok).sum(axis=1) > stop - start - slack
     shared = _overlap(start, stop, bad)
-    touched = shared > slack
-    first = touched.argmax(axis=0) if len(start) else np.zeros(len(bad), dtype=np.intp)
+    overlaps = shared > slack
+    first = overlaps.argmax(axis=0) if len(start) else np.zeros(len(bad), dtype=np.intp)
     own = np.full(len(start), number)
     frames = Frames(
         own,
@@ -168,9 +168,9 @@ def _match(
         _novel(one.labels),
         one.labels.flagged,
         one.labels.scores,
-        np.where(quiet, OK, _failure_of(shared, start, stop, bad, slack)),
-        quiet,
-        np.any(touched, axis=1),
+        np.where(in_ok, OK, _failure_of(shared, start, stop, bad, slack)),
+        in_ok,
+        np.any(overlaps, axis=1),
     )
     failures = Failures(
         np.full(len(bad), number),
@@ -178,7 +178,7 @@ def _match(
         np.array([block.stop for block in bad], dtype=np.float64),
         np.array([block.label for block in bad], dtype=str),
         before + first,
-        before + first + touched.sum(axis=0),
+        before + first + overlaps.sum(axis=0),
     )
     return frames, failures, ok
 
@@ -198,7 +198,7 @@ def _overlap(start: Array, stop: Array, blocks: Sequence[Block]) -> Array:
 def _failure_of(
     shared: Array, start: Array, stop: Array, bad: Sequence[Block], slack: float
 ) -> Words:
-    """Name the failure that each frame is, if it is one."""
+    """True failure class of each frame, `UNCLEAR` where it is none, shape (frames,)."""
     if not bad:
         return np.full(len(start), UNCLEAR)
     whole = np.array([block.stop - block.start for block in bad])
@@ -220,8 +220,8 @@ def _merged(blocks: Sequence[Block]) -> list[Block]:
 
 
 def _covered(frames: Frames) -> float:
-    """Time that quiet frames cover, in [s]."""
-    start, stop = frames.start[frames.quiet], frames.stop[frames.quiet]
+    """Time that frames within `ok` blocks cover, in [s]."""
+    start, stop = frames.start[frames.in_ok], frames.stop[frames.in_ok]
     return float((stop - np.maximum(start, np.append(-np.inf, stop[:-1]))).sum())
 
 

@@ -24,7 +24,7 @@ class Predictions:
         step: Time from one sample to the next, in [s].
         blocks: Annotations, in order; each ends with the recording at the latest.
         truth: Class of each frame that is cut from a block, shape (frames,).
-        called: Predicted class of it, shape (frames,).
+        predicted: Predicted class of it, shape (frames,).
         labels: Predictions on the whole recording.
     """
 
@@ -33,7 +33,7 @@ class Predictions:
     step: float
     blocks: tuple[Block, ...]
     truth: Words
-    called: Words
+    predicted: Words
     labels: Labels
 
 
@@ -53,14 +53,14 @@ def predict(classifier: Classifier, recording: Recording) -> Predictions:
     """
     if ANOMALY in classifier.classes:
         recording = replace(recording, blocks=tuple(map(_unnamed, recording.blocks)))
-    truth, called = _of_blocks(classifier, recording)
+    truth, predicted = _of_blocks(classifier, recording)
     return Predictions(
         recording.name,
         group_of(recording.name),
         1.0 / recording.rate,
         _within(recording),
         truth,
-        called,
+        predicted,
         _whole(classifier, recording),
     )
 

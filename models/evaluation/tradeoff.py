@@ -1,16 +1,15 @@
-"""The trade-off: how much is found for how many false alarms, over a threshold on the scores.
+"""The trade-off: recall against false alarms per hour, over a threshold on the scores.
 
 Conventions: a frame's *failure score* is 1 - P(ok) if the scores are probabilities, or else the
 largest score of a failure less that of `ok`. At a threshold, the frames with larger scores count as
 failures, and all is counted as in `eventscore`. If a finding takes two frames of evidence, it is
 they whose scores are larger, or which are out of distribution; frames beside them that are not `ok`
-join in. Thresholds are
-scores of quiet frames, the highest first: in between, nothing but recall changes. Alarms that grow
-together as the threshold sinks become fewer; lest that is a merit, a threshold costs what the
-dearest of those above it costs.
+join them. Thresholds are scores of frames within `ok` blocks, the highest first: in between,
+nothing but recall changes. Alarms that merge as the threshold falls become fewer; so that this is
+no advantage, the false alarms of a threshold are the most of all thresholds at or above it.
 
 To read the recall at a budget from this curve is to choose the threshold on the very recordings
-that are measured: it tells what the scores are good for, not what a model will do.
+that are measured: it rates the scores, and does not predict how a model will do on others.
 """
 
 from collections.abc import Sequence
@@ -41,7 +40,7 @@ class TradeOff:
         found: Failures found, shape (runs, points).
         failures: Failures, shape (runs,).
         false: False alarms, shape (runs, points).
-        hours: `ok` motion that was heard, shape (runs,), in [h].
+        hours: `ok` motion that frames cover, shape (runs,), in [h].
     """
 
     thresholds: Array
@@ -110,24 +109,24 @@ def trade_off(matched: Matched) -> TradeOff:
     frames, failures = matched.frames, matched.failures
     risk = failure_score(frames.scores, matched.classes)
     failing = (frames.truth != OK) & (frames.truth != UNCLEAR)
-    quiet = np.unique(risk[frames.quiet])[::-1]
-    ranks = np.unique(np.geomspace(1, max(len(quiet), 1), POINTS).round().astype(np.intp)) - 1
-    thresholds = quiet[ranks[: len(quiet)]]
+    scores = np.unique(risk[frames.in_ok])[::-1]
+    ranks = np.unique(np.geomspace(1, max(len(scores), 1), POINTS).round().astype(np.intp)) - 1
+    thresholds = scores[ranks[: len(scores)]]
     above = [_flagged(matched, risk > threshold) for threshold in thresholds]
-    heard = [alarms(matched, flagged) for flagged in above]
+    raised = [alarms(matched, flagged) for flagged in above]
     return TradeOff(
         thresholds,
         _columns(matched, [frames.run[flagged & failing] for flagged in above]),
         matched.by_run(frames.run[failing]),
         _columns(matched, [failures.run[hit(matched, flagged)] for flagged in above]),
         matched.by_run(failures.run),
-        _columns(matched, [each.run[each.false] for each in heard]),
-        matched.ok_heard / HOUR,
+        _columns(matched, [each.run[each.false] for each in raised]),
+        matched.ok_covered / HOUR,
     )
 
 
 def _flagged(matched: Matched, above: Mask) -> Mask:
-    """Say which frames are failures if those above a threshold are sure of it, shape (frames,)."""
+    """Frames of findings if those above a threshold are evidence, shape (frames,)."""
     if not matched.confirms:
         return above
     frames = matched.frames
@@ -138,7 +137,7 @@ def _flagged(matched: Matched, above: Mask) -> Mask:
 
 
 def failure_score(scores: Array, classes: Sequence[str]) -> Array:
-    """Grade frames by how much a model takes them for a failure, whichever.
+    """Score of any failure.
 
     Args:
         scores: Of all classes, shape (frames, classes).
@@ -155,9 +154,9 @@ def failure_score(scores: Array, classes: Sequence[str]) -> Array:
 
 
 def _within(shares: Array, rates: Array, budget: float) -> Array:
-    """Take from each set the share at the last threshold that it can afford, shape (sets,)."""
-    affordable = np.maximum.accumulate(rates, axis=1) <= budget
-    last = affordable.sum(axis=1) - 1
+    """Share of each set at the last threshold within its budget, shape (sets,)."""
+    allowed = np.maximum.accumulate(rates, axis=1) <= budget
+    last = allowed.sum(axis=1) - 1
     values = np.append(shares, np.full((len(shares), 1), np.nan), axis=1)
     taken: Array = values[np.arange(len(values)), last]  # -1, none, is the NaN at the end
     return taken

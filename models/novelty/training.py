@@ -49,7 +49,7 @@ class Learnt:
         ]
         if self.annotated:
             annotated = _many(self.annotated, "run")
-            lines.append(f"of {annotated} that somebody annotated, what is annotated `ok` alone")
+            lines.append(f"of {annotated} with annotations, the part annotated `ok` alone")
         if self.groups == 1:
             lines.append(
                 "its parts were left out in turn, which does not show how much another run differs"

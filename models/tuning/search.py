@@ -34,9 +34,9 @@ class Measures:
     Attributes:
         balanced_accuracy: Mean recall of the classes.
         log_loss: Balanced log-loss, in nats.
-        failure_recall: Failure frames that were called some failure, of the failure frames.
-        false_alarm_rate: `ok` frames that were called a failure, of the `ok` frames.
-        subset_accuracy: Frames that were called what they are, of all: the paper's criterion.
+        failure_recall: Failure frames that were predicted as any failure, of the failure frames.
+        false_alarm_rate: `ok` frames that were predicted as a failure, of the `ok` frames.
+        subset_accuracy: Frames with the right prediction, of all: the paper's criterion.
     """
 
     balanced_accuracy: float
@@ -91,7 +91,7 @@ def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
     """Key that sorts points, the best first.
 
     Args:
-        criterion: The measure; the log-loss decides between equals.
+        criterion: The measure; the log-loss breaks ties.
     """
     if criterion == "log-loss":
         return lambda measures: (measures.log_loss, 0.0)
