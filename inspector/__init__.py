@@ -39,7 +39,7 @@ _MODULES = {
 
 
 def __getattr__(name: str) -> Any:
-    """Import what is asked for: `inspector --help` needs none of it, and it takes long."""
+    """Import a name on first use: `inspector --help` needs none of them, and they take long."""
     if name not in _MODULES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module

@@ -45,13 +45,13 @@ def of_series(count: int, *, dim: bool = False) -> list[Color]:
     return [(int(r * shade), int(g * shade), int(b * shade)) for r, g, b in colors]
 
 
-LOUDNESS: dict[str, Color] = {
+LEVELS: dict[str, Color] = {
     "quiet": (84, 94, 114),
     "elevated": (205, 92, 72),
     "high": (250, 170, 40),
     "critical": (255, 248, 180),
 }
-"""How loud a link is. The louder, the lighter: that order is visible to any eyes."""
+"""States of a link's level. The louder, the lighter: the order is visible to the colour-blind."""
 
 HEAT = np.array(
     [[13, 8, 45], [66, 10, 104], [147, 38, 103], [221, 81, 58], [252, 165, 10], [252, 255, 164]],

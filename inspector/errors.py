@@ -1,4 +1,4 @@
-"""What can go wrong for a person: one base error, subclasses that keep their facts."""
+"""Expected errors of the inspector: one base error, subclasses that keep their facts."""
 
 from pathlib import Path
 

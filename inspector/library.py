@@ -15,12 +15,12 @@ Library = Mapping[str, models.Classifier]
 
 
 class CannotTellError(InspectorError):
-    """A run in which no model can see anything."""
+    """A run that no model can label."""
 
 
 @dataclass(frozen=True)
 class Labelled:
-    """What a model said.
+    """Labels of a run, and the model that gave them.
 
     Attributes:
         labels: One label per frame.
@@ -46,28 +46,28 @@ def load_library(paths: Sequence[Path] = ()) -> Library:
 
 
 def for_robot(library: Library, robot: str | None) -> Library:
-    """Leave out what goes joint by joint and has learnt from other robots alone.
+    """Models without those that classify joint by joint and were trained on other robots alone.
 
-    What single joints do carries over to a robot that was not met less than what norms do. A model
-    whose runs name no robot stays, and so do all if none would be left.
+    Signals of single joints generalise to new robots less than norms. A model whose runs name no
+    robot stays, and so do all if none would be left.
 
     Args:
         library: Models to choose from.
-        robot: The robot that they are to hear, if it has a name.
+        robot: The robot of the run, if it has a name.
     """
-    kept = {name: model for name, model in library.items() if _knows(model, robot)}
+    kept = {name: model for name, model in library.items() if _fits(model, robot)}
     return kept or library
 
 
-def _knows(model: models.Classifier, robot: str | None) -> bool:
+def _fits(model: models.Classifier, robot: str | None) -> bool:
     if not any(map(models.signals.by_joint, model.profile.signals)):
         return True
-    met = {models.splitting.robot_of(name) for name in model.runs} - {""}
-    return not met or robot in met
+    robots = {models.splitting.robot_of(name) for name in model.runs} - {""}
+    return not robots or robot in robots
 
 
 def label_run(run: nm.Run, library: Library) -> Labelled:
-    """Label a run by the model of the nearest rate at or below its own that it can feed.
+    """Label a run by the model of the nearest rate at or below its own whose signals it has.
 
     Args:
         run: The run.
@@ -77,8 +77,8 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         Labels on the time axis of the run.
 
     Raises:
-        CannotTellError: If the run is slower than every model, feeds none, or has no frame without
-            a gap.
+        CannotTellError: If the run's rate is below that of every model, it has the signals of none,
+            or has no frame without a gap.
         SignalError: If the run is too short for a frame.
     """
     signals = signals_of(run)
@@ -92,13 +92,13 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
     if not len(labels):
         raise CannotTellError(
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
-            " takes to tell anything"
+            " requires"
         )
     return _counted(Labelled(labels, name, remark))
 
 
 def signals_of(run: nm.Run) -> dict[str, Real]:
-    """Take what models listen to, without the error where what is desired is what was measured.
+    """Signals that models take, without the error where the desired motion is the measured one.
 
     Args:
         run: The run.
@@ -111,7 +111,7 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
 
 
 def _counted(labelled: Labelled) -> Labelled:
-    """Say how many frames are out of distribution."""
+    """Add a remark on how many frames are out of distribution."""
     labels = labelled.labels
     novel = 0 if labels.novel is None else int(labels.novel.sum())
     if not novel:
@@ -132,7 +132,7 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
         Labels on the time axis of the log.
 
     Raises:
-        CannotTellError: If no model has the rate of the noise; it cannot be lowered, since the
+        CannotTellError: If no model has the rate of the noise; it cannot be decimated, since the
             joint velocities are not there.
         SignalError: If the noise is too short for a frame.
     """
@@ -140,7 +140,7 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
     name, classifier = _choose(library, rate, (models.NOISE,))
     if not _close(rate, classifier.rate):
         raise CannotTellError(
-            f"a noise of {rate:g} Hz cannot be lowered to the {classifier.rate:g} Hz of"
+            f"a noise of {rate:g} Hz cannot be decimated to the {classifier.rate:g} Hz of"
             f" model {name} without joint velocities"
         )
     labels = classifier.classify(noise, classifier.rate, start=float(time[0]))

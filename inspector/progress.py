@@ -1,4 +1,4 @@
-"""A progress bar where somebody watches, nothing elsewhere."""
+"""A progress bar on a terminal, nothing elsewhere."""
 
 import sys
 from collections.abc import Iterable, Iterator
@@ -8,11 +8,11 @@ T = TypeVar("T")
 
 
 def progress(items: Iterable[T], what: str, *, total: int) -> Iterator[T]:
-    """Pass items on, and show on a terminal how many came.
+    """Items as they come, with a progress bar on a terminal.
 
     Args:
-        items: What is worked off.
-        what: Says what is being done.
+        items: To be passed on.
+        what: Name of the task.
         total: How many there will be.
 
     Yields:

@@ -49,7 +49,7 @@ def test_below_every_model_nothing_is_observable(rate):
     assert not found.observable
     for each in found.classes:
         assert (each.observability, each.needed) == (Observability.CANNOT_TELL, 1000.0)
-        assert each.reason == f"{rate:g} Hz is slower than every model"
+        assert each.reason == f"{rate:g} Hz is below the rate of every model"
 
 
 def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason_is_given():

@@ -135,7 +135,7 @@ def test_two_logs_of_one_name_are_not_written_over_each_other(importing, tmp_pat
 def test_an_output_is_required(importing, bag):
     status, _, err = importing(bag)
     assert status == 2
-    assert "say where the run goes" in err
+    assert "name the run file to write" in err
 
 
 @pytest.mark.parametrize("missing", ["rosbags", "mcap"])

@@ -60,7 +60,7 @@ def test_classes_stay_apart(eyes):
 
 @pytest.mark.parametrize("eyes", EYES)
 def test_levels_stay_apart_and_the_louder_is_the_lighter(eyes):
-    levels = list(colors.LOUDNESS.values())
+    levels = list(colors.LEVELS.values())
     assert nearest(levels, eyes) > 30
     assert (np.diff(lab(levels, eyes)[:, 0]) > 5).all()
 

@@ -72,7 +72,7 @@ def test_the_page_of_the_demo_is_valid_and_has_everything(demo):
     assert demo.startswith('<!DOCTYPE html>\n<html lang="en">')
     for tag in ("html", "head", "title", "body", "h1", "img", "audio"):
         assert page.tags.count(tag) == 1, tag
-    titles = ("Findings", "Annotated", "Over time", "To be heard", "Links", "Joints")
+    titles = ("Findings", "Annotated", "Over time", "Sound", "Links", "Joints")
     for title in (*titles, "What the log can show", "Remarks"):
         assert title in page.words
     assert "panda_link7" in page.words
@@ -132,12 +132,12 @@ def test_names_cannot_smuggle_anything_into_the_page(tmp_path):
     assert not re.search(r"[\x00-\x08\x0b-\x1f]", text)
 
 
-def test_a_log_too_slow_for_ears_has_no_sound(tmp_path):
+def test_a_log_without_audible_frequencies_has_no_sound(tmp_path):
     time = np.arange(600) / 30
     run = short_run(time=time, velocity=np.sin(np.stack((time, 2 * time), axis=1)))
     page = Page(html.page(inspected(run, tmp_path)))
     assert "audio" not in page.tags
-    assert "too slow for ears" in page.words
+    assert "rate is too low for audible frequencies" in page.words
 
 
 def test_gaps_and_silence_are_drawn(tmp_path):
@@ -156,7 +156,7 @@ def test_findings_are_listed_with_their_scores(tmp_path):
     assert "wobble, out of distribution 3.00 3.50 0.70" in words
 
 
-def test_many_joints_are_cut_to_the_loudest_and_that_is_said(tmp_path):
+def test_many_joints_are_cut_to_the_loudest_with_a_remark(tmp_path):
     names = tuple(f"joint{i}" for i in range(30))
     run = short_run(velocity=np.ones((6000, 30)), joint_names=names)
     words = Page(html.page(inspected(run, tmp_path))).words

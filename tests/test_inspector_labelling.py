@@ -48,16 +48,18 @@ def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
     assert max(event.stop for event in events) < 4.7
 
 
-def test_a_faster_run_is_lowered_and_a_slower_one_is_not_judged():
+def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
     labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), LIBRARY)
     assert labelled.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
     with pytest.raises(CannotTellError, match="500 Hz"):
         label_run(run_of(np.zeros((2000, 1)), 500.0), LIBRARY)
 
 
-def test_a_scalar_noise_cannot_be_lowered():
+def test_a_scalar_noise_cannot_be_decimated():
     time = np.arange(20_000) / 5000.0
-    with pytest.raises(CannotTellError, match="5000 Hz cannot be lowered to the 1000 Hz of model"):
+    with pytest.raises(
+        CannotTellError, match="5000 Hz cannot be decimated to the 1000 Hz of model"
+    ):
         label_noise(time, np.ones(20_000), LIBRARY)
 
 
@@ -95,14 +97,14 @@ def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
     assert set(labelled.labels.label[~labelled.labels.novel]) == {"ok"}
 
 
-def test_a_run_that_feeds_no_model_is_not_judged_and_the_reason_is_said():
+def test_a_run_without_the_signals_of_a_model_is_not_classified_and_the_error_has_the_reason():
     alone = {"general-1khz": LIBRARY["general-1khz"]}
     run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
     with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
         label_run(run, alone)
 
 
-def test_joints_are_heard_of_robots_that_were_met_and_norms_of_all_others():
+def test_joints_are_classified_of_robots_in_the_training_set_and_norms_of_all_others():
     both = {name: LIBRARY[name] for name in ("general-1khz", "joints-1khz")}
     assert for_robot(both, "panda") == both
     for robot in (None, "ur5", "my.urdf"):
@@ -111,7 +113,7 @@ def test_joints_are_heard_of_robots_that_were_met_and_norms_of_all_others():
     assert for_robot(alone, "ur5") == alone  # who names one model means it
 
 
-def test_a_model_whose_runs_name_no_robot_hears_the_joints_of_any():
+def test_a_model_whose_runs_name_no_robot_classifies_the_joints_of_any():
     own = replace(LIBRARY["joints-1khz"], runs={"monday": "", "tuesday": ""})
     library = {"general-1khz": LIBRARY["general-1khz"], "own": own}
     assert for_robot(library, "ur5") == library

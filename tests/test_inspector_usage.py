@@ -67,7 +67,14 @@ def help_of(monkeypatch):
 
 def test_every_command_is_in_a_panel(help_of):
     titles = [line.strip("╭╮─ ") for line in help_of() if line.startswith("╭")]
-    assert titles == ["Options", "Look", "Judge", "Import and export", "Train", "Simulate"]
+    assert titles == [
+        "Options",
+        "Inspect",
+        "Classify and audit",
+        "Import and export",
+        "Train",
+        "Simulate",
+    ]
 
 
 @PATHS

@@ -8,9 +8,8 @@ import rerun as rr
 from recordings import LANE, LINE, MOTION, check_columns, entities, read
 from rerun.chunk import RrdReader
 
-from inspector.analysis.analyse import Analysis, analyse_file
-from inspector.analysis.status import Status
-from inspector.colors import LOUDNESS
+from inspector.analysis.analyse import Analysis, Status, analyse_file
+from inspector.colors import LEVELS
 from inspector.errors import InspectorError
 from inspector.recording.recording import NOISE_POINTS, linked, write
 from models import Event, Labels
@@ -431,7 +430,7 @@ def test_the_base_of_an_arm_is_drawn_as_quiet_as_it_is(whole):
     mesh = "/robot/panda/visual_geometries/panda_link0/visual_0"
     time, (colour,) = read(path, mesh, "Asset3D:albedo_factor")
     assert time is None
-    assert colour == [int.from_bytes([*LOUDNESS["quiet"], 255], "big")]
+    assert colour == [int.from_bytes([*LEVELS["quiet"], 255], "big")]
 
 
 def test_the_papers_terms_are_shown_on_demand(tmp_path):

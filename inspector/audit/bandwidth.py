@@ -129,7 +129,7 @@ def corner(spectrum: Spectrum, floor: Array) -> float | None:
 
     A robot's spectrum falls from its motion to the noise of sensors and drives, which is flat or
     falls gently. A filter shows as an octave of that noise that is flat, and a fall that is steep
-    and goes on to the Nyquist frequency or into the ``floor``. A vibration in one band falls
+    and extends to the Nyquist frequency or into the ``floor``. A vibration in one band falls
     steeply too, but is louder, or ends on noise.
 
     Args:

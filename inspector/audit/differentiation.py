@@ -68,7 +68,7 @@ SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savi
 
 
 def derived(run: Run, signal: str) -> bool:
-    """Whether a run's ``meta`` says that a signal was differentiated on the way in.
+    """Whether a run's ``meta`` states that a signal was differentiated at import.
 
     Args:
         run: The run.

@@ -10,7 +10,7 @@ from inspector.audit.observability import ClassObservability, Observability
 
 
 def text(name: str, audit: Audit) -> str:
-    """Write an audit for people.
+    """An audit as text.
 
     Args:
         name: What the run is called.

@@ -6,7 +6,7 @@ The limits:
   multi-sines of 20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations,
   which are short and broad: theirs is that of the model, from its first band to its last.
 - *The model.* A run is labelled by the model of the nearest rate at or below its own. Outside of
-  its bands nothing is observable; below all models the answer is *cannot tell*.
+  its bands nothing is observable; below all models the status is *cannot tell*.
 - *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
   or a filter.
 - *Three bands.* Fewer than three of the model's bands are no spectrum; `models.LogBands` has the
@@ -101,7 +101,7 @@ def observable_classes(
                 for label in classes
             )
         slowest = min((profile.rate for profile in profiles), default=None)
-        reason = f"{rate:g} Hz is slower than every model"
+        reason = f"{rate:g} Hz is below the rate of every model"
         return tuple(
             ClassObservability(label, Observability.CANNOT_TELL, needed=slowest, reason=reason)
             for label in classes

@@ -22,7 +22,9 @@ def evaluate(
     part: InPart = Part.ALL,
     seen_too: Annotated[
         bool,
-        typer.Option("--seen-too", help="Accept runs that the model was trained on, and say so."),
+        typer.Option(
+            "--seen-too", help="Accept runs that the model was trained on; the report lists them."
+        ),
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:

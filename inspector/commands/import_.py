@@ -81,7 +81,7 @@ def import_(
             typer.echo(line)
         return
     if output is None:
-        raise typer.BadParameter("say where the run goes", param_hint="'--output' / '-o'")
+        raise typer.BadParameter("name the run file to write", param_hint="'--output' / '-o'")
     failed = False
     for result in import_logs(
         logs,

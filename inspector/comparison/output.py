@@ -10,7 +10,7 @@ from noisemodel import Comparisons
 from noisemodel.atomic import refuse_existing, replacing
 
 MOST = 8
-"""Robots that a recording may hold; more make it too slow to look at."""
+"""Robots that a recording may hold; more make the viewer too slow."""
 
 
 @dataclass(frozen=True)

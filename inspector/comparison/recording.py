@@ -54,7 +54,7 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
 
 
 def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
-    """Take the level of each estimate every 10 ms, relative to its own root mean square.
+    """Level of each estimate every 10 ms, relative to its own root mean square.
 
     Args:
         one: The comparison.

@@ -30,7 +30,7 @@ class Content:
     remarks: tuple[str, ...]
 
     def __str__(self) -> str:
-        """Say it in a line."""
+        """The content in a line."""
         labels = self.analysis.labels
         parts = [
             f"{len(self.time)} samples of noise{'' if self.extended is None else ' of two kinds'}",
@@ -50,7 +50,7 @@ def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
         kind: Kind of the extended noise, see ``noisemodel.extended``.
 
     Returns:
-        What there is; remarks say what is not.
+        What there is; remarks name what is not.
 
     Raises:
         UnknownKindError: If there is no such kind.

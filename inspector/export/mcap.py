@@ -65,7 +65,7 @@ def write_mcap(content: Content, path: Path) -> None:
         writer.finish()
 
 
-def origin(content: Content) -> int:
+def start_stamp(content: Content) -> int:
     """Time in the MCAP file of the run's time 0, in [ns].
 
     Args:
@@ -97,7 +97,7 @@ def _topics(content: Content) -> dict[str, dict[str, Any]]:
 
 def _messages(content: Content) -> Iterator[Iterator[Message]]:
     """Messages of each topic in order of time."""
-    zero = origin(content)
+    zero = start_stamp(content)
 
     def stamp(time: float) -> int:
         return max(0, zero + round(time * NANOSECONDS))

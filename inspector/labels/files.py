@@ -65,7 +65,7 @@ def write_labels(
     Args:
         spans: Annotated blocks, or findings.
         path: The file to write.
-        format_name: "noisytest", "csv" or "audacity"; by default as the suffix says.
+        format_name: "noisytest", "csv" or "audacity"; by default by the suffix.
         overwrite: Whether a file that exists may be replaced.
 
     Raises:
@@ -88,7 +88,7 @@ def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, 
     Args:
         path: The file.
         run: The run of the labels.
-        format_name: "noisytest", "csv" or "audacity"; by default as the suffix says.
+        format_name: "noisytest", "csv" or "audacity"; by default by the suffix.
 
     Returns:
         The blocks, in order of time.

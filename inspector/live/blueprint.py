@@ -21,7 +21,7 @@ class Contents:
 
     Attributes:
         joints: Title and entity paths of each plot of joint signals.
-        root: Frame that the robot is seen from; None without a robot.
+        root: Frame that the view follows; None without a robot.
         classes: Whether there are classes.
         rate: Samples per second, in [Hz].
     """

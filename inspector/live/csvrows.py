@@ -58,7 +58,7 @@ class CsvReader:
 
         Args:
             lines: The lines.
-            first: Number of the first, for people.
+            first: Number of the first, for warnings.
             note: Called with each row that cannot be read.
 
         Yields:

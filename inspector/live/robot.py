@@ -25,7 +25,7 @@ class LiveRobot:
         floating: Whether the base moves.
 
     Attributes:
-        root: Frame that the robot is seen from.
+        root: Frame that the view follows.
         children: Links that move, in the order of `transforms`; the base, if it moves, is last.
 
     Raises:

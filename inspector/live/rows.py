@@ -35,14 +35,14 @@ class Reader(Protocol):
     """Reads one format."""
 
     names: tuple[str, ...]
-    """Names of the joints; empty if the format does not say."""
+    """Names of the joints; empty if the format has none."""
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
         """Read whole lines, the first of which has a number."""
 
 
 def widen(stream: BinaryIO) -> None:
-    """Let a pipe hold as much as is read at once: its writer need not wait for us."""
+    """Set a pipe's buffer to as much as is read at once, so that its writer need not wait."""
     import fcntl
 
     with suppress(AttributeError, OSError):  # another system; no pipe

@@ -24,7 +24,7 @@ ADDRESS = re.compile(r"(?:rerun\+http://)?(?:(?P<host>[^:/]+):)?(?P<port>\d{1,5}
 START_TIMEOUT = 20.0
 """How long a viewer may take to start, in [s]."""
 CONNECT_TIMEOUT = 2.0
-"""How long a viewer may take to answer, in [s]."""
+"""Time within which a viewer has to respond, in [s]."""
 SERVICE = "/rerun.sdk_comms.v1alpha1.MessageProxyService/Knock"
 CHECK_INTERVAL = 1.0
 """Time between checks that the viewer is still there, in [s]."""
@@ -83,7 +83,7 @@ class Sink:
         """Check once in a second that the viewer is there.
 
         Returns:
-            Whether it answered now.
+            Whether it responded now.
         """
         if self._address is None or self.gone or time.monotonic() - self._checked < CHECK_INTERVAL:
             return False
@@ -160,9 +160,9 @@ def _listens(host: str, port: int) -> bool:
 
 
 def _is_viewer(host: str, port: int) -> bool:
-    """Request what no gRPC server has: one answers with a status, and others do not.
+    """Whether a gRPC server listens: one responds to an unknown service with a status.
 
-    Rerun's client itself would wait for ever for another server.
+    Rerun's client itself would wait forever for another server.
     """
     connection = HTTPConnection(host, port, timeout=CONNECT_TIMEOUT)
     try:

@@ -17,7 +17,7 @@ it happens.
 
 The frame before the first was not labelled, so that the failure sets in during the first frame's
 last hop. This is the prior: a normal distribution with `ONSET` and `DEVIATION`. Its mean is the
-answer where nothing stands out. Where no frame fits in before the first one, because the run
+result where nothing stands out. Where no frame fits in before the first one, because the run
 begins or a gap ends there, the mean is the frame's start, and the deviation that of a frame.
 
 The end is the onset of the same stretch reversed in time, with the prior `END`.
@@ -121,7 +121,7 @@ def _powers(run: Run, first: int, bins: int, size: int, *, backwards: bool) -> t
     last = np.arange(1, bins + 1)
     begin = np.maximum.accumulate(np.where(valid, 0, last))  # of the stretch without a gap
     middle = error.mean(axis=1, dtype=np.float64)
-    # What is left of a steady acceleration is constant: the second time takes that away.
+    # What is left of a steady acceleration is constant: the second time removes that.
     fast = _high_passed(_high_passed(middle, begin, rate), begin, rate)
     within = error.var(axis=1, dtype=np.float64) if size > 1 else np.zeros_like(middle)
     changes = sudden(motion.mean(axis=1, dtype=np.float64), valid, rate)

@@ -45,7 +45,7 @@ class Innovation:
         residual: Their prediction residual, of the same shape.
         total: Norm of the changes over the joints, shape (stages, samples), in [rad/s²].
         level: Norm of the residual, but no more than ``total``, shape (stages, samples), in
-            [rad/s²]: a change that was predicted and stays away is no innovation.
+            [rad/s²]: a change that was predicted and does not occur is no innovation.
     """
 
     change: Array

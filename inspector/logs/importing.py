@@ -188,8 +188,8 @@ def _of_clock(track: TimedTrack) -> Iterator[str]:
     stamps, clock = track.track.stamps, track.clock
     if stamps.unit != "seconds":
         yield f"stamps are in {stamps.unit}"
-    if stamps.origin:
-        yield stamps.origin
+    if stamps.remark:
+        yield stamps.remark
     if not clock.uniform:
         yield (
             f"resampled to {clock.rate:g} Hz (the stamps' nominal rate is"

@@ -24,7 +24,7 @@ class Stamps:
         time: Time since the first stamp, as logged, shape (samples,), in [s].
         rows: Line number of each sample, if the file has lines.
         unit: Unit of the stamps in the log.
-        origin: Remark on where they come from, if it is not the expected source.
+        remark: On their source, if it is not the expected one.
         held: Whether values apply between stamps however far apart, as those of a planned
             trajectory do.
     """
@@ -33,17 +33,17 @@ class Stamps:
     time: Array
     rows: Sequence[int] | None = None
     unit: str = "seconds"
-    origin: str = ""
+    remark: str = ""
     held: bool = False
 
     @classmethod
     def of_nanoseconds(
-        cls, stamps: NDArray[np.int64], *, origin: str = "", held: bool = False
+        cls, stamps: NDArray[np.int64], *, remark: str = "", held: bool = False
     ) -> "Stamps":
         """Stamps from whole nanoseconds, shape (samples,)."""
         first = int(stamps[0])
         return cls(
-            Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), origin=origin, held=held
+            Decimal(first).scaleb(-9), np.multiply(stamps - first, 1e-9), remark=remark, held=held
         )
 
     @classmethod

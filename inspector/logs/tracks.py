@@ -38,7 +38,7 @@ class Assignment:
         columns: Its columns.
         signal: The signal.
         joint: The joint's name, or the convention of a base.
-        explicit: Whether the mapping of the options says so.
+        explicit: Whether it is from the mapping of the options.
     """
 
     field: Field

@@ -88,7 +88,7 @@ def align(before: Run, after: Run, how: Align = Align.AUTO) -> Alignment:
 
 
 def envelope(run: Run) -> Array:
-    """Take the speed of all joints together, desired if there is one, shape (samples,).
+    """Norm of the joint velocities, desired ones if there are any, shape (samples,).
 
     The desired motion is the better guide: a defect changes what is measured.
     """

@@ -21,7 +21,7 @@ class Contents:
     Attributes:
         joints: Plots of joint signals.
         links: Links whose power before and after is shown.
-        root: Frame that the robot is seen from; None without a robot.
+        root: Frame that the view follows; None without a robot.
         lanes: How many lanes of classes there are.
         events: Whether any change is listed.
         sounds: Names of the sounds.

@@ -1,4 +1,4 @@
-"""Bring two runs to what they have in common: signals, rate, and a stretch of time."""
+"""Two runs with what they have in common: signals, rate, and a stretch of time."""
 
 from dataclasses import replace
 from typing import Any
@@ -18,7 +18,7 @@ REMARKED = 0.005
 
 
 def alike(before: Run, after: Run) -> tuple[Run, Run, tuple[str, ...]]:
-    """Leave out what only one of two runs has of the noise, and decimate the faster one.
+    """Two runs with the signals and the rate that both have.
 
     Args:
         before: A run.
@@ -103,7 +103,7 @@ def _at_rate(run: Run, rate: float) -> Run:
 
 
 def _cut(run: Run, first: int, stop: int, time: Array) -> Run:
-    """Take samples out of a run and give them other times."""
+    """A part of a run, with other times."""
     blocks = _moved(run, float(time[0] - run.time[first]), float(time[0]), float(time[-1]))
     return part(run, first, stop, time=time, blocks=blocks)
 

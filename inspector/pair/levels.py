@@ -15,9 +15,9 @@ from noisemodel.types import Array
 STEP = 0.05
 """Time over which a level is taken, in [s]."""
 FLOOR_DB = -100.0
-"""Levels of the noise below this are taken for it, in [dB re 1 rad/s]: no encoder is as quiet."""
+"""Least level of the noise, below that of any encoder, in [dB re 1 rad/s]; less is raised."""
 LINK_RANGE_DB = 40.0
-"""Links that are quieter than the loudest peak by more than this differ by nothing."""
+"""Links that are quieter than the loudest peak by more than this have no difference."""
 LOWEST_BAND = 16.0
 """Centre of the lowest octave, in [Hz]."""
 

@@ -78,14 +78,14 @@ def compare(
     robot: bool = True,
     kind: str = "normal",
 ) -> Pair:
-    """Read two run files and lay them beside each other.
+    """Two run files, aligned and analysed.
 
     Args:
         before: A run file.
         after: Another.
         library: Models to choose from by rate.
         how: How they are aligned.
-        robot: Whether to look at the robot, if both runs are of one that is known.
+        robot: Whether to compare the robot's links, if both runs are of one that is known.
         kind: Kind of the extended noise, see ``noisemodel.extended``.
 
     Returns:
@@ -101,11 +101,11 @@ def compare(
     one, other, left_out = together(one, other, alignment)
     missing = _no_links(one, other) if robot else ""
     sides = [
-        _look(path, run, library, kind=kind if robot and not missing else "")
+        _analysed(path, run, library, kind=kind if robot and not missing else "")
         for path, run in ((before, one), (after, other))
     ]
-    said = dict.fromkeys(remark for side in sides for remark in side.remarks)
-    both = [(remark, [remark in side.remarks for side in sides]) for remark in said]
+    remarked = dict.fromkeys(remark for side in sides for remark in side.remarks)
+    both = [(remark, [remark in side.remarks for side in sides]) for remark in remarked]
     return Pair(
         before=sides[0],
         after=sides[1],
@@ -123,7 +123,7 @@ def _who(before: bool, after: bool) -> str:
     return "Both" if before and after else "Before" if before else "After"
 
 
-def _look(path: Path, run: nm.Run, library: Library, *, kind: str) -> Analysis:
+def _analysed(path: Path, run: nm.Run, library: Library, *, kind: str) -> Analysis:
     """Analyse a part of a run; its links too, if a kind of noise is named."""
     digest = hashlib.sha256(path.read_bytes()).hexdigest()
     found = with_links(analyse(run, library, name=path.stem, sha256=digest), kind)
@@ -131,7 +131,7 @@ def _look(path: Path, run: nm.Run, library: Library, *, kind: str) -> Analysis:
 
 
 def _no_links(before: nm.Run, after: nm.Run) -> str:
-    """Say why the links of two runs cannot be compared; nothing if they can."""
+    """Why the links of two runs cannot be compared; empty if they can."""
     for which, run in zip(SIDES, (before, after), strict=True):
         if not robot_known(run):
             named = "names no robot" if run.robot is None else f"names {run.robot!r}, not known"

@@ -79,7 +79,7 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
 
 
 def _loudest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
-    """When to look first: at the loudest new failure, or else where the level changed most."""
+    """Time to show first: of the loudest new failure, or else of the largest change of level."""
     new = [change for change in found if change.kind == NEW]
     if new:
         worst = max(new, key=lambda change: change.level.after)

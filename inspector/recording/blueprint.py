@@ -20,7 +20,7 @@ class Contents:
     Attributes:
         joints: Plots of joint signals.
         details: Moments that were logged sample by sample.
-        root: Frame that the robot is seen from; None without a robot.
+        root: Frame that the view follows; None without a robot.
         links: Whether there is noise of links.
         terms: Whether there are the paper's terms A, B and C.
         lanes: How many lanes of classes there are, found and annotated.

@@ -14,7 +14,7 @@ from noisemodel.links import LinkNoise
 from noisemodel.noise import REFERENCE_POWER
 from noisemodel.types import Array
 
-STATES = colors.LOUDNESS
+STATES = colors.LEVELS
 """From below -20 dB to above -6 dB of the loudest link's peak."""
 THRESHOLDS_DB = (-20.0, -12.0, -6.0)
 HYSTERESIS_DB = 3.0

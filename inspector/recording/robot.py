@@ -65,13 +65,13 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
 
 
 def of_run(run: Run, folder: Path) -> UrdfTree:
-    """Read the robot of a run that names one; `load` says more."""
+    """Read the robot of a run that names one; see `load`."""
     assert run.robot is not None
     return load(run.robot, folder, (*run.joint_names, *run.desired_joint_names))
 
 
 def root(tree: UrdfTree, *, floating: bool) -> str:
-    """The frame that a robot is seen from: its base, or the world if that floats."""
+    """The frame that the view follows: the robot's base, or the world if that floats."""
     return WORLD if floating else str(tree.root_link().name)
 
 
@@ -268,7 +268,7 @@ def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> P
 def _read_by_rerun(path: Path) -> bool:
     """Whether rerun's reader of COLLADA draws a file; of others it draws nothing, silently.
 
-    Seen with 0.41 on the robots of example-robot-data: it takes triangles of version 1.4.1 only,
+    As of 0.41 on the robots of example-robot-data: it takes triangles of version 1.4.1 only,
     and turns what is not Z_UP, which URDFs do not mean.
     """
     text = path.read_text(encoding="utf-8", errors="replace")

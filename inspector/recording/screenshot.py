@@ -75,7 +75,7 @@ def shoot(
 
     Raises:
         InspectorError: If the recording cannot be read.
-        ViewerError: If a system package is missing, or the viewer ends or does not answer.
+        ViewerError: If a system package is missing, or the viewer ends or does not respond.
         OutputError: If the file exists or cannot be written.
     """
     require()
@@ -130,7 +130,7 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
         A client of the viewer.
 
     Raises:
-        ViewerError: If the viewer is not installed, ends, or does not answer.
+        ViewerError: If the viewer is not installed, ends, or does not respond.
     """
     from inspector.recording import unstable
 
@@ -138,8 +138,8 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
     start = ("--headless", "--port", str(port), "--hide-welcome-screen")
     window = ("--window-size", f"{size[0]}x{size[1]}")
     with (
-        tempfile.TemporaryDirectory() as home,
-        viewer.started(*start, *window, env=_environment(home)) as process,
+        tempfile.TemporaryDirectory() as folder,
+        viewer.started(*start, *window, env=_environment(folder)) as process,
     ):
         try:
             until = time.monotonic() + TIMEOUT
@@ -152,7 +152,7 @@ def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
                     break
                 except Exception as error:  # the client raises what it likes until the viewer is up
                     if time.monotonic() > until:
-                        raise ViewerError(f"the viewer does not answer ({error})") from error
+                        raise ViewerError(f"the viewer does not respond ({error})") from error
                     time.sleep(0.1)
             yield client
         finally:
@@ -202,11 +202,11 @@ def final_state(client: "ViewerClient") -> Any:
         time.sleep(0.5)
 
 
-def _environment(home: str) -> dict[str, str]:
-    """Keep the viewer away from the user's settings, and on software where that is possible."""
+def _environment(folder: str) -> dict[str, str]:
+    """Environment for the viewer: no settings of the user, software rendering if possible."""
     software = _drivers("lvp_icd*.json")
     driver = {"VK_DRIVER_FILES": str(software[0])} if software else {}
-    return os.environ | {"HOME": home, "XDG_RUNTIME_DIR": home, "RUST_LOG": "error"} | driver
+    return os.environ | {"HOME": folder, "XDG_RUNTIME_DIR": folder, "RUST_LOG": "error"} | driver
 
 
 def _drivers(pattern: str) -> list[Path]:

@@ -1,11 +1,11 @@
 """Every API of rerun that is marked unstable: views, their arrangement, panels, audio, bars.
 
-What churns, as seen from 0.41:
+What changes between versions, as of 0.41:
 
 - ``rerun.blueprint`` as a whole: names and arguments of views and axes change between minor
   versions, and so do the defaults of views, hence everything here is explicit;
 - ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
-  time that it is logged at; a static asset stays silent;
+  time that it is logged at; a static asset is not played;
 - ``ViewCoordinates``;
 - ``rerun.experimental``, by which a viewer returns pictures and what its views report;
 - columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
@@ -92,7 +92,7 @@ def tensor(name: str, origin: str) -> Part:
 
 
 def robot(name: str, origin: str, frame: str) -> Part:
-    """Draw what moves, as seen from a frame of transforms."""
+    """Draw what moves, in a view that follows a frame of transforms."""
     return rrb.Spatial3DView(
         origin="/",
         contents=[f"{origin}/**"],
@@ -120,7 +120,7 @@ def audio(name: str, origin: str) -> Part:
 
 
 def tabs(*parts: Part, name: str | None = None) -> Part:
-    """Put parts behind each other; the first is seen."""
+    """Put parts behind each other as tabs; the first is shown."""
     return rrb.Tabs(*parts, active_tab=0, name=name)
 
 

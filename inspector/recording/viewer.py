@@ -30,7 +30,7 @@ MAX_SCRATCH_BYTES = 1_000_000_000
 
 
 class ViewerError(InspectorError):
-    """A viewer that is missing, cannot start, or does not answer."""
+    """A viewer that is missing, cannot start, or does not respond."""
 
 
 def has_display() -> bool:

@@ -14,7 +14,7 @@ from inspector.recording import viewer
 from inspector.recording.viewer import HOST, ViewerError
 
 START_TIMEOUT = 30.0
-"""Time within which a server has to answer, in [s]."""
+"""Time within which a server has to respond, in [s]."""
 
 
 @dataclass(frozen=True)
@@ -122,5 +122,5 @@ def _wait_for(port: int, server: viewer.Process) -> None:
         else:
             return
     raise ViewerError(
-        f"the viewer does not answer on port {port}, {START_TIMEOUT:g} s after its start"
+        f"the viewer does not respond on port {port}, {START_TIMEOUT:g} s after its start"
     )

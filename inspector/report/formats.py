@@ -18,9 +18,9 @@ ANNOTATIONS = 10
 
 
 def text(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts for people, a line per run and a line per event.
+    """Verdicts as text, a line per run and a line per event.
 
-    Bad inputs are left out: the command line says them on stderr.
+    Bad inputs are left out: the command line prints them on stderr.
     """
     lines = []
     for verdict in verdicts:
@@ -34,7 +34,7 @@ def text(verdicts: Sequence[Verdict]) -> str:
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts as ``noise-verdict/2``.
+    """Verdicts as JSON, ``noise-verdict/2``.
 
     Args:
         verdicts: What was found in runs; findings that were localised have a ``localisation``.

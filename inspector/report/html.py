@@ -1,4 +1,4 @@
-"""A page about a run that needs no viewer: one file, which fetches nothing from anywhere."""
+"""A page about a run that needs no viewer: one HTML file without links to others."""
 
 import re
 from base64 import b64encode
@@ -12,16 +12,16 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
-from inspector.report.markdown import ORIGIN, note, origin
+from inspector.report.markdown import LOCALISATION, localised, note
 from inspector.sound.clip import clip, worst_time
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
 
-HEARD = "What is heard are the joints' velocities above 20 Hz, their powers added up."
+AUDIBLE = "Audible are the joints' velocities above 20 Hz; their powers are added."
 POLICY = "default-src 'none'; img-src data:; media-src data:; style-src 'unsafe-inline'"
-"""Told to browsers, so that nothing is fetched whatever a run's names are."""
+"""Policy for browsers: nothing is fetched, whatever a run's names are."""
 STYLE = """
 :root { color-scheme: light; }
 body { font: 16px/1.5 system-ui, sans-serif; color: #1b1f24; max-width: 62rem;
@@ -114,15 +114,15 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
 
 
 def _add_sound(body: ET.Element, analysis: Analysis) -> None:
-    heard = clip(analysis.run, around=worst_time(analysis))
-    _text(body, "h2", "To be heard")
-    if heard is None:
-        _text(body, "p", "The log is too slow for ears.", "note")
+    sound = clip(analysis.run, around=worst_time(analysis))
+    _text(body, "h2", "Sound")
+    if sound is None:
+        _text(body, "p", "The log's rate is too low for audible frequencies.", "note")
         return
-    source = f"data:audio/wav;base64,{_encoded(heard.data)}"
+    source = f"data:audio/wav;base64,{_encoded(sound.data)}"
     ET.SubElement(body, "audio", controls="controls", src=source)
-    span = f"From {heard.start:.2f} s to {heard.stop:.2f} s: {heard.description}."
-    _text(body, "p", f"{span} {HEARD}", "note")
+    span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
+    _text(body, "p", f"{span} {AUDIBLE}", "note")
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def _text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
 
 
 def _described(analysis: Analysis) -> str:
-    """Say in words what the picture shows."""
+    """What the picture shows, for readers without it."""
     rows = ["classes", "noise", "spectrogram of the noise"]
     rows += ["loudest links"] if analysis.links is not None else []
     return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
@@ -198,18 +198,22 @@ def facts(analysis: Analysis) -> Table:
         ("duration", f"{run.duration:.2f} s at {run.rate:g} Hz"),
         ("joints", str(len(run.joint_names))),
         ("model", analysis.model or "none"),
-        *((key, _told(run.meta[key])) for key in ("scenario", "seed", "source") if key in run.meta),
+        *(
+            (key, _in_words(run.meta[key]))
+            for key in ("scenario", "seed", "source")
+            if key in run.meta
+        ),
     ]
     return Table("", ("", ""), rows)
 
 
-def _told(value: object) -> str:
+def _in_words(value: object) -> str:
     return ", ".join(map(str, value)) if isinstance(value, list) else str(value)
 
 
 def found(analysis: Analysis) -> Iterator[Table]:
     """List findings and annotated blocks, those that there are."""
-    said = note(analysis)
+    remark = note(analysis)
     if analysis.findings:
         rows = [
             (
@@ -217,24 +221,26 @@ def found(analysis: Analysis) -> Iterator[Table]:
                 f"{event.start:.2f}",
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
-                *origin(analysis, event),
+                *localised(analysis, event),
             )
             for event in analysis.findings
         ]
-        head = ("class", "from [s]", "to [s]", "score", *ORIGIN)
-        yield Table("Findings", head, rows, (1, 2, 3), said)
+        head = ("class", "from [s]", "to [s]", "score", *LOCALISATION)
+        yield Table("Findings", head, rows, (1, 2, 3), remark)
     if analysis.run.blocks:
         annotated = [
             (
                 block.label,
                 f"{block.start:.2f}",
                 f"{block.stop:.2f}",
-                *origin(analysis, block),
+                *localised(analysis, block),
             )
             for block in analysis.run.blocks
         ]
-        said = "" if analysis.findings else said
-        yield Table("Annotated", ("class", "from [s]", "to [s]", *ORIGIN), annotated, (1, 2), said)
+        remark = "" if analysis.findings else remark
+        yield Table(
+            "Annotated", ("class", "from [s]", "to [s]", *LOCALISATION), annotated, (1, 2), remark
+        )
 
 
 def parts(analysis: Analysis) -> Iterator[Table]:
@@ -277,7 +283,7 @@ def _ranked(
     facts: Sequence[tuple[str, ...]],
     note: str,
 ) -> Table:
-    """Order parts by their power, and say how many are left out."""
+    """Rows of parts by their power, and how many are left out."""
     share = power / (power.sum() or 1.0)
     order = np.argsort(-power, kind="stable")[:MOST]
     rows = [(names[i], f"{share[i]:.1%}", *facts[i]) for i in order]

@@ -1,4 +1,4 @@
-"""Words for where a failure was localised, as reports print them."""
+"""Localisation of a failure in words, as reports print it."""
 
 from inspector.localisation.localise import Localisation
 
@@ -9,7 +9,7 @@ PRECISE = 10.0
 
 
 def words(found: Localisation, *, quote: str = "") -> tuple[str, str, str]:
-    """Put a localisation into words.
+    """A localisation in words.
 
     Args:
         found: The localisation of a failure.

@@ -1,4 +1,4 @@
-"""The report that lies in a recording, in Markdown."""
+"""The report of a recording, in Markdown."""
 
 from collections.abc import Sequence
 
@@ -9,9 +9,9 @@ from inspector.report.localisation import words
 from models import Event
 from noisemodel import Block
 
-ORIGIN = ("shows first in", "by joints", "band", "links, shares of the excess")
-"""Names of the columns that say where a failure comes from."""
-HEAD = ("class", "from [s]", "to [s]", *ORIGIN)
+LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")
+"""Names of the columns of a localisation."""
+HEAD = ("class", "from [s]", "to [s]", *LOCALISATION)
 
 
 def report(analysis: Analysis) -> str:
@@ -42,14 +42,14 @@ def report(analysis: Analysis) -> str:
                 f"{e.label}{e.novelty}",
                 f"{e.start:.2f}",
                 f"{e.stop:.2f}",
-                *origin(analysis, e, quote="`"),
+                *localised(analysis, e, quote="`"),
             )
             for e in analysis.findings
         ]
         parts += ["## Events", _table(HEAD, found)]
     if run.blocks:
         rows = [
-            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *origin(analysis, b, quote="`"))
+            (b.label, f"{b.start:.2f}", f"{b.stop:.2f}", *localised(analysis, b, quote="`"))
             for b in run.blocks
         ]
         parts += ["## Annotated", _table(HEAD, rows)]
@@ -61,8 +61,8 @@ def report(analysis: Analysis) -> str:
 
 
 def sentence(analysis: Analysis, event: Event | Block) -> str:
-    """Say what an event is, when, and where it comes from."""
-    stage, joints, *others = origin(analysis, event, quote="`")
+    """Class, time and localisation of an event, in a line of Markdown."""
+    stage, joints, *others = localised(analysis, event, quote="`")
     by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
     where = "; ".join(part for part in (by, *others) if part)
     novel = event.novelty if isinstance(event, Event) else ""
@@ -70,10 +70,15 @@ def sentence(analysis: Analysis, event: Event | Block) -> str:
     return f"{event.label}, {when}{where and f': {where}'}"
 
 
-def origin(
+def novelty(event: Event | Block) -> str:
+    """Remark that an event is out of distribution; empty if it is not."""
+    return ", out of distribution" if isinstance(event, Event) and event.novel else ""
+
+
+def localised(
     analysis: Analysis, failure: Event | Block, *, quote: str = ""
 ) -> tuple[str, str, str, str]:
-    """Say where a failure comes from: stage of the control flow, joints, band, links."""
+    """Localisation of a failure in words: stage of the control flow, joints, band, links."""
     if failure.label == "ok":
         return "", "", "", ""
     known = analysis.localisations[failure]
@@ -81,7 +86,7 @@ def origin(
 
 
 def note(analysis: Analysis) -> str:
-    """Say why no failure has a stage; nothing if that is not so."""
+    """Why no failure has a stage; empty if the run has stages."""
     if not analysis.localisations or has_stages(analysis.run):
         return ""
     return "No stages: the run has neither desired velocities nor named stages of the control flow."

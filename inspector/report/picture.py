@@ -72,7 +72,7 @@ def _class_names(analysis: Analysis) -> list[str]:
 
 
 def _classes(axes: "Axes", analysis: Analysis) -> None:
-    """Draw a row for each class: filled what was found, hatched what somebody annotated."""
+    """Draw a row for each class: findings filled, annotations hatched."""
     names = _class_names(analysis)
     shades = colors.of_classes(tuple(names))
     for row, name in enumerate(names):

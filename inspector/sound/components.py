@@ -101,10 +101,10 @@ def _of_links(run: nm.Run, kind: str, link: str) -> Components:
         raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
     robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
     surface = nm.Surface.of(robot, "auto")
-    heard = [name for name in surface.names if name not in surface.without_geometry]
-    if link and link not in heard:
-        raise InspectorError(f"no link {link!r} that makes noise; there are {', '.join(heard)}")
-    chosen = [surface.names.index(name) for name in ([link] if link else heard)]
+    noisy = [name for name in surface.names if name not in surface.without_geometry]
+    if link and link not in noisy:
+        raise InspectorError(f"no link {link!r} that makes noise; there are {', '.join(noisy)}")
+    chosen = [surface.names.index(name) for name in ([link] if link else noisy)]
     motions = [robot.configuration(run)]
     if (desired := robot.desired(run)) is not None:
         motions.append(desired)

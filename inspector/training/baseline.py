@@ -125,10 +125,10 @@ def _read(path: Path, rate: float | None) -> Iterator[tuple[Source, models.Recor
 def _check(source: Source, first: Source) -> None:
     """Refuse a recording of another rate or robot than the first."""
     if abs(source.rate / first.rate - 1) > models.profile.TOLERANCE:
-        slower = min(source.rate, first.rate)
+        lower = min(source.rate, first.rate)
         raise InspectorError(
             f"{source.path}: recorded at {source.rate:g} Hz, {first.path} at {first.rate:g} Hz;"
-            f" --rate {slower:g} decimates the faster ones"
+            f" --rate {lower:g} decimates the faster ones"
         )
     if source.robot and first.robot and source.robot != first.robot:
         raise InspectorError(
@@ -136,9 +136,9 @@ def _check(source: Source, first: Source) -> None:
             " a baseline is of one robot"
         )
     if source.joints and first.joints and source.joints != first.joints:
-        odd = sorted(source.joints ^ first.joints)
+        differing = sorted(source.joints ^ first.joints)
         raise InspectorError(
-            f"{source.path}: has other joints than {first.path} ({', '.join(odd[:3])});"
+            f"{source.path}: has other joints than {first.path} ({', '.join(differing[:3])});"
             " a baseline is of one robot"
         )
 

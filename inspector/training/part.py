@@ -14,6 +14,6 @@ class Part(StrEnum):
         """Whether a recording belongs to this part.
 
         Args:
-            held_out: What ``models.held_out`` says of its group.
+            held_out: Result of ``models.held_out`` for its group.
         """
         return self is Part.ALL or held_out == (self is Part.TEST)

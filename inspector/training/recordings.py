@@ -56,7 +56,7 @@ def of_annotated_run(path: Path, rate: float) -> models.Recording:
         Its norms and joints with its blocks.
 
     Raises:
-        InspectorError: If the run is slower than that, or has no blocks.
+        InspectorError: If the run's rate is lower, or it has no blocks.
     """
     found = of_run(path, nm.Run.load(path), rate)
     if not found.blocks:
@@ -76,18 +76,18 @@ def of_run(path: Path, run: nm.Run, rate: float) -> models.Recording:
         Its norms and joints with its blocks, if it has any.
 
     Raises:
-        InspectorError: If the run is slower than that.
+        InspectorError: If the run's rate is lower.
     """
     if run.rate < rate * (1 - 1e-3):
         raise InspectorError(f"{path}: recorded at {run.rate:g} Hz, the model needs {rate:g} Hz")
-    slower = nm.decimated(run, rate)
+    decimated = nm.decimated(run, rate)
     return models.Recording(
         name=path.stem,
-        signal={**nm.norms(slower), **nm.by_joint(slower)},
+        signal={**nm.norms(decimated), **nm.by_joint(decimated)},
         rate=rate,
-        blocks=tuple(models.Block(b.start, b.stop, b.label) for b in slower.blocks),
-        start=float(slower.time[0]),
-        valid=slower.mask,
+        blocks=tuple(models.Block(b.start, b.stop, b.label) for b in decimated.blocks),
+        start=float(decimated.time[0]),
+        valid=decimated.mask,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
     )
 

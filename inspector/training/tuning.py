@@ -274,7 +274,7 @@ def _trial(
 
 
 def _validation_name(recording: models.Recording) -> str:
-    """A name unlike those of the training set: both folders of NoisyTest have the same names."""
+    """A name that is not in the training set: both folders of NoisyTest have the same names."""
     name = recording.name
     return f"{name} of the validation set" if group_of(name) == name else name
 

@@ -90,7 +90,7 @@ def stamps_of(logged: "array[int]", received: "array[int]") -> Stamps:
     """Stamps of the messages, or if they have none, of the recorder."""
     if any(logged):
         return Stamps.of_nanoseconds(np.frombuffer(logged, dtype=np.int64))
-    return Stamps.of_nanoseconds(np.frombuffer(received, dtype=np.int64), origin=RECORDER)
+    return Stamps.of_nanoseconds(np.frombuffer(received, dtype=np.int64), remark=RECORDER)
 
 
 def _count(numbers: Sequence[float] | bytes | memoryview) -> int:

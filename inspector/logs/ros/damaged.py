@@ -105,7 +105,7 @@ def _sqlite_messages(file: Path, lost: list[str]) -> Iterator[Message]:
 
 
 def _database(file: Path) -> sqlite3.Connection:
-    """Database that may be shorter than its header says."""
+    """Database that may be shorter than its header states."""
     database = sqlite3.connect(f"{file.resolve().as_uri()}?immutable=1", uri=True)
     database.execute("PRAGMA writable_schema = ON")  # otherwise SQLite refuses to open it
     return database

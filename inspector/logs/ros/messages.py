@@ -38,7 +38,7 @@ class TopicReader(Protocol):
 
 
 class JointStates:
-    """``sensor_msgs/JointState``: measured motion, or desired if the topic's name says so."""
+    """``sensor_msgs/JointState``: measured motion, or desired by the topic's name."""
 
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
