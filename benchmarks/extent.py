@@ -23,13 +23,13 @@ import noisemodel as nm
 from inspector.assets import model_files
 from inspector.library import load_library
 from inspector.localisation.extent import extent
-from scenarios.sample import LOWERED, Sample
+from scenarios.sample import DECIMATED, Sample
 
 WITHIN = (0.05, 0.1, 0.2)
 """Errors that are counted, in [s]."""
 CLASSES = ("impact", "highaccelerations", "oscillations", "all")
 MODELS = ("joints-1khz", "scalar-10khz")
-"""Models whose findings are looked at."""
+"""Models whose findings are measured."""
 LIBRARY = load_library([path for path in model_files() if path.stem in MODELS])
 
 
@@ -40,7 +40,7 @@ def run_of(sample: Sample, model: str) -> nm.Run:
         return nm.Run(time=time, velocity=sample.noise[:, None], joint_names=("noise",))
     measured, desired = (sample.joints[f"{name}_joints"].T for name in ("measured", "desired"))
     return nm.Run(
-        time=np.arange(len(measured)) / LOWERED,
+        time=np.arange(len(measured)) / DECIMATED,
         velocity=measured,
         velocity_desired=desired,
         joint_names=tuple(f"joint{number}" for number in range(measured.shape[1])),

@@ -14,7 +14,7 @@ as a part of all frames they would make every error small.
 The third table is the question of the paper whether a model serves another robot: the same models
 get fewer joints, in the paper the knees and ankles of LOLA. Samples have norms of whole limbs, and
 only the legs of our walkers are driven, so that both legs of TALOS have 98 % of the power of its
-noise; one leg has half of it, with another course in time. For Go2 it is two feet that swing
+noise; one leg has half of it, with other values over time. For Go2 it is two feet that swing
 together, since front and hind legs are similar. Failures at a foot that is left out count too.
 """
 

@@ -22,7 +22,7 @@ from joblib.externals.loky import get_reusable_executor
 
 import models
 from inspector.training.tuning import Search, tune
-from models.tuning.search import ask
+from models.tuning.search import validate
 
 
 def timed(work: Callable[[], object]) -> tuple[object, float, float]:
@@ -71,8 +71,8 @@ def main() -> None:
     for index in random.integers(len(tuned.profiles), size=given.naive):
         point = tuned.profiles[index]
         predicted, cpu, _ = timed(lambda point=point: alone(point, sets))
-        found = ask([point], tuned.trial)
-        same += np.array_equal(predicted, np.array(found.classes)[found.answers[0].chosen])
+        found = validate([point], tuned.trial)
+        same += np.array_equal(predicted, np.array(found.classes)[found.decisions[0].chosen])
         spent += cpu
     each = spent / given.naive
     print(f"naively {1e3 * each:.0f} ms CPU a point, {each * count / 60:.0f} min for the grid;")

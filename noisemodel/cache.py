@@ -1,4 +1,4 @@
-"""Arrays that took long to make, kept in the user's cache folder for the next time."""
+"""Cache of arrays that take long to make, in the user's cache folder."""
 
 import hashlib
 import io
@@ -17,11 +17,11 @@ from noisemodel.errors import OutputError
 Arrays: TypeAlias = dict[str, NDArray[Any]]
 
 DIGEST = 32
-"""Bytes after the archive that show whether it is whole; npz does not mind them."""
+"""Bytes after the archive that show whether it is whole; NumPy ignores them."""
 
 
-def remembered(key: str, make: Callable[[], Arrays]) -> Arrays:
-    """Look arrays up by a key, and make them if they are not known yet.
+def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
+    """Arrays by a key: from the cache if it has them, or else made and kept.
 
     A cache is a convenience: a file that is damaged is made anew, a folder that cannot be
     written to is left alone. It may be deleted at any time.
@@ -36,7 +36,7 @@ def remembered(key: str, make: Callable[[], Arrays]) -> Arrays:
     """
     try:
         file = folder() / f"{key}.npz"
-    except RuntimeError:  # the user has no home
+    except RuntimeError:  # the user has no home folder
         return make()
     try:
         return _read(file)
@@ -66,10 +66,10 @@ def _write(file: Path, arrays: Arrays) -> None:
 
 
 def folder() -> Path:
-    """Name the folder of what is remembered about surfaces (which need not exist).
+    """The folder of cached surfaces (which need not exist).
 
     Raises:
-        RuntimeError: If the user has no home.
+        RuntimeError: If the user has no home folder.
     """
     base = Path(os.environ.get("XDG_CACHE_HOME", ""))
     if not base.is_absolute():  # as the XDG base directory specification has it

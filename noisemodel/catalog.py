@@ -109,7 +109,7 @@ ROBOTS: Mapping[str, Listed] = MappingProxyType(
 
 
 def package_roots() -> tuple[Path, ...]:
-    """Name the folders in which the listed robots' ``package://`` addresses are looked up.
+    """Folders that the listed robots' ``package://`` addresses are searched in.
 
     Raises:
         RobotError: If example-robot-data is not installed.

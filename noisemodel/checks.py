@@ -76,7 +76,7 @@ def check_valid(valid: Mask, samples: int) -> None:
             f"valid: shape {valid.shape} of {valid.dtype}, expected {(samples,)} of bool"
         )
     if not valid.any():
-        raise RunError("valid: false in every sample, nothing is left to look at")
+        raise RunError("valid: false in every sample, no sample is left")
 
 
 def check_blocks(blocks: Sequence[Block], time: Array) -> None:

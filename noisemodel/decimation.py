@@ -1,4 +1,4 @@
-"""Runs decimated to a lower sample rate, as a logger of that rate would have seen the motion."""
+"""Runs decimated to a lower sample rate, as a logger of that rate would have recorded them."""
 
 from dataclasses import replace
 from fractions import Fraction

@@ -109,7 +109,7 @@ class MissingMeshError(MeshError):
 
     def __init__(self, mesh: str | Path, problem: str) -> None:
         super().__init__(mesh, problem)
-        self.args = (f"{self}; `missing='skip'` goes on without",)
+        self.args = (f"{self}; `missing='skip'` leaves it out",)
 
 
 class UnknownRobotError(RobotError):

@@ -1,6 +1,6 @@
 """Excitation motion of any robot without a simulator: slow sines, ripple, two shakes, a jerk.
 
-Every joint follows three slow sines, its travel, with a small ripple at all frequencies above, as
+Every joint follows three slow sines with a small ripple at all frequencies above, as
 of real drives. A floating base moves in the same way at a tenth of the speed. There are three
 events:
 
@@ -9,9 +9,9 @@ events:
   simplified noise does not distinguish them;
 - ``jerk``: the speed of all joints jumps within one sample, and the jump decays.
 
-Positions keep to the limits of the URDF: the travel of a joint with little room or speed is scaled
-down. Limits that leave no room at all (lower = upper) or no speed are not taken for limits. Joints
-that mimic another one follow it; the base's pose does not change the noise and stays at the origin.
+Positions keep to the limits of the URDF: the motion of a joint with a small range or speed is
+scaled down. Limits without any range (lower = upper) or speed are not taken for limits. Joints that
+mimic another one follow it; the base's pose does not change the noise and stays at the origin.
 """
 
 from typing import NamedTuple
@@ -29,17 +29,17 @@ SECONDS = 6.0
 RATE = 4000.0
 """Sample rate unless another is given, in [Hz]."""
 NOMINAL_SPEED = {"prismatic": 0.3}
-"""Speed of the travel in [m/s]; of joints that turn it is 1 rad/s."""
+"""Speed of the slow sines in [m/s]; of joints that turn it is 1 rad/s."""
 BASE_SPEED = 0.1
 """Speed of a floating base, in [m/s] and [rad/s]."""
-TRAVEL_HZ = (0.1, 0.8)
+SINES_HZ = (0.1, 0.8)
 SINES = 3
 RIPPLE = 0.01
 """Root mean square of the ripple, as a share of the joint's nominal speed."""
 RIPPLE_HZ = 10.0
 """Lowest frequency of the ripple, which has the same power in every octave above, in [Hz]."""
-ROOM = 0.9
-"""Share of its room and its speed that a joint may use for its travel."""
+USABLE = 0.9
+"""Share of its range and of its speed that a joint uses at most."""
 SHAKE = 0.2
 """Amplitude of a shake, in [rad/s]."""
 SHAKE_HZ = (40.0, 200.0)
@@ -54,17 +54,17 @@ class Limits(NamedTuple):
 
     Attributes:
         centre: Middle of the range, 0 without one, in [rad] or [m].
-        room: Width of the range, in [rad] or [m].
+        range: Width of the range, in [rad] or [m].
         speed: Largest speed, in [rad/s] or [m/s].
     """
 
     centre: Array
-    room: Array
+    range: Array
     speed: Array
 
 
 def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
-    """Motion of a robot that excites every joint, as this module's first lines say.
+    """Motion of a robot that excites every joint, as the module's docstring defines it.
 
     Args:
         robot: Any robot.
@@ -88,12 +88,12 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     time = np.arange(round(SECONDS * rate)) / rate
     joints = {joint.name: joint for joint in robot.joints if joint.name in robot.joint_names}
     speed = np.array([NOMINAL_SPEED.get(joint.kind, 1.0) for joint in joints.values()])
-    velocity = _travel_and_events(time, len(joints), random, rate) * speed
+    velocity = _motion(time, len(joints), random, rate) * speed
     bounds = limits(robot)
     position = np.cumsum(velocity, axis=0) / rate
     low, high = _extent(position)
-    scale = np.minimum(1.0, ROOM * bounds.room / np.maximum(high - low, 1e-9))
-    scale = np.minimum(scale, ROOM * bounds.speed / np.maximum(abs(velocity).max(axis=0), 1e-9))
+    scale = np.minimum(1.0, USABLE * bounds.range / np.maximum(high - low, 1e-9))
+    scale = np.minimum(scale, USABLE * bounds.speed / np.maximum(abs(velocity).max(axis=0), 1e-9))
     velocity = velocity * scale
     hertz = random.uniform(*SHAKE_HZ)
     blocks = [Block(*JERK, "jerk")]
@@ -101,7 +101,7 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
         column = robot.joint_names.index(joint)
         velocity[:, column] += SHAKE * _burst(time, start, stop, hertz)
         blocks.append(Block(start, stop, label))
-    base = BASE_SPEED * _travel_and_events(time, 6, random, rate) if robot.floating_base else None
+    base = BASE_SPEED * _motion(time, 6, random, rate) if robot.floating_base else None
     return Run(
         time=time,
         velocity=velocity,
@@ -132,8 +132,8 @@ def limits(robot: Robot) -> Limits:
         upper = float(model.upperPositionLimit[model.idx_qs[index]])
         speed = float(model.velocityLimit[model.idx_vs[index]])
         bounded = kinds[name] != "continuous" and 0.0 < upper - lower < np.inf
-        centre, room = ((lower + upper) / 2, upper - lower) if bounded else (0.0, np.inf)
-        rows.append((centre, room, speed if speed > 0.0 else np.inf))
+        centre, width = ((lower + upper) / 2, upper - lower) if bounded else (0.0, np.inf)
+        rows.append((centre, width, speed if speed > 0.0 else np.inf))
     return Limits(*np.array(rows, dtype=np.float64).reshape(-1, 3).T)
 
 
@@ -163,22 +163,22 @@ def ends(robot: Robot) -> tuple[str, ...]:
     return tuple(dict.fromkeys(robot.joints[index - 1].name for index in (near, far)))
 
 
-def _travel_and_events(time: Array, axes: int, random: np.random.Generator, rate: float) -> Array:
-    """Travel, ripple and jerk of each axis at a nominal speed of 1, shape (samples, axes)."""
-    travel = _travel(time, axes, random)
+def _motion(time: Array, axes: int, random: np.random.Generator, rate: float) -> Array:
+    """Slow sines, ripple and jerk of each axis at a nominal speed of 1, shape (samples, axes)."""
+    slow = _sines(time, axes, random)
     ripple = RIPPLE * _ripple(len(time), axes, random, rate)
     after = np.maximum(time - JERK[0], 0.0)
     jump = 0.5 * (time >= JERK[0]) * np.exp(-after / JERK_DECAY)
-    velocity: Array = travel + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
+    velocity: Array = slow + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
     return velocity
 
 
-def _travel(time: Array, axes: int, random: np.random.Generator) -> Array:
+def _sines(time: Array, axes: int, random: np.random.Generator) -> Array:
     """Sum slow sines, spread evenly over octaves, to a mean square of 1, shape (samples, axes)."""
-    hertz = np.exp(random.uniform(np.log(TRAVEL_HZ[0]), np.log(TRAVEL_HZ[1]), (SINES, axes)))
+    hertz = np.exp(random.uniform(np.log(SINES_HZ[0]), np.log(SINES_HZ[1]), (SINES, axes)))
     phase = random.uniform(0.0, 2.0 * np.pi, (SINES, axes))
-    travel: Array = np.sin(2.0 * np.pi * time[:, None, None] * hertz + phase).sum(axis=1)
-    return travel * float(np.sqrt(2.0 / SINES))
+    sines: Array = np.sin(2.0 * np.pi * time[:, None, None] * hertz + phase).sum(axis=1)
+    return sines * float(np.sqrt(2.0 / SINES))
 
 
 def _ripple(samples: int, axes: int, random: np.random.Generator, rate: float) -> Array:

@@ -75,7 +75,7 @@ def triangles(
         robot: The robot.
         geometry: "visual" or "collision", as the URDF has them; "hull", the convex hull of every
             visual by itself; or "auto", the visual or, of a link that has none, the collision.
-        missing: What to do about a mesh that is not there: "error", or "skip" it and say so.
+        missing: What to do about a mesh that is not there: "error", or "skip" it with a warning.
 
     Returns:
         The triangles of every link that moves.
@@ -129,7 +129,7 @@ def triangles(
 
 
 def _links(robot: Robot) -> tuple[dict[str, tuple[int, Array, Array]], tuple[str, ...]]:
-    """Say which joint moves each link of the URDF and where it sits there, and name the links."""
+    """Joint that moves each link of the URDF, the link's pose there, and the links' names."""
     from pinocchio import FrameType
 
     bodies = [frame for frame in robot.model.frames if frame.type == FrameType.BODY]

@@ -10,7 +10,7 @@ from noisemodel.robot import Robot
 from noisemodel.types import Array, Real
 
 CHUNK = 4096
-"""Samples that are worked on at once: few enough for the cache, many enough to forget Python."""
+"""Samples that are worked on at once: few enough for the cache, with little overhead of Python."""
 
 
 def link_twists(robot: Robot, q: Real, v: Real) -> Array:

@@ -81,15 +81,17 @@ def by_moments(
             continue
         entries, jacobian = jacobians(int(joint))
         forms = {"normal": link.mean_square_normal, "rms": link.mean_square}
-        seen = {kind: _seen(forms[kind], jacobian) for kind in {kind for kind, _ in motions}}
+        projected = {
+            kind: _projected(forms[kind], jacobian) for kind in {kind for kind, _ in motions}
+        }
         for total, (kind, _), product in zip(power, motions, products, strict=True):
-            square = np.einsum("jkb,jkb->b", seen[kind], product[entries[:, None], entries])
+            square = np.einsum("jkb,jkb->b", projected[kind], product[entries[:, None], entries])
             # Rounding may make a square negative.
             total[:, place] = sound_power(np.maximum(square, 0.0), link.area)
     return power
 
 
-def _seen(form: Array, jacobian: Array) -> Array:
+def _projected(form: Array, jacobian: Array) -> Array:
     """J' M J, shape (entries, entries, bins)."""
     pushed = (form @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
     return np.asarray(np.einsum("ajb,akb->jkb", pushed, jacobian))

@@ -1,4 +1,4 @@
-"""What a URDF gives its links to be seen or to collide: shapes and meshes, each in its place."""
+"""Visual and collision geometry of a URDF's links: shapes and meshes, each with its pose."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -63,7 +63,7 @@ def read(urdf: Path, use: str) -> list[LinkShape]:
         All pieces, in the order of the file.
 
     Raises:
-        GeometryError: If a shape is not known, or a size or a scale is no number that can be.
+        GeometryError: If a shape is unknown, or a size or a scale is no number that can be.
     """
     root = ET.parse(urdf).getroot()  # noqa: S314
     return [

@@ -1,4 +1,4 @@
-"""The surface of one link: integrals that say how fast it moves on average."""
+"""The surface of one link: integrals that give its mean speed in any motion."""
 
 import hashlib
 from dataclasses import asdict, dataclass
@@ -7,7 +7,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.cache import remembered
+from noisemodel.cache import cached
 from noisemodel.moments import moments
 from noisemodel.quadrature import Cloud, fine, point_speeds, reduced
 from noisemodel.turning import rounding, tabulate
@@ -33,7 +33,7 @@ class LinkSurface:
         mean_square_normal: The same for the speed normal to the surface, shape (6, 6).
         rounding: Axes in which equal rotations have equal mean-square speed, shape (3, 3).
         turning: Ratio of mean to root-mean-square speed of rotations, by axis, as a table.
-        points: Weighted points that stand for the surface.
+        points: Weighted points on the surface.
     """
 
     area: float
@@ -47,7 +47,7 @@ class LinkSurface:
 
     @classmethod
     def of(cls, triangles: Array, axis: Array | None) -> Self:
-        """Integrate over the triangles of a link, or remember having done so.
+        """Surface of a link by integrals over its triangles, which are cached.
 
         Args:
             triangles: Corners in the joint's axes, shape (triangles, 3, 3), in [m].
@@ -58,10 +58,10 @@ class LinkSurface:
         """
         content = hashlib.sha256(triangles.tobytes())
         content.update(b"any" if axis is None else axis.tobytes())
-        known = remembered(f"{VERSION}-{content.hexdigest()}", lambda: _integrals(triangles, axis))
-        points = Cloud(known.pop("points"), known.pop("weights"))
-        area, lever = float(known.pop("area")), float(known.pop("lever"))
-        return cls(area=area, lever=lever, points=points, **known)
+        kept = cached(f"{VERSION}-{content.hexdigest()}", lambda: _integrals(triangles, axis))
+        points = Cloud(kept.pop("points"), kept.pop("weights"))
+        area, lever = float(kept.pop("area")), float(kept.pop("lever"))
+        return cls(area=area, lever=lever, points=points, **kept)
 
 
 def _integrals(triangles: Array, axis: Array | None) -> dict[str, NDArray[Any]]:
@@ -83,7 +83,7 @@ def _integrals(triangles: Array, axis: Array | None) -> dict[str, NDArray[Any]]:
 
 
 def _lever(cloud: Cloud, axis: Array | None) -> float:
-    """Take the mean distance from an axis through the origin."""
+    """Mean distance from an axis through the origin."""
     if axis is None:
         return float("nan")
     turning = np.concatenate((np.zeros(3), axis))[:, None]

@@ -13,12 +13,12 @@ from types import MappingProxyType
 import numpy as np
 
 from noisemodel import collada, obj, stl
-from noisemodel.cache import Arrays, remembered
+from noisemodel.cache import Arrays, cached
 from noisemodel.errors import MeshError
 from noisemodel.types import Array, Mesh
 
 VERSION = 1
-"""Of all that decides what triangles a file has; to be raised with every change of it."""
+"""Version of the code that reads triangles; to be raised with every change of its results."""
 
 TAIL = 1024
 """Bytes at the end of a file among which its closing word is."""
@@ -63,7 +63,7 @@ def hull(path: Path) -> Array:
 
 
 def check_whole(path: Path) -> None:
-    """See whether a file of a known kind ends where it should, without reading all of it.
+    """Refuse a file of a known kind that is cut off, without reading all of it.
 
     Raises:
         MeshError: If it is empty, cut off or not what its name says, or cannot be read.
@@ -104,7 +104,7 @@ def _kept(what: str, path: Path, data: bytes, make: Callable[[], Mesh]) -> Array
         points, faces = make()
         return {"points": points, "faces": faces.astype(np.int32)}
 
-    kept = remembered(f"{what}-{VERSION}-{path.suffix.lower()[1:]}-{content}", arrays)
+    kept = cached(f"{what}-{VERSION}-{path.suffix.lower()[1:]}-{content}", arrays)
     triangles: Array = kept["points"][kept["faces"]]
     return triangles
 

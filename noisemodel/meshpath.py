@@ -13,7 +13,7 @@ def find(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
         address: As the URDF has it: ``package://`` (two slashes or three), ``file://``, or a path
             relative to the URDF.
         urdf: The URDF.
-        roots: Folders in which ``package://`` addresses are looked up. Meshes lie in one of these
+        roots: Folders that ``package://`` addresses are searched in. Meshes lie in one of these
             or beside the URDF.
 
     Returns:
@@ -33,7 +33,7 @@ def find(address: str, urdf: Path, roots: Sequence[Path]) -> Path:
     if not found:
         raise MissingMeshError(address, f"not found in {', '.join(map(str, roots))}")
     allowed = (*roots, urdf.parent)
-    # Resolving takes longer than all else here, and most folders are where their names say.
+    # Resolving takes longer than all else here, and most folders are no links.
     if not any(found[0].is_relative_to(root) for root in allowed) and not any(
         found[0].is_relative_to(root.resolve()) for root in allowed
     ):

@@ -1,4 +1,4 @@
-"""A thousand weighted points that stand for a surface where no exact integral is known."""
+"""A thousand weighted points that approximate a surface where no exact integral is known."""
 
 from dataclasses import dataclass
 from typing import TypeAlias
@@ -48,7 +48,7 @@ def fine(triangles: Array) -> Cloud:
     """
     triangles, areas, _ = faces(triangles)
     spread = np.linalg.eigvalsh(_statistics(*edge_points(triangles, areas), ALL)[1][0])
-    # A slender link that spins about itself is seen only by steps smaller than it is thick.
+    # A slender link that spins about itself is resolved only by steps smaller than it is thick.
     thickness, length = np.sqrt(np.maximum([spread[:2].sum(), spread[2]], 0.0))
     step = max(thickness / FINENESS, SLENDEREST * length)
     step = min(step, 0.05 * np.sqrt(areas.sum()))  # enough points for any number of cells
@@ -133,10 +133,10 @@ def point_speeds(points: Array, twists: Array) -> Array:
 
 
 def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Rows]:
-    """Sort the points by cells, and say where each cell begins.
+    """Points sorted by cells, and where each cell begins.
 
-    Cells are cut at their mean across their longest axis. The cloud is seen in axes in which it
-    is less slender: so a rod is cut around itself, too, and not only along.
+    Cells are cut at their mean across their longest axis. The cloud is transformed to axes in
+    which it is less slender: so a rod is cut around itself, too, and not only along.
     """
     points, weights = cloud.points @ _plumper(cloud), cloud.weights
     order, starts = np.arange(len(points)), np.zeros(1, dtype=np.intp)

@@ -29,7 +29,7 @@ class Robot:
     Attributes:
         name: Its name in the list, or that of its URDF file.
         path: The URDF that it was read from.
-        package_roots: Folders in which ``package://`` addresses are looked up.
+        package_roots: Folders that ``package://`` addresses are searched in.
         model: Pinocchio's model; mimic joints are joints of their own in it.
         joints: All joints after the universe, in Pinocchio's order.
         nq: Length of a configuration.
@@ -56,7 +56,7 @@ class Robot:
 
         Args:
             name: A listed name (see ``noisemodel.ROBOTS``), or the path of a URDF.
-            floating_base: Whether the base moves freely; unless given, as the list says, and
+            floating_base: Whether the base moves freely; unless given, as listed, and
                 False for a URDF of one's own.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
 
@@ -208,7 +208,7 @@ def locate(name: str | Path) -> Path:
 
 
 def package_roots(name: str | Path) -> tuple[Path, ...]:
-    """Name the folders in which a robot's meshes are looked up, and outside of which none may lie.
+    """Folders that a robot's meshes are searched in, and outside of which none may lie.
 
     Args:
         name: A listed name, or the path of a URDF: then its folder and the two above it, or
@@ -228,12 +228,12 @@ def _model(path: Path, floating_base: bool) -> Any:
     import pinocchio
 
     root = (pinocchio.JointModelFreeFlyer(),) if floating_base else ()
-    with kept_stderr() as said:
+    with kept_stderr() as messages:
         try:
             return pinocchio.buildModelFromUrdf(str(path), *root)
         except (ValueError, RuntimeError) as error:
-            # The exception only says that the URDF is not valid; the reason went to stderr.
-            reasons = re.findall(r"Error: +(.+)", said()) or [str(error)]
+            # The exception only states that the URDF is not valid; the reason went to stderr.
+            reasons = re.findall(r"Error: +(.+)", messages()) or [str(error)]
             reason = " ".join(reasons[0].split())
             raise RobotError(f"{path}: Pinocchio cannot read the URDF ({reason})") from error
 

@@ -76,15 +76,15 @@ class Run:
 
     def __post_init__(self) -> None:
         """Fill in defaults and check everything once."""
-        settle = object.__setattr__
-        settle(self, "time", np.asarray(self.time, dtype=np.float64))
-        settle(self, "desired_joint_names", self.desired_joint_names or self.joint_names)
-        settle(self, "blocks", tuple(sorted(self.blocks)))
-        settle(self, "stages", MappingProxyType(dict(self.stages)))
-        settle(self, "meta", MappingProxyType(dict(self.meta)))
+        assign = object.__setattr__
+        assign(self, "time", np.asarray(self.time, dtype=np.float64))
+        assign(self, "desired_joint_names", self.desired_joint_names or self.joint_names)
+        assign(self, "blocks", tuple(sorted(self.blocks)))
+        assign(self, "stages", MappingProxyType(dict(self.stages)))
+        assign(self, "meta", MappingProxyType(dict(self.meta)))
         checks.check_time(self.time)
         if self.valid is None:
-            settle(self, "valid", np.ones(len(self.time), dtype=bool))
+            assign(self, "valid", np.ones(len(self.time), dtype=bool))
         checks.check_valid(self.mask, len(self.time))
         checks.check_names("joint_names", self.joint_names)
         checks.check_names("desired_joint_names", self.desired_joint_names)
@@ -196,7 +196,7 @@ class Run:
                 looked for beside the file.
 
         Returns:
-            The run; what was differentiated is said under ``differentiated`` in its ``meta``.
+            The run; what was differentiated is listed under ``differentiated`` in its ``meta``.
 
         Raises:
             RunFileError: If the file is no run file, or holds a run that is wrong.
@@ -280,7 +280,7 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     velocity = signals["velocity"]
     samples, joints = len(signals["time"]), velocity.shape[-1]
     if velocity.ndim == 2 and len(velocity) != samples and joints == samples:
-        joints = len(velocity)  # transposed, as the error will say
+        joints = len(velocity)  # transposed, which the error states
     return {
         **signals,
         "joint_names": _names(arrays, "joint_names", [f"joint{i + 1}" for i in range(joints)]),
@@ -306,7 +306,7 @@ def _robot(arrays: Mapping[str, NDArray[Any]], folder: Path) -> str | None:
 
 
 def _robot_from(folder: Path, robot: str) -> str:
-    """Name a URDF as it is seen from the folder of the run file."""
+    """Path of a URDF relative to the folder of the run file."""
     moves = _is_urdf(robot) and not Path(robot).is_absolute()
     return os.path.relpath(robot, folder) if moves else robot
 

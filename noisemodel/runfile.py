@@ -41,9 +41,9 @@ ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
 """The arrays of a run file: the kind of number or text that each holds, and its axes."""
 
 DAMAGE = (EOFError, MemoryError, RuntimeError, struct.error, zlib.error, lzma.LZMAError)
-"""What zipfile and NumPy raise on archives that are broken, encrypted or lie about their size."""
+"""What zipfile and NumPy raise on archives that are broken, encrypted or state a wrong size."""
 
-WORTH = 0.8
+COMPRESSIBLE = 0.8
 """Arrays are compressed if that leaves less than this share of their size."""
 STRETCH, STRETCHES = 4096, 16
 """Bytes of a stretch on which compression is tried, and how many there are."""
@@ -59,11 +59,11 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
         path: The file.
 
     Returns:
-        Its arrays by name; integers that stand for numbers become floating-point.
+        Its arrays by name; integers become floating-point where numbers are expected.
 
     Raises:
         RunFileError: If the file cannot be read, is no archive of plain arrays, names an
-            array that is not known, holds another kind of array, or is of another version.
+            unknown array, holds another kind of array, or is of another version.
     """
     try:
         with zipfile.ZipFile(path) as archive:
@@ -129,11 +129,11 @@ def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
 
 
 def _shrinks(array: Any) -> bool:
-    """Try compression on a part of an array: some stretches that are spread over it."""
+    """Whether compression pays, tried on some stretches that are spread over an array."""
     data = np.atleast_1d(array).ravel(order="K").view(np.uint8)
     starts = np.linspace(0, max(0, len(data) - STRETCH), STRETCHES).astype(int)
     tried = b"".join(data[start : start + STRETCH].tobytes() for start in starts.tolist())
-    return len(zlib.compress(tried, 1)) < WORTH * len(tried)
+    return len(zlib.compress(tried, 1)) < COMPRESSIBLE * len(tried)
 
 
 def _plain(path: Path, name: str, array: Any) -> NDArray[Any]:

@@ -1,4 +1,4 @@
-"""Mean speeds of a link's surface: what the paper's equation and its alternatives say."""
+"""Mean speeds of a link's surface: the paper's equation and its alternatives."""
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
@@ -167,7 +167,7 @@ def _root(form: Array, twist: Array) -> Array:
 
 
 def check_kind(kind: str) -> None:
-    """Refuse a kind that is not known.
+    """Refuse an unknown kind.
 
     Raises:
         UnknownKindError: If it is none of ``KINDS``.

@@ -36,7 +36,7 @@ def read(data: bytes) -> Mesh:
 
 
 def is_text(head: bytes, tail: bytes | None = None) -> bool:
-    """Tell ASCII from binary, of which some begin with the same word.
+    """Whether a file is ASCII; some binary files begin with the same word.
 
     Args:
         head: The file, or its beginning.
@@ -46,5 +46,5 @@ def is_text(head: bytes, tail: bytes | None = None) -> bool:
 
 
 def count(head: bytes) -> int:
-    """Number of facets that a binary file says it has."""
+    """Number of facets by the header of a binary file."""
     return int.from_bytes(head[HEADER - 4 : HEADER], "little")

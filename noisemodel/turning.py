@@ -15,7 +15,7 @@ TINY = 1e-300
 def rounding(inertia: Array) -> Array:
     """Find the axes in which rotations of equal size have the same root-mean-square speed.
 
-    Seen in these axes a slender link is as round as a ball, so that one table fits all.
+    In these axes a slender link is as round as a ball, so that one table fits all.
 
     Args:
         inertia: Mean-square speed of unit rotations, w' J w, shape (3, 3), in [m²].
@@ -32,7 +32,7 @@ def tabulate(cloud: Cloud, rounded: Array) -> Array:
     """Tabulate the ratio of the mean to the root-mean-square speed over all axes.
 
     Args:
-        cloud: Points that stand for the surface.
+        cloud: Points on the surface.
         rounded: The result of ``rounding``.
 
     Returns:
@@ -52,7 +52,7 @@ def tabulate(cloud: Cloud, rounded: Array) -> Array:
 
 
 def turning_speed(table: Array, rounded: Array, angular: Array) -> Array:
-    """Look up the mean speed <|w x r|>.
+    """Mean speed <|w x r|>, from the table.
 
     Args:
         table: The result of ``tabulate``, shape (97, 97).

@@ -1,4 +1,4 @@
-"""What must hold of a URDF before Pinocchio sees it, which crashes or stays silent on some."""
+"""Checks of a URDF before Pinocchio reads it, which crashes on some and accepts wrong ones."""
 
 import math
 from dataclasses import dataclass

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from noisemodel import cache
-from noisemodel.cache import remembered
+from noisemodel.cache import cached
 
 
 @pytest.fixture(autouse=True)
@@ -31,22 +31,22 @@ def assert_made(arrays):
     assert arrays["faces"].dtype == np.int32
 
 
-def test_what_is_remembered_is_made_once():
+def test_cached_arrays_are_made_once():
     make = Maker()
-    assert_made(remembered("a-1", make))
-    assert_made(remembered("a-1", make))
+    assert_made(cached("a-1", make))
+    assert_made(cached("a-1", make))
     assert make.calls == 1
 
 
 def test_another_key_is_another_thing():
     make = Maker()
-    remembered("a-1", make)
-    remembered("a-2", make)
+    cached("a-1", make)
+    cached("a-2", make)
     assert make.calls == 2
 
 
 def test_it_lies_in_the_users_cache_folder(home):
-    remembered("a-1", Maker())
+    cached("a-1", Maker())
     assert [path.name for path in home.iterdir()] == ["a-1.npz"]
 
 
@@ -63,22 +63,22 @@ def test_without_an_absolute_folder_it_is_the_one_in_the_home(tmp_path, monkeypa
 @pytest.mark.parametrize("content", [b"", b"nonsense", b"PK\x05\x06" + b"\0" * 18])
 def test_a_damaged_file_is_made_anew(home, content):
     make = Maker()
-    remembered("a-1", make)
+    cached("a-1", make)
     (home / "a-1.npz").write_bytes(content)
-    remembered("a-1", make)
-    assert_made(remembered("a-1", make))
+    cached("a-1", make)
+    assert_made(cached("a-1", make))
     assert make.calls == 2
 
 
 def test_a_file_with_one_byte_changed_anywhere_is_made_anew(home):
     make = Maker()
-    remembered("a-1", make)
+    cached("a-1", make)
     whole = (home / "a-1.npz").read_bytes()
     for position in range(len(whole)):
         damaged = bytearray(whole)
         damaged[position] ^= 0x55
         (home / "a-1.npz").write_bytes(damaged)
-        assert_made(remembered("a-1", make))
+        assert_made(cached("a-1", make))
     assert make.calls == 1 + len(whole)
 
 
@@ -88,30 +88,30 @@ def test_pickles_in_the_folder_are_not_opened(home):
     np.savez(archive, points=np.array([{"a": 1}], dtype=object))
     content = archive.getvalue()
     (home / "a-1.npz").write_bytes(content + hashlib.sha256(content).digest())
-    assert_made(remembered("a-1", Maker()))
+    assert_made(cached("a-1", Maker()))
 
 
 def test_a_folder_that_cannot_be_written_to_is_no_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
     make = Maker()
-    assert_made(remembered("a-1", make))
-    assert_made(remembered("a-1", make))
+    assert_made(cached("a-1", make))
+    assert_made(cached("a-1", make))
     assert make.calls == 2
 
 
-def test_what_cannot_be_made_is_not_remembered(home):
+def test_what_cannot_be_made_is_not_cached(home):
     def fail():
         raise ValueError("no such thing")
 
     with pytest.raises(ValueError, match="no such thing"):
-        remembered("a-1", fail)
+        cached("a-1", fail)
     assert not home.exists()
-    assert_made(remembered("a-1", Maker()))
+    assert_made(cached("a-1", Maker()))
 
 
 def test_nothing_but_the_archive_is_left_behind(home):
-    remembered("a-1", Maker())
+    cached("a-1", Maker())
     assert len(list(home.iterdir())) == 1
     with np.load(home / "a-1.npz", allow_pickle=False) as archive:
         assert_made(dict(archive))

@@ -23,7 +23,7 @@ def robot(request):
 
 def test_positions_stay_within_the_limits(robot):
     run, bounds = excitation(robot), limits(robot)
-    assert (np.abs(run.position - bounds.centre) <= bounds.room / 2).all()
+    assert (np.abs(run.position - bounds.centre) <= bounds.range / 2).all()
     assert np.isfinite(run.position).all()
 
 
@@ -71,11 +71,11 @@ def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):
 
 def test_limits_that_leave_no_room_are_none(tmp_path):
     bounds = limits(Robot.load("double_pendulum"))
-    assert np.isinf(bounds.room).all()
+    assert np.isinf(bounds.range).all()
     assert np.isinf(bounds.speed).all()
     np.testing.assert_array_equal(bounds.centre, 0.0)
     bounds = limits(chain(tmp_path, "revolute", "continuous"))
-    np.testing.assert_array_equal(bounds.room, [18.0, np.inf])
+    np.testing.assert_array_equal(bounds.range, [18.0, np.inf])
     np.testing.assert_array_equal(bounds.speed, [1.0, 1.0])
 
 

@@ -146,7 +146,7 @@ def test_a_mesh_in_parts_has_the_area_of_the_whole(tmp_path):
     assert len(first.triangles[0]) == len(second.triangles[0]) == 5120
 
 
-def test_visual_collision_hull_and_auto_take_what_they_say(tmp_path):
+def test_visual_collision_hull_and_auto_take_their_own_geometry(tmp_path):
     open_box = mesh_of(shapes.box(1, 2, 3)[:10], tmp_path)  # without its upper side
     built = robot(
         tmp_path,
@@ -185,7 +185,7 @@ def test_shapes_are_those_of_trimesh():
         assert np.allclose(ours.max(axis=(0, 1)), theirs.bounds[1], rtol=0, atol=1e-12)
 
 
-def test_round_shapes_are_too_small_by_what_is_said_of_them():
+def test_round_shapes_are_too_small_by_the_documented_error():
     side = area(shapes.cylinder(1, 2)) - area(shapes.cylinder(1, 1))
     ends = area(shapes.cylinder(1, 1)) - side
     ball = area(shapes.capsule(1, 1)) - side
@@ -274,7 +274,7 @@ def test_areas_of_known_robots(name):
 
 
 @pytest.mark.slow
-def test_every_listed_robot_can_be_drawn_but_one_whose_meshes_nobody_has():
+def test_every_listed_robot_can_be_drawn_but_one_without_published_meshes():
     bare, refused = [], []
     for name in ROBOTS:
         if name == "ur3_empty":
@@ -311,7 +311,7 @@ def test_meshes_that_are_missing_can_be_skipped_and_are_named():
         ("visual", {"missing": "ignore"}, "missing 'ignore' is not known, expected .* error, skip"),
     ],
 )
-def test_words_that_are_not_known_are_named(tmp_path, geometry, options, message):
+def test_unknown_settings_are_named(tmp_path, geometry, options, message):
     with pytest.raises(GeometryError, match=message):
         triangles(robot(tmp_path), geometry, **options)
 
@@ -335,7 +335,7 @@ def test_a_shape_of_impossible_size_is_named_with_its_link(tmp_path, geometry, m
 @pytest.mark.parametrize(
     ("content", "scale", "message"),
     [
-        (None, "1 1 1", r"mesh package://a.obj: not found in .*`missing='skip'` goes on without"),
+        (None, "1 1 1", r"mesh package://a.obj: not found in .*`missing='skip'` leaves it out"),
         ("", "1 1 1", r"mesh .*/a.obj: is empty"),
         ("v 0 0 0\n", "1 1 1", r"mesh .*/a.obj: has no triangles"),
         (TRIANGLE.replace("0 1 0", "0 1 nan"), "1 1 1", "a.obj: has corners that are not finite"),
