@@ -12,7 +12,7 @@ class Drivetrain:
         stiffness: Position gain of each drive, in [N m/rad].
         damping: Velocity gain of each drive, in [N m s/rad].
         torque: Limit of each drive, in [N m].
-        armature: Inertia of each drive as its joint sees it, in [kg m²].
+        armature: Inertia of each drive at its joint, in [kg m²].
         friction: Coulomb friction of each joint, in [N m].
         viscous: Viscous friction of each joint, in [N m s/rad].
     """

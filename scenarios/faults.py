@@ -30,7 +30,7 @@ class Faults:
             (samples, effectors, 2), in [m] and [m/s].
         sensors: Added to the values of sensors, by name: time to shape (ticks, values).
         gain: Scale of the force control's gains: time to shape (ticks,).
-        events: Events that are known before the simulation.
+        events: Events that are defined before the simulation.
         facts: The drawn values, for the metadata of the run.
     """
 

@@ -149,7 +149,7 @@ class Folder:
         return times
 
     def missing(self, tasks: Iterable[Task]) -> list[Task]:
-        """Those of the runs that are neither in the folder nor known to fall."""
+        """Those of the runs that are neither in the folder nor recorded as falls."""
         done = {*self.kept(), *self.fallen()}
         return [task for task in tasks if task not in done]
 

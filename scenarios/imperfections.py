@@ -16,7 +16,7 @@ class Imperfections:
         stiffness: Scale of each drive's position gain.
         damping: Scale of each drive's velocity gain.
         force_gain: Scale of the force control's gain.
-        mass: Scale of each moving body's inertia; the controller does not know it.
+        mass: Scale of each moving body's inertia; the controller's model has 1.
         payload: Mass unknown to the controller, in [kg].
         friction: Scale of each joint's Coulomb friction.
         viscous: Scale of each joint's viscous friction.
@@ -50,7 +50,7 @@ class Imperfections:
             rng: Random number generator.
             joints: How many drives the robot has.
             bodies: How many moving bodies it has.
-            payload: Largest mass that the controller does not know, in [kg].
+            payload: Largest mass that the controller has no model of, in [kg].
             force: Largest standard deviation of the force sensors' noise, in [N].
 
         Returns:

@@ -167,7 +167,7 @@ def annotate(
         if "band" in event.facts:
             filtered = deviation(velocity, twin, rate=rate, band=event.facts["band"], rule=rule)
             level = _level(filtered, rate, rule)
-        until = max(0, first - round(rule.smoothing * rate))  # the average looks ahead
+        until = max(0, first - round(rule.smoothing * rate))  # the average is not causal
         earlier = slice(max(0, until - round(rule.before * rate)), until)
         background = float(level[earlier][~acting[earlier]].max(initial=0.0))
         least = max(rule.felt, background if event.label == "oscillations" else 0.0)

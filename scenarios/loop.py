@@ -60,7 +60,7 @@ class Control(Protocol):
         ...
 
     def fallen(self, sensors: Array) -> bool:
-        """Tell whether the robot has fallen, by the sensors' means over the tick before."""
+        """Whether the robot has fallen, by the sensors' means over the tick before."""
         ...
 
 

@@ -33,7 +33,7 @@ def build(
         model: A ``pinocchio.Model``, any tree of revolute, continuous and prismatic joints, its
             root fixed or floating; every moving body has a mass.
         physics: Properties that the Pinocchio model lacks.
-        effectors: Parts of the robot that touch the world.
+        effectors: Parts of the robot that may be in contact with the environment.
         boxes: Obstacles and ground.
 
     Returns:

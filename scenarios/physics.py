@@ -11,7 +11,7 @@ class Physics:
 
     Attributes:
         timestep: In [s].
-        armature: Inertia of each drive as its joint sees it, shape (joints,), in [kg m²] or [kg].
+        armature: Inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg].
         damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
         friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
         contact: Time constant of a contact, in [s].

@@ -55,7 +55,7 @@ class Sample:
         robot: A name in ``scenarios.ROBOTS``.
         rate: Sample rate, in [Hz].
         signals: Noise signals by name, each of shape (samples,).
-        decimated: Norms of the run decimated to ``DECIMATED``, as a slower logger has them.
+        decimated: Norms of the run decimated to ``DECIMATED``, as a logger of that rate has them.
         blocks: Annotated stretches.
         meta: The recipe, and the hash of the run's arrays.
         joints: Desired, measured and error velocities of the decimated run, each of shape
@@ -73,13 +73,13 @@ class Sample:
     @classmethod
     def of(cls, run: Run) -> Self:
         """The sample of a simulated run."""
-        slower = decimated(run, DECIMATED)
+        decimated_run = decimated(run, DECIMATED)
         return cls(
             robot=str(run.robot),
             rate=run.rate,
             signals=signals(run),
-            decimated=norms(slower),
-            joints=joints(slower),
+            decimated=norms(decimated_run),
+            joints=joints(decimated_run),
             blocks=run.blocks,
             meta={**run.meta, "sha256": digest(run)},
         )

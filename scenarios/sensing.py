@@ -24,7 +24,7 @@ def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> N
 
     Args:
         spec: The ``mujoco.MjSpec``, with a site on each effector.
-        effectors: Parts of the robot that touch the world.
+        effectors: Parts of the robot that may be in contact with the environment.
         root: The base's body, if it floats.
     """
     for effector in effectors:

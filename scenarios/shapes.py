@@ -94,4 +94,4 @@ class Ball:
 
 
 Effector: TypeAlias = Rod | Sole | Ball
-"""A part of a robot that touches the world."""
+"""A part of a robot that may be in contact with the environment."""

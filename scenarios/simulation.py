@@ -67,7 +67,7 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
         drawn values, and the effect of each event on the motion.
 
     Raises:
-        ScenarioError: If the robot or the scenario is not known, the robot does not have the
+        ScenarioError: If the robot or the scenario is unknown, the robot does not have the
             scenario, the seed is negative, or the duration too short.
         MissingSimulatorError: If MuJoCo is not installed.
         SimulationError: If the simulation diverged, or the robot fell.
@@ -143,7 +143,7 @@ def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
         The scenario and the robot.
 
     Raises:
-        ScenarioError: If one is not known, or the robot does not have the scenario.
+        ScenarioError: If one is unknown, or the robot does not have the scenario.
     """
     if robot not in ROBOTS:
         raise UnsimulatedRobotError(robot, ROBOTS)

@@ -52,7 +52,7 @@ def choose(
         Scenarios of each robot, in the order of the table.
 
     Raises:
-        ScenarioError: If a robot or a scenario is not known, or nothing is left for a robot.
+        ScenarioError: If a robot or a scenario is unknown, or nothing is left for a robot.
     """
     if not robots:
         raise DatasetError(f"no robot is named; there are {', '.join(ROBOTS)}")

@@ -20,7 +20,7 @@ class Arm:
         contact: Time constant of the tool's rubber tip, in [s].
         force_gain: Speed of the tool per error of the contact force, in [m/(s N)].
         force_filter: Time constant of the low-pass on the contact force, in [s].
-        payload: Largest mass at the tool that the controller does not know, in [kg].
+        payload: Largest mass at the tool that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensor's noise, in [N].
         held: Positions of the locked joints that are not at zero, by name.
     """
@@ -40,12 +40,12 @@ class Arm:
 
     @property
     def family(self) -> str:
-        """The family of robots, which decides on the scenarios."""
+        """The family of robots, which has its own scenarios."""
         return "arm"
 
     @property
     def effectors(self) -> tuple[Rod, ...]:
-        """The parts that touch the world."""
+        """The parts that may be in contact with the environment."""
         return (self.tool,)
 
 

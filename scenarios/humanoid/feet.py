@@ -18,7 +18,7 @@ EARLY = 0.13
 """How early a foot may touch down, as a share of its swing: its height is a few millimetres."""
 BRIM = 0.01
 """Distance from the last toe on a platform to its edge, in [m]."""
-NOBODY = -1
+NO_FOOT = -1
 """The foot in the air while both are on the ground."""
 
 
@@ -36,7 +36,7 @@ def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, A
     """
     places, yaws = np.zeros((len(time), 2, 3)), np.zeros((len(time), 2))
     places[:, :, 1] = robot.apart, -robot.apart
-    swinging = np.full(len(time), NOBODY)
+    swinging = np.full(len(time), NO_FOOT)
     for step in steps:
         first, end = np.searchsorted(time, (step.start, step.stop))
         if first == len(time):

@@ -45,7 +45,7 @@ class Humanoid:
         pace: Duration of its steps, relative to that of the motion.
         gains: Of its stabilizer.
         carrier: Frame that carries the payload.
-        payload: Largest mass that the controller does not know, in [kg].
+        payload: Largest mass that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         size: Its size, relative to that which the defects of the scenarios are defined for.
         held: Positions of the locked joints that are not at zero, by name.
@@ -68,7 +68,7 @@ class Humanoid:
 
     @property
     def family(self) -> str:
-        """The family of robots, which decides on the scenarios."""
+        """The family of robots, which has its own scenarios."""
         return "humanoid"
 
 

@@ -13,11 +13,11 @@ BALANCE = 0.7
 """Gain of the foot placement on the offset of the capture point."""
 FURTHEST = 0.3
 """Largest distance of feet from their planned place, as a share of the robot's height."""
-DECIDED = 0.8
+FIXED = 0.8
 """Share of its path after which the place of a foot is fixed."""
 DESCENDING = 0.5
 """Share of its path after which a foot may touch down early."""
-MET = 0.15
+CONTACT = 0.15
 """Force above which a foot is in contact, as a share of the weight."""
 LEVELLING = 50.0
 """Rate at which a foot in the air compensates the tilt of the body, in [1/s]."""
@@ -81,9 +81,9 @@ class Feet:
         lever = plan.feet[number, :, :2] - plan.centre[number, :2]
         turned = estimate.yaw_correction * lever[:, ::-1] * (-1.0, 1.0)  # of a small angle
         upright = self._lean * plan.size * np.array((estimate.pitch, -estimate.roll))
-        undecided = swing & (progress < DECIDED)
+        adjustable = swing & (progress < FIXED)
         target = estimate.position_correction + balance + turned + upright
-        self._right[undecided] = target[undecided]
+        self._right[adjustable] = target[adjustable]
         return np.asarray(self._left + progress[:, None] * (self._right - self._left))
 
     def _compliance(self, number: int, estimate: StateEstimate) -> Array:
@@ -93,8 +93,8 @@ class Feet:
         planned force, as does a foot from an early touch-down on.
         """
         plan, swing = self._plan, self._plan.swing[number]
-        met = (plan.progress[number] > DESCENDING) & (estimate.force > MET * plan.weight)
-        self._early = swing & (self._early | met)
+        in_contact = (plan.progress[number] > DESCENDING) & (estimate.force > CONTACT * plan.weight)
+        self._early = swing & (self._early | in_contact)
         tilt = estimate.pitch * self._lever[:, 0] - estimate.roll * self._lever[:, 1]
         levelling = LEVELLING * (self._lean * tilt - self._rise)
         compliant = self._gain[number] * (estimate.force - self._load[number]) - LEAK * self._rise

@@ -23,7 +23,7 @@ class Quadruped:
         attitude_filter: Time constant of the low-pass on the attitude, in [s].
         force_gain: Speed of a foot per error of its contact force, in [m/(s N)].
         force_filter: Time constant of the low-pass on the contact forces, in [s].
-        payload: Largest mass on its back that the controller does not know, in [kg].
+        payload: Largest mass on its back that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         held: Positions of the locked joints that are not at zero, by name.
     """
@@ -46,12 +46,12 @@ class Quadruped:
 
     @property
     def family(self) -> str:
-        """The family of robots, which decides on the scenarios."""
+        """The family of robots, which has its own scenarios."""
         return "quadruped"
 
     @property
     def effectors(self) -> tuple[Ball, ...]:
-        """The parts that touch the world."""
+        """The parts that may be in contact with the environment."""
         return self.feet
 
 
