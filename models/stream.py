@@ -88,7 +88,7 @@ class Stream:
         plain = stacked(samples, self._profile.signals)
         if plain.ndim > 1 and len(plain) != len(self._samples):
             raise SignalError(
-                f"{len(plain)} rows of norms and joints came, expected {len(self._samples)}"
+                f"{len(plain)} rows of norms and joints, expected {len(self._samples)}"
             )
         check(plain, valid, first=self._count)
         found = self._take(rounded(plain, self._profile), valid)

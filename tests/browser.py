@@ -1,4 +1,4 @@
-"""A real browser for tests to look with: the machine's own, which draws in software."""
+"""A real browser for tests: the one of the system, with software rendering."""
 
 import shutil
 from contextlib import contextmanager

@@ -9,7 +9,7 @@ BAR = '<visual><origin xyz="0.1 0 0.3"/><geometry><box size="0.2 0.1 0.6"/></geo
 
 
 def chain(folder, *kinds, shapes=None, axis="0 0 1", follow="", **options):
-    """A robot with a joint of each kind, and a bar on each link unless told otherwise."""
+    """A robot with a joint of each kind, and a bar on each link unless other geometry is given."""
     shapes = [BAR] * len(kinds) if shapes is None else shapes
     text = '<robot name="chain"><link name="link0"/>'
     for number, (kind, shape) in enumerate(zip(kinds, shapes, strict=True), start=1):

@@ -26,7 +26,7 @@ def frames(seconds=5.0):
 
 def perfect(blocks, seconds=5.0):
     """True class of each frame: a failure as soon as the frame holds any of it."""
-    called = []
+    labels = []
     for start in frames(seconds):
         stop = start + LENGTH / RATE
         shared = {
@@ -35,17 +35,17 @@ def perfect(blocks, seconds=5.0):
             if block.label != "ok"
         }
         most = max(shared, default=0.0)
-        called.append(shared[most] if most > 2e-3 else "ok")
-    return called
+        labels.append(shared[most] if most > 2e-3 else "ok")
+    return labels
 
 
-def predicted(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, start=0.0):
+def predicted(name, blocks, labels=None, *, seconds=5.0, scores=None, cut=None, start=0.0):
     """Predictions on a recording; by default without errors, also of frames cut from blocks."""
-    called = perfect(blocks, seconds) if called is None else called
-    called = np.array(called)
+    labels = perfect(blocks, seconds) if labels is None else labels
+    labels = np.array(labels)
     begins = start + frames(seconds)
     if scores is None:
-        scores = np.array([np.eye(4)[CLASSES.index(label)] - 0.5 for label in called])
+        scores = np.array([np.eye(4)[CLASSES.index(label)] - 0.5 for label in labels])
     truth = np.array([block.label for block in blocks])
     return Predictions(
         name,
@@ -54,7 +54,7 @@ def predicted(name, blocks, called=None, *, seconds=5.0, scores=None, cut=None, 
         tuple(sorted(b._replace(start=b.start + start, stop=b.stop + start) for b in blocks)),
         truth,
         truth if cut is None else np.array(cut),
-        Labels(begins, begins + LENGTH / RATE, called, scores, CLASSES),
+        Labels(begins, begins + LENGTH / RATE, labels, scores, CLASSES),
     )
 
 
@@ -63,10 +63,10 @@ IMPACT = blocks((0.0, 2.0, "ok"), (2.03, 2.2, "impact"), (3.0, 5.0, "ok"))
 OSCILLATION = blocks((0.0, 1.0, "ok"), (1.05, 3.5, "oscillations"), (3.6, 5.0, "ok"))
 
 
-def many(seeds, called=None):
+def many(seeds, labels=None):
     """Good runs, impacts and oscillations of one robot."""
     return [
-        predicted(f"talos/{scenario}-{seed:03d}", annotated, called)
+        predicted(f"talos/{scenario}-{seed:03d}", annotated, labels)
         for seed in range(seeds)
         for scenario, annotated in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
     ]

@@ -113,13 +113,13 @@ def write_bag(path, talk, topics, *, storage="mcap", compression=None):
         if compression:
             writer.set_compression(CompressionMode[compression.upper()], CompressionFormat.ZSTD)
     with writer:
-        said = []
+        entries = []
         for topic, messages in topics.items():
             kind = messages if isinstance(messages, str) else messages[0][1].__msgtype__
             connection = writer.add_connection(topic, kind, typestore=talk.store)
             if not isinstance(messages, str):
-                said += [(int(at), connection, message) for at, message in messages]
-        for at, connection, message in sorted(said, key=lambda each: each[0]):
+                entries += [(int(at), connection, message) for at, message in messages]
+        for at, connection, message in sorted(entries, key=lambda each: each[0]):
             writer.write(connection, at, talk.raw(message))
     return path
 

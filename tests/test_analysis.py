@@ -28,7 +28,7 @@ CLASSES = ("ok", "impact", "oscillations")
 
 
 def moving(*, desired=True, seconds=5.0, rate=RATE, tone=0.0, **changes):
-    """Two joints that travel, and measured noise."""
+    """Two joints that move, and measured noise."""
     time = np.arange(round(seconds * rate)) / rate
     generator = np.random.default_rng(0)
     wanted = np.stack([0.5 * np.sin(2 * np.pi * f * time) for f in (0.3, 0.4)], axis=1)
@@ -76,7 +76,7 @@ def test_the_status_is_the_same_in_every_output(tmp_path):
         assert exit_status([verdict]) == {"ok": 0, "findings": 1, "cannot-tell": 4}[status]
 
 
-def test_a_log_held_at_ten_hertz_cannot_be_told_in_any_output():
+def test_a_log_held_at_ten_hertz_has_the_status_cannot_tell_in_every_output():
     steps = 1e-3 * np.random.default_rng(1).normal(size=(50, 2))
     velocity = np.repeat(steps, 100, axis=0)
     held = Run(time=np.arange(5000) / RATE, velocity=velocity, joint_names=("a", "b"))
@@ -86,7 +86,7 @@ def test_a_log_held_at_ten_hertz_cannot_be_told_in_any_output():
     assert found.reason == found.message
 
 
-def test_a_run_without_a_fitting_model_cannot_be_told_and_has_a_reason():
+def test_a_run_without_a_fitting_model_has_the_status_cannot_tell_and_a_reason():
     found = analyse(moving(rate=50.0), LIBRARY)
     assert (found.status, found.labels, found.findings) == (Status.CANNOT_TELL, None, ())
     assert "rate of 50 Hz" in found.reason
@@ -129,7 +129,7 @@ def test_a_lane_covers_all_frames_once_and_shows_each_finding(text):
         assert found.findings[-1].label in {name for *_, name in lane}
 
 
-def test_unknown_frames_that_are_ignored_raise_nothing_and_it_is_said():
+def test_unknown_frames_that_are_ignored_raise_nothing_and_are_a_remark():
     generator = np.random.default_rng(3)
     loud = 1e4 * generator.normal(size=(5000, 1))
     noise = np.abs(loud[:, 0])
@@ -162,7 +162,7 @@ def test_a_run_of_unknown_frames_alone_is_not_ok_when_they_are_ignored(monkeypat
     )
 
 
-def test_the_headline_counts_findings_by_class_and_says_how_many_are_novel():
+def test_the_headline_counts_findings_by_class_and_those_out_of_distribution():
     events = (Event("impact", 1.0, 1.2, 0.9), Event("impact", 2.0, 2.2, 0.9, novel=True))
     found = analysed("....", findings=events, spans=events, status=Status.FINDINGS)
     assert found.headline == "findings: 2 impact; 1 out of distribution"
@@ -177,22 +177,22 @@ def zeros(run, **changes):
 
 
 def test_zeros_in_place_of_a_desired_velocity_are_left_out_of_a_run_that_moves():
-    run, said = without_placeholder(zeros(moving()))
+    run, remark = without_placeholder(zeros(moving()))
     assert run.velocity_desired is None
-    assert said == (
+    assert remark == (
         "The desired velocity is zero throughout while joints move at more than 0.1 rad/s for"
         " seconds: it was left out."
     )
-    assert said in analyse(zeros(moving()), LIBRARY).message
+    assert remark in analyse(zeros(moving()), LIBRARY).message
 
 
 def test_zeros_are_left_out_where_the_desired_position_changes():
     still = 1e-4 * np.random.default_rng(0).normal(size=(5000, 2))
     target = np.linspace(0.0, 0.5, 5000)[:, None] * np.ones(2)
-    run, said = without_placeholder(zeros(moving(), velocity=still, position_desired=target))
+    run, remark = without_placeholder(zeros(moving(), velocity=still, position_desired=target))
     assert run.velocity_desired is None
     assert run.position_desired is not None
-    assert "while the desired position changes" in said
+    assert "while the desired position changes" in remark
 
 
 @pytest.mark.parametrize("push", [0.036, 0.5])
@@ -202,9 +202,9 @@ def test_a_standing_arm_that_is_pushed_keeps_its_zeros(push):
     standing = zeros(
         moving(seconds=10.0), velocity=pushes, position_desired=np.full((10_000, 2), 0.3)
     )
-    run, said = without_placeholder(standing)
+    run, remark = without_placeholder(standing)
     assert run is standing
-    assert said == ""
+    assert remark == ""
 
 
 def test_a_desired_velocity_that_is_not_all_zero_stays():

@@ -99,8 +99,8 @@ def modules_imported(path):
                     yield name
 
 
-def room_of(name):
-    """The folder that a module is in, or the module itself if it lies flat in its package."""
+def folder_of(name):
+    """The folder that a module is in, or the module itself if it is directly in its package."""
     parts = name.split(".")
     inside = MODULES[name].name == "__init__.py" or len(parts) > 2
     return ".".join(parts[:2]) if inside else name
@@ -140,11 +140,11 @@ def test_modules_do_not_import_each_other_in_a_circle():
 
 
 @pytest.mark.parametrize("package", sorted(OURS))
-def test_rooms_import_downwards(package):
+def test_folders_of_a_package_import_downwards(package):
     arrows = {}
     for name, path in MODULES.items():
         if name.split(".")[0] == package and name != package:
-            rooms = {room_of(other) for other in modules_imported(path) if other != package}
-            own = {room for room in rooms if room.startswith(f"{package}.")}
-            arrows.setdefault(room_of(name), set()).update(own - {room_of(name)})
+            folders = {folder_of(other) for other in modules_imported(path) if other != package}
+            own = {folder for folder in folders if folder.startswith(f"{package}.")}
+            arrows.setdefault(folder_of(name), set()).update(own - {folder_of(name)})
     assert circle(arrows) == []

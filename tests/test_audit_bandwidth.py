@@ -85,7 +85,7 @@ def test_the_corner_of_a_filter_is_found(rate, order, share):
 
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("level", [0.0, 3e-4, 3e-3, 3e-2])
-def test_plain_sensor_noise_is_no_filter(rate, level):
+def test_sensor_noise_alone_is_no_filter(rate, level):
     _, position, velocity = motion(rate)
     found = bandwidth(run_of(velocity + noise(velocity.shape, level), rate, position=position))
     assert (found.corner, found.differentiator, found.hold, found.floor_from) == (

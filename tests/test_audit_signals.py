@@ -23,7 +23,7 @@ def test_radians_give_no_warning(rate, level):
 
 
 @pytest.mark.parametrize(
-    ("by_position", "by_velocity", "said"),
+    ("by_position", "by_velocity", "message"),
     [
         (1, 180 / np.pi, "degrees per second beside positions in radians"),
         (180 / np.pi, 1, "positions look like degrees beside velocities in radians"),
@@ -32,28 +32,31 @@ def test_radians_give_no_warning(rate, level):
         (1, 1 / (2 * np.pi), "turns per second"),
     ],
 )
-def test_velocities_in_another_unit_than_positions_give_a_warning(by_position, by_velocity, said):
+def test_velocities_in_another_unit_than_positions_give_a_warning(
+    by_position, by_velocity, message
+):
     _, position, velocity = motion(1000.0)
     velocity = velocity + noise(velocity.shape, 0.01)
-    assert said in warnings(by_velocity * velocity, by_position * position)[0]
+    assert message in warnings(by_velocity * velocity, by_position * position)[0]
 
 
 def test_degrees_throughout_are_found_by_how_far_they_reach():
     _, position, velocity = motion(30.0)
-    (said, *_) = warnings(np.rad2deg(velocity), np.rad2deg(position), 30.0)
-    assert said == "positions look like degrees or normalised (joint0 reaches 63.03)"
-    (said, *_) = warnings(np.rad2deg(velocity), 2 * np.rad2deg(position), 30.0)
-    assert "or normalised" not in said
+    (message, *_) = warnings(np.rad2deg(velocity), np.rad2deg(position), 30.0)
+    assert message == "positions look like degrees or normalised (joint0 reaches 63.03)"
+    (message, *_) = warnings(np.rad2deg(velocity), 2 * np.rad2deg(position), 30.0)
+    assert "or normalised" not in message
 
 
-def test_positions_that_stop_at_round_ends_look_normalised():
+def test_positions_that_stop_at_round_ends_are_reported_as_normalised():
     _, position, velocity = motion(30.0)
     assert any(
-        "normalised: several joints stop at 100" in said
-        for said in warnings(velocity, np.clip(120 * position, -100, 100), 30.0)
+        "normalised: several joints stop at 100" in message
+        for message in warnings(velocity, np.clip(120 * position, -100, 100), 30.0)
     )
     assert any(
-        "stop at 1" in said for said in warnings(velocity, np.clip(1.2 * position, -1, 1), 30.0)
+        "stop at 1" in message
+        for message in warnings(velocity, np.clip(1.2 * position, -1, 1), 30.0)
     )
 
 
@@ -66,8 +69,8 @@ def test_one_wheel_among_many_joints_gives_no_warning():
 
 def test_velocities_that_no_robot_reaches_give_a_warning():
     _, _, velocity = motion(1000.0)
-    (said,) = warnings(np.rad2deg(velocity))
-    assert "degrees or turns per minute (joint4 reaches" in said
+    (message,) = warnings(np.rad2deg(velocity))
+    assert "degrees or turns per minute (joint4 reaches" in message
 
 
 # --- copies

@@ -1,4 +1,4 @@
-"""What can go wrong with a humanoid's world: as large as the robot, and where its plan has it."""
+"""Defects of a humanoid's environment: scaled to the robot, and placed by its plan."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Humanoids in simulation stand, bear their weight, walk, and feel what they were not told of."""
+"""Humanoids in simulation stand, carry their weight, walk, and have impacts on obstacles."""
 
 import mujoco
 import numpy as np
@@ -142,7 +142,7 @@ def test_an_obstacle_is_an_early_contact_and_an_impact(obstacle):
     assert blocks[0].start == pytest.approx(event["start"], abs=0.03)
 
 
-def test_runs_are_the_same_until_the_obstacle_is_met(straight, obstacle):
+def test_runs_are_the_same_until_the_contact_with_the_obstacle(straight, obstacle):
     onset = int(obstacle.meta["events"][0]["start"] * 10_000) - 1
     np.testing.assert_array_equal(obstacle.velocity[:onset], straight.velocity[:onset])
 

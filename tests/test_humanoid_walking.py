@@ -1,4 +1,4 @@
-"""Plans of walks: the pendulum's law, footsteps that are met, and feet that do not jump."""
+"""Plans of walks: the pendulum's law, footsteps that are reached, and feet that do not jump."""
 
 import numpy as np
 import pytest

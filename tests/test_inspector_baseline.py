@@ -1,4 +1,4 @@
-"""`inspector baseline`: from good runs to a model that finds what departs from them."""
+"""`inspector baseline`: from good runs to a model that finds anomalies against them."""
 
 import json
 import re
@@ -99,7 +99,7 @@ def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("odd", "said"),
+    ("odd", "message"),
     [
         (
             run_of(1, rate=2000.0),
@@ -116,14 +116,14 @@ def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
         ),
     ],
 )
-def test_runs_of_different_robots_or_rates_are_refused(tmp_path, odd, said):
+def test_runs_of_different_robots_or_rates_are_refused(tmp_path, odd, message):
     run_of(0, robot="panda").save(tmp_path / "a.npz")
     odd.save(tmp_path / "b.npz")
     status, out, err = call("baseline", tmp_path, "-o", tmp_path / "model.npz")
     assert (status, out) == (3, "")
     assert err.startswith("inspector: ")
     assert err.count("\n") == 1
-    assert re.search(said, err), err
+    assert re.search(message, err), err
     assert not (tmp_path / "model.npz").exists()
 
 
@@ -132,7 +132,7 @@ def test_bad_input_is_one_line(folder, tmp_path):
     failing = tmp_path / "failing.npz"
     replace(run_of(1), blocks=(Block(0.0, 6.0, "impact"),)).save(failing)
     run_of(2, seconds=3.0).save(tmp_path / "short.npz")
-    for arguments, said in [
+    for arguments, message in [
         ((good, "--alarms", 0), "0 alarms per hour, expected more than 0: say, 1"),
         ((failing,), "no good frame in 1 recordings"),
         ((tmp_path / "short.npz",), "3 s of good motion are too short to learn from"),
@@ -144,7 +144,7 @@ def test_bad_input_is_one_line(folder, tmp_path):
     ]:
         status, out, err = call("baseline", *arguments, "-o", output)
         assert (status, out, err.count("\n")) == (3, "", 1), (arguments, err)
-        assert said in err
+        assert message in err
     status, _, err = call("baseline", good, "-o", folder / "robot.npz")
     assert status == 3
     assert "exists" in err

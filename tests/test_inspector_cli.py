@@ -30,7 +30,7 @@ def inspector(monkeypatch, capsys):
     return call
 
 
-def bare_run(path: Path, *, rate: float = 10_000.0, seconds: float = 1.0) -> Path:
+def run_without_robot(path: Path, *, rate: float = 10_000.0, seconds: float = 1.0) -> Path:
     time = np.arange(round(seconds * rate)) / rate
     np.savez(path, time=time, velocity=np.cos(time)[:, None])
     return path
@@ -72,14 +72,14 @@ def test_the_viewer_is_started_on_loopback_and_not_waited_for(inspector, monkeyp
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(viewer, "has_display", lambda: True)
     monkeypatch.setattr(subprocess, "Popen", Viewer)
-    status, out, _ = inspector("view", bare_run(tmp_path / "run.npz"))
+    status, out, _ = inspector("view", run_without_robot(tmp_path / "run.npz"))
     assert status == 0
     assert "recording:" not in out
     (command,) = started
     assert command[command.index("--bind") + 1] == "127.0.0.1"
 
 
-def test_a_viewer_that_dies_is_said_and_the_recording_stays(inspector, monkeypatch, tmp_path):
+def test_a_viewer_that_ends_is_reported_and_the_recording_stays(inspector, monkeypatch, tmp_path):
     class Viewer:
         def __init__(self, *_, **__): ...
 
@@ -92,14 +92,14 @@ def test_a_viewer_that_dies_is_said_and_the_recording_stays(inspector, monkeypat
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     monkeypatch.setattr(viewer, "has_display", lambda: True)
     monkeypatch.setattr(subprocess, "Popen", Viewer)
-    status, out, err = inspector("view", bare_run(tmp_path / "run.npz"))
+    status, out, err = inspector("view", run_without_robot(tmp_path / "run.npz"))
     assert status == 0
     assert err == "the viewer ended with status 101\n"
     assert "recording:" in out
 
 
 def test_a_rate_below_every_model_shows_everything_but_the_lanes(inspector, tmp_path):
-    run = bare_run(tmp_path / "slow.npz", rate=200.0, seconds=5.0)
+    run = run_without_robot(tmp_path / "slow.npz", rate=200.0, seconds=5.0)
     status, out, _ = inspector("view", run, "--save", tmp_path / "slow.rrd")
     assert status == 0
     assert "cannot-tell: rate of 200 Hz" in out
@@ -111,8 +111,8 @@ def test_a_rate_below_every_model_shows_everything_but_the_lanes(inspector, tmp_
     assert "200 Hz" in out
 
 
-def test_a_run_between_two_rates_is_lowered_never_raised(inspector, tmp_path):
-    status, out, _ = inspector("classify", bare_run(tmp_path / "run.npz", rate=4000.0))
+def test_a_run_between_two_rates_is_decimated_never_upsampled(inspector, tmp_path):
+    status, out, _ = inspector("classify", run_without_robot(tmp_path / "run.npz", rate=4000.0))
     assert status in (0, 1)
     assert "Labelled at 1000 Hz" in out
 
@@ -127,7 +127,7 @@ def test_noisytests_logs_are_classified(inspector, tmp_path):
     assert "10khz" in verdict["model"]
 
 
-def test_where_a_finding_comes_from_is_said_on_request(inspector):
+def test_findings_are_localised_on_request(inspector):
     status, out, _ = inspector("classify", demo_run(), "--format", "json", "--localise")
     (run,) = json.loads(out)["runs"]
     assert status == 1
@@ -141,7 +141,7 @@ def test_where_a_finding_comes_from_is_said_on_request(inspector):
 
 def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
     (tmp_path / "text.npz").write_text("not an archive")
-    good = bare_run(tmp_path / "good.npz")
+    good = run_without_robot(tmp_path / "good.npz")
     status, out, err = inspector(
         "classify",
         good,
@@ -162,14 +162,14 @@ def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
     assert "gone.npz: cannot be read (No such file or directory)" in lines[1]
 
 
-def test_a_run_too_short_for_a_frame_cannot_be_told(inspector, tmp_path):
-    status, out, _ = inspector("classify", bare_run(tmp_path / "short.npz", seconds=0.2))
+def test_a_run_too_short_for_a_frame_has_the_status_cannot_tell(inspector, tmp_path):
+    status, out, _ = inspector("classify", run_without_robot(tmp_path / "short.npz", seconds=0.2))
     assert status == 4
     assert "cannot-tell: a signal of 2000 samples is too short: a frame takes 4000" in out
 
 
 @pytest.mark.parametrize("format_", ["junit", "github", "json"])
-def test_every_format_for_machines_names_a_bad_file(inspector, tmp_path, format_):
+def test_every_format_for_programs_names_a_bad_file(inspector, tmp_path, format_):
     (tmp_path / "bad.npz").write_text("")
     status, out, _ = inspector("classify", tmp_path / "bad.npz", "--format", format_)
     assert status == 3
@@ -186,7 +186,7 @@ def test_wrong_usage_exits_with_2(inspector):
 def test_a_model_that_is_damaged_is_one_line(inspector, tmp_path):
     model = tmp_path / "model.npz"
     model.write_bytes(model_files()[0].read_bytes()[:1000])
-    run = bare_run(tmp_path / "run.npz")
+    run = run_without_robot(tmp_path / "run.npz")
     status, _, err = inspector("classify", run, "--model", model)
     assert status == 3
     assert err.count("\n") == 1
@@ -194,7 +194,7 @@ def test_a_model_that_is_damaged_is_one_line(inspector, tmp_path):
 
 
 def test_outputs_that_exist_are_kept(inspector, tmp_path):
-    run = bare_run(tmp_path / "run.npz")
+    run = run_without_robot(tmp_path / "run.npz")
     (tmp_path / "out.rrd").write_text("precious")
     status, _, err = inspector("view", run, "--save", tmp_path / "out.rrd")
     assert (status, err.count("\n")) == (3, 1)
@@ -204,7 +204,7 @@ def test_outputs_that_exist_are_kept(inspector, tmp_path):
 
 
 def test_an_output_that_cannot_be_written_is_one_line(inspector, tmp_path):
-    run = bare_run(tmp_path / "run.npz")
+    run = run_without_robot(tmp_path / "run.npz")
     status, _, err = inspector("view", run, "--save", tmp_path / "no" / "out.rrd")
     assert (status, err.count("\n")) == (3, 1)
     assert "cannot be written (No such file" in err
@@ -219,7 +219,7 @@ def test_long_work_is_not_begun_for_an_output_that_exists(inspector, tmp_path):
 
 
 def test_the_noise_is_printed_and_written(inspector, tmp_path):
-    run = bare_run(tmp_path / "run.npz")
+    run = run_without_robot(tmp_path / "run.npz")
     status, out, _ = inspector("noise", run, "--csv", tmp_path / "noise.csv")
     assert status == 0
     assert "peak 1 rad/s at 0.000 s" in out
@@ -247,7 +247,7 @@ def test_a_kind_that_does_not_exist_or_cannot_be_had_is_one_line(inspector, tmp_
     status, _, err = inspector("noise", demo_run(), "--kind", "loud")
     assert (status, err.count("\n")) == (3, 1)
     assert "no kind 'loud' of noise; there are simplified, paper" in err
-    status, _, err = inspector("noise", bare_run(tmp_path / "run.npz"), "--kind", "paper")
+    status, _, err = inspector("noise", run_without_robot(tmp_path / "run.npz"), "--kind", "paper")
     assert (status, err.count("\n")) == (3, 1)
     assert "kind 'paper' needs a robot, the run names None" in err
 
@@ -266,12 +266,12 @@ def test_a_model_is_trained_and_evaluated(inspector, tmp_path):
     generator = np.random.default_rng(0)
     for seed in range(3):
         time = np.arange(20_000) / 10_000
-        calm = 1 + 0.01 * generator.normal(size=20_000)
-        calm[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
+        signal = 1 + 0.01 * generator.normal(size=20_000)
+        signal[10_000:] += 0.3 * np.sin(2 * np.pi * 200 * time[10_000:])
         np.savez(
             tmp_path / f"run{seed}.npz",
             time=time,
-            velocity=calm[:, None],
+            velocity=signal[:, None],
             block_start=[0.0, 1.0],
             block_stop=[1.0, 2.0],
             block_label=["ok", "oscillations"],
@@ -294,8 +294,8 @@ def test_a_model_is_trained_and_evaluated(inspector, tmp_path):
     np.testing.assert_array_equal(confusion.sum(axis=1), [7, 7])
 
 
-def test_a_profile_that_does_not_exist_at_a_rate_is_said(inspector, tmp_path):
-    run = bare_run(tmp_path / "run.npz")
+def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(inspector, tmp_path):
+    run = run_without_robot(tmp_path / "run.npz")
     arguments = ["train", run, "-o", tmp_path / "m.npz", "--profile"]
     status, _, err = inspector(*arguments, "noisytest-rbf", "--rate", 1000)
     assert (status, "exists at 10000 Hz only" in err) == (3, True)

@@ -1,4 +1,4 @@
-"""Colours stay apart for those who see no red or no green."""
+"""Colours stay apart for the red- and green-blind."""
 
 import numpy as np
 import pytest
@@ -40,13 +40,13 @@ def lab(rgb, eyes):
 
 
 def nearest(rgb, eyes):
-    """Distance of the two colours that are hardest to tell apart; 2.3 can just be seen."""
+    """Distance of the two colours that are nearest to each other; 2.3 is just noticeable."""
     places = lab(rgb, eyes)
     apart = np.linalg.norm(places[:, None] - places, axis=2)
     return apart[~np.eye(len(places), dtype=bool)].min()
 
 
-def test_the_measure_knows_red_from_green_as_eyes_do():
+def test_the_measure_separates_red_from_green_except_for_the_colour_blind():
     red, green = (200, 60, 0), (105, 105, 0)
     assert nearest([red, green], "all cones") > 60
     assert nearest([red, green], "no green cones") < 30

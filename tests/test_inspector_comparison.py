@@ -93,7 +93,7 @@ def test_a_picture_is_drawn_without_a_display(found, tmp_path):
     assert (tmp_path / "out.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_the_command_writes_everything_and_goes_on_after_a_robot_that_cannot_be_had(
+def test_the_command_writes_everything_and_continues_after_a_robot_that_cannot_be_read(
     inspector, urdf, tmp_path
 ):
     pytest.importorskip("matplotlib")

@@ -118,13 +118,13 @@ def test_a_picture_is_drawn(folder, tmp_path):
     assert struct.unpack(">II", png[16:24]) == (1100, 850)
 
 
-def sure(name, blocks, random):
-    """A recording that is heard with probabilities."""
+def probable_recording(name, blocks, random):
+    """A recording with predicted probabilities."""
     scores = np.array([np.eye(4)[CLASSES.index(label)] for label in perfect(blocks)])
     scores = np.exp(4 * scores + random.normal(size=scores.shape))
     scores /= scores.sum(axis=1, keepdims=True)
-    called = [CLASSES[best] for best in scores.argmax(axis=1)]
-    return predicted(name, blocks, called, scores=scores)
+    labels = [CLASSES[best] for best in scores.argmax(axis=1)]
+    return predicted(name, blocks, labels, scores=scores)
 
 
 def test_pictures_leave_out_measures_that_do_not_exist(tmp_path, monkeypatch):
@@ -135,7 +135,7 @@ def test_pictures_leave_out_measures_that_do_not_exist(tmp_path, monkeypatch):
     monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))
     random = np.random.default_rng(0)
     probable = [
-        sure(f"talos/{name}-{seed:03d}", blocks, random)
+        probable_recording(f"talos/{name}-{seed:03d}", blocks, random)
         for seed in range(8)
         for name, blocks in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
     ]

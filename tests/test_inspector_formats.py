@@ -38,7 +38,7 @@ def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
     assert exit_status(verdicts) == status
 
 
-def test_text_says_what_was_found_and_when():
+def test_text_states_what_was_found_and_when():
     lines = text([QUIET, LOUD]).splitlines()
     assert lines[0] == "quiet.npz: ok [scalar-10khz]"
     assert lines[2] == "  impact from 1.00 s to 1.50 s"
@@ -77,7 +77,7 @@ def test_json_has_the_localisation_of_findings_that_were_localised():
     assert loud["events"][1]["localisation"] == unknown
 
 
-def test_junit_counts_and_tells_why():
+def test_junit_counts_runs_and_states_reasons():
     suite = ET.fromstring(junit([QUIET, LOUD, SLOW, BROKEN])).find("testsuite")
     assert {key: suite.get(key) for key in ("tests", "failures", "errors", "skipped")} == {
         "tests": "4",
@@ -94,7 +94,7 @@ WRITERS = pytest.mark.parametrize("write", FORMATS.values(), ids=FORMATS)
 
 
 @WRITERS
-def test_no_format_is_silent_about_a_finding_or_its_novelty(write):
+def test_every_format_states_findings_and_their_novelty(write):
     written = write([LOUD])
     for event in LOUD.events:
         assert event.label in written
@@ -103,7 +103,7 @@ def test_no_format_is_silent_about_a_finding_or_its_novelty(write):
 
 @WRITERS
 @pytest.mark.parametrize("verdict", [QUIET, LOUD])
-def test_ignored_unknown_frames_are_said_in_every_format(write, verdict):
+def test_ignored_unknown_frames_are_stated_in_every_format(write, verdict):
     ignoring = replace(verdict, unknown=Unknown.IGNORE, message="Unknown frames are ignored.")
     assert "ignore" in write([ignoring])
     assert "ignore" not in write([verdict])
@@ -127,6 +127,6 @@ def test_github_gets_ten_annotations_of_a_kind_at_most():
     assert sum(line.startswith("::warning") for line in lines) == 1
 
 
-def test_nothing_to_say_is_said_in_every_format():
+def test_an_empty_list_of_verdicts_is_valid_in_every_format():
     for write in FORMATS.values():
         assert isinstance(write([]), str)

@@ -120,7 +120,7 @@ def test_joints_are_ordered_by_what_vibrates_in_them(tmp_path):
     assert re.search(r"elbow 96\.\d% .* wrist 3\.\d%", words)
 
 
-def test_names_cannot_smuggle_anything_into_the_page(tmp_path):
+def test_names_are_escaped_in_the_page(tmp_path):
     evil = "<script>alert(1)</script>\"'&$\\frac{$"
     run = short_run(joint_names=(evil, "wrist"), blocks=(Block(1.0, 2.0, f"<b>{evil}"),))
     found = inspected(run, tmp_path, name=evil)

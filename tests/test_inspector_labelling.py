@@ -24,13 +24,13 @@ def run_of(velocity, rate):
 
 @pytest.mark.parametrize("rate", [1000.0, 10_000.0])
 @pytest.mark.parametrize("speed", [0.0, 0.3])
-def test_standstill_and_uniform_motion_are_quiet(rate, speed):
+def test_standstill_and_uniform_motion_have_no_findings(rate, speed):
     run = run_of(np.full((int(3 * rate), 7), speed), rate)
     assert label_run(run, LIBRARY).labels.events() == ()
 
 
 @pytest.mark.parametrize("rate", [1000.0, 10_000.0])
-def test_a_smooth_motion_without_any_sensor_noise_is_quiet(rate):
+def test_a_smooth_motion_without_any_sensor_noise_has_no_findings(rate):
     time = np.arange(int(4 * rate)) / rate
     run = run_of(np.sin(2 * np.pi * 0.3 * np.outer(time, np.linspace(0.5, 1, 7))), rate)
     assert label_run(run, LIBRARY).labels.events() == ()
@@ -63,7 +63,7 @@ def test_a_scalar_noise_cannot_be_decimated():
         label_noise(time, np.ones(20_000), LIBRARY)
 
 
-def test_the_richest_model_that_a_run_feeds_is_taken():
+def test_the_model_with_most_of_the_signals_of_a_run_is_taken():
     generator = np.random.default_rng(0)
     noisy = 0.1 + 1e-3 * generator.normal(size=(3000, 3))
     assert label_run(run_of(noisy, 1000.0), LIBRARY).model == "scalar-1khz"  # desired is measured
@@ -89,8 +89,8 @@ def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
     assert "ok" not in whole.labels.label
     assert whole.labels.novel.all()
     count = len(whole.labels)
-    said = f"{count} of {count} frames are out of distribution for model general-1khz."
-    assert whole.remark == said
+    remark = f"{count} of {count} frames are out of distribution for model general-1khz."
+    assert whole.remark == remark
     known = np.where(run.time[:, None] < 3.0, odd, 0.1 + 1e-7 * odd)
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
     assert "frames are out of distribution for model general-1khz" in labelled.remark

@@ -195,7 +195,7 @@ def test_a_damaged_sample_is_named_and_replaced_with_overwrite(inspector, simula
     assert len(simulated.calls) == 3
 
 
-def test_without_the_simulator_one_line_says_what_to_install(inspector, tmp_path, monkeypatch):
+def test_without_the_simulator_one_line_names_what_to_install(inspector, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     for call in (("simulate", "panda", "-o", tmp_path / "r.npz"), many("-o", tmp_path / "data")):
         status, _, err = inspector(*call)

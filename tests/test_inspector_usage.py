@@ -20,7 +20,7 @@ def test_the_version_is_that_of_the_distribution(monkeypatch):
     assert (result.exit_code, result.output) == (0, "inspector 1.2.3\n")
 
 
-def test_a_source_tree_that_is_not_installed_says_so(monkeypatch):
+def test_the_version_option_states_that_a_source_tree_is_not_installed(monkeypatch):
     def version(name):
         raise metadata.PackageNotFoundError(name)
 

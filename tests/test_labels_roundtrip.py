@@ -21,7 +21,7 @@ def folder(tmp_path_factory):
 
 @st.composite
 def annotated_runs(draw):
-    """Runs with blocks that begin and end anywhere, at bare floats."""
+    """Runs with blocks that begin and end anywhere, at any floats."""
     begin = draw(st.sampled_from([0.0, -3.0, 1e5]) | times)
     time = begin + np.arange(200) / draw(st.sampled_from([3.0, 30.0, 1000.0]))
     edges = sorted(draw(st.lists(st.floats(time[0], time[-1]), max_size=12, unique=True)))

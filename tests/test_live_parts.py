@@ -141,7 +141,7 @@ def test_labels_at_a_lower_rate_are_those_of_the_whole_run(library):
     labeller = Labeller(library, 2000.0, {"velocity": 3})
     labels = labelled(labeller, velocity)
     assert labeller.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
-    # The first frame and the last ones touch ends beyond which the whole run was guessed.
+    # The first frame and the last ones touch ends beyond which the whole run was extrapolated.
     np.testing.assert_allclose(labels.start, batch.start[1:-1], atol=1e-9)
     assert np.array_equal(labels.label, batch.label[1:-1])
     np.testing.assert_allclose(labels.scores, batch.scores[1:-1], atol=1e-6)

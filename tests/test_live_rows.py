@@ -19,17 +19,17 @@ HEAD = b"time,elbow.velocity,wrist.velocity,elbow.position,wrist.position,load"
 
 
 def noting():
-    said = []
+    warned = []
 
     def note(kind, line, count=1):
-        said.append((kind, line))
+        warned.append((kind, line))
 
-    return note, said
+    return note, warned
 
 
 def read(reader, lines, first=2):
-    note, said = noting()
-    return list(reader.read(lines, first, note)), said
+    note, warned = noting()
+    return list(reader.read(lines, first, note)), warned
 
 
 # CSV.
@@ -37,12 +37,12 @@ def read(reader, lines, first=2):
 
 def test_columns_are_found_by_their_names():
     reader = CsvReader(HEAD, ())
-    (rows,), said = read(reader, b"0.5,1,2,3,4,9\n0.6,1.5,-2e-3,3,4,9\n")
+    (rows,), warned = read(reader, b"0.5,1,2,3,4,9\n0.6,1.5,-2e-3,3,4,9\n")
     assert reader.names == ("elbow", "wrist")
     assert rows.time.tolist() == [0.5, 0.6]
     assert rows.signals["velocity"].tolist() == [[1.0, 2.0], [1.5, -2e-3]]
     assert rows.signals["position"].tolist() == [[3.0, 4.0], [3.0, 4.0]]
-    assert said == []
+    assert warned == []
 
 
 def test_names_select_joints_and_their_order():
@@ -56,27 +56,27 @@ def test_names_select_joints_and_their_order():
 
 
 def test_empty_cells_and_nan_are_unknown():
-    (rows,), said = read(CsvReader(HEAD, ()), b"0,,nan,1,2,3\n")
+    (rows,), warned = read(CsvReader(HEAD, ()), b"0,,nan,1,2,3\n")
     assert np.isnan(rows.signals["velocity"]).all()
-    assert said == []
+    assert warned == []
 
 
 def test_malformed_rows_are_reported_by_their_line_and_left_out():
     lines = b"0,1,2,3,4,9\n1,2,3\n\nx,1,2,3,4,9\n2,1,2,3,4,9\n"
-    (rows,), said = read(CsvReader(HEAD, ()), lines, first=100)
+    (rows,), warned = read(CsvReader(HEAD, ()), lines, first=100)
     assert rows.time.tolist() == [0.0, 2.0]
-    assert [line for _, line in said] == [
+    assert [line for _, line in warned] == [
         "line 101: 3 cells where the header names 6; such rows are left out",
         "line 103: could not convert string to float: 'x'; such rows are left out",
     ]
-    assert {kind for kind, _ in said} == {"malformed rows"}
+    assert {kind for kind, _ in warned} == {"malformed rows"}
 
 
 def test_without_stamps_a_malformed_row_still_takes_its_time():
-    (rows,), said = read(CsvReader(b"a.velocity", ()), b"1\noops\n3\n")
+    (rows,), warned = read(CsvReader(b"a.velocity", ()), b"1\noops\n3\n")
     np.testing.assert_array_equal(rows.signals["velocity"], [[1.0], [np.nan], [3.0]])
     assert rows.time is None
-    assert len(said) == 1
+    assert len(warned) == 1
 
 
 def test_all_ways_of_reading_agree():
@@ -85,10 +85,10 @@ def test_all_ways_of_reading_agree():
     table[random.uniform(size=table.shape) < 0.1] = np.nan
     lines = "".join(",".join(map(repr, row)) + "\n" for row in table.tolist()).encode()
     padded = lines.replace(b",", b" ,", 1)
-    (numbers,), said = read(CsvReader(HEAD, ()), lines)
+    (numbers,), warned = read(CsvReader(HEAD, ()), lines)
     (fast,), _ = read(CsvReader(HEAD, ()), padded)
     (careful,), _ = read(CsvReader(HEAD, ()), lines + b"broken\n")
-    assert said == []
+    assert warned == []
     assert CsvReader(HEAD, ())._read_numbers(lines) is not None
     assert CsvReader(HEAD, ())._read_numbers(padded) is None
     for rows in (numbers, fast, careful):
@@ -97,15 +97,15 @@ def test_all_ways_of_reading_agree():
 
 
 def test_lines_may_end_as_on_windows():
-    (rows,), said = read(CsvReader(b"t;a.velocity\r\n", ()), b"0;1.5\r\n1;2.5\r\n")
+    (rows,), warned = read(CsvReader(b"t;a.velocity\r\n", ()), b"0;1.5\r\n1;2.5\r\n")
     assert rows.signals["velocity"].tolist() == [[1.5], [2.5]]
-    assert said == []
+    assert warned == []
 
 
 def test_rows_of_wrong_lengths_that_add_up_are_reported_too():
-    (rows,), said = read(CsvReader(HEAD, ()), b"0,1,2,3,4\n1,1,2,3,4,9,9\n2,1,2,3,4,9\n")
+    (rows,), warned = read(CsvReader(HEAD, ()), b"0,1,2,3,4\n1,1,2,3,4,9,9\n2,1,2,3,4,9\n")
     assert rows.time.tolist() == [2.0]
-    assert [line.split(":")[0] for _, line in said] == ["line 2", "line 3"]
+    assert [line.split(":")[0] for _, line in warned] == ["line 2", "line 3"]
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_rows_of_wrong_lengths_that_add_up_are_reported_too():
         (b"a.velocity", ("b",), "the header has no velocity of joint 'b'"),
     ],
 )
-def test_headers_that_do_not_say_enough_are_refused(head, names, reason):
+def test_headers_that_do_not_define_all_columns_are_refused(head, names, reason):
     with pytest.raises(LiveError, match=reason):
         CsvReader(head, names)
 
@@ -139,11 +139,11 @@ def test_objects_hold_arrays_as_a_run_file_names_them():
 def test_objects_of_other_widths_are_kept_apart_and_malformed_ones_reported():
     lines = b'{"velocity":[1,2]}\n{"velocity":[1]}\n{"velocity":[1\n[3]\n{"velocity":["a"]}\n'
     lines += b'{"velocity":{}}\n'
-    parts, said = read(JsonReader(()), lines, first=1)
+    parts, warned = read(JsonReader(()), lines, first=1)
     assert [rows.signals["velocity"].shape for rows in parts] == [(1, 2), (1, 1)]
-    assert [line.split(":")[0] for _, line in said] == ["line 3", "line 4", "line 5", "line 6"]
-    assert said[1][1] == "line 4: no JSON object with a velocity; such rows are left out"
-    assert said[3][1] == "line 6: velocity holds no numbers; such rows are left out"
+    assert [line.split(":")[0] for _, line in warned] == ["line 3", "line 4", "line 5", "line 6"]
+    assert warned[1][1] == "line 4: no JSON object with a velocity; such rows are left out"
+    assert warned[3][1] == "line 6: velocity holds no numbers; such rows are left out"
 
 
 # The stream.
@@ -243,7 +243,7 @@ def test_input_without_samples_is_one_line_and_no_file(tmp_path):
     ("content", "reason"),
     [(b"", "the input is empty; expected a CSV header"), (b"a,b\n1,2\n", "names no velocity")],
 )
-def test_input_that_cannot_begin_begins_no_session(content, reason):
+def test_invalid_input_begins_no_session(content, reason):
     with pytest.raises(LiveError, match=reason):
         follow(io.BytesIO(content), (), lambda names: pytest.fail("a session began"))
 
@@ -254,7 +254,7 @@ def test_ctrl_c_ends_with_the_summary_and_a_whole_file(tmp_path):
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     )
-    process.stdin.write(csv(700) + "0.800,1\n")  # what it says of that line says that it is there
+    process.stdin.write(csv(700) + "0.800,1\n")  # its warning on that line shows that it runs
     process.stdin.flush()
     assert "line 702: 2 cells" in process.stderr.readline()
     process.send_signal(signal.SIGINT)

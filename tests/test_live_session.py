@@ -55,22 +55,22 @@ def part(signals, piece):
 
 def shown(tmp_path, signals, cuts=(), **options):
     """Push a motion in pieces; the recording, the warnings, and the summary."""
-    path, said = tmp_path / "live.rrd", []
+    path, warned = tmp_path / "live.rrd", []
     session = inspector.LiveSession(
-        RATE, save=path, on_warning=said.append, overwrite=True, **options
+        RATE, save=path, on_warning=warned.append, overwrite=True, **options
     )
     edges = [0, *sorted(cuts), len(signals["time"])]
     with session:
         for first, stop in pairwise(edges):
             session.push(**part(signals, slice(first, stop)))
-    return path, said, session.summary
+    return path, warned, session.summary
 
 
 def test_a_session_shows_everything(tmp_path, library):
-    path, said, summary = shown(
+    path, warned, summary = shown(
         tmp_path, motion(3.0, 7), robot="panda", joint_names=PANDA, library=library
     )
-    assert said == []
+    assert warned == []
     assert {
         "/noise/simplified",
         "/spectrogram/bands",
@@ -137,7 +137,7 @@ def test_no_peak_of_the_noise_is_lost(tmp_path, library):
 
 
 @pytest.mark.parametrize("seconds", [1.0, 0.97])
-def test_lines_come_every_tenth_of_a_second_and_none_is_left_out(tmp_path, library, seconds):
+def test_lines_are_drawn_every_tenth_of_a_second_and_none_is_left_out(tmp_path, library, seconds):
     signals = motion(seconds)
     path, _, _ = shown(tmp_path, signals, cuts=[7, 500, 501], library=library)
     time, values = read(path, "/noise/simplified", "Scalars:scalars")
@@ -148,7 +148,7 @@ def test_lines_come_every_tenth_of_a_second_and_none_is_left_out(tmp_path, libra
     assert sum(not chunk.is_static for chunk in chunks) == 10
 
 
-def test_the_robot_stands_as_its_joints_say(tmp_path, library):
+def test_the_robot_has_the_pose_of_its_joints(tmp_path, library):
     signals = motion(1.0, 7)
     path, _, _ = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
     time, turns = read(path, "/robot/motion", "Transform3D:quaternion")
@@ -173,12 +173,12 @@ def test_a_floating_base_makes_noise_and_moves(tmp_path, library):
     assert [1.0, 2.0, 3.0] in [place[0] for place in places]
 
 
-def test_missing_samples_end_the_lane_and_labels_go_on_after_them(tmp_path, library):
+def test_missing_samples_end_the_lane_and_labels_resume_after_them(tmp_path, library):
     signals = motion(4.0, hum=(9.0, 9.0))
     kept = np.ones(4000, dtype=bool)
     kept[1000:2500] = False
-    path, said, summary = shown(tmp_path, part(signals, kept), [777, 1900], library=library)
-    assert said == ["gap at 2.500 s: 1500 samples are missing"]
+    path, warned, summary = shown(tmp_path, part(signals, kept), [777, 1900], library=library)
+    assert warned == ["gap at 2.500 s: 1500 samples are missing"]
     assert summary.warnings == {"missing samples": 1500}
     time, states = read(path, "/class/found", "StateChange:state")
     assert [state[0] for state in states] == ["ok", "", "ok", ""]
@@ -201,8 +201,8 @@ def test_unknown_values_make_no_noise_and_no_label(tmp_path, library):
     signals = motion(2.0, hum=(9.0, 9.0))
     signals["velocity"][1000:1003, 1] = np.nan
     signals["velocity"][1500, 0] = np.inf
-    path, said, summary = shown(tmp_path, signals, library=library)
-    assert said == [
+    path, warned, summary = shown(tmp_path, signals, library=library)
+    assert warned == [
         "velocity or velocity_desired is not known at 1.000 s: such samples make no noise, frames"
         " with one have no label"
     ]
@@ -222,16 +222,16 @@ def test_unknown_positions_only_stop_the_robot(tmp_path, library):
 
 
 def test_another_number_of_joints_is_warned_of_once_counted_and_not_labelled(tmp_path, library):
-    whole, said = motion(3.0), []
+    whole, warned = motion(3.0), []
     with inspector.LiveSession(
-        RATE, save=tmp_path / "live.rrd", library=library, on_warning=said.append
+        RATE, save=tmp_path / "live.rrd", library=library, on_warning=warned.append
     ) as session:
         session.push(**part(whole, slice(0, 1000)))
         for first in range(1000, 2000, 100):
             narrow = part(whole, slice(first, first + 100))
             session.push(**narrow | {"velocity": narrow["velocity"][:, :2]})
         session.push(**part(whole, slice(2000, 3000)))
-    assert said[0].startswith("velocity of 2 columns from 1.000 s on, where it had 3: not shown")
+    assert warned[0].startswith("velocity of 2 columns from 1.000 s on, where it had 3: not shown")
     assert session.summary.warnings["samples with another width of velocity"] == 1000
     assert session.summary.warnings["samples without noise"] == 1000
     assert sum(session.summary.labels.values()) == 14
@@ -240,13 +240,13 @@ def test_another_number_of_joints_is_warned_of_once_counted_and_not_labelled(tmp
 
 
 def test_signals_that_cease_or_appear_are_warned_of(tmp_path, library):
-    whole, said = motion(1.0), []
+    whole, warned = motion(1.0), []
     with inspector.LiveSession(
-        RATE, save=tmp_path / "live.rrd", library=library, on_warning=said.append
+        RATE, save=tmp_path / "live.rrd", library=library, on_warning=warned.append
     ) as session:
         session.push(velocity=whole["velocity"][:500], position=whole["position"][:500])
         session.push(velocity=whole["velocity"][500:], base_pose=np.zeros((500, 7)))
-    assert sorted(said) == [
+    assert sorted(warned) == [
         "base_pose from 0.500 s on was not there at first: not shown",
         "no position from 0.500 s on: it was there at first",
     ]
@@ -263,12 +263,12 @@ def test_without_stamps_samples_follow_each_other(tmp_path, library):
 
 
 def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(tmp_path, library):
-    said = []
+    warned = []
     with inspector.LiveSession(
-        250.0, save=tmp_path / "live.rrd", library=library, on_warning=said.append
+        250.0, save=tmp_path / "live.rrd", library=library, on_warning=warned.append
     ) as session:
         session.push(velocity=np.ones((500, 2)))
-    assert said == [
+    assert warned == [
         "No labels: rate of 250 Hz; the models' rates are 1000, 10000 Hz: too low for any; log"
         " faster."
     ]
@@ -279,13 +279,13 @@ def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(t
 
 
 def test_a_robot_without_positions_is_not_drawn_and_that_is_warned_of(tmp_path, library):
-    said = []
+    warned = []
     with inspector.LiveSession(
         RATE, robot="panda", joint_names=PANDA, save=tmp_path / "a.rrd", library=library,
-        on_warning=said.append,
+        on_warning=warned.append,
     ) as session:  # fmt: skip
         session.push(velocity=np.zeros((100, 7)))
-    assert said == ["no positions: the robot is not drawn"]
+    assert warned == ["no positions: the robot is not drawn"]
     assert "/noise/simplified" in entities(tmp_path / "a.rrd")
 
 

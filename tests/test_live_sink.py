@@ -42,13 +42,15 @@ def second(first):
     return {"velocity": np.ones((1000, 2)), "time": first + np.arange(1000) / 1000}
 
 
-def test_a_viewer_that_dies_is_warned_of_once_and_labels_go_on(tmp_path, monkeypatch):
+def test_a_viewer_that_ends_is_warned_of_once_and_labels_continue(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
-    said = []
+    warned = []
     with receiver(tmp_path) as (port, end):
-        session = inspector.LiveSession(1000.0, connect=f"127.0.0.1:{port}", on_warning=said.append)
+        session = inspector.LiveSession(
+            1000.0, connect=f"127.0.0.1:{port}", on_warning=warned.append
+        )
         session.push(**second(0.0))
-        assert said == []
+        assert warned == []
         assert len(session.summary.delays) == 7
         end()
         started = time.monotonic()
@@ -56,7 +58,7 @@ def test_a_viewer_that_dies_is_warned_of_once_and_labels_go_on(tmp_path, monkeyp
             session.push(**second(first))
         summary = session.close()
         assert time.monotonic() - started < 20.0
-    (line,) = said
+    (line,) = warned
     assert line.startswith("the viewer is gone or hangs, noticed at 1.")
     assert line.endswith("s: samples are only labelled and counted")
     assert summary.warnings == {"samples that the viewer may not have shown": 3000}
@@ -64,19 +66,19 @@ def test_a_viewer_that_dies_is_warned_of_once_and_labels_go_on(tmp_path, monkeyp
     assert f"shown by the viewer at 127.0.0.1:{port}" in str(summary)
 
 
-def test_a_file_goes_on_when_the_viewer_beside_it_dies(tmp_path, monkeypatch):
+def test_a_file_is_continued_when_the_viewer_beside_it_ends(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "CHECK_INTERVAL", 0.0)
-    path, said = tmp_path / "live.rrd", []
+    path, warned = tmp_path / "live.rrd", []
     with receiver(tmp_path) as (port, end):
         session = inspector.LiveSession(
-            1000.0, connect=str(port), save=path, on_warning=said.append
+            1000.0, connect=str(port), save=path, on_warning=warned.append
         )
         session.push(**second(0.0))
         end()
         session.push(**second(1.0))
         summary = session.close()
     assert summary.warnings == {"samples that the viewer may not have shown": 1000}
-    assert said[0].endswith("s: the file goes on")
+    assert warned[0].endswith("s: the file goes on")
     assert len(summary.delays) == 17
     assert path.stat().st_size > 10_000
 

@@ -46,7 +46,7 @@ def following(state):
 
 
 def until(client, holds, timeout=60.0):
-    """Ask for the viewer's state until something holds; it answers late under load."""
+    """Ask for the viewer's state until something holds; it responds late under load."""
     limit = time.monotonic() + timeout
     while True:
         try:

@@ -106,7 +106,7 @@ def test_the_localisation_of_a_verdict_is_that_of_a_view_of_its_run():
     assert verdict.localisations == {event: seen.localisations[event] for event in seen.findings}
 
 
-def test_the_report_says_stage_and_band_of_each_failure(tmp_path):
+def test_the_report_states_stage_and_band_of_each_failure(tmp_path):
     analysis = inspected(shaken_run(), tmp_path)
     assert "| class | from [s] | to [s] | shows first in | by joints | band |" in report(analysis)
     low, high = analysis.localisations[SHAKE].band
@@ -120,7 +120,7 @@ def test_the_report_says_stage_and_band_of_each_failure(tmp_path):
     assert "No stages" not in report(analysis)
 
 
-def test_a_run_without_desired_velocities_says_once_that_it_has_no_stages(tmp_path):
+def test_a_run_without_desired_velocities_has_one_remark_on_missing_stages(tmp_path):
     blocks = (SHAKE, Block(4.0, 4.2, "impact"))
     analysis = inspected(shaken_run(velocity_desired=None, blocks=blocks), tmp_path)
     assert all(known.stage == "" for known in analysis.localisations.values())

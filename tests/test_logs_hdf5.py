@@ -66,7 +66,7 @@ def test_isaac_labs_states_take_precedence_over_observations_and_hold_the_base(t
     assert np.array_equal(run.position, POSITION)
     assert run.rate == pytest.approx(50.0)
     assert np.allclose(run.base_pose[:, 3:], [0, 0, np.sqrt(0.5), np.sqrt(0.5)])
-    # The body looks along the world's y: motion along x is to its right.
+    # The body faces along the world's y: motion along x is to its right.
     assert np.allclose(run.base_velocity, [0.0, -1.0, 0.0, 2.0, 0.0, 3.0])
 
 

@@ -72,7 +72,7 @@ def test_mujocos_state_without_a_free_base_is_all_joints(tmp_path):
     assert run.base_pose is None
 
 
-def test_isaacs_arrays_are_known_and_its_root_is_mapped(tmp_path):
+def test_isaacs_arrays_are_recognised_and_its_root_is_mapped(tmp_path):
     turn = [np.cos(0.3), np.sin(0.3), 0.0, 0.0]
     root = np.column_stack(
         (numbers(3), np.tile(turn, (400, 1)), np.tile([0, 0, 1, 0, 0, 2], (400, 1)))

@@ -9,7 +9,7 @@ from noisemodel import Robot
 
 
 @pytest.mark.parametrize("stamp", ["time", "timestamp", "t", "__time", "stamp", "Time"])
-def test_a_time_column_is_known_by_its_name(tmp_path, stamp):
+def test_a_time_column_is_recognised_by_its_name(tmp_path, stamp):
     path = write(tmp_path / "log.csv", {"a.velocity": 0 * TIME, stamp: TIME})
     assert np.array_equal(read_log(path).run.time, TIME)
 
@@ -28,7 +28,7 @@ def test_a_time_column_is_known_by_its_name(tmp_path, stamp):
         ("actual_qd_5", "velocity", "joint_5"),
     ],
 )
-def test_a_joint_column_is_known_by_its_name(tmp_path, column, signal, joint):
+def test_a_joint_column_is_recognised_by_its_name(tmp_path, column, signal, joint):
     ones = np.ones(len(TIME))
     run = read_log(write(tmp_path / "log.csv", {"time": TIME, column: ones})).run
     assert run.joint_names == (joint,)
@@ -46,7 +46,7 @@ def test_a_joint_column_is_known_by_its_name(tmp_path, column, signal, joint):
         ("target_q_0", "position_desired"),
     ],
 )
-def test_a_desired_column_is_known_by_its_name(tmp_path, column, signal):
+def test_a_desired_column_is_recognised_by_its_name(tmp_path, column, signal):
     run = read_log(log(tmp_path, **{column: np.ones(len(TIME))})).run
     assert np.array_equal(getattr(run, signal), np.ones((len(TIME), 1)))
     assert run.joint_names == ("elbow",)

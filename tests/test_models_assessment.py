@@ -36,7 +36,7 @@ def fresh(seeds=range(10, 16)):
     ]
 
 
-def test_a_model_is_measured_by_runs_that_it_does_not_know(classifier):
+def test_a_model_is_measured_by_runs_outside_of_its_training_set(classifier):
     found = models.assess(classifier, iter(fresh()))
     assert (found.runs, found.groups) == (12, 6)
     assert found.blocks == {"ok": 12, "oscillations": 6}
@@ -83,16 +83,16 @@ def test_measures_with_intervals_are_the_measures_without():
             assert np.isnan(each.value) == (measures[name][label] is None), (name, label)
 
 
-def test_perfection_is_one_and_its_interval_says_by_how_few_runs():
+def test_perfect_predictions_score_one_with_the_exact_bound_of_their_groups():
     found = measure(many(6))
     for each in (found.frames.balanced_accuracy, found.frames.failure_recall):
         assert each.value == each.high == 1.0
     assert found.frames.failure_recall.low == pytest.approx(0.025 ** (1 / 12))
-    rooms = [0.025 ** (1 / runs) for runs in (18, 6, 6)]
-    assert found.frames.balanced_accuracy.low == pytest.approx(np.mean(rooms))
+    bounds = [0.025 ** (1 / runs) for runs in (18, 6, 6)]
+    assert found.frames.balanced_accuracy.low == pytest.approx(np.mean(bounds))
 
 
-def test_runs_that_the_model_knows_are_refused_or_confessed(classifier):
+def test_runs_of_the_training_set_are_refused_or_listed(classifier):
     known = recording("panda/swing-001", 1)
     with pytest.raises(models.SeenError, match=r"panda/swing-001: .* on the same recording as"):
         models.assess(classifier, [*fresh(), known])
@@ -128,12 +128,12 @@ def test_a_run_whose_blocks_lie_in_gaps_is_classified_from_end_to_end(classifier
     valid[1000:3000:100] = False
     gappy = replace(fresh()[0], valid=valid, blocks=(models.Block(1.2, 2.8, "oscillations"),))
     found = models.assess(classifier, [gappy, *fresh()[1:]])
-    assert found.frames.evaluation.confusion.sum() < judge_frames(classifier)
+    assert found.frames.evaluation.confusion.sum() < count_frames(classifier)
     assert found.blocks["oscillations"] == 6
-    assert len(found.score.missed()) == 1  # no frame of it could be heard
+    assert len(found.score.missed()) == 1  # no frame of it can be classified
 
 
-def judge_frames(classifier):
+def count_frames(classifier):
     return models.assess(classifier, fresh()).frames.evaluation.confusion.sum()
 
 
@@ -170,7 +170,7 @@ def test_it_prints_the_papers_measures_under_the_papers_names():
     assert any("(calling all frames ok: 71.4%)" in line for line in lines)
 
 
-def test_it_says_why_there_are_no_intervals():
+def test_the_reason_for_missing_intervals_is_printed():
     text = str(measure(many(2)))
     assert "Measures of fewer than 5 groups have none." in text
     assert "Balanced accuracy       100.0%\n" in text

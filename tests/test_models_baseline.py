@@ -1,4 +1,4 @@
-"""A baseline knows good motion alone, and for how many false alarms it is set."""
+"""A baseline is trained on good motion alone, with a limit for a false-alarm budget."""
 
 from dataclasses import replace
 
@@ -103,7 +103,7 @@ def test_where_there_is_motion_enough_alarms_are_counted():
     assert "extrapolated" not in str(found)
 
 
-def test_a_smaller_budget_asks_for_a_farther_limit():
+def test_a_smaller_budget_gives_a_larger_limit():
     apart = np.random.default_rng(4).exponential(0.2, 300)
     limits = [limit(apart, motion(apart), budget).distance for budget in (0.1, 1.0, 10.0, 100.0)]
     assert limits == sorted(limits, reverse=True)
@@ -120,7 +120,7 @@ def test_frames_that_overlap_or_touch_are_one_alarm_and_runs_are_never_joined():
     np.testing.assert_array_equal(alarm_peaks(apart, two, 0.5), [5.0, 4.0])
 
 
-def test_little_good_motion_is_said_to_show_little(learnt):
+def test_little_good_motion_gives_a_remark(learnt):
     text = str(learnt)
     assert "learnt from 0.0133 h of good motion in 6 runs" in text
     assert "can show no fewer than 225 alarms per hour: the limit is extrapolated" in text
@@ -161,8 +161,10 @@ def test_a_baseline_is_a_model_file_and_the_same_runs_give_the_same_bytes(learnt
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
     loaded = models.Classifier.load(tmp_path / "one.npz")
     assert isinstance(loaded.estimator, Baseline)
-    heard, known = (m.classify(signals(12, 0.3), RATE) for m in (loaded, learnt.classifier))
-    np.testing.assert_array_equal(heard.scores, known.scores)
+    loaded_labels, labels = (
+        m.classify(signals(12, 0.3), RATE) for m in (loaded, learnt.classifier)
+    )
+    np.testing.assert_array_equal(loaded_labels.scores, labels.scores)
 
 
 def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
@@ -175,11 +177,11 @@ def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
 def test_a_stream_has_the_labels_of_the_whole_signal(learnt):
     whole = signals(12, rattle=0.3)
     stream = models.Stream(learnt.classifier)
-    heard = [
+    parts = [
         stream.push({name: signal[first : first + 370] for name, signal in whole.items()})
         for first in range(0, SECONDS * 1000, 370)
     ]
-    labels = np.concatenate([each.label for each in heard])
+    labels = np.concatenate([each.label for each in parts])
     batch = learnt.classifier.classify(whole, RATE)
     np.testing.assert_array_equal(labels, batch.label[: len(labels)])
     assert models.ANOMALY in labels
@@ -206,7 +208,7 @@ def test_the_noise_alone_is_enough_for_a_baseline():
 
 
 @pytest.mark.parametrize("alarms", [0.0, -1.0, np.nan, np.inf])
-def test_no_alarm_at_all_is_no_budget(alarms):
+def test_a_budget_of_no_alarm_is_refused(alarms):
     good = models.GoodMotion.read(GOOD[:2], PROFILE)
     with pytest.raises(models.ProfileError, match="alarms per hour, expected more than 0"):
         models.learn_baseline(good, PROFILE, alarms=alarms)

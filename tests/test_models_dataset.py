@@ -15,7 +15,7 @@ THEIRS = replace(
 
 
 def recording(*blocks, samples=3000, **changes):
-    """A ramp, so that each value says which sample it is."""
+    """A ramp, so that each value identifies its sample."""
     facts = {"name": "walk", "signal": np.arange(float(samples)), "rate": 1000.0, "blocks": blocks}
     return Recording(**{**facts, **changes})
 
@@ -64,7 +64,7 @@ def test_noisytest_takes_the_stop_in_and_loses_the_first_sample():
 
 
 def test_noisytest_widens_by_a_sample_more_and_pads_at_the_ends():
-    # Rounding to 32 bits decides whether the samples on both bounds are in: one frame anyhow.
+    # Rounding to 32 bits determines whether the samples on both bounds are in: one frame anyhow.
     assert len(cut_block(1.0, 1.2, THEIRS, training=False)) in (401, 402)
     samples = cut_block(0.0, 0.1, THEIRS, training=False)
     assert samples.tolist() == list(range(1, 401))  # the ramp, padded behind 0.251 s
@@ -157,7 +157,7 @@ def test_blocks_that_cannot_be_are_refused(blocks, reason):
         recording(*blocks)
 
 
-def test_blocks_that_overlap_and_agree_are_welcome():
+def test_blocks_that_overlap_and_agree_are_accepted():
     assert len(recording(Block(0.0, 2.0, "ok"), Block(1.0, 2.5, "ok")).blocks) == 2
 
 

@@ -10,8 +10,8 @@ TRUTH = np.array(["ok"] * 6 + ["impact"] * 2 + ["oscillations"] * 2)
 CLASSES = ("ok", "impact", "oscillations")
 
 
-def evaluation(*called):
-    return Evaluation.of(TRUTH, np.array(called), CLASSES)
+def evaluation(*labels):
+    return Evaluation.of(TRUTH, np.array(labels), CLASSES)
 
 
 PERFECT = evaluation(*TRUTH)
@@ -26,7 +26,7 @@ def test_a_perfect_classifier_scores_one():
     assert PERFECT.recall.tolist() == PERFECT.precision.tolist() == [1.0, 1.0, 1.0]
 
 
-def test_calling_everything_ok_shows_why_the_papers_measures_mislead():
+def test_predicting_ok_everywhere_shows_why_the_papers_measures_mislead():
     assert ALL_OK.subset_accuracy == ALL_OK.failure_detection_rate == 0.6
     assert ALL_OK.failure_recall == ALL_OK.false_alarm_rate == 0.0
     assert ALL_OK.balanced_accuracy == pytest.approx(1 / 3)

@@ -12,8 +12,8 @@ from models.evaluation.matching import Matched
 COUNT = len(frames())
 
 
-def called(**labels):
-    """What frames are called, by class the numbers of the frames; all others are ok."""
+def labelled(**labels):
+    """Labels of frames, by class the numbers of the frames; all others are ok."""
     names = ["ok"] * COUNT
     for label, numbers in labels.items():
         for number in numbers:
@@ -35,7 +35,7 @@ def false(result):
     return int(result.alarms.false.sum())
 
 
-def test_a_model_without_fault_finds_and_names_everything_and_cries_no_wolf():
+def test_a_model_without_mistakes_finds_and_names_everything_without_false_alarms():
     events = measured(many(8))
     assert events.all_found.value == events.all_named.value == events.failure_recall.value == 1.0
     assert events.found["impact"].value == events.named["oscillations"].value == 1.0
@@ -45,8 +45,8 @@ def test_a_model_without_fault_finds_and_names_everything_and_cries_no_wolf():
     assert 0.0 < events.delay.value <= events.late_delay.value <= 0.1
 
 
-def test_a_model_that_always_says_ok_finds_nothing_and_cries_no_wolf():
-    events = measured(many(8, called()))
+def test_a_model_that_predicts_ok_everywhere_finds_nothing_and_has_no_false_alarms():
+    events = measured(many(8, labelled()))
     assert events.all_found.value == events.failure_recall.value == 0.0
     assert events.false_alarms == 0
     assert events.false_alarms_per_hour.low == 0.0
@@ -54,8 +54,8 @@ def test_a_model_that_always_says_ok_finds_nothing_and_cries_no_wolf():
     assert np.isnan(events.delay.value)
 
 
-def test_a_model_that_never_falls_silent_finds_everything_and_pays_for_it():
-    recordings = many(8, called(impact=range(COUNT)))
+def test_a_model_that_flags_every_frame_finds_everything_with_false_alarms():
+    recordings = many(8, labelled(impact=range(COUNT)))
     events = measured(recordings)
     assert events.all_found.value == events.found["oscillations"].value == 1.0
     assert events.named["oscillations"].value == 0.0
@@ -65,22 +65,24 @@ def test_a_model_that_never_falls_silent_finds_everything_and_pays_for_it():
 
 
 def test_one_false_alarm_of_three_frames_counts_once():
-    assert false(scored(predicted("a", GOOD, called(impact=[10, 11, 12])))) == 1
+    assert false(scored(predicted("a", GOOD, labelled(impact=[10, 11, 12])))) == 1
 
 
-def test_an_alarm_is_one_whatever_classes_its_frames_are_called():
-    assert len(scored(predicted("a", GOOD, called(impact=[10], oscillations=[11, 13]))).alarms) == 1
+def test_an_alarm_is_one_whatever_the_predicted_classes_of_its_frames():
+    assert (
+        len(scored(predicted("a", GOOD, labelled(impact=[10], oscillations=[11, 13]))).alarms) == 1
+    )
 
 
 def test_frames_that_touch_are_one_alarm_and_those_further_apart_are_two():
-    touching = scored(predicted("a", GOOD, called(impact=[10, 14])))  # 1.0 to 1.4 s, 1.4 to 1.8 s
+    touching = scored(predicted("a", GOOD, labelled(impact=[10, 14])))  # 1.0 to 1.4 s, 1.4 to 1.8 s
     assert len(touching.alarms) == false(touching) == 1
     assert (touching.alarms.start[0], touching.alarms.stop[0]) == pytest.approx((1.0, 1.8))
-    assert false(scored(predicted("a", GOOD, called(impact=[10, 15])))) == 2
+    assert false(scored(predicted("a", GOOD, labelled(impact=[10, 15])))) == 2
 
 
 def test_alarms_of_two_runs_never_join():
-    last, first = called(impact=[COUNT - 1]), called(impact=[0])
+    last, first = labelled(impact=[COUNT - 1]), labelled(impact=[0])
     result = scored(predicted("a", GOOD, last), predicted("b", GOOD, first, start=5.0))
     assert false(result) == 2
     assert [each["run"] for each in result.false_alarms()] == ["a", "b"]
@@ -88,47 +90,47 @@ def test_alarms_of_two_runs_never_join():
 
 def test_an_alarm_that_runs_on_into_a_failure_is_not_false_but_wrong_where_it_is_ok():
     early = range(10, 21)  # from 1.0 s on; the blow comes at 2.03 s
-    result = scored(predicted("a", IMPACT, called(impact=early)))
+    result = scored(predicted("a", IMPACT, labelled(impact=early)))
     assert (false(result), result.wrong.tolist()) == (0, [1.0])
     assert result.found.tolist() == [True]
 
 
-def test_an_alarm_in_time_that_nobody_annotated_is_neither_right_nor_false():
+def test_an_alarm_without_annotations_around_is_neither_right_nor_false():
     gap = blocks((0.0, 1.0, "ok"), (2.0, 5.0, "ok"))
-    assert false(scored(predicted("a", gap, called(impact=[12, 13])))) == 0
-    assert false(scored(predicted("a", gap, called(impact=[12, 16, 20])))) == 1  # 2.0 s on is ok
+    assert false(scored(predicted("a", gap, labelled(impact=[12, 13])))) == 0
+    assert false(scored(predicted("a", gap, labelled(impact=[12, 16, 20])))) == 1  # 2.0 s on is ok
 
 
 def test_ok_blocks_that_touch_are_one_stretch_of_ok():
     halves = blocks((0.0, 2.5, "ok"), (2.5, 5.0, "ok"))
-    assert false(scored(predicted("a", halves, called(impact=[23])))) == 1
+    assert false(scored(predicted("a", halves, labelled(impact=[23])))) == 1
 
 
 def test_a_failure_is_named_by_a_frame_of_its_own_class_alone():
-    result = scored(predicted("a", IMPACT, called(highaccelerations=[18, 19])))
+    result = scored(predicted("a", IMPACT, labelled(highaccelerations=[18, 19])))
     assert (result.found.tolist(), result.named.tolist()) == ([True], [False])
-    result = scored(predicted("a", IMPACT, called(highaccelerations=[18], impact=[19])))
+    result = scored(predicted("a", IMPACT, labelled(highaccelerations=[18], impact=[19])))
     assert result.named.tolist() == [True]
-    beside = scored(predicted("a", IMPACT, called(highaccelerations=[18], impact=[30])))
+    beside = scored(predicted("a", IMPACT, labelled(highaccelerations=[18], impact=[30])))
     assert beside.named.tolist() == [False]
 
 
 @pytest.mark.parametrize(("frame", "delay"), [(17, 0.07), (18, 0.17), (20, 0.37)])
-def test_the_delay_lasts_until_the_first_frame_that_tells_is_complete(frame, delay):
+def test_the_delay_lasts_until_the_first_flagged_frame_is_complete(frame, delay):
     # The blow starts at 2.03 s; frame 17 lasts from 1.7 s to 2.1 s.
-    result = scored(predicted("a", IMPACT, called(impact=range(frame, 23))))
+    result = scored(predicted("a", IMPACT, labelled(impact=range(frame, 23))))
     assert result.delay.tolist() == pytest.approx([delay])
 
 
 def test_a_frame_that_shares_no_more_than_a_sample_with_a_failure_does_not_find_it():
     late = blocks((0.0, 2.0, "ok"), (2.1, 2.2, "impact"))
-    assert scored(predicted("a", late, called(impact=[17]))).found.tolist() == [False]
+    assert scored(predicted("a", late, labelled(impact=[17]))).found.tolist() == [False]
     sooner = blocks((0.0, 2.0, "ok"), (2.098, 2.2, "impact"))
-    assert scored(predicted("a", sooner, called(impact=[17]))).found.tolist() == [True]
+    assert scored(predicted("a", sooner, labelled(impact=[17]))).found.tolist() == [True]
 
 
 def test_what_is_missed_is_listed():
-    result = scored(predicted("a", OSCILLATION), predicted("b", IMPACT, called()))
+    result = scored(predicted("a", OSCILLATION), predicted("b", IMPACT, labelled()))
     assert result.missed() == [{"run": "b", "label": "impact", "start": 2.03, "stop": 2.2}]
     assert np.isnan(result.delay[1])
 
@@ -149,7 +151,7 @@ def test_a_frame_is_a_failure_if_it_holds_it_or_is_filled_by_it_by_half():
     assert np.flatnonzero(truth == "oscillations").tolist() == [*range(9, 34)]
 
 
-def test_time_in_which_no_alarm_could_be_false_is_not_counted_as_heard():
+def test_time_in_which_no_alarm_could_be_false_is_not_counted_as_covered():
     short = blocks((0.0, 0.3, "ok"), (0.5, 0.6, "impact"), (1.05, 1.85, "ok"))
     matched = Matched.of([predicted("a", short), predicted("b", GOOD)])
     assert matched.ok_annotated.tolist() == pytest.approx([1.1, 5.0])
@@ -158,9 +160,9 @@ def test_time_in_which_no_alarm_could_be_false_is_not_counted_as_heard():
 
 def test_times_may_start_anywhere():
     moved = scored(
-        predicted("a", IMPACT, start=1e6), predicted("b", GOOD, called(impact=[3]), start=-7.0)
+        predicted("a", IMPACT, start=1e6), predicted("b", GOOD, labelled(impact=[3]), start=-7.0)
     )
-    plain = scored(predicted("a", IMPACT), predicted("b", GOOD, called(impact=[3])))
+    plain = scored(predicted("a", IMPACT), predicted("b", GOOD, labelled(impact=[3])))
     assert moved.found.tolist() == plain.found.tolist()
     assert moved.delay == pytest.approx(plain.delay, abs=1e-6)
     assert false(moved) == false(plain) == 1
@@ -207,7 +209,7 @@ def test_the_order_of_the_recordings_does_not_matter():
 def test_a_robot_alone_is_measured_by_its_own_runs():
     recordings = [
         *many(6),
-        *[predicted(f"go2/blow-{seed:03d}", IMPACT, called()) for seed in range(6)],
+        *[predicted(f"go2/blow-{seed:03d}", IMPACT, labelled()) for seed in range(6)],
     ]
     resampling = Resampling.of([each.group for each in recordings])
     result = score(Matched.of(recordings))

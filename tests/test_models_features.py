@@ -39,7 +39,7 @@ def test_every_profile_gives_finite_features_of_its_count(profile):
 
 
 @pytest.mark.parametrize("profile", PROFILES, ids=NAMES)
-def test_a_frames_features_do_not_depend_on_its_company(profile):
+def test_a_frames_features_do_not_depend_on_other_frames(profile):
     frames = RANDOM.random((5, profile.length))
     together = models.features(frames, profile)
     alone = np.vstack([models.features(frames[i : i + 1], profile) for i in range(5)])

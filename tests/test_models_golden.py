@@ -77,7 +77,7 @@ def test_every_prediction_is_noisytests(trial, name):
 def test_every_decision_is_noisytests(trial, name):
     _, sets, classifier, theirs, _ = trial
     decisions = classifier.decision(sets[name].frames)
-    # libsvm stops at 1e-3, so that its answer hangs on the last bits of what it is given.
+    # libsvm stops at 1e-3, so that its result depends on the last bits of its input.
     assert np.abs(decisions - theirs[f"{name}_dec_ovo"]).max() < 2.2e-3
     if name == "validation":
         scores = classifier.scores(sets[name].frames)

@@ -17,13 +17,13 @@ def test_bounds_of_rare_events_are_those_of_the_tables():
     assert garwood(10) == pytest.approx((4.7954, 18.3904), abs=1e-4)
 
 
-def test_no_event_at_all_leaves_room_for_some():
+def test_no_event_at_all_has_an_upper_bound_above_zero():
     rate = each_its_own(1000).rate(np.zeros(1000), np.full(1000, 2.0 / 1000))
     assert (rate.value, rate.low) == (0.0, 0.0)
     assert rate.high == pytest.approx(3.6889 / 2.0, abs=1e-4)
 
 
-def test_events_that_come_in_crowds_are_less_certain_than_those_that_come_alone():
+def test_clustered_events_have_wider_intervals_than_single_ones():
     hours, alone, crowd = np.full(50, 0.1), np.zeros(50), np.zeros(50)
     alone[:20] = 1
     crowd[:2] = 10
@@ -34,7 +34,7 @@ def test_events_that_come_in_crowds_are_less_certain_than_those_that_come_alone(
     assert resampling.rate(crowd, hours).high > 1.3 * exact[1]
 
 
-def test_runs_without_a_mistake_promise_no_more_than_they_can():
+def test_runs_without_a_mistake_have_the_bound_of_their_number():
     for runs in (5, 20, 500):
         perfect = each_its_own(runs).share(np.full(runs, 7.0), np.full(runs, 7.0))
         assert perfect.value == perfect.high == 1.0
@@ -60,7 +60,7 @@ def test_intervals_shrink_with_the_root_of_the_number_of_groups():
     assert widths[1] / widths[2] == pytest.approx(2.0, rel=0.15)
 
 
-def test_more_runs_of_the_same_groups_make_nothing_more_certain():
+def test_more_runs_of_the_same_groups_narrow_no_interval():
     part, whole = np.tile([2.0, 9.0, 5.0, 7.0, 1.0, 10.0], 5), np.full(30, 10.0)
     few = Resampling.of([f"g{number % 6}" for number in range(6)]).share(part[:6], whole[:6])
     many = Resampling.of([f"g{number % 6}" for number in range(30)]).share(part, whole)
@@ -109,7 +109,7 @@ def test_sets_are_the_same_each_time_and_in_any_order_of_the_runs():
     assert (back.low, back.high) == pytest.approx((first.low, first.high))
 
 
-def test_the_bounds_of_a_mean_allow_for_the_least_known_part():
+def test_the_bounds_of_a_mean_allow_for_its_least_certain_part():
     resampling = each_its_own(40)
     both = [np.ones(40, dtype=bool), np.arange(40) < 6]
     mean = resampling.bounded(1.0, np.ones(2000), both)

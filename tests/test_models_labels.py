@@ -1,4 +1,4 @@
-"""A finding takes two frames of evidence; what stands beside them joins in."""
+"""A finding takes two frames of evidence; failure frames beside them belong to it."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -16,17 +16,17 @@ HOP, LENGTH = 0.1, 0.4
 
 
 def labels(text, *, above_threshold=None):
-    """Frames of classes by their first letters, `ok` as a dot; upper case where they are sure."""
+    """Frames of classes by their first letters, `ok` as a dot; upper case above the threshold."""
     names = {".": "ok", **{name[0]: name for name in (*CLASSES[1:], UNKNOWN)}}
     start = HOP * np.arange(len(text))
-    called = np.array([names[letter.lower()] for letter in text], dtype=str)
+    labels = np.array([names[letter.lower()] for letter in text], dtype=str)
     certain = (
         np.array([letter.isupper() for letter in text], dtype=bool)
         if above_threshold is None
         else above_threshold
     )
     scores = np.zeros((len(text), len(CLASSES)))
-    return Labels(start, start + LENGTH, called, scores, CLASSES, certain)
+    return Labels(start, start + LENGTH, labels, scores, CLASSES, certain)
 
 
 def debounced(text):
@@ -73,36 +73,36 @@ def test_frames_on_both_sides_of_a_gap_are_two_stretches():
 
 
 @pytest.mark.parametrize("text", ["I..", "..I", "...iI", "Iii.."])
-def test_one_sure_frame_is_enough_where_its_neighbour_is_not_there(text):
+def test_one_frame_above_the_threshold_is_enough_without_a_neighbour(text):
     assert (labels(text).debounced != "ok").tolist() == [letter != "." for letter in text]
 
 
-def test_one_sure_frame_is_enough_beside_a_gap():
+def test_one_frame_above_the_threshold_is_enough_beside_a_gap():
     starts = np.array([0.0, 0.1, 0.2, 5.0, 5.1, 5.2])
     for text, kept in (("..I...", 1), ("...I..", 1), (".I....", 0), ("....I.", 0)):
         found = replace(labels(text), start=starts, stop=starts + 0.4)
         assert (found.debounced == "impact").sum() == kept
 
 
-def test_the_only_frame_of_a_signal_speaks_for_itself():
+def test_the_only_frame_of_a_signal_is_enough():
     assert labels("I").debounced.tolist() == ["impact"]
     assert labels("i").debounced.tolist() == ["ok"]
 
 
-def test_without_sureness_each_frame_speaks_for_itself():
+def test_without_an_alarm_threshold_each_failure_frame_is_flagged():
     plain = replace(labels("i.iOi"), above_threshold=None)
     assert plain.debounced is plain.label
     assert plain.raw is plain.label
     assert [event.label for event in plain.events()] == ["impact", "oscillations"]
 
 
-def test_while_frames_come_in_the_sure_ones_are_failures():
+def test_raw_labels_are_failures_above_the_threshold_only():
     assert labels(".iIIiu.").raw.tolist() == [
         "ok", "ok", "impact", "impact", "ok", "unknown", "ok",
     ]  # fmt: skip
 
 
-def test_what_is_confirmed_is_never_more_than_what_seemed_to_fail():
+def test_confirmed_frames_are_failure_frames_and_fewer_if_more_evidence_is_required():
     generator = np.random.default_rng(3)
     for _ in range(50):
         failing, apart = generator.random(40) < 0.6, generator.random(39) < 0.1
@@ -142,7 +142,7 @@ def test_unknown_frames_that_are_ignored_are_no_evidence():
     assert len(replace(labels("..IIu..."), unknown_is_finding=False).events()) == 1
 
 
-def test_an_event_says_whether_it_is_out_of_distribution():
+def test_an_event_states_whether_it_is_out_of_distribution():
     found = labels(".II...II..uu.")
     novel = np.zeros(13, dtype=bool)
     novel[[7, 10, 11]] = True
@@ -163,8 +163,8 @@ def test_no_frame_out_of_distribution_is_ever_ok(text):
 
 
 @given(LETTERS, st.data())
-def test_a_frame_that_becomes_louder_never_takes_a_finding_away(text, data):
-    """Louder: `ok` becomes failure or unknown, a failure becomes sure, and either way stays so."""
+def test_a_frame_that_becomes_louder_never_removes_a_finding(text, data):
+    """Louder: `ok` becomes failure or unknown, a failure exceeds the threshold, for good."""
     louder = {".": ".iIoOu", "i": "iIoOu", "o": "iIoOu", "I": "IOu", "O": "IOu", "u": "uIO"}
     changed = "".join(data.draw(st.sampled_from(louder[letter])) for letter in text)
     before, after = labels(text), labels(changed)

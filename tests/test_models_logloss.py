@@ -65,7 +65,7 @@ def test_each_class_counts_the_same_however_many_frames_it_has():
     )
 
 
-def test_a_frame_that_gets_surer_lowers_the_loss():
+def test_a_frame_with_a_larger_margin_lowers_the_loss():
     margins, truth = sample()
     surer = margins.copy()
     surer[0, truth[0]] += 1.0

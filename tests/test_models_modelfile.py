@@ -87,7 +87,7 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
 
 
-def test_plain_numpy_reads_it_too(path):
+def test_numpy_alone_reads_it_too(path):
     with np.load(path, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))
     assert manifest["format"] == "noise-model/5"
@@ -96,7 +96,7 @@ def test_plain_numpy_reads_it_too(path):
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
 
 
-def test_a_model_is_not_overwritten_unless_asked(path):
+def test_a_model_is_not_overwritten_unless_requested(path):
     before = path.read_bytes()
     with pytest.raises(models.OutputError, match=r"model.npz: exists already; choose another name"):
         CLASSIFIER.save(path)
@@ -200,7 +200,7 @@ def test_compressed_members_are_refused(path):
     refused(path, "is compressed, expected stored")
 
 
-def test_a_header_that_promises_more_than_there_is_is_refused(path):
+def test_a_header_that_states_more_than_there_is_is_refused(path):
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(
         header, {"descr": "<f8", "fortran_order": False, "shape": (10**12,)}
@@ -264,7 +264,7 @@ def test_wrong_manifests_are_refused(path, changes, reason):
         ("leaf", np.inf, "array 'leaf' holds values that are not finite"),
     ],
 )
-def test_trees_that_look_where_nothing_is_are_refused(path, name, value, reason):
+def test_trees_with_children_or_features_out_of_range_are_refused(path, name, value, reason):
     classifier = trained(replace(PROFILE, estimator="trees", rounds=3, leaves=4))
     classifier.save(path, overwrite=True)
     array = classifier.estimator.arrays()[name].copy()

@@ -1,4 +1,4 @@
-"""Networks answer as those that they were made of."""
+"""Networks predict as those of scikit-learn that they were made of."""
 
 from dataclasses import replace
 

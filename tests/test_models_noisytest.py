@@ -49,7 +49,7 @@ def rows(samples, rate=10_000):
     ],
     ids=["header", "bare", "tabs-crlf", "blanks", "byte-order-mark", "umlaut"],
 )
-def test_logs_are_read_as_people_write_them(log, text):
+def test_logs_are_read_in_every_common_layout(log, text):
     time, noise = models.read_log(log(text))
     assert time.tolist() == [0.0, 0.1, 0.2]
     assert noise.tolist() == [1.5, 2.5, 3.5]

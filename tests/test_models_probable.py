@@ -1,6 +1,6 @@
-"""Networks and trees say how probable each class is, and know what they do not know.
+"""Networks and trees give probabilities of classes, and mark frames that are out of distribution.
 
-They do so by norms, and trees also joint by joint.
+Both classify norms, and trees also joints.
 """
 
 from dataclasses import replace
@@ -82,7 +82,7 @@ def test_scores_are_probabilities(classifier):
     np.testing.assert_allclose(scores.sum(axis=1), 1.0, rtol=1e-12)
 
 
-def test_a_frame_by_itself_is_decided_on_as_among_others(classifier):
+def test_a_single_frame_has_the_decision_values_that_it_has_among_others(classifier):
     features = np.random.default_rng(5).normal(size=(70, len(classifier.mean)))
     together = classifier.decide(features)
     alone = np.concatenate([classifier.decide(row[None]) for row in features])
@@ -96,8 +96,8 @@ def test_a_class_without_frames_is_never_predicted(estimator, classes):
     features = generator.normal(size=(200, 4))
     there = [0, classes]
     targets = np.where(features[:, 0] > 0, there[1], there[0])
-    patient = replace(PROFILES[estimator], epochs=300, decay=0.0)
-    learnt = fit(features, targets, np.array(["one"] * 200), patient)
+    long = replace(PROFILES[estimator], epochs=300, decay=0.0)
+    learnt = fit(features, targets, np.array(["one"] * 200), long)
     scores = learnt.score(learnt.decision(features))
     assert scores.shape == (200, classes + 1)
     assert scores[:, 1:classes].max() < 1e-6
@@ -139,7 +139,7 @@ def test_calibration_finds_the_scale_of_overconfident_logits():
     np.testing.assert_allclose(calibrated(2.5 * log_true, calibration), log_true, atol=0.2)
 
 
-def test_a_lower_alarm_calls_more_frames_a_failure(classifier):
+def test_a_lower_alarm_threshold_predicts_more_failure_frames(classifier):
     decisions = classifier.decision(
         models.frame(
             stacked(RECORDINGS[13].signal, classifier.profile.signals),
@@ -231,7 +231,7 @@ def test_a_stream_of_other_joints_is_refused():
     classifier = models.Classifier.train(
         Examples.read(RECORDINGS[:12], PROFILES["joints"]), PROFILES["joints"]
     )
-    with pytest.raises(models.SignalError, match="12 rows of norms and joints came, expected 15"):
+    with pytest.raises(models.SignalError, match="12 rows of norms and joints, expected 15"):
         models.Stream(classifier, joints=4).push(RECORDINGS[0].signal)
 
 

@@ -35,7 +35,7 @@ def test_noisytest_differs_from_the_paper_by_named_settings():
 @pytest.mark.parametrize(
     "profile", [models.Profile.noisytest("linear"), models.LogBands().at(1234.5)]
 )
-def test_a_profile_survives_json(profile):
+def test_a_profile_is_equal_after_json(profile):
     assert models.Profile.of(json.loads(json.dumps(profile.as_dict()))) == profile
 
 

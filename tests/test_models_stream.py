@@ -37,7 +37,7 @@ def noise(samples, seed=0):
 
 @cache
 def classifier(name):
-    """A classifier that knows a hum when it hears one."""
+    """A classifier that is trained to find a hum."""
     blocks = [(0.0, 1.9, "ok"), (2.1, 4.0, "oscillations")]
     blocks = tuple(models.Block(start, stop, label) for start, stop, label in blocks)
     recording = models.Recording("walk", noise(4000, seed=1), RATE, blocks)
@@ -72,7 +72,7 @@ def streamed(stream, signal, cuts, valid=None):
 
 
 def joined(parts):
-    """The labels of several answers as those of one."""
+    """The labels of several chunks as those of one."""
     fields = ("start", "stop", "label", "scores")
     return models.Labels(
         *(np.concatenate([getattr(part, name) for part in parts]) for name in fields),
@@ -131,8 +131,8 @@ def test_skipping_is_pushing_a_gap(name, before, lost, after):
 
 def test_a_label_comes_with_the_last_sample_of_its_frame():
     stream, signal = models.Stream(classifier("ours")), noise(1000)
-    came = [i for i in range(1000) if len(stream.push(signal[i : i + 1]))]
-    assert came == [399, 499, 599, 699, 799, 899, 999]
+    complete = [i for i in range(1000) if len(stream.push(signal[i : i + 1]))]
+    assert complete == [399, 499, 599, 699, 799, 899, 999]
     assert stream.count == 1000
 
 
@@ -225,5 +225,5 @@ def test_streaming_needs_neither_scikit_learn_nor_scipy(tmp_path):
         "print(sorted({'sklearn', 'scipy', 'noisemodel', 'joblib'} & set(sys.modules)))\n"
     )
     command = [sys.executable, "-c", code, tmp_path / "model.npz"]
-    answer = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert answer.stdout.split("\n")[:2] == ["17", "[]"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[:2] == ["17", "[]"]

@@ -12,12 +12,12 @@ COUNT = len(frames())
 
 
 def graded(name, blocks, risk):
-    """A recording whose frames have failure scores: a failure is called from 0 on."""
+    """A recording whose frames have failure scores: a failure is predicted from 0 on."""
     risk = np.asarray(risk, dtype=float)
     scores = np.full((len(risk), 4), -9.0)
     scores[:, 0], scores[:, 1] = 0.0, risk
-    called = np.where(risk > 0, "impact", "ok").tolist()
-    return predicted(name, blocks, called, scores=scores)
+    labels = np.where(risk > 0, "impact", "ok").tolist()
+    return predicted(name, blocks, labels, scores=scores)
 
 
 def noisy(seeds, spread=1.0):
@@ -39,7 +39,7 @@ def read(recordings, *budgets):
     return trade_off(Matched.of(recordings)).at_budgets(budgets, resampling)
 
 
-def test_scores_without_fault_find_everything_for_nothing():
+def test_perfect_scores_find_everything_without_false_alarms():
     curve = trade_off(Matched.of(many(3))).curve()
     assert curve["failure_recall"][0] == curve["events_found"][0] == 1.0
     assert curve["false_alarms_per_hour"][0] == 0.0
@@ -48,7 +48,7 @@ def test_scores_without_fault_find_everything_for_nothing():
     assert recall.low == pytest.approx(0.025 ** (1 / 12))  # twelve runs have failures
 
 
-def test_scores_that_know_nothing_find_nothing_for_nothing():
+def test_constant_scores_find_nothing_without_false_alarms():
     dull = [graded(f"talos/blow-{seed:03d}", IMPACT, np.zeros(COUNT)) for seed in range(6)]
     curve = trade_off(Matched.of(dull)).curve()
     assert curve["failure_recall"].tolist() == [0.0]
@@ -90,11 +90,11 @@ def test_what_is_read_stays_within_the_budget_and_grows_with_it():
         assert recall == curve["failure_recall"][prefix][-1]
 
 
-def test_alarms_that_grow_together_are_not_cheaper_than_before_they_did():
+def test_alarms_that_merge_do_not_reduce_the_false_alarms():
     # At a low threshold, one alarm lasts through the run; a little above, there are five.
     risk = np.where(np.arange(COUNT) % 10 == 0, -1.0, -2.0)
     loud = np.array([5.0 if label != "ok" else -3.0 for label in perfect(IMPACT)])
-    loud[20] = -1.5  # the last frame that holds the blow, heard below that threshold alone
+    loud[20] = -1.5  # the last frame that holds the blow, found below that threshold alone
     recordings = [graded(f"talos/good-{seed:03d}", GOOD, risk) for seed in range(5)]
     recordings += [graded(f"talos/blow-{seed:03d}", IMPACT, loud) for seed in range(5)]
     curve = trade_off(Matched.of(recordings)).curve()
@@ -111,7 +111,7 @@ def test_alarms_that_grow_together_are_not_cheaper_than_before_they_did():
 
 def test_without_ok_motion_nothing_is_read():
     swings = [
-        predicted(f"talos/swing-{seed:03d}", OSCILLATION[1:2], called=perfect(OSCILLATION))
+        predicted(f"talos/swing-{seed:03d}", OSCILLATION[1:2], labels=perfect(OSCILLATION))
         for seed in range(6)
     ]
     assert np.isnan(read(swings, 5.0)[0][0].value)
@@ -133,12 +133,12 @@ def test_probabilities_differ_from_margins():
 
 
 def confident(name, confidence, right, random):
-    """A recording of a model that is so sure, and right so often."""
+    """A recording of a model with such a confidence, and right so often."""
     hits = random.random(COUNT) < right
-    called = np.where(hits, "ok", "impact")
+    labels = np.where(hits, "ok", "impact")
     scores = np.full((COUNT, 4), (1 - confidence) / 3)
     scores[np.arange(COUNT), np.where(hits, 0, 1)] = confidence
-    return predicted(name, GOOD, called.tolist(), scores=scores)
+    return predicted(name, GOOD, labels.tolist(), scores=scores)
 
 
 @pytest.mark.parametrize(("confidence", "right"), [(0.75, 0.75), (0.99, 0.69), (0.55, 0.95)])
@@ -165,7 +165,7 @@ def test_two_bins_with_errors_of_opposite_sign_do_not_cancel():
     assert error.value == pytest.approx(0.2, abs=0.02)
 
 
-def test_certainty_itself_has_a_bin():
+def test_a_confidence_of_one_has_a_bin():
     table = reliability(Matched.of([confident("a", 1.0, 1.0, np.random.default_rng(0))]))
     assert table.table()["frames"].tolist() == [0.0] * 9 + [COUNT]
 

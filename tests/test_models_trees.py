@@ -1,4 +1,4 @@
-"""Trees answer as those that they were made of."""
+"""Trees predict as those of scikit-learn that they were made of."""
 
 from dataclasses import replace
 
@@ -24,9 +24,9 @@ def test_trees_have_the_probabilities_of_scikit_learn(leaves, classes):
         max_iter=30, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
         early_stopping=False, random_state=0,
     ).fit(features, targets)  # fmt: skip
-    asked = 3.0 * generator.normal(size=(100, 5))
+    points = 3.0 * generator.normal(size=(100, 5))
     np.testing.assert_allclose(
-        ours.score(ours.decision(asked)), theirs.predict_proba(asked), rtol=1e-9
+        ours.score(ours.decision(points)), theirs.predict_proba(points), rtol=1e-9
     )
 
 

@@ -17,7 +17,7 @@ def test_a_file_appears_with_its_contents_and_nothing_else(tmp_path):
     assert os.listdir(tmp_path) == ["out.txt"]
 
 
-def test_nothing_is_seen_under_the_name_before_the_end(tmp_path):
+def test_nothing_exists_under_the_name_before_the_end(tmp_path):
     with replacing(tmp_path / "out.txt") as temporary:
         temporary.write_text("half")
         assert not (tmp_path / "out.txt").exists()

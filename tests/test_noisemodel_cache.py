@@ -51,7 +51,7 @@ def test_it_lies_in_the_users_cache_folder(home):
 
 
 @pytest.mark.parametrize("value", ["", "relative/folder", None])
-def test_without_an_absolute_folder_it_is_the_one_in_the_home(tmp_path, monkeypatch, value):
+def test_without_an_absolute_folder_it_is_the_one_in_the_home_folder(tmp_path, monkeypatch, value):
     monkeypatch.setenv("HOME", str(tmp_path))
     if value is None:
         monkeypatch.delenv("XDG_CACHE_HOME")
@@ -100,7 +100,7 @@ def test_a_folder_that_cannot_be_written_to_is_no_error(tmp_path, monkeypatch):
     assert make.calls == 2
 
 
-def test_what_cannot_be_made_is_not_cached(home):
+def test_arrays_that_cannot_be_made_are_not_cached(home):
     def fail():
         raise ValueError("no such thing")
 

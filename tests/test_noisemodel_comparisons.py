@@ -178,7 +178,7 @@ def test_an_event_between_two_samples_has_no_contrast(tmp_path):
 
 
 def test_mimic_joints_that_cannot_be_coupled_move_independently(tmp_path):
-    follow = '<mimic joint="nobody"/>'
+    follow = '<mimic joint="unknown"/>'
     found = alone(arm(tmp_path, "revolute", "revolute", follow=follow))
     assert found.joints == 2
     assert "move independently" in found.remarks[0]

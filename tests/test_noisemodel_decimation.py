@@ -11,7 +11,7 @@ def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
 
 
 @pytest.mark.parametrize("rate", [5000.0, 1000.0, 2500.0, 300.0])
-def test_a_slow_motion_stays_what_it_was(rate):
+def test_a_slow_motion_is_unchanged(rate):
     slow = decimated(run_of(20.0), rate)
     assert slow.rate == pytest.approx(rate)
     inner = slice(20, -20)
@@ -20,12 +20,12 @@ def test_a_slow_motion_stays_what_it_was(rate):
     assert slow.time[0] == 5.0
 
 
-def test_what_a_slower_logger_cannot_see_is_gone_not_folded():
+def test_frequencies_above_the_lower_nyquist_frequency_are_removed_not_folded():
     slow = decimated(run_of(900.0), 1000.0)
     assert np.abs(slow.velocity[20:-20]).max() < 1e-2
 
 
-def test_the_noise_of_a_lowered_run_is_not_the_lowered_noise():
+def test_the_noise_of_a_decimated_run_is_not_the_decimated_noise():
     # |sin| of 900 Hz has power at 0 Hz; a slower logger's velocities would have none.
     noise = np.abs(run_of(900.0).velocity).mean()
     assert noise > 0.6
@@ -38,7 +38,7 @@ def test_a_constant_velocity_stays_constant_to_the_edges():
     np.testing.assert_allclose(decimated(run, 1000.0).velocity, 2.0, atol=2e-3)
 
 
-def test_all_velocities_are_lowered_and_nothing_else_is_kept():
+def test_all_velocities_are_decimated_and_nothing_else_is_kept():
     run = run_of(20.0)
     run = run_of(
         20.0,
@@ -80,6 +80,6 @@ def test_a_rate_is_never_raised():
         decimated(run_of(20.0, rate=1000), 2000.0)
 
 
-def test_too_little_motion_is_said():
+def test_too_little_motion_is_refused():
     with pytest.raises(RunError, match="0.001 s of motion are too short for 1000 Hz"):
         decimated(run_of(20.0, seconds=0.001), 1000.0)

@@ -84,7 +84,7 @@ def test_a_half_turn_between_two_samples_does_not_silence_the_rest():
     assert np.allclose(np.linalg.norm(linear, axis=1), 1.0, atol=1e-9)
 
 
-def test_a_run_of_positions_alone_has_velocities_and_says_how(tmp_path):
+def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_path):
     position, velocity = swing(TIME)
     pose, twist = tumble(TIME)
     np.savez(

@@ -23,7 +23,7 @@ def shaking(robot, frequency, samples=4000):
 
 
 def shaken(robot, surface, frequency, kind="normal", **options):
-    """Mean power once the filter has settled."""
+    """Mean power after the filter's transient."""
     motion = shaking(robot, frequency)
     return extended(robot, surface, *motion, kind, **options).total[1000:].mean()
 
@@ -34,8 +34,8 @@ def test_a_shaking_sphere_radiates_as_acoustics_has_it(tmp_path, frequency):
     robot, surface = slider(tmp_path, SPHERE)
     x = 2 * np.pi * frequency * np.sqrt(surface.area[0] / (4 * np.pi)) / 343.2
     full = shaken(robot, surface, frequency)
-    heard = shaken(robot, surface, frequency, efficiency="dipole", rate=RATE)
-    assert heard / full == pytest.approx(x**4 / (4 + x**4), rel=0.03)
+    radiated = shaken(robot, surface, frequency, efficiency="dipole", rate=RATE)
+    assert radiated / full == pytest.approx(x**4 / (4 + x**4), rel=0.03)
 
 
 def test_the_corner_of_a_sphere_is_where_its_efficiency_is_half(tmp_path):
@@ -49,8 +49,8 @@ def test_uniform_motion_is_silent_from_the_first_sample_on(tmp_path):
     robot, surface = slider(tmp_path, SPHERE)
     q = np.linspace(0, 1, 500)[:, None]
     loud = extended(robot, surface, q, np.full_like(q, 3.0))
-    heard = extended(robot, surface, q, np.full_like(q, 3.0), efficiency="dipole", rate=RATE)
-    assert heard.total.max() < 1e-20 * loud.total.max()
+    radiated = extended(robot, surface, q, np.full_like(q, 3.0), efficiency="dipole", rate=RATE)
+    assert radiated.total.max() < 1e-20 * loud.total.max()
 
 
 @pytest.mark.parametrize("kind", KINDS)

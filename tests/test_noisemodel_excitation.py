@@ -69,7 +69,7 @@ def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):
     assert ends(chain(tmp_path, "revolute")) == ("joint1",)
 
 
-def test_limits_that_leave_no_room_are_none(tmp_path):
+def test_limits_without_a_range_are_none(tmp_path):
     bounds = limits(Robot.load("double_pendulum"))
     assert np.isinf(bounds.range).all()
     assert np.isinf(bounds.speed).all()

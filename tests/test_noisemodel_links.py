@@ -42,7 +42,7 @@ def test_the_desired_motion_adds_its_own_power():
     np.testing.assert_allclose(link_noise(both).power, 2 * link_noise(run).power, rtol=1e-12)
 
 
-def test_each_link_knows_the_joints_that_move_it():
+def test_each_link_names_the_joints_that_move_it():
     found = link_noise(arm_run())
     movers = dict(zip(found.links, found.movers, strict=True))
     assert movers["shoulder_link"] == {"shoulder_pan_joint"}

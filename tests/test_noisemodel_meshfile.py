@@ -170,7 +170,7 @@ def test_a_node_of_a_dae_may_stand_in_several_places(tmp_path):
     assert np.array_equal(triangles, np.concatenate((TRIANGLE, TRIANGLE + np.array([0, 0, 9]))))
 
 
-def test_a_broken_material_takes_no_geometry_away(tmp_path):
+def test_a_broken_material_removes_no_geometry(tmp_path):
     effect = """<library_effects><effect id="e"><profile_COMMON><newparam sid="s"><sampler2D>
       <source>gone</source></sampler2D></newparam></profile_COMMON></effect></library_effects>"""
     node = """<node><instance_geometry url="#g"><bind_material><technique_common>

@@ -38,7 +38,7 @@ def test_all_of_a_sliding_surface_has_one_speed():
     assert square(form, np.array([1.0, 2.0, -2.0, 0.0, 0.0, 0.0])) == pytest.approx(9.0, rel=1e-14)
 
 
-def test_a_sphere_that_spins_makes_no_wind():
+def test_a_sphere_that_spins_has_no_normal_speed():
     """The mean-square speed is w² a² 2/3, none of it outwards."""
     exact = moments(SHAPES["sphere"])
     spin = np.array([0.0, 0.0, 0.0, 1.0, 2.0, 2.0])

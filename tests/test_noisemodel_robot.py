@@ -51,7 +51,7 @@ def test_every_listed_robot_loads():
             assert (robot.nq, robot.nv) == (robot.model.nq, robot.model.nv), name
 
 
-def test_the_empty_ur3_says_so_in_one_line():
+def test_the_empty_ur3_is_refused_in_one_line():
     with pytest.raises(RobotError, match=r"ur3.urdf: the URDF is empty or unexpanded") as caught:
         Robot.load("ur3_empty")
     assert "\n" not in str(caught.value)
@@ -94,7 +94,7 @@ def test_joints_that_the_run_does_not_name_rest(tmp_path):
     assert np.array_equal(v, [[0, 1, 0]] * 2)
 
 
-def test_the_base_moves_as_the_run_says_and_rests_in_gaps(tmp_path):
+def test_the_base_has_the_pose_of_the_run_and_rests_in_gaps(tmp_path):
     robot = arm(tmp_path, floating_base=True)
     pose = np.array([[1, 2, 3, 0, 0, 1, 0], [0, 0, 0, 0, 0, 0, 0]], dtype=float)
     q, v = robot.configuration(
@@ -111,7 +111,7 @@ def test_the_base_moves_as_the_run_says_and_rests_in_gaps(tmp_path):
     assert np.array_equal(v[0, :6], [1, 2, 3, 4, 5, 6])
 
 
-def test_a_base_of_which_the_run_says_nothing_rests(tmp_path):
+def test_a_base_without_a_pose_in_the_run_rests(tmp_path):
     robot = arm(tmp_path, floating_base=True)
     q, v = robot.configuration(run(("elbow",), np.ones((2, 1)), np.ones((2, 1))))
     assert np.array_equal(q[0, :7], [0, 0, 0, 0, 0, 0, 1])
@@ -171,7 +171,7 @@ def test_a_urdf_that_is_not_there_is_named(tmp_path):
         Robot.load(tmp_path / "gone.urdf")
 
 
-def test_a_missing_example_robot_data_says_how_to_get_it(monkeypatch):
+def test_a_missing_example_robot_data_is_an_error_with_what_to_install(monkeypatch):
     def gone(name):
         raise catalog.PackageNotFoundError(name)
 

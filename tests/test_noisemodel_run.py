@@ -122,7 +122,7 @@ def test_blocks_may_touch_and_reach_the_end_of_the_last_sample():
     assert len(run(blocks=(Block(0.0, 0.05, "ok"), Block(0.05, 0.1, "impact"))).blocks) == 2
 
 
-def test_quaternions_in_gaps_are_not_looked_at():
+def test_quaternions_in_gaps_are_not_checked():
     pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (100, 1))
     pose[50] = 0.0
     assert run(base_pose=pose, valid=np.arange(100) != 50).base_pose is not None

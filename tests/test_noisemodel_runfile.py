@@ -94,7 +94,7 @@ def test_any_simulator_writes_a_run_with_one_savez(tmp_path):
     assert run.robot is None
 
 
-def test_integers_stand_for_numbers(tmp_path):
+def test_integers_are_loaded_as_floating_point(tmp_path):
     np.savez(tmp_path / "run.npz", time=np.arange(40), velocity=np.ones((40, 2), dtype=int))
     assert Run.load(tmp_path / "run.npz").velocity.dtype == np.float64
 
@@ -218,7 +218,7 @@ def saved(tmp_path):
         (b"PK\x03\x04 and no more", "not a run file: File is not a zip file"),
     ],
 )
-def test_a_foreign_file_is_refused(tmp_path, contents, message):
+def test_a_file_of_another_kind_is_refused(tmp_path, contents, message):
     (tmp_path / "run.npz").write_bytes(contents)
     with pytest.raises(RunFileError, match=message):
         Run.load(tmp_path / "run.npz")
@@ -263,7 +263,7 @@ def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeypat
         Run.load(path)
 
 
-def test_an_array_that_claims_more_than_there_is_is_refused(tmp_path):
+def test_an_array_that_states_more_than_there_is_is_refused(tmp_path):
     path = tmp_path / "run.npz"
     header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }".ljust(117)
     with zipfile.ZipFile(path, "w") as archive:

@@ -15,7 +15,7 @@ def test_standstill_is_silent():
     assert np.array_equal(simplified(np.zeros((5, 3)), np.zeros((5, 3))), np.zeros(5))
 
 
-def test_one_joint_is_as_loud_as_it_is_fast():
+def test_the_noise_of_one_joint_is_its_speed():
     assert np.array_equal(simplified(np.array([[3.0], [-4.0]])), [3.0, 4.0])
 
 
@@ -30,7 +30,7 @@ def test_noise_grows_with_the_speed(velocity, factor):
 
 
 @given(VELOCITIES)
-def test_noise_does_not_care_about_signs_and_order_of_joints(velocity):
+def test_noise_does_not_depend_on_signs_and_order_of_joints(velocity):
     assert np.allclose(simplified(velocity), simplified(-velocity[:, ::-1]), rtol=1e-14)
 
 

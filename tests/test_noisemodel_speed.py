@@ -55,7 +55,7 @@ def test_twice_the_velocity_is_twice_the_speed(every, kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_noise_does_not_care_where_the_base_stands(every, kind):
+def test_noise_does_not_depend_on_the_place_of_the_base(every, kind):
     robot, surface = every
     q, v = motion(robot)
     elsewhere = q.copy()

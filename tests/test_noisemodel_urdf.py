@@ -22,7 +22,7 @@ def chain(joints):
     ) + "</robot>"  # fmt: skip
 
 
-def test_a_urdf_gives_its_name_and_who_mimics_whom(tmp_path):
+def test_a_urdf_gives_its_name_and_mimic_joints(tmp_path):
     path = tmp_path / "arm.urdf"
     path.write_text(
         GOOD.replace("<axis", '<mimic joint="wrist" multiplier="-2" offset="0.5"/><axis')
@@ -67,7 +67,7 @@ def test_fixed_joints_may_have_an_axis_of_length_0(tmp_path):
         (GOOD.replace(JOINT, ""), "Two root links found"),
     ],
 )
-def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_trouble(tmp_path, capfd, text, message):
+def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_problem(tmp_path, capfd, text, message):
     path = tmp_path / "arm.urdf"
     path.write_text(text)
     with pytest.raises(RobotError, match=message) as caught:

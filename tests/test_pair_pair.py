@@ -190,7 +190,7 @@ def test_a_motion_that_only_speeds_up_determines_no_lag():
     assert align(ramp, ramp).refused
 
 
-def test_the_desired_motion_is_the_guide_where_there_is_one():
+def test_runs_are_aligned_by_the_desired_motion_where_there_is_one():
     shaken = np.random.default_rng(3).normal(size=(4000, 2))
     good = moving(velocity_desired=moving().velocity)
     bad = moving(velocity=shaken, velocity_desired=moving().velocity)
@@ -198,7 +198,7 @@ def test_the_desired_motion_is_the_guide_where_there_is_one():
     assert align(good, bad).correlation == pytest.approx(1.0)
 
 
-def test_starts_and_clocks_are_taken_as_asked():
+def test_starts_and_clocks_are_taken_on_request():
     run = moving()
     later = dataclasses.replace(run, time=run.time + 1.5)
     assert align(run, later, Align.START).lag == 0
@@ -242,7 +242,7 @@ def test_the_faster_run_is_decimated_and_both_have_one_level(tmp_path):
     )
 
 
-def test_a_lowered_run_keeps_the_positions_of_its_links(tmp_path):
+def test_a_decimated_run_keeps_the_positions_of_its_links(tmp_path):
     fast = panda()
     slow = dataclasses.replace(
         part(fast, 0, 10_000),

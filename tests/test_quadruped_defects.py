@@ -1,4 +1,4 @@
-"""What goes wrong under quadrupeds: it grows with the robot, and ground ends where it is told."""
+"""Defects of quadrupeds: they grow with the robot, and the ground ends where it is planned."""
 
 import numpy as np
 import pytest

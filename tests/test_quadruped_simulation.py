@@ -1,4 +1,4 @@
-"""Quadrupeds stand, trot as they are told, and stumble where something lies in their way."""
+"""Quadrupeds in simulation stand, trot as planned, and have impacts on obstacles."""
 
 import mujoco
 import numpy as np

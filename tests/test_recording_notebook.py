@@ -57,7 +57,7 @@ def test_without_a_display_the_recording_is_named(run, monkeypatch):
         inspector.show(run)
 
 
-def test_a_viewer_that_dies_is_an_error_that_names_the_recording(run, monkeypatch):
+def test_a_viewer_that_ends_is_an_error_that_names_the_recording(run, monkeypatch):
     monkeypatch.setattr(viewer, "open_window", lambda _: "the viewer ended with status 101")
     with pytest.raises(ViewerError, match=r"status 101; the recording is in .*\.rrd"):
         inspector.show(run)

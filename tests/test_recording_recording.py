@@ -180,7 +180,7 @@ def test_a_run_without_failures_selects_nothing(tmp_path):
 
 
 def panel(path, part):
-    """Read what the layout says of the time panel."""
+    """Settings of the time panel in the layout."""
     reader = RrdReader(path)
     (blueprint,) = reader.blueprints()
     for chunk in reader.store(store=blueprint).stream():
@@ -231,7 +231,7 @@ def test_open_views_have_few_points(whole):
 
 
 def points(path):
-    """Count the points of the lines that are seen at first, by view."""
+    """Number of points of the lines that are shown at first, by view."""
     shown = {"/noise/**": 0, "/spectrogram/bands/**": 0, "/score/**": 0}
     for content in shown:
         chunks = RrdReader(path).store().stream().filter(content=content)
@@ -241,7 +241,7 @@ def points(path):
     return shown
 
 
-def test_the_robot_stands_as_its_joints_say(whole):
+def test_the_robot_has_the_pose_of_its_joints(whole):
     path, run = whole
     time, turns = read(path, "/robot/motion/panda_joint1", "Transform3D:quaternion")
     angles = np.interp(time, run.time, run.position[:, 0])

@@ -58,7 +58,7 @@ def test_a_mesh_that_cannot_be_read_is_named(tmp_path, name, content, problem):
         drawable(robot(tmp_path, f"package://{name}"), (tmp_path,), tmp_path)
 
 
-def test_a_missing_mesh_is_named_with_the_places_that_were_looked_at(tmp_path):
+def test_a_missing_mesh_is_named_with_the_places_that_were_searched(tmp_path):
     with pytest.raises(MeshError, match=f"gone.stl: not found in {tmp_path}"):
         drawable(robot(tmp_path, "package://gone.stl"), (tmp_path,), tmp_path)
 

@@ -31,7 +31,7 @@ def recording(tmp_path):
     return tmp_path / "run.rrd"
 
 
-def says(monkeypatch, script):
+def fake_viewer(monkeypatch, script):
     """Let a shell script take the place of the viewer; its arguments are the viewer's."""
     monkeypatch.setattr(
         viewer, "command", lambda *arguments: ["/bin/sh", "-c", script, "rerun", *arguments]
@@ -41,24 +41,26 @@ def says(monkeypatch, script):
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it runs on
 def test_a_window_that_opens_is_not_waited_for(monkeypatch):
     monkeypatch.setattr(viewer, "SETTLE", 0.1)
-    says(monkeypatch, "sleep 0.5")
+    fake_viewer(monkeypatch, "sleep 0.5")
     assert viewer.open_window(Path("run.rrd")) == ""
 
 
 def test_a_viewer_that_runs_already_takes_the_recording_over(monkeypatch, tmp_path):
-    says(monkeypatch, f"echo $2 >> {tmp_path}/ports")  # `--port 9876`, and it ends at once
+    fake_viewer(monkeypatch, f"echo $2 >> {tmp_path}/ports")  # `--port 9876`, and it ends at once
     assert viewer.open_window(Path("run.rrd")) == ""
     assert (tmp_path / "ports").read_text().split() == [viewer.PORT]
 
 
 def test_where_another_program_listens_a_free_port_is_taken(monkeypatch, tmp_path):
-    says(monkeypatch, f'echo $2 >> {tmp_path}/ports; [ "$2" = auto ]')
+    fake_viewer(monkeypatch, f'echo $2 >> {tmp_path}/ports; [ "$2" = auto ]')
     assert viewer.open_window(Path("run.rrd")) == ""
     assert (tmp_path / "ports").read_text().split() == [viewer.PORT, "auto"]
 
 
-def test_a_viewer_that_dies_is_one_line_with_the_reason(monkeypatch):
-    says(monkeypatch, "printf 'INFO fine\\n\\033[31mError: no \\033[0mdisplay\\n' >&2; exit 101")
+def test_a_viewer_that_ends_is_one_line_with_the_reason(monkeypatch):
+    fake_viewer(
+        monkeypatch, "printf 'INFO fine\\n\\033[31mError: no \\033[0mdisplay\\n' >&2; exit 101"
+    )
     problem = viewer.open_window(Path("run.rrd"))
     assert problem == "the viewer ended with status 101 (no display)"
 
@@ -80,13 +82,13 @@ def listening_on(pid):
     return [s[3] for s in sockets if any(f"pid={child}," in s[-1] for child in children)]
 
 
-def test_a_recording_is_served_on_loopback_only_and_no_longer_than_asked(recording):
+def test_a_recording_is_served_on_loopback_only_and_no_longer_than_requested(recording):
     with web.serving(recording) as served:
         page, data = served.url.split("/?url=")
         assert page.startswith("http://127.0.0.1:")
         assert data.startswith("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A")
-        with urllib.request.urlopen(page) as answer:
-            assert b"rerun" in answer.read().lower()
+        with urllib.request.urlopen(page) as response:
+            assert b"rerun" in response.read().lower()
         if shutil.which("ss") and shutil.which("pgrep"):
             addresses = listening_on(served.server.process.pid)
             assert len(addresses) == 2
@@ -107,8 +109,8 @@ def test_a_port_that_is_taken_is_one_line(recording):
             pass
 
 
-def test_a_server_that_dies_at_once_is_an_error_with_the_reason(monkeypatch, recording):
-    says(monkeypatch, "echo Error: no memory >&2; exit 3")
+def test_a_server_that_ends_at_once_is_an_error_with_the_reason(monkeypatch, recording):
+    fake_viewer(monkeypatch, "echo Error: no memory >&2; exit 3")
     with (
         pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"),
         web.serving(recording),
@@ -116,7 +118,7 @@ def test_a_server_that_dies_at_once_is_an_error_with_the_reason(monkeypatch, rec
         pass
 
 
-def test_a_server_that_dies_later_is_an_error(recording):
+def test_a_server_that_ends_later_is_an_error(recording):
     with web.serving(recording) as served:
         os.killpg(served.server.process.pid, signal.SIGKILL)
         with pytest.raises(ViewerError, match="the viewer ended with status -9"):

@@ -94,7 +94,7 @@ def test_no_more_good_frames_than_the_share_lie_above_the_threshold(rockets):
     assert rockets.found(scored(), scores, 0.02).startswith("100.0%")  # two
 
 
-def test_ours_and_a_classifier_of_scikit_learn_get_a_row_for_each_sound(
+def test_ours_and_a_classifier_of_scikit_learn_get_a_row_for_each_noise(
     rockets, data, monkeypatch, capsys
 ):
     for name, rows in (("our", 2), ("logistic", 2)):
@@ -108,14 +108,14 @@ def test_ours_and_a_classifier_of_scikit_learn_get_a_row_for_each_sound(
         assert "measured: 4 runs, panda-" in out
 
 
-def test_what_to_install_is_said_before_anything_is_read(rockets, monkeypatch):
+def test_missing_packages_are_named_before_anything_is_read(rockets, monkeypatch):
     monkeypatch.setattr(rockets, "find_spec", lambda name: None)
     monkeypatch.setattr(sys, "argv", ["", "no such folder"])
     with pytest.raises(SystemExit, match="pip install aeon torch"):
         rockets.main()
 
 
-def test_who_takes_part_is_said_if_nobody_has_the_name(rockets, monkeypatch):
+def test_an_unknown_contender_is_refused_with_the_known_ones(rockets, monkeypatch):
     monkeypatch.setattr(sys, "argv", ["", "no such folder", "--only", "perceptron"])
     with pytest.raises(SystemExit, match="no classifier 'perceptron'; there are our trees"):
         rockets.main()

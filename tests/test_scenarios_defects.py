@@ -1,4 +1,4 @@
-"""Defects draw faults that keep to their settings, and tell what they did."""
+"""Defects draw faults that keep to their settings, and record them."""
 
 import numpy as np
 import pytest
@@ -91,7 +91,7 @@ def test_ground_that_gives_way_is_as_high_as_before_until_it_does(plan):
     assert {event.label for event in faults.events} == {"highaccelerations"}
 
 
-def test_jumps_of_the_reference_go_away_and_come_back(plan):
+def test_jumps_of_the_reference_return(plan):
     faults = ReferenceJumps().draw(np.random.default_rng(2), plan)
     shift = np.linalg.norm(faults.shift(plan.time)[:, 0], axis=1)
     assert not shift[: int(faults.events[0].start * 1e3)].any()
@@ -99,7 +99,7 @@ def test_jumps_of_the_reference_go_away_and_come_back(plan):
     after_second = int((faults.events[1].stop + 0.01) * 1e3)
     assert shift[after_second] == pytest.approx(0, abs=1e-12)
     steps = np.linalg.norm(np.diff(faults.shift(plan.time)[:, 0], axis=0), axis=1)
-    assert steps.max() <= 2.0 * 1e-3 + 1e-9  # never faster than the settings say
+    assert steps.max() <= 2.0 * 1e-3 + 1e-9  # never faster than the settings
 
 
 def test_the_force_signal_jumps_only_while_the_tool_presses(plan):

@@ -1,4 +1,4 @@
-"""The page about the scenarios says what the table of the code says."""
+"""The page about the scenarios has what the table of the code has."""
 
 from pathlib import Path
 

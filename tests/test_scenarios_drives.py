@@ -1,4 +1,4 @@
-"""Drives report what their encoders tell, and answer late and within their limits."""
+"""Drives report what their encoders measure, and respond after a delay and within their limits."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_torque_arrives_after_the_delay_and_within_the_limit():
     assert torques == [0, 0, 0, 5, 5]
 
 
-def test_a_robot_weighs_what_its_imperfections_say():
+def test_a_robot_has_the_mass_of_its_imperfections():
     import pinocchio as pin
 
     model = pin.buildSampleModelManipulator()
@@ -126,7 +126,7 @@ def plan_from(position, force) -> Plan:
     return Plan(position, np.zeros(ticks), np.full(ticks, force), np.zeros(ticks), (), (), ())
 
 
-def test_the_tool_goes_where_the_plan_says():
+def test_the_tool_follows_the_plan():
     ticks = 400
     share = np.linspace(0, 1, ticks)[:, None]
     _, model = tool_control(plan_from(np.zeros((ticks, 3)), np.nan))

@@ -1,4 +1,4 @@
-"""Only what is felt is labelled, and nothing is called ok that a defect may have touched."""
+"""Only measurable deviations are labelled, and nothing is ok that a defect may have disturbed."""
 
 from itertools import pairwise
 

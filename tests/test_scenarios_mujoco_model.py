@@ -1,4 +1,4 @@
-"""The generated MuJoCo model moves, weighs and touches like the Pinocchio model it came from."""
+"""The generated MuJoCo model has the motion, masses and contacts of its Pinocchio model."""
 
 import mujoco
 import numpy as np

@@ -31,7 +31,7 @@ def test_a_movement_starts_and_ends_at_rest():
     assert np.diff(share)[[0, -1]] == pytest.approx(0, abs=1e-7)
 
 
-def test_a_bend_goes_away_and_comes_back():
+def test_a_bend_leaves_the_path_and_returns():
     path = bump(np.linspace(0, 1, 1001))
     assert path[[0, 500, -1]] == pytest.approx([0, 1, 0])
     assert np.diff(path)[[0, -1]] == pytest.approx(0, abs=2e-5)

@@ -1,4 +1,4 @@
-"""Simulated runs show what their scenario promises, and the same seed gives the same file."""
+"""Simulated runs show the failures of their scenario, and the same seed gives the same file."""
 
 import json
 import subprocess
@@ -111,7 +111,7 @@ def test_a_run_is_complete_and_uniform(runs):
     assert set(run.stages) == {"planned", "commanded"}
 
 
-def test_a_run_says_how_it_was_made(runs, tmp_path):
+def test_a_run_states_how_it_was_made(runs, tmp_path):
     run = runs["obstacle-full", 5]
     run.save(tmp_path / "run.npz")
     loaded = Run.load(tmp_path / "run.npz")
@@ -136,7 +136,7 @@ def test_the_robot_stays_within_its_speed_and_torque(runs):
         assert (np.abs(run.effort).max(axis=0) < [87.0] * 4 + [12.0] * 3).all()
 
 
-def test_a_healthy_robot_is_not_silent(runs):
+def test_a_healthy_robot_makes_noise(runs):
     still = runs["straight", 5].velocity[:1000]
     assert 1e-4 < still.std() < 5e-3
     assert np.unique(still[:, 0]).size > 100
@@ -235,7 +235,7 @@ def test_numbers_out_of_range_are_refused():
         scenarios.simulate("panda", "straight", 0, duration=1.0)
 
 
-def test_without_mujoco_the_error_says_what_to_install(monkeypatch):
+def test_without_mujoco_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(
         scenarios.MissingSimulatorError, match=r"pip install 'noise-inspector\[sim\]'"
@@ -252,7 +252,7 @@ def test_listing_scenarios_needs_no_simulator():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_the_table_has_the_papers_numbers_and_says_what_happens_in_one_sentence():
+def test_the_table_has_the_papers_numbers_and_a_sentence_for_each_scenario():
     lines = scenarios.SCENARIOS.values()
     assert [line.number for line in lines] == list(range(1, 28))
     assert [line.name for line in lines if line.healthy] == list(HEALTHY)
@@ -265,7 +265,7 @@ def test_the_table_has_the_papers_numbers_and_says_what_happens_in_one_sentence(
         assert "ok" in line.labels
 
 
-def test_a_scenario_is_known_by_its_number_too(runs):
+def test_a_scenario_is_found_by_its_number_too(runs):
     run = scenarios.simulate("panda", 5, 5, duration=SHORT)
     np.testing.assert_array_equal(run.velocity, runs["obstacle-full", 5].velocity)
     assert run.meta["number"] == 5

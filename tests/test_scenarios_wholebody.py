@@ -60,7 +60,7 @@ def test_soles_centre_of_mass_and_base_reach_their_targets(robot):
     np.testing.assert_allclose(rotation, base, rtol=0, atol=1e-10)
 
 
-def test_lifting_a_foot_moves_the_joints_as_its_column_says(robot):
+def test_lifting_a_foot_moves_the_joints_by_its_column(robot):
     middle = stand(robot)
     middle.follow(*_targets(robot, 0.0))
     for foot in (0, 1):
