@@ -27,10 +27,10 @@ from scenarios.tasks import DatasetSpec, Task, choose
 
 HERE = Path(__file__).parent
 SEEDS = {"talos": 20, "go2": 40, "panda": 23, "solo12": 6, "anymal": 6}
-"""Seeds of each robot in every scenario, from 0, to learn from: but those that are held out."""
-UNUSED, LAST = 55, 90
-"""Range of the seeds of the test set: held-out runs of the seeds below were used while the profiles
-were designed, so that they are no test."""
+"""Training seeds of each robot in every scenario, from 0; those that are held out are left out."""
+LOOKED_AT, LAST = 55, 90
+"""First test seed, and the one after the last: what is held out of them is measured on. What is
+held out of the seeds below was used while the profiles were chosen."""
 HOURS, FIRST = {"talos": 0.4, "go2": 0.4, "panda": 1.05}, 2000
 """Good motion of each robot in which false alarms are counted, in [h], and its first seed."""
 MODELS = {
@@ -44,17 +44,18 @@ MODELS = {
 DEMO = ("panda", "obstacle-full", 100, 4.0)
 CARD = """# {name}
 
-Labels frames of {signals} at {rate:g} Hz as {classes} or unknown.
+Classifies frames of noise at {rate:g} Hz: {classes}, or unknown.
+Input signals: {signals}.
 
-Made by `make models`: profile `{profile}`, {runs} runs of the training part of
-{seeds}, every scenario (`scenarios`, recipe {recipe});
-hashes of all of them are in the model file. The measures below are of runs that were held out by
-hash, of seeds {unused} to {last}, and of {hours:.3g} hours more of good motion: robots of the
-training set, new seeds (docs/classifier.md lists what they were used for before).
+Made by `make models`: profile `{profile}`, trained on {runs} runs, the training part of
+{seeds}, in every scenario (`scenarios`, recipe {recipe});
+the model file has the hashes of all of them. The figures below are measured on what is held out by
+hash of seeds {looked_at} to {last}, and on {hours:.3g} h more of good motion: robots of the
+training set, seeds outside it (docs/classifier.md says how often this test set was used).
 
-Not in the training set: any other robot, real drives (gears, friction that is not Coulomb's,
-belts), payloads, hands at work. Frames that are out of distribution are labelled unknown, as far as
-levels alone show it.
+Not in the training set: any other robot, real drives (gears, friction other than Coulomb's, belts),
+payloads, manipulation. Frames unlike the training set are out of distribution, as far as levels
+alone show it. Real logs and other simulators: docs/classifier.md, "Open".
 
 ```
 {report}
@@ -97,7 +98,7 @@ def main() -> None:
 def wanted(task: Task, count: int) -> bool:
     """Whether a run is of the first seeds and not held out, or of the last, and held out."""
     if models.held_out(models.group_of(task.name)):
-        return task.seed >= UNUSED and task.robot in HOURS
+        return task.seed >= LOOKED_AT and task.robot in HOURS
     return task.seed < count
 
 
@@ -110,13 +111,13 @@ def simulate(path: Path, tasks: list[Task], jobs: int) -> None:
 
 
 def unseen(data: Path, good: Path, rate: float) -> Iterator[models.Recording]:
-    """Recordings of the test set."""
+    """Runs that models are measured on."""
     yield from recordings([data], rate, Part.TEST)
     yield from recordings([good], rate)
 
 
 def card(name: str, model: models.Classifier, report: str) -> str:
-    """The card of a model: its training set, its measures and its limits."""
+    """Card of a model: what it was trained on, its figures, its limits."""
     return CARD.format(
         name=name,
         signals=", ".join(model.profile.signals),
@@ -126,7 +127,7 @@ def card(name: str, model: models.Classifier, report: str) -> str:
         runs=len(model.runs),
         seeds=", ".join(f"{robot} (seeds 0 to {count - 1})" for robot, count in SEEDS.items()),
         recipe=RECIPE,
-        unused=UNUSED,
+        looked_at=LOOKED_AT,
         last=LAST - 1,
         hours=sum(HOURS.values()),
         report=report,

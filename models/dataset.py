@@ -44,7 +44,7 @@ class Dataset:
         Args:
             recordings: Annotated signals at the profile's rate, each of another name.
             profile: How blocks are cut and framed, and which labels there are.
-            training: Whether the frames are for training; `cut` says what that changes.
+            training: Whether the frames are for training; see `cut`.
 
         Returns:
             All frames without an invalid sample.
@@ -83,7 +83,7 @@ class Dataset:
         Args:
             folder: Folder that holds a ``.toml`` beside each ``.log``.
             profile: How blocks are cut and framed, and which labels there are.
-            training: Whether the frames are for training; `cut` says what that changes.
+            training: Whether the frames are for training; see `cut`.
 
         Returns:
             All annotated frames.

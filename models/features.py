@@ -49,7 +49,7 @@ def rounded(samples: Real, profile: Profile) -> Array:
 
     Args:
         samples: A noise signal, any shape.
-        profile: Says whether samples are 32-bit numbers.
+        profile: Defines whether samples are 32-bit numbers.
     """
     if profile.single_precision:
         samples = samples.astype(np.float32, copy=False)
@@ -98,7 +98,7 @@ def _with_joints(found: Array, profile: Profile) -> Array:
 
     Args:
         found: Shape (..., rows, bands).
-        profile: Says how many rows are norms, and how many signals go joint by joint.
+        profile: Defines how many rows are norms, and how many signals have a row per joint.
     """
     rows, bands = found.shape[:-2], found.shape[-1]
     norms, kinds = profile.norms, len(profile.signals) - profile.norms

@@ -107,7 +107,7 @@ class Profile:
     gamma: float = 5.7e-4
     """Kernel parameter; the linear kernel has none."""
     multiclass: Multiclass = "one-vs-rest"
-    """How two-class machines are combined for more classes."""
+    """How two-class SVMs are combined for more classes."""
     networks: int = 5
     """Networks whose probabilities are averaged, each trained without one part of the groups."""
     units: int = 64

@@ -1,7 +1,7 @@
 """Signals: the input of a classifier, one noise estimate or several signals by name.
 
 A signal is a norm, shape (samples,), or what the norm is of, joint by joint, shape
-(joints, samples); its name says which. Stacked, they are rows: norms first, and then all joints of
+(joints, samples), by its name. Stacked, they are rows: norms first, and then all joints of
 one signal after those of the other.
 """
 
@@ -63,8 +63,8 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
 
     Raises:
         MissingSignalError: If one is not there.
-        SignalError: If one is of another shape than its name says, or they differ in length or in
-            their joints.
+        SignalError: If one is of another shape than its name requires, or they differ in length
+            or in their joints.
     """
     there = named(signals)
     if lacking := [name for name in names if name not in there]:

@@ -132,7 +132,7 @@ def seen(train: Mapping[str, str], test: Mapping[str, str]) -> dict[str, str]:
         test: SHA-256 of each test recording, by name.
 
     Returns:
-        What of them, by name of the recording. Other names than those of samples say nothing
+        What of them, by name of the recording. Other names than those of samples define nothing
         where there are hashes: `run.npz` of one folder is not that of another.
     """
     hashes = {digest: name for name, digest in train.items() if digest}

@@ -66,7 +66,7 @@ def check_whole(path: Path) -> None:
     """Refuse a file of a known kind that is cut off, without reading all of it.
 
     Raises:
-        MeshError: If it is empty, cut off or not what its name says, or cannot be read.
+        MeshError: If it is empty, cut off or not of the kind of its suffix, or cannot be read.
     """
     try:
         size = path.stat().st_size

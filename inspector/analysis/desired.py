@@ -17,11 +17,11 @@ STEP = 1e-6
 
 
 def without_placeholder(run: Run) -> tuple[Run, str]:
-    """Leave a desired velocity out that is zero throughout although the robot is told to move.
+    """A run without a desired velocity that is zero throughout although its desired motion is not.
 
     Controllers that take position targets write zeros in its place. It is left out if the desired
     position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters of any
-    two seconds. The zeros of a robot that is told to stand stay, also when it is pushed.
+    two seconds. The zeros of a robot that is to stand stay, also when it is pushed.
 
     Args:
         run: The run.

@@ -15,7 +15,7 @@ KINDS = ("simplified", *nm.KINDS)
 
 
 @dataclass(frozen=True)
-class Loudness:
+class NoiseLevel:
     """A run's noise in numbers, by one estimate.
 
     Attributes:
@@ -37,7 +37,7 @@ class Loudness:
     remarks: tuple[str, ...] = ()
 
     def __str__(self) -> str:
-        """Say it in lines."""
+        """The levels in lines."""
         head = f"{self.kind}: rms {self.rms:.4g} {self.unit}, peak {self.peak:.4g} {self.unit}"
         rows = [f"  {share:6.1%}  {name}" for name, share in self.shares if share >= 0.001]
         remarks = [f"  {remark}" for remark in self.remarks]
@@ -100,15 +100,15 @@ def estimate(run: Run, kind: str, *, geometry: str = "auto") -> Estimate:
     noise = nm.extended(
         robot, surface, *robot.configuration(run), kind, q_desired=q_desired, v_desired=v_desired
     )
-    bare = (
+    without_geometry = (
         (f"links without geometry: {', '.join(surface.without_geometry)}",)
         if surface.without_geometry
         else ()
     )
-    return Estimate(kind, "√W", noise.power, noise.names, bare)
+    return Estimate(kind, "√W", noise.power, noise.names, without_geometry)
 
 
-def loudness(run: Run, estimate: Estimate) -> Loudness:
+def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
     """Sum an estimate up.
 
     Args:
@@ -122,7 +122,7 @@ def loudness(run: Run, estimate: Estimate) -> Loudness:
     energy = estimate.power[run.mask].sum(axis=0)
     shares = energy / (energy.sum() or 1.0)
     order = np.argsort(-shares, kind="stable")
-    return Loudness(
+    return NoiseLevel(
         kind=estimate.kind,
         unit=estimate.unit,
         rms=float(np.sqrt(np.mean(pressure[run.mask] ** 2))),

@@ -1,4 +1,4 @@
-"""The moments of a run that are worth looking at first."""
+"""The moments of a run to be shown first."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from noisemodel.links import vibrating
 from noisemodel.types import Array
 
 STEP = 0.05
-"""Time over which loudness is taken, in [s]."""
+"""Time over which a level is taken, in [s]."""
 MOST = 3
 LOUDEST = "loudest"
 
@@ -57,19 +57,19 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
     ]
     stretches = [(failure.label, failure.start, failure.stop) for failure in failures]
     begin, end = float(run.time[0]), float(run.time[-1])
-    time, loudness = _loudness(analysis)
+    time, level = _level(analysis)
     found = []
     for label, start, stop in stretches or [(LOUDEST, begin, end)]:
         inside = np.flatnonzero((time >= start - STEP / 2) & (time <= stop + STEP / 2))
         if len(inside):
-            peak = inside[loudness[inside].argmax()]
+            peak = inside[level[inside].argmax()]
             moment = Moment(label, max(start, begin), min(stop, end), float(time[peak]))
-            found.append((float(loudness[peak]), moment))
+            found.append((float(level[peak]), moment))
     found.sort(key=lambda pair: -pair[0])
     return tuple(moment for _, moment in found[:MOST])
 
 
-def _loudness(analysis: Analysis) -> tuple[Array, Array]:
+def _level(analysis: Analysis) -> tuple[Array, Array]:
     """Mean square of the noise above 10 Hz, every 50 ms: middles of the steps and values."""
     run = analysis.run
     fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
 
 EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
-"""The errors that are told in one line; all others are bugs."""
+"""The errors that are printed in one line; all others are bugs."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Verdict:
         model: Name of the model that labelled, empty if none could.
         events: Findings, in order.
         message: A line that says more, may be empty.
-        localisations: The localisation of each finding, if it was asked for.
+        localisations: The localisation of each finding, if it was requested.
         unknown: What became of `unknown` frames.
         model_sha256: SHA-256 of the model's file, empty without.
     """

@@ -11,7 +11,7 @@ from noisemodel.types import Real
 FARTHEST = 10
 """Largest lag of a copy, before or after, in samples."""
 
-LOOKED_AT = 1000
+EXAMINED = 1000
 """Samples in motion that are compared, evenly spread, or a few more."""
 
 SAME = 0.99
@@ -67,7 +67,7 @@ def _lag(measured: Real, desired: Real) -> int | None:
     for lag in sorted(range(-FARTHEST, FARTHEST + 1), key=abs):
         ends = np.searchsorted(changes, (max(-lag, 0), samples - max(lag, 0) - 1))
         moving = changes[slice(*ends)]
-        moving = moving[:: max(1, len(moving) // LOOKED_AT)]
+        moving = moving[:: max(1, len(moving) // EXAMINED)]
         equal = np.count_nonzero(measured[moving + lag] == desired[moving])
         if len(moving) >= FARTHEST and equal >= SAME * len(moving):
             return lag

@@ -12,7 +12,7 @@ from noisemodel.types import Array
 EXACT = 1e-12
 """Largest deviation of a difference of positions, as a share of the largest velocity."""
 
-LOOKED_AT = 5000
+EXAMINED = 5000
 """Samples that are compared, evenly spread, or a few more."""
 
 COARSE = 1e-4
@@ -93,7 +93,7 @@ def differentiator_of(run: Run) -> Differentiator | None:
     if run.position is None or len(run.time) < 3:
         return None
     inner = np.flatnonzero(run.mask[:-2] & run.mask[1:-1] & run.mask[2:]) + 1
-    inner = inner[:: max(1, len(inner) // LOOKED_AT)]
+    inner = inner[:: max(1, len(inner) // EXAMINED)]
     moves = np.ptp(run.velocity[run.mask], axis=0) > 0
     if not (len(inner) and moves.any()):
         return None

@@ -20,7 +20,7 @@ def noise(
     overwrite: Overwrite = False,
 ) -> None:
     """Print the noise level of a run, by joints and links."""
-    from inspector.analysis.level import default_kinds, estimate, loudness, write_csv
+    from inspector.analysis.level import default_kinds, estimate, noise_level, write_csv
     from noisemodel import Run
 
     recorded = Run.load(run)
@@ -29,4 +29,4 @@ def noise(
         write_csv(recorded, estimates, csv, overwrite=overwrite)
     typer.echo(f"{run}: {recorded.duration:.2f} s at {recorded.rate:g} Hz")
     for each in estimates:
-        typer.echo(str(loudness(recorded, each)))
+        typer.echo(str(noise_level(recorded, each)))

@@ -25,7 +25,7 @@ from noisemodel.atomic import refuse_existing
 from noisemodel.parallel import each
 
 BATCHES = 4
-"""Least number of batches per job: a killed job loses one, and jobs end at nearly the same time."""
+"""Least number of batches per job: a stopped job loses one; all end at nearly the same time."""
 
 HEADS = {
     "balanced_accuracy": ("balanced", "accuracy"),

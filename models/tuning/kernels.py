@@ -75,7 +75,7 @@ def decide(
 
 
 def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> Array:
-    """Decision values of machines trained on a kernel matrix, shape (frames, machines)."""
+    """Decision values of SVMs trained on a kernel matrix, shape (frames, decisions)."""
     weights = svm.balance(targets)
     if profile.multiclass == "one-vs-one":
         weighted = dict(enumerate(weights.tolist()))
@@ -85,9 +85,9 @@ def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> A
         return decisions if decisions.ndim == 2 else -decisions[:, None]
     each = [
         svm.svc(profile, profile.regularization * weight, precomputed=True).fit(
-            train, targets == machine
+            train, targets == number
         )
-        for machine, weight in enumerate(weights.tolist())
+        for number, weight in enumerate(weights.tolist())
     ]
     return np.stack([fitted.decision_function(test) for fitted in each], axis=1)
 

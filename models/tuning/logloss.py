@@ -20,9 +20,9 @@ def class_margins(decisions: Array, *, classes: int, multiclass: Multiclass) -> 
     """Least decision value in favour of each class.
 
     Args:
-        decisions: Decision values of all machines, shape (frames, machines).
+        decisions: Decision values of all SVMs, shape (frames, decisions).
         classes: How many classes there are.
-        multiclass: How the machines are combined.
+        multiclass: How the SVMs are combined.
 
     Returns:
         Margins, shape (frames, classes). One-vs-rest: the decision values. One-vs-one: the least of
