@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.analysis.verdict import Status, exit_status, judge
+from inspector.analysis.verdict import Status, classify_file, exit_status
 from inspector.assets import demo_run, model_files
 from inspector.audit import Observability, audit, shortcomings, summary
 from inspector.audit.observability import OSCILLATIONS, band_edges, has_frame
@@ -135,7 +135,7 @@ def test_a_run_without_findings_in_which_nothing_is_observable_is_not_ok(tmp_pat
     sections = butter(4, 15.0, fs=1000, output="sos")
     run = run_of(sosfilt(sections, still, axis=0), 1000.0)
     run.save(tmp_path / "filtered.npz")
-    verdict = judge(tmp_path / "filtered.npz", LIBRARY)
+    verdict = classify_file(tmp_path / "filtered.npz", LIBRARY)
     assert label_run(run, LIBRARY).labels.events() == ()
     assert verdict.status is Status.CANNOT_TELL
     assert exit_status([verdict]) == 4
@@ -145,7 +145,7 @@ def test_a_run_without_findings_in_which_nothing_is_observable_is_not_ok(tmp_pat
 def test_one_class_that_is_partly_observable_is_a_remark(tmp_path):
     zeros = np.zeros((6000, 2))
     run_of(zeros, 1000.0).save(tmp_path / "still.npz")
-    verdict = judge(tmp_path / "still.npz", LIBRARY)
+    verdict = classify_file(tmp_path / "still.npz", LIBRARY)
     assert verdict.status is Status.OK
     assert verdict.message == (
         "Can show impact and highaccelerations; oscillations only from 20 to 440 Hz"

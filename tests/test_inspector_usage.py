@@ -69,8 +69,8 @@ def test_every_command_is_in_a_panel(help_of):
     titles = [line.strip("╭╮─ ") for line in help_of() if line.startswith("╭")]
     assert titles == [
         "Options",
-        "Inspect",
-        "Classify and audit",
+        "Look",
+        "Judge",
         "Import and export",
         "Train",
         "Simulate",

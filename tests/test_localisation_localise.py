@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from inspector.analysis.analyse import analyse_file
-from inspector.analysis.verdict import judge
+from inspector.analysis.verdict import classify_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.localisation.band import band
@@ -99,7 +99,7 @@ def test_every_failure_is_localised_and_what_is_ok_is_not():
 
 def test_the_localisation_of_a_verdict_is_that_of_a_view_of_its_run():
     library = load_library(model_files())
-    verdict = judge(demo_run(), library, localise=True)
+    verdict = classify_file(demo_run(), library, localise=True)
     assert verdict.events
     seen = analyse_file(demo_run(), library, links=False)
     assert verdict.events == seen.findings

@@ -68,7 +68,7 @@ class Verdict:
         )
 
 
-def judge(
+def classify_file(
     path: Path,
     library: Library,
     *,
@@ -97,7 +97,7 @@ def judge(
         return Verdict(path, Status.BAD_INPUT, message=message, unknown=unknown)
 
 
-def judge_all(
+def classify_files(
     paths: Sequence[Path],
     library: Library,
     *,
@@ -117,7 +117,7 @@ def judge_all(
     Returns:
         A verdict per file, in their order.
     """
-    one = partial(judge, library=library, unknown=unknown, localise=localise)
+    one = partial(classify_file, library=library, unknown=unknown, localise=localise)
     return each(one, paths, jobs=jobs)
 
 

@@ -53,7 +53,7 @@ def classify(
       4  cannot tell: say, the rate is too low for every model
     """
     from inspector import assets
-    from inspector.analysis.verdict import exit_status, judge_all
+    from inspector.analysis.verdict import classify_files, exit_status
     from inspector.library import load_library
     from inspector.progress import progress
     from inspector.report.formats import FORMATS
@@ -66,8 +66,8 @@ def classify(
         from inspector.labels.findings import label_paths, write_findings
 
         targets = label_paths(runs, labels_to, format_name=labels_format, overwrite=overwrite)
-    judged = judge_all(runs, library, unknown=unknown, localise=localise, jobs=jobs)
-    verdicts = list(progress(judged, "classify", total=len(runs)))
+    classified = classify_files(runs, library, unknown=unknown, localise=localise, jobs=jobs)
+    verdicts = list(progress(classified, "classify", total=len(runs)))
     typer.echo(FORMATS[format](verdicts))
     if targets:
         write_findings(verdicts, targets, format_name=labels_format, overwrite=overwrite)

@@ -70,11 +70,6 @@ def sentence(analysis: Analysis, event: Event | Block) -> str:
     return f"{event.label}, {when}{where and f': {where}'}"
 
 
-def novelty(event: Event | Block) -> str:
-    """Remark that an event is out of distribution; empty if it is not."""
-    return ", out of distribution" if isinstance(event, Event) and event.novel else ""
-
-
 def localised(
     analysis: Analysis, failure: Event | Block, *, quote: str = ""
 ) -> tuple[str, str, str, str]:
