@@ -33,16 +33,17 @@ class Labelled:
     remark: str = ""
 
 
-def load_library(paths: Sequence[Path] = ()) -> Library:
+def load_library(paths: Sequence[str | Path] = ()) -> Library:
     """Read models, by the stems of their files.
 
     Args:
-        paths: Model files; those that ship unless given.
+        paths: Model files, or names of models that ship; all of these unless given.
 
     Raises:
         ModelFileError: If a file is no model.
     """
-    return {path.stem: models.Classifier.load(path) for path in paths or assets.model_files()}
+    files = assets.model_files([Path(path) for path in paths])
+    return {path.stem: models.Classifier.load(path) for path in files}
 
 
 def for_robot(library: Library, robot: str | None) -> Library:

@@ -17,7 +17,7 @@ def extremes(time: Array, values: Real, *, points: int) -> tuple[Array, Array]:
         Times, shape (kept,), and values, shape (kept, series), kept ≤ points; everything, if
         there are not more samples than points.
     """
-    if len(time) <= points:
+    if len(time) <= points or not values.shape[1]:
         return time, np.asarray(values, dtype=np.float64)
     size = -(-len(time) // (points // 2))
     starts = np.arange(0, len(time), size)

@@ -66,7 +66,7 @@ class RateError(ModelsError):
     """
 
     def __init__(self, rate: float, known: Iterable[float], advice: str) -> None:
-        self.rate, self.known = rate, tuple(sorted(known))
+        self.rate, self.known = rate, tuple(sorted(set(known)))
         there = ", ".join(f"{each:g}" for each in self.known) or "none"
         super().__init__(f"rate of {rate:g} Hz; the models' rates are {there} Hz: {advice}")
 

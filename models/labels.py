@@ -59,10 +59,8 @@ class Event:
         return ", out of distribution" if self.novel else ""
 
     def __str__(self) -> str:
-        return (
-            f"{self.label} from {self.start:.2f} s to {self.stop:.2f} s"
-            f" (score {self.score:.2f}{self.novelty})"
-        )
+        score = f"(score {self.score:.2f}{self.novelty})"
+        return f"{self.label} from {interval(self.start, self.stop)} {score}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,6 +225,12 @@ class Labels:
     def __str__(self) -> str:
         found = [str(event) for event in self.events()] or ["no findings"]
         return "\n".join([*found, f"in {len(self)} frames"])
+
+
+def interval(start: float, stop: float) -> str:
+    """Write two times in [s]: to a hundredth, or to a thousandth if they are less apart."""
+    digits = 2 if stop - start >= 0.01 else 3
+    return f"{start:.{digits}f} s to {stop:.{digits}f} s"
 
 
 def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:

@@ -12,10 +12,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspector.analysis.analyse import Analysis, analyse, analyse_noise
-from inspector.analysis.desired import without_placeholder
 from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict, exit_status
 from inspector.assets import demo_run, model_files
+from inspector.audit import audit
+from inspector.audit.placeholder import without_placeholder
 from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.formats import FORMATS
@@ -257,3 +258,37 @@ def test_a_run_is_labelled_and_audited_once(monkeypatch):
     html.page(found)
     assert found.localisations
     assert counts == {"audit": 1, "label_run": 1}
+
+
+@given(st.text(alphabet="..iIoOu", min_size=1, max_size=30))
+@settings(deadline=None, max_examples=60)
+def test_each_stretch_of_flagged_frames_has_a_finding_within_its_frames(text):
+    from inspector.analysis.analyse import _extents, _stretches
+
+    labels = analysed(text).labels
+    spans, findings = _extents(moving(), labels)
+    assert [finding.label for finding in findings] == [span.label for span in spans]
+    assert all(finding.start < finding.stop for finding in findings)
+    for first, last in _stretches(labels):
+        assert any(first - 1e-9 <= e.start and e.stop <= last + 1e-9 for e in findings)
+    assert bool(findings) == bool(labels.events())
+
+
+def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_path):
+    run = moving(tone=1.0)
+    run.save(tmp_path / "shaken.npz")
+    library = load_library(["general-1khz"])
+    found = analyse(tmp_path / "shaken.npz", library)
+    assert (found.name, found.model) == ("shaken", "general-1khz")
+    assert found.findings == analyse(run, library).findings
+
+
+def test_short_findings_are_written_to_the_millisecond():
+    assert str(Event("impact", 3.0, 3.002, 0.9)) == "impact from 3.000 s to 3.002 s (score 0.90)"
+    assert str(Event("impact", 3.0, 3.2, 0.9)) == "impact from 3.00 s to 3.20 s (score 0.90)"
+
+
+def test_the_audit_names_a_placeholder_of_the_desired_velocity():
+    clause = "zero throughout while joints move at more than 0.1 rad/s for seconds: a placeholder"
+    assert any(clause in warning for warning in audit(zeros(moving()), LIBRARY).warnings)
+    assert not any("placeholder" in warning for warning in audit(moving(), LIBRARY).warnings)

@@ -18,6 +18,7 @@ from inspector.pair.levels import (
     steps,
     whole,
 )
+from inspector.pair.recording import write
 from models import Event, Labels
 from noisemodel import Block, Run
 
@@ -317,3 +318,14 @@ def test_a_limit_cycle_is_new(tmp_path, library):
     for block in blocks:
         assert any(c.start < block.stop and block.start < c.stop for c in new)
     assert whole(pair).change > 1.0
+
+
+def test_runs_without_a_common_joint_are_shown_beside_each_other(tmp_path):
+    time = np.arange(4000) / 1000
+    one, other = (
+        Run(time=time, velocity=np.cos(time)[:, None], velocity_desired=np.cos(time)[:, None],
+            joint_names=(name,))
+        for name in ("elbow", "knee")
+    )  # fmt: skip
+    write(compared(tmp_path, one, other), tmp_path / "pair.rrd")
+    assert (tmp_path / "pair.rrd").exists()

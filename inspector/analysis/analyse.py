@@ -16,9 +16,9 @@ import numpy as np
 
 import models
 import noisemodel as nm
-from inspector.analysis.desired import without_placeholder
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
+from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.library import (
     CannotTellError,
@@ -168,10 +168,10 @@ def status_of(frames: int, findings: Sequence[Event]) -> Status:
 
 
 def analyse(
-    run: nm.Run,
+    run: nm.Run | str | Path,
     library: Library | None = None,
     *,
-    name: str = "run",
+    name: str = "",
     sha256: str = "",
     unknown: Unknown = Unknown.FINDING,
 ) -> Analysis:
@@ -181,21 +181,27 @@ def analyse(
     need: an object that reads them from its file on demand can stand in for a `noisemodel.Run`.
 
     Args:
-        run: The run.
+        run: The run, or a run file.
         library: Models to choose from, see `inspector.load_library`; those that ship unless given.
-        name: Name of the run.
+        name: Name of the run; that of its file unless given.
         sha256: SHA-256 of the file that it came from.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
 
     Returns:
         The analysis. A run that no model can label is no error: its status is `cannot-tell`.
+
+    Raises:
+        RunFileError: If the file is no run file.
     """
+    if isinstance(run, (str, Path)):
+        name = name or Path(run).stem
+        run = nm.Run.load(run)
     library = load_library() if library is None else library
     run, left_out = without_placeholder(run)
     seen = audit(run, library)
     notes = (left_out,) if left_out else ()
     empty = Analysis(
-        name=name,
+        name=name or "run",
         status=Status.CANNOT_TELL,
         run=run,
         audit=seen,
@@ -329,28 +335,29 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
 def _extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
     """List the events of labels, and the same from onset to end, in the order of the latter.
 
-    A stretch of flagged frames has an onset and an end. Where its class changes, each event has its
-    own within these; if that leaves less than a hop, it is as long as its frames allow.
+    A stretch of flagged frames has an onset and an end. Where the class changes within it, each
+    frame counts for the hop around its middle; an event that is left without any time, because
+    its frames only touch what the next one covers, is none of its own.
     """
     frame, step = float(labels.stop[0] - labels.start[0]), hop(labels)
-    whole = [
-        (first, last, extent(run, first, last, frame=frame, hop=step))
-        for first, last in _stretches(labels)
-    ]
-
-    def real(span: Event) -> Event:
-        (onset, end) = next(
-            found for first, last, found in whole if first <= span.start and span.stop <= last
-        )
-        start, stop = extent(run, span.start, span.stop, frame=frame, hop=step)
-        start, stop = max(start, onset), min(stop, end)
-        if stop - start < step:
-            start, stop = max(span.start, onset), min(span.stop, end)
-        if stop <= start:  # its frames end before the onset, or start after the end
-            start, stop = span.start, span.stop
-        return replace(span, start=start, stop=stop)
-
-    pairs = [(span, real(span)) for span in labels.events()]
+    margin, events, pairs = (frame - step) / 2, labels.events(), []
+    for first, last in _stretches(labels):
+        onset, end = extent(run, first, last, frame=frame, hop=step)
+        own = [span for span in events if first <= span.start and span.stop <= last]
+        found = [
+            (
+                span,
+                replace(
+                    span,
+                    start=max(onset, span.start + margin if span.start > first else onset),
+                    stop=min(end, span.stop - margin if span.stop < last else end),
+                ),
+            )
+            for span in own
+        ]
+        longest = max(found, key=lambda pair: pair[1].stop - pair[1].start)[0]
+        kept = [pair for pair in found if pair[1].start < pair[1].stop]
+        pairs += kept or [(longest, replace(longest, start=onset, stop=end))]
     pairs.sort(key=lambda pair: (pair[1].start, pair[1].stop))
     return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)
 

@@ -11,6 +11,7 @@ from inspector.audit.bandwidth import Bandwidth, bandwidth
 from inspector.audit.copies import copies
 from inspector.audit.hold import hold_length
 from inspector.audit.observability import ClassObservability, Observability, observable_classes
+from inspector.audit.placeholder import placeholder
 from inspector.audit.units import unit_warnings
 from inspector.library import for_robot, signals_of
 from noisemodel import Run
@@ -114,6 +115,8 @@ def _jitter(run: Run) -> tuple[float, float] | None:
 
 def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
     yield from unit_warnings(run)
+    if clause := placeholder(run):
+        yield f"{clause}: a placeholder, which is left out"
     for copy in copies(run):
         whose = "all joints" if len(copy.joints) == len(run.joint_names) else ", ".join(copy.joints)
         samples = f"{abs(copy.lag)} sample{'' if abs(copy.lag) == 1 else 's'}"

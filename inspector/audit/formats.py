@@ -76,7 +76,7 @@ def _classes(audit: Audit) -> str:
     else:
         clauses = [f"{each.label} {_rest(each)}" for each in others]
     if shown:
-        clauses = [f"can show {_listed(shown)}", *clauses]
+        clauses = [f"the log can show {_listed(shown)}", *clauses]
     sentence = "; ".join(clauses)
     return f"{sentence[0].upper()}{sentence[1:]}."
 

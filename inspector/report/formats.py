@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.analysis.verdict import Verdict
 from models import Event
+from models.labels import interval
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
@@ -97,7 +98,7 @@ def junit(verdicts: Sequence[Verdict]) -> str:
 def github(verdicts: Sequence[Verdict]) -> str:
     """Write verdicts as GitHub workflow commands, at most ten of a kind."""
     errors = [
-        _annotation("error", verdict, ", ".join(map(_sentence, verdict.events)) or verdict.message)
+        _annotation("error", verdict, "; ".join(map(_sentence, verdict.events)) or verdict.message)
         for verdict in verdicts
         if verdict.status in (Status.BAD_INPUT, Status.FINDINGS)
     ]
@@ -136,7 +137,7 @@ def _localisation(known: "Localisation") -> dict[str, object]:
 
 
 def _sentence(event: Event) -> str:
-    return f"{event.label} from {event.start:.2f} s to {event.stop:.2f} s{event.novelty}"
+    return f"{event.label} from {interval(event.start, event.stop)}{event.novelty}"
 
 
 def _plain(value: object) -> str:

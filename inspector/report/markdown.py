@@ -7,6 +7,7 @@ from inspector.localisation.links import fault_links
 from inspector.localisation.localise import has_stages
 from inspector.report.localisation import words
 from models import Event
+from models.labels import interval
 from noisemodel import Block
 
 LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")
@@ -66,7 +67,7 @@ def sentence(analysis: Analysis, event: Event | Block) -> str:
     by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
     where = "; ".join(part for part in (by, *others) if part)
     novel = event.novelty if isinstance(event, Event) else ""
-    when = f"{event.start:.2f} s to {event.stop:.2f} s{novel}"
+    when = f"{interval(event.start, event.stop)}{novel}"
     return f"{event.label}, {when}{where and f': {where}'}"
 
 

@@ -16,12 +16,34 @@ STEP = 1e-6
 """Change of a desired position from which it changes, in [rad] or [m]."""
 
 
-def without_placeholder(run: Run) -> tuple[Run, str]:
-    """A run without a desired velocity that is zero throughout although its desired motion is not.
+def placeholder(run: Run) -> str:
+    """Tell a desired velocity that is zero throughout although the robot is told to move.
 
-    Controllers that take position targets write zeros in its place. It is left out if the desired
-    position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters of any
-    two seconds. The zeros of a robot that is to stand stay, also when it is pushed.
+    Controllers that take position targets write zeros in its place. They are a placeholder if the
+    desired position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters
+    of any two seconds. The zeros of a robot that is told to stand stay, also when it is pushed.
+
+    Args:
+        run: The run.
+
+    Returns:
+        A clause that says so; empty if the desired velocity is one, or there is none.
+    """
+    desired = run.velocity_desired
+    if desired is None or not desired.size or np.any(desired):
+        return ""
+    if _changes(run):
+        return "the desired velocity is zero throughout while the desired position changes"
+    if _moves(run):
+        return (
+            "the desired velocity is zero throughout while joints move at more than"
+            f" {MOVES:g} rad/s for seconds"
+        )
+    return ""
+
+
+def without_placeholder(run: Run) -> tuple[Run, str]:
+    """Leave a desired velocity out that is a placeholder.
 
     Args:
         run: The run.
@@ -30,19 +52,11 @@ def without_placeholder(run: Run) -> tuple[Run, str]:
         The run, without its desired velocity if that is a placeholder, and a sentence that says
         so; the run itself and an empty text otherwise.
     """
-    desired = run.velocity_desired
-    if desired is None or not desired.size or np.any(desired):
+    clause = placeholder(run)
+    if not clause:
         return run, ""
-    if _changes(run):
-        reason = "the desired position changes"
-    elif _moves(run):
-        reason = f"joints move at more than {MOVES:g} rad/s for seconds"
-    else:
-        return run, ""
-    return (
-        replace(run, velocity_desired=None),
-        f"The desired velocity is zero throughout while {reason}: it was left out.",
-    )
+    said = f"{clause[0].upper()}{clause[1:]}: it was left out."
+    return replace(run, velocity_desired=None), said
 
 
 def _changes(run: Run) -> bool:
