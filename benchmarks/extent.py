@@ -20,9 +20,9 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import noisemodel as nm
+from inspector.analysis.analyse import extents
 from inspector.assets import model_files
 from inspector.library import load_library
-from inspector.localisation.extent import extent
 from scenarios.sample import DECIMATED, Sample
 
 WITHIN = (0.05, 0.1, 0.2)
@@ -55,17 +55,16 @@ def errors(sample: Sample, model: str) -> Iterator[tuple[str, str, tuple[float, 
     labels = classifier.classify(
         {name: signals[name] for name in profile.signals}, classifier.rate, start=0.0
     )
-    for event in labels.events():
+    for event, found in zip(*extents(run, labels), strict=True):
         blocks = [
             block
             for block in sample.blocks
             if block.label == event.label and block.stop > event.start and block.start < event.stop
         ]
         if blocks:
-            found = extent(run, event.start, event.stop)
             onset, end = blocks[0].start, blocks[-1].stop
-            yield event.label, "onset", (event.start - onset, found[0] - onset)
-            yield event.label, "end", (event.stop - end, found[1] - end)
+            yield event.label, "onset", (event.start - onset, found.start - onset)
+            yield event.label, "end", (event.stop - end, found.stop - end)
 
 
 def main() -> None:

@@ -263,10 +263,10 @@ def test_a_run_is_labelled_and_audited_once(monkeypatch):
 @given(st.text(alphabet="..iIoOu", min_size=1, max_size=30))
 @settings(deadline=None, max_examples=60)
 def test_each_stretch_of_flagged_frames_has_a_finding_within_its_frames(text):
-    from inspector.analysis.analyse import _extents, _stretches
+    from inspector.analysis.analyse import _stretches, extents
 
     labels = analysed(text).labels
-    spans, findings = _extents(moving(), labels)
+    spans, findings = extents(moving(), labels)
     assert [finding.label for finding in findings] == [span.label for span in spans]
     assert all(finding.start < finding.stop for finding in findings)
     for first, last in _stretches(labels):

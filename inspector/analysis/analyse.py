@@ -317,7 +317,7 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     """Add labels to an analysis, with the findings and the status that follow from them."""
     reported = empty.unknown is Unknown.FINDING
     labels = replace(labelled.labels, unknown_is_finding=reported)
-    spans, findings = _extents(empty.run, labels)
+    spans, findings = extents(empty.run, labels)
     known = int((labels.label != models.UNKNOWN).sum())
     return replace(
         empty,
@@ -332,7 +332,7 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     )
 
 
-def _extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
+def extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
     """List the events of labels, and the same from onset to end, in the order of the latter.
 
     A stretch of flagged frames has an onset and an end. Where the class changes within it, each
