@@ -121,6 +121,7 @@ def called(script, folder, *, given=None):
     return done.stdout
 
 
+@pytest.mark.slow
 def test_a_noise_that_differs_in_its_last_bit_is_noticed(short, tmp_path):
     altered = tmp_path / "altered"
     for package in PACKAGES:
@@ -143,6 +144,7 @@ def test_a_noise_that_differs_in_its_last_bit_is_noticed(short, tmp_path):
     assert lines[-1] == "2 compared: 1 the same, 1 different"
 
 
+@pytest.mark.slow
 def test_noise_and_scores_are_those_of_the_first_version(first, short, tmp_path):
     status, lines = compared(first, short, tmp_path)
     assert status == 0, "\n".join(lines)

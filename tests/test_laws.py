@@ -98,7 +98,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("rate", [1000.0, 10_000.0])
 @given(**FAULTS)
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, frequency, seed):
     check_the_law("panda", rate, kind, joint, frequency, seed)
 
@@ -115,7 +115,7 @@ def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
 
 
 @given(**FAULTS, faint=st.floats(0.001, 0.3))
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency, seed, faint):
     run = good_run("panda", 1000.0)
     signal = fault(run, kind, 20.0 * 20.0**frequency, seed)

@@ -17,15 +17,19 @@ QUICK = {"networks": 2, "units": 4, "epochs": 3}
 """Settings for short training, where the result does not matter."""
 
 
+@parametrize_with_checks([NoiseFeatures(), NoiseClassifier(settings=QUICK)])
+def test_estimators_pass_the_checks_of_scikit_learn(estimator, check):
+    check(estimator)
+
+
+@pytest.mark.slow
 @parametrize_with_checks(
     [
-        NoiseFeatures(),
-        NoiseClassifier(settings=QUICK),
         NoiseClassifier(settings={"estimator": "trees", "rounds": 2}),
         NoiseClassifier(settings={"estimator": "svm"}),
     ]
 )
-def test_scikit_learns_contract_is_kept(estimator, check):
+def test_classifiers_of_other_kinds_pass_them_too(estimator, check):
     check(estimator)
 
 
