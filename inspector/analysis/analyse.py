@@ -335,29 +335,26 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
 def extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
     """List the events of labels, and the same from onset to end, in the order of the latter.
 
-    A stretch of flagged frames has an onset and an end. Where the class changes within it, each
-    frame counts for the hop around its middle; an event that is left without any time, because
-    its frames only touch what the next one covers, is none of its own.
+    A stretch of flagged frames has an onset and an end, and each event an onset and an end within
+    these. An event is none of its own if it is left without any time when each frame counts for the
+    hop around its middle: its frames only touch what the next one covers.
     """
     frame, step = float(labels.stop[0] - labels.start[0]), hop(labels)
     margin, events, pairs = (frame - step) / 2, labels.events(), []
     for first, last in _stretches(labels):
         onset, end = extent(run, first, last, frame=frame, hop=step)
-        own = [span for span in events if first <= span.start and span.stop <= last]
-        found = [
-            (
-                span,
-                replace(
-                    span,
-                    start=max(onset, span.start + margin if span.start > first else onset),
-                    stop=min(end, span.stop - margin if span.stop < last else end),
-                ),
-            )
-            for span in own
-        ]
-        longest = max(found, key=lambda pair: pair[1].stop - pair[1].start)[0]
-        kept = [pair for pair in found if pair[1].start < pair[1].stop]
-        pairs += kept or [(longest, replace(longest, start=onset, stop=end))]
+        found = []
+        for span in (each for each in events if first <= each.start and each.stop <= last):
+            start = max(onset, span.start + margin if span.start > first else onset)
+            stop = min(end, span.stop - margin if span.stop < last else end)
+            if start < stop:
+                own = extent(run, span.start, span.stop, frame=frame, hop=step)
+                if min(own[1], end) - max(own[0], onset) >= step:
+                    start, stop = max(own[0], onset), min(own[1], end)
+                found.append((span, replace(span, start=start, stop=stop)))
+            elif not found:
+                fallback = (span, replace(span, start=onset, stop=end))
+        pairs += found or [fallback]
     pairs.sort(key=lambda pair: (pair[1].start, pair[1].stop))
     return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)
 
