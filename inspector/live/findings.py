@@ -33,7 +33,8 @@ class Findings:
             return
         # The frame that is `ok` belongs to both parts: neither ends where the signal goes on.
         last = int(quiet[-1])
-        self._closed = _merged(self._closed, waiting.part(slice(last + 1)).events())
+        if len(quiet) <= last:  # most often all of it is `ok`, and a label must not wait
+            self._closed = _merged(self._closed, waiting.part(slice(last + 1)).events())
         self._open = waiting.part(slice(last, None))
 
     @property
