@@ -45,7 +45,7 @@ class Analysis:
         name: Name of the run.
         status: `ok`, `findings` or `cannot-tell`.
         run: The run as it was analysed; a scalar noise is a run of one joint.
-        reason: Why nothing can be told, in a sentence or two; empty otherwise.
+        reason: Why there is no verdict, in a sentence or two; empty if there is one.
         labels: One label per frame; None where no model fits.
         model: Name of the model that labelled, empty without.
         model_sha256: SHA-256 of its file, empty without.
@@ -373,7 +373,7 @@ def hop(labels: models.Labels) -> float:
 
 
 def _missing(run: nm.Run) -> Iterator[str]:
-    """Say what a run does not hold."""
+    """List what a run lacks, and what was computed in its place."""
     if run.robot is None:
         yield "No 3D robot: the run names none."
     elif not robot_known(run):

@@ -17,11 +17,11 @@ STEP = 1e-6
 
 
 def placeholder(run: Run) -> str:
-    """Tell a desired velocity that is zero throughout although the robot is told to move.
+    """Check whether the desired velocity is zero throughout although the robot has to move.
 
     Controllers that take position targets write zeros in its place. They are a placeholder if the
     desired position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters
-    of any two seconds. The zeros of a robot that is told to stand stay, also when it is pushed.
+    of any two seconds. The zeros of a robot that has to stand remain, also when it is pushed.
 
     Args:
         run: The run.
