@@ -78,6 +78,21 @@ class Drives:
         self._velocity = self._velocity + self._beta * innovation
         return reading, self._velocity
 
+    def command(
+        self, targets: Array, rates: Array, torque: Array
+    ) -> tuple[Array, Array, Array]:
+        """What the drives follow over one tick.
+
+        Args:
+            targets: Positions of the reference, shape (samples, joints), in [rad].
+            rates: Velocities of the reference, shape (samples, joints), in [rad/s].
+            torque: Torques of the model, shape (joints,), in [N m].
+
+        Returns:
+            The same three, as the drives follow them.
+        """
+        return targets, rates, torque
+
     def torque(
         self, position: Array, velocity: Array, desired: Array, rate: Array, feedforward: Array
     ) -> Array:
@@ -95,6 +110,10 @@ class Drives:
         """
         demanded = feedforward + self._stiffness * (desired - position)
         demanded += self._damping * (rate - velocity)
+        return self._delayed(demanded)
+
+    def _delayed(self, demanded: Array) -> Array:
+        """Torques demanded before the delay, within the limits."""
         acting = self._waiting.popleft()
         self._waiting.append(np.minimum(np.maximum(demanded, self._least), self._limit))
         return acting

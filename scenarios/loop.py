@@ -178,13 +178,14 @@ def record(
         if overlay is not None:
             wave = np.einsum("seo,ej->osj", overlay[now], reference.lift)
             targets, rates = targets + wave[0], rates + wave[1]
+        targets, rates, torque = drives.command(targets, rates, reference.torque)
         motion.position_desired[now], motion.velocity_desired[now] = targets, rates
         for step, sample in enumerate(range(now.start, now.stop)):
             position, velocity = drives.read(joint_position, encoder_error[sample])
-            torque = drives.torque(position, velocity, targets[step], rates[step], reference.torque)
-            data.ctrl[:] = torque
+            acting = drives.torque(position, velocity, targets[step], rates[step], torque)
+            data.ctrl[:] = acting
             motion.position[sample], motion.velocity[sample] = position, velocity
-            motion.torque[sample] = torque
+            motion.torque[sample] = acting
             if base:
                 motion.base_pose[sample], motion.base_velocity[sample] = base_pose, base_velocity
             mujoco.mj_step(model, data)

@@ -23,6 +23,10 @@ class Reducible(Protocol):
         """The joints that move."""
 
     @property
+    def length_scale(self) -> float:
+        """Scale of all lengths of the URDF."""
+
+    @property
     def held(self) -> Mapping[str, float]:
         """Positions of the locked joints that are not at 0, in [rad] or [m]."""
 
@@ -39,11 +43,14 @@ def reduced_model(robot: Reducible) -> Any:
     Raises:
         UnsupportedModelError: If the URDF lacks a joint.
     """
-    return _reduced(robot.name, robot.drives.joints, tuple(sorted(robot.held.items())))
+    held = tuple(sorted(robot.held.items()))
+    return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
 
 
 @lru_cache(maxsize=8)
-def _reduced(name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...]) -> Any:
+def _reduced(
+    name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...], scale: float
+) -> Any:
     model = Robot.load(name).model
     lacking = {*moved, *dict(held)} - set(model.names)
     if lacking:
@@ -63,4 +70,22 @@ def _reduced(name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], .
         raise UnsupportedModelError(
             f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"
         )
-    return reduced
+    return reduced if scale == 1.0 else _scaled(reduced, scale)
+
+
+def _scaled(model: Any, scale: float) -> Any:
+    """A copy of a model with all lengths scaled, its masses unchanged."""
+    scaled = model.copy()
+    for index in range(1, model.njoints):
+        scaled.jointPlacements[index] = _moved(model.jointPlacements[index], scale)
+        given = model.inertias[index]
+        scaled.inertias[index] = pin.Inertia(
+            given.mass, scale * given.lever, scale**2 * given.inertia
+        )
+    for index in range(model.nframes):
+        scaled.frames[index].placement = _moved(model.frames[index].placement, scale)
+    return scaled
+
+
+def _moved(placement: Any, scale: float) -> Any:
+    return pin.SE3(placement.rotation, scale * placement.translation)

@@ -15,3 +15,6 @@ _ROBOTS: tuple[Simulated, ...] = (TALOS, G1, GO2, SOLO12, ANYMAL, PANDA, UR5, UR
 
 ROBOTS: Mapping[str, Simulated] = MappingProxyType({robot.name: robot for robot in _ROBOTS})
 """The robots that can be simulated, by name."""
+
+WIDE: Mapping[str, Simulated] = ROBOTS
+"""All robots of the wide domains, by name."""

@@ -30,6 +30,7 @@ from scenarios.robots import ROBOTS, Simulated
 from scenarios.table import SCENARIOS, Scenario
 
 if TYPE_CHECKING:
+    from scenarios.drives import Drives
     from scenarios.loop import Motion, Scene
 
 RECIPE = 2
@@ -195,8 +196,6 @@ def _record(
 ) -> "Motion":
     """Record the scene with the drives of the robot and the errors of its sensors."""
     from scenarios.drives import Drives
-    from scenarios.loop import record
-    from scenarios.sensing import sensors_of
 
     nominal = robot.drives
     joints = len(nominal.joints)
@@ -209,7 +208,37 @@ def _record(
         imperfections=imperfections,
         step=STEP,
     )
-    recording = len(plan.time)
+    return recorded(scene, drives, plan, faults, imperfections, rng)
+
+
+def recorded(
+    scene: "Scene",
+    drives: "Drives",
+    plan: Plan,
+    faults: Faults,
+    imperfections: Imperfections,
+    rng: np.random.Generator,
+) -> "Motion":
+    """Record a scene with given drives.
+
+    Args:
+        scene: The robot in its environment.
+        drives: Its drives.
+        plan: Plan of the motion.
+        faults: The faults to inject.
+        imperfections: The imperfections of the robot.
+        rng: Random numbers of the sensors' noise.
+
+    Returns:
+        The recorded signals.
+
+    Raises:
+        DivergedError: If it diverged, or the robot fell.
+    """
+    from scenarios.loop import record
+    from scenarios.sensing import sensors_of
+
+    recording, joints = len(plan.time), scene.model.nu
     ticks = scene.settling + recording
     sensor_error = scene.noise * rng.standard_normal((ticks, len(scene.noise)))
     where = sensors_of(scene.model)

@@ -23,6 +23,7 @@ class Arm:
         payload: Largest mass at the tool that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensor's noise, in [N].
         held: Positions of the locked joints that are not at zero, by name.
+        length_scale: Scale of all lengths of the URDF.
     """
 
     name: str
@@ -37,6 +38,7 @@ class Arm:
     payload: float = 0.3
     force_noise: float = 0.4
     held: dict[str, float] = field(default_factory=dict)
+    length_scale: float = 1.0
 
     @property
     def family(self) -> str:

@@ -49,6 +49,7 @@ class Humanoid:
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         size: Its size, relative to that which the defects of the scenarios are defined for.
         held: Positions of the locked joints that are not at zero, by name.
+        length_scale: Scale of all lengths of the URDF.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Humanoid:
     force_noise: float
     size: float = 1.0
     held: dict[str, float] = field(default_factory=dict)
+    length_scale: float = 1.0
 
     @property
     def family(self) -> str:

@@ -26,6 +26,7 @@ class Quadruped:
         payload: Largest mass on its back that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         held: Positions of the locked joints that are not at zero, by name.
+        length_scale: Scale of all lengths of the URDF.
     """
 
     name: str
@@ -43,6 +44,7 @@ class Quadruped:
     payload: float
     force_noise: float
     held: dict[str, float] = field(default_factory=dict)
+    length_scale: float = 1.0
 
     @property
     def family(self) -> str:
