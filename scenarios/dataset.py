@@ -13,7 +13,6 @@ from scenarios.errors import (
     SimulationError,
 )
 from scenarios.folder import Folder
-from scenarios.simulation import simulate
 from scenarios.tasks import Task, grouped_by_twin
 
 POLL = 0.5
@@ -37,7 +36,7 @@ def make(folder: Folder, tasks: Sequence[Task], *, jobs: int = 1) -> Iterator[Ta
         MissingSimulatorError: If MuJoCo is not installed.
         DatasetError: If a run cannot be simulated or written.
     """
-    groups = grouped_by_twin(folder.missing(tasks))
+    groups = grouped_by_twin(folder.missing(tasks), folder.format.motion)
     if groups and find_spec("mujoco") is None:
         raise MissingSimulatorError
     if jobs == 1 or len(groups) < 2:
@@ -80,7 +79,7 @@ def _make(folder: Folder, group: tuple[Task, ...]) -> Iterator[Task]:
         start = time.process_time()
         try:
             try:
-                run = simulate(task.robot, task.scenario, task.seed, duration=folder.duration)
+                run = folder.format.simulate(task, folder.duration)
             except SimulationError as fall:
                 folder.save_fall(task, fall)
             else:

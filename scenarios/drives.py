@@ -78,9 +78,7 @@ class Drives:
         self._velocity = self._velocity + self._beta * innovation
         return reading, self._velocity
 
-    def command(
-        self, targets: Array, rates: Array, torque: Array
-    ) -> tuple[Array, Array, Array]:
+    def command(self, targets: Array, rates: Array, torque: Array) -> tuple[Array, Array, Array]:
         """What the drives follow over one tick.
 
         Args:

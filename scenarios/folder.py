@@ -17,16 +17,14 @@ from noisemodel import Block, Run
 from noisemodel.atomic import replacing
 from scenarios.errors import DatasetError, SampleError, SimulationError
 from scenarios.formats import FORMATS, Format
-from scenarios.robots import ROBOTS
-from scenarios.simulation import RECIPE, SHORTEST
-from scenarios.table import SCENARIOS
+from scenarios.simulation import SHORTEST
 from scenarios.tasks import Task
 
 FORMAT = "noise-dataset/1"
 MANIFEST = "dataset.json"
 TIMES = "times.csv"
 FALLEN = ".fallen.json"
-_NAMES = re.compile(rf"({'|'.join(ROBOTS)})[/-]({'|'.join(SCENARIOS)})-(\d{{3,}})")
+_NAMES = re.compile(r"([a-z0-9_]+)[/-](.+)-(\d{3,})")
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,8 @@ class Folder:
             raise DatasetError(f"no format {format_name!r} of data sets; there are {known}")
         if duration is not None and not duration >= SHORTEST:
             raise DatasetError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
-        settings = {"format": FORMAT, "recipe": RECIPE, "form": format_name, "duration": duration}
+        recipe = FORMATS[format_name].recipe
+        settings = {"format": FORMAT, "recipe": recipe, "form": format_name, "duration": duration}
         try:
             if path.exists() and not path.is_dir():
                 raise DatasetError(f"{path}: is a file; name a folder")
@@ -85,12 +84,13 @@ class Folder:
         return cls(path, format_name, duration)
 
     @property
-    def _format(self) -> Format:
+    def format(self) -> Format:
+        """Its kind."""
         return FORMATS[self.format_name]
 
     def file(self, task: Task) -> Path:
         """Path of the file of a run."""
-        return self.path / f"{self._format.stem(task)}{self._format.suffix}"
+        return self.path / f"{self.format.stem(task)}{self.format.suffix}"
 
     def save(self, task: Task, run: Run) -> None:
         """Write a run; an existing file is replaced.
@@ -98,7 +98,7 @@ class Folder:
         Raises:
             OutputError: If it cannot be written.
         """
-        self._format.write(run, self._prepared(task))
+        self.format.write(run, self._prepared(task))
 
     def save_fall(self, task: Task, fall: SimulationError) -> None:
         """Record when and why a robot fell.
@@ -107,7 +107,7 @@ class Folder:
             OutputError: If it cannot be written.
         """
         facts = {"robot": task.robot, "scenario": task.scenario, "seed": task.seed}
-        record = {**facts, "time": fall.time, "problem": fall.problem, "recipe": RECIPE}
+        record = {**facts, "time": fall.time, "problem": fall.problem, "recipe": self.format.recipe}
         _write_json(self._prepared(task).with_suffix(FALLEN), {**record, "duration": self.duration})
 
     def save_time(self, task: Task, seconds: float) -> None:
@@ -129,11 +129,11 @@ class Folder:
         Raises:
             SampleError: If its file is damaged.
         """
-        return self._format.read(self.file(task))
+        return self.format.read(self.file(task))
 
     def kept(self) -> list[Task]:
         """The runs in the folder, in order."""
-        return self._found(self._format.suffix)
+        return self._found(self.format.suffix)
 
     def fallen(self) -> list[Task]:
         """The runs in which the robot fell, in order."""
@@ -144,7 +144,8 @@ class Folder:
         path, times = self.path / TIMES, {}
         for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
             name, _, seconds = line.partition(",")
-            if (found := _NAMES.fullmatch(name)) and re.fullmatch(r"\d+\.\d\d", seconds):
+            found = _NAMES.fullmatch(name)
+            if found and self.format.holds(_task(found)) and re.fullmatch(r"\d+\.\d\d", seconds):
                 times[_task(found)] = float(seconds)
         return times
 
@@ -187,7 +188,7 @@ class Folder:
         paths = (path.relative_to(self.path).as_posix() for path in self.path.rglob(f"*{suffix}"))
         plain = (re.sub("^(training|validation)/", "", path) for path in paths)
         matches = (_NAMES.fullmatch(name.removesuffix(suffix)) for name in plain)
-        return sorted(_task(found) for found in matches if found)
+        return sorted(filter(self.format.holds, (_task(found) for found in matches if found)))
 
 
 def _task(found: re.Match[str]) -> Task:

@@ -18,3 +18,6 @@ ROBOTS: Mapping[str, Simulated] = MappingProxyType({robot.name: robot for robot 
 
 WIDE: Mapping[str, Simulated] = ROBOTS
 """All robots of the wide domains, by name."""
+
+TARGETS = ("xarm7", "a1", "hyq", "talos")
+"""Robots that nothing is learnt from: other domains are measured on them (docs/evaluation.md)."""

@@ -7,11 +7,12 @@ from typing import Any, Self
 
 from noisemodel import Block
 from scenarios.folder import Folder
-from scenarios.robots import ROBOTS
 from scenarios.table import SCENARIOS
 
 FRAME, HOP = 0.4, 0.1
 """Length of a frame, and time from one to the next (paper, Sec. III-A), in [s]."""
+FEW = 8
+"""Robots up to which each has a column, and scenarios named at most."""
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,10 @@ class Statistics:
         kept, fallen, times = folder.kept(), folder.fallen(), folder.times()
         stood = Counter((task.robot, task.scenario) for task in kept)
         fell = Counter((task.robot, task.scenario) for task in fallen)
-        robots = [robot for robot in ROBOTS if any(robot == key[0] for key in stood + fell)]
+        robots = [
+            robot for robot in folder.format.robots if any(robot == key[0] for key in stood + fell)
+        ]
+        names = dict.fromkeys((*SCENARIOS, *(name for _, name in sorted(stood + fell))))
         amounts: dict[str, dict[str, Amount]] = {robot: {} for robot in robots}
         costs = dict.fromkeys(robots, Cost())
         motion = 0.0
@@ -95,7 +99,7 @@ class Statistics:
         upright = {
             robot: {
                 name: (stood[robot, name], stood[robot, name] + fell[robot, name])
-                for name in SCENARIOS
+                for name in names
                 if (robot, name) in stood + fell
             }
             for robot in robots
@@ -130,13 +134,24 @@ class Statistics:
         return "\n\n".join((first, self._upright(), self._amounts(), self._costs()))
 
     def _upright(self) -> str:
+        if len(self.upright) > FEW:
+            return self._upright_by_robot()
         lines = [f"{'upright':26}" + "".join(f"{robot:>10}" for robot in self.upright)]
-        for name, scenario in SCENARIOS.items():
-            if any(name in mine for mine in self.upright.values()):
-                shares = (mine.get(name) for mine in self.upright.values())
-                cells = (f"{share[0]}/{share[1]}" if share else "-" for share in shares)
-                number = f"{scenario.number:>2} {name:23}"
-                lines.append(number + "".join(f"{cell:>10}" for cell in cells))
+        for name in {name: None for mine in self.upright.values() for name in mine}:
+            shares = (mine.get(name) for mine in self.upright.values())
+            cells = (f"{share[0]}/{share[1]}" if share else "-" for share in shares)
+            number = f"{SCENARIOS[name].number:>2}" if name in SCENARIOS else "  "
+            lines.append(f"{number} {name:23}" + "".join(f"{cell:>10}" for cell in cells))
+        return "\n".join(lines)
+
+    def _upright_by_robot(self) -> str:
+        """One line per robot, with the scenarios in which it fell most."""
+        lines = [f"{'upright':26}{'runs':>10}   fell in"]
+        for robot, mine in self.upright.items():
+            up, runs = (sum(pair[side] for pair in mine.values()) for side in (0, 1))
+            fell = sorted(((n - u, name) for name, (u, n) in mine.items() if n > u), reverse=True)
+            most = ", ".join(f"{name} ({count})" for count, name in fell[:FEW])
+            lines.append(f"{robot:26}{f'{up}/{runs}':>10}   {most or 'none'}")
         return "\n".join(lines)
 
     def _amounts(self) -> str:

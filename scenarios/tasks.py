@@ -1,6 +1,6 @@
 """The runs of a data set, and their order."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from typing import TypeAlias
@@ -23,8 +23,8 @@ class Task:
     """A run of a data set.
 
     Attributes:
-        robot: A name in ``scenarios.ROBOTS``.
-        scenario: A name in ``scenarios.SCENARIOS`` that the robot has.
+        robot: A name in ``scenarios.ROBOTS``; in wide domains, in ``scenarios.robots.WIDE``.
+        scenario: A name in ``scenarios.SCENARIOS`` that the robot has; in wide domains, a fault.
         seed: The random seed.
     """
 
@@ -143,26 +143,30 @@ class DatasetSpec:
                 if task in fallen:
                     lost += 1
                 else:
-                    filled += duration or _motion(task).duration
+                    filled += duration or motion_of(task).duration
         return tasks
 
 
-def grouped_by_twin(tasks: Iterable[Task]) -> list[tuple[Task, ...]]:
+def grouped_by_twin(
+    tasks: Iterable[Task], motion: Callable[[Task], object]
+) -> list[tuple[Task, ...]]:
     """Runs in groups that share their twin: one robot, one seed, one motion.
 
     Args:
         tasks: Runs.
+        motion: What else than robot and seed is equal in them.
 
     Returns:
         The groups, in the order of their first runs.
     """
     groups: dict[object, list[Task]] = {}
     for task in tasks:
-        groups.setdefault((task.robot, task.seed, _motion(task)), []).append(task)
+        groups.setdefault((task.robot, task.seed, motion(task)), []).append(task)
     return [tuple(group) for group in groups.values()]
 
 
-def _motion(task: Task) -> Motion:
+def motion_of(task: Task) -> Motion:
+    """Motion of a run of the scenarios."""
     return SCENARIOS[task.scenario].cases[ROBOTS[task.robot].family].motion
 
 

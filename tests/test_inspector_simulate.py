@@ -16,7 +16,7 @@ import scenarios
 from inspector.cli import main
 from inspector.training.recordings import recordings
 from noisemodel import Block, Run
-from scenarios import dataset
+from scenarios import formats
 from scenarios.sample import Sample, is_sample
 
 ROOT = Path(__file__).parents[1]
@@ -50,7 +50,7 @@ def simulated(monkeypatch):
         return stub(robot, line.name, seed, duration or 7.0)
 
     simulate.calls, simulate.falls = calls, falls
-    monkeypatch.setattr(dataset, "simulate", simulate)
+    monkeypatch.setattr(formats, "simulate", simulate)
     monkeypatch.setattr(scenarios, "simulate", simulate)
     return simulate
 

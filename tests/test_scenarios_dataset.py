@@ -11,12 +11,13 @@ import pytest
 
 import scenarios
 from noisemodel import Block, Run, runfile
-from scenarios import dataset, folder
+from scenarios import formats
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.sample import Sample
+from scenarios.simulation import RECIPE
 from scenarios.statistics import Statistics
-from scenarios.tasks import DatasetSpec, Task, choose, grouped_by_twin
+from scenarios.tasks import DatasetSpec, Task, choose, grouped_by_twin, motion_of
 
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
 ALL = DatasetSpec(choice=choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2).tasks()
@@ -35,7 +36,7 @@ def simulated(monkeypatch):
         return stub(task, duration or 7.0)
 
     simulate.calls, simulate.falls = calls, falls
-    monkeypatch.setattr(dataset, "simulate", simulate)
+    monkeypatch.setattr(formats, "simulate", simulate)
     return simulate
 
 
@@ -106,7 +107,7 @@ def test_numbers_out_of_range_are_refused(numbers, problem):
 
 def test_runs_that_share_their_twin_are_one_group():
     tasks = DatasetSpec(choice=choose(["panda", "ur5"]), seeds=2).tasks()
-    groups = grouped_by_twin(tasks)
+    groups = grouped_by_twin(tasks, motion_of)
     assert sorted(task for group in groups for task in group) == sorted(tasks)
     assert len(set(tasks)) == len(tasks)
     twins = set()
@@ -169,7 +170,7 @@ def test_a_run_that_fell_is_recorded_and_not_simulated_again(simulated, tmp_path
     assert not place.file(fallen).exists()
     record = json.loads((tmp_path / "panda/obstacle-toe-001.fallen.json").read_text())
     assert (record["time"], record["problem"], record["seed"]) == (1.25, "it fell", 1)
-    assert record["recipe"] == folder.RECIPE
+    assert record["recipe"] == RECIPE
     assert list(make(place, ALL)) == []
     statistics = Statistics.of(place)
     assert statistics.upright["panda"]["obstacle-toe"] == (1, 2)

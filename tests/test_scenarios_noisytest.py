@@ -12,7 +12,7 @@ import models
 import noisemodel as nm
 import scenarios
 from noisemodel import Block, Run
-from scenarios import dataset, noisytest
+from scenarios import formats, noisytest
 from scenarios.dataset import make
 from scenarios.folder import Folder
 from scenarios.tasks import DatasetSpec, choose
@@ -105,7 +105,7 @@ def test_one_seed_of_four_is_for_validation(run, tmp_path, monkeypatch):
     def simulate(robot, scenario, seed, *, duration=None):
         return replace(run, meta={**META, "scenario": scenario, "seed": seed})
 
-    monkeypatch.setattr(dataset, "simulate", simulate)
+    monkeypatch.setattr(formats, "simulate", simulate)
     place = Folder.opened(tmp_path, format_name="noisytest")
     tasks = DatasetSpec(choice=choose(["panda"], ["1"]), seeds=8).tasks()
     assert len(list(make(place, tasks))) == 8

@@ -48,6 +48,14 @@ class Form(StrEnum):
     NOISYTEST = "noisytest"
 
 
+class Side(StrEnum):
+    """Domains by what they are for."""
+
+    ALL = "all"
+    SOURCE = "source"
+    TARGET = "target"
+
+
 @app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
 def run(
     robot: Annotated[
@@ -138,6 +146,75 @@ def dataset(
             typer.echo(f"NoisyTest cannot train without blocks of {', '.join(lacking)}", err=True)
     statistics = Statistics.of(folder)
     typer.echo(dumps(statistics.as_dict(), indent=2) if as_json else f"{output}: {statistics}")
+
+
+@app.command(epilog="Example: inspector simulate domains --seeds 8 -o data/ -j 2")
+def domains(
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The folder to write.")
+    ] = None,
+    robots: Annotated[str, typer.Option(help="Names of robots; by default all.")] = "",
+    seeds: Annotated[int, typer.Option(help="Seeds per robot; each draws a domain.")] = 8,
+    first_seed: Annotated[int, typer.Option(help="The first random seed.")] = 10_000,
+    faults: Annotated[int, typer.Option(help="Faulty runs per robot and seed.")] = 2,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    list_: Annotated[
+        bool, typer.Option("--list", help="Print robots and distribution, simulate nothing.")
+    ] = False,
+) -> None:
+    """Simulate wide domains: many robots, drives, controllers, motions; resumes if killed."""
+    from inspector.progress import progress
+    from scenarios.dataset import make
+    from scenarios.domains import DISTRIBUTION
+    from scenarios.domainset import tasks
+    from scenarios.folder import Folder
+    from scenarios.robots import TARGETS, WIDE
+    from scenarios.statistics import Statistics
+
+    if list_ or output is None:
+        sources = [robot for robot in WIDE if robot not in TARGETS]
+        typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
+        typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{DISTRIBUTION}")
+        return
+    chosen = tasks(_listed(robots), first=first_seed, seeds=seeds, faults=faults)
+    folder = Folder.opened(output, format_name="domains")
+    missing = folder.missing(chosen)
+    for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
+        pass
+    typer.echo(f"{output}: {Statistics.of(folder)}")
+
+
+@app.command(epilog="Example: inspector simulate logs data/ -o logs/ --copies 2")
+def logs(
+    data: Annotated[Path, typer.Argument(help="A folder of `inspector simulate domains`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")],
+    copies: Annotated[int, typer.Option(min=1, help="Logs of each run.")] = 1,
+    rate: Annotated[
+        float | None, typer.Option(help="Of all logs, in Hz; drawn by default.")
+    ] = None,
+    side: Annotated[
+        Side, typer.Option(help="All domains, those to learn from, or those never learnt from.")
+    ] = Side.ALL,
+) -> None:
+    """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
+    from collections import Counter
+
+    from scenarios.domainset import logs as logs_of
+    from scenarios.domainset import write
+    from scenarios.folder import Folder
+
+    folder = Folder.opened(data, format_name="domains")
+    rates, labelled, lost = Counter[float](), 0, 0
+    for _, run in write(logs_of(folder, copies=copies, rate=rate, side=side.value), output):
+        rates[run.rate] += 1
+        for event in run.meta["events"]:
+            labelled += event["labelled"] > 0
+            lost += not event["labelled"]
+    counts = ", ".join(f"{count} at {rate:g} Hz" for rate, count in sorted(rates.items()))
+    typer.echo(
+        f"{output}: {rates.total()} logs ({counts}); {labelled} events with a label, {lost} that"
+        " cannot be seen"
+    )
 
 
 def _listed(names: str) -> list[str]:

@@ -1,0 +1,96 @@
+"""Domains are drawn by seed, within the distribution and what a family bears."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from scenarios.domains import DISTRIBUTION, Distribution
+from scenarios.domains.distribution import RATES, DistributionError
+from scenarios.limits import Limits
+
+FREE = Limits()
+
+
+def domains(count=200, limits=FREE):
+    return [DISTRIBUTION.domain(np.random.default_rng(seed), limits) for seed in range(count)]
+
+
+def loggers(count=200):
+    return [
+        DISTRIBUTION.logger(np.random.default_rng(seed), domain, most=10_000.0)
+        for seed, domain in enumerate(domains(count))
+    ]
+
+
+def test_equal_seeds_draw_equal_domains():
+    assert domains(5) == domains(5)
+    assert loggers(5) == loggers(5)
+
+
+def test_values_lie_between_the_ends():
+    for name in ("payload", "gear", "torque_limit", "torque_rise", "encoder_bandwidth"):
+        ends = getattr(DISTRIBUTION, {"encoder_bandwidth": "loop_bandwidth"}.get(name, name))
+        values = [getattr(domain, name) for domain in domains()]
+        assert min(ends) <= min(values) <= max(values) <= max(ends), name
+    for name in ("noise", "jitter", "gear"):
+        values = [getattr(logger, name) for logger in loggers()]
+        assert min(getattr(DISTRIBUTION, name)) <= min(values)
+        assert max(values) <= max(getattr(DISTRIBUTION, name)), name
+
+
+def test_the_far_ends_are_drawn_by_wild_runs_only():
+    mild = [d.stiffness for d in domains(500) if d.wildness < 0.2 and d.control != "impedance"]
+    wild = [d.stiffness for d in domains(500) if d.wildness > 0.8]
+    assert min(mild) > 0.5
+    assert min(wild) < 0.15
+
+
+def test_every_kind_of_control_and_of_log_is_drawn():
+    assert {d.control for d in domains()} == {"pd", "computed-torque", "impedance", "policy"}
+    assert {log.velocity for log in loggers()} == {"measured", "filtered", "differentiated"}
+    assert {log.desired for log in loggers()} == {"commanded", "planned", "zero", "missing"}
+    assert {log.rate for log in loggers(500)} == set(RATES)
+    assert {log.hold > 1 for log in loggers()} == {True, False}
+
+
+def test_what_a_family_does_not_bear_is_not_drawn():
+    limits = Limits(stiffness=(0.5, 1.0), damping=(0.6, 1.1), delay=2e-3, hold=0.01)
+    for domain in domains(limits=limits):
+        assert 0.5 <= domain.stiffness <= 1.0
+        assert 0.6 <= domain.damping <= 1.1
+        assert domain.delay <= 2e-3
+        assert domain.policy_rate == 0 or domain.policy_rate >= 100 - 1e-9
+
+
+def test_a_part_of_the_domains_is_never_learnt_from():
+    assert {d.target for d in domains()} == {True, False}
+    assert all(d.target == (d.control == "impedance") for d in domains())
+    shares = np.mean([log.target for log in loggers(500)])
+    assert 0.05 < shares < 0.4
+
+
+def test_it_prints_each_range_with_its_source():
+    lines = str(DISTRIBUTION).splitlines()
+    assert len(lines) == 1 + len(fields(Distribution))
+    row = next(line for line in lines if line.startswith("gear"))
+    assert row.split()[:3] == ["gear", "30", "160"]
+    assert "real Panda" in row
+    assert "wildness" in str(domains(1)[0])
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (
+            {"delay": (0.0, 0.5)},
+            r"distribution: delay \(0.0, 0.5\): expected within 0 to 0.05 s",
+        ),
+        ({"ripple": (0.0, float("nan"))}, "expected within 0 to 0.1$"),
+        ({"bits": (16.0, 40.0)}, "expected within 8 to 30 bit"),
+        ({"gear": 100.0}, "gear 100.0: expected a mild and a wild end"),
+    ],
+)
+def test_a_distribution_out_of_range_is_refused(change, problem):
+    with pytest.raises(DistributionError, match=problem):
+        replace(DISTRIBUTION, **change)
