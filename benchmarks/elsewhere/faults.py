@@ -1,0 +1,240 @@
+"""Faults of the domains elsewhere, on the border between a controller and its robot."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TypeAlias
+
+import numpy as np
+
+from benchmarks.elsewhere.references import Reference
+from noisemodel.types import Array
+from scenarios.events import Event
+
+Range: TypeAlias = tuple[float, float]
+KINDS = ("push", "throw", "latency", "chatter", "jump", "hold", "decalibration")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Ranges from which a domain draws its faults.
+
+    Attributes:
+        force: Peak of a push, in [N].
+        ball: Mass of a thrown ball, in [kg]; None where nothing can be thrown.
+        delay: Additional age of measurements or commands, in [s].
+        gain: Factor on the gains of a joint that chatters.
+        jump: Jump of a joint's reference, in [rad].
+        hold: Duration for which a command is held, in [s].
+        offset: Offset of an encoder, in [rad].
+        late_commands: Whether commands are late rather than measurements.
+        slow: Whether late measurements make steps, rather than fast oscillations.
+    """
+
+    force: Range = (30.0, 150.0)
+    ball: Range | None = (0.3, 1.5)
+    delay: Range = (0.03, 0.08)
+    gain: Range = (15.0, 30.0)
+    jump: Range = (0.02, 0.1)
+    hold: Range = (0.06, 0.25)
+    offset: Range = (0.02, 0.06)
+    late_commands: bool = False
+    slow: bool = True
+
+
+@dataclass(frozen=True)
+class Push:
+    """A force on a link, half a sine over time: first and last tick, link, peak in [N]."""
+
+    start: int
+    stop: int
+    link: int
+    force: Array
+
+    def at(self, tick: int) -> Array:
+        """The force at a tick, shape (3,), in [N]."""
+        return self.force * np.sin(np.pi * (tick - self.start + 0.5) / (self.stop - self.start))
+
+
+@dataclass(frozen=True)
+class Throw:
+    """A ball thrown at a link: tick, link, velocity in [m/s], mass in [kg], stiffness in [N/m].
+
+    The stiffness is None for a hard ball.
+    """
+
+    start: int
+    link: int
+    velocity: Array
+    mass: float
+    stiffness: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Control:
+    """What a controller is given at each tick, and what disturbs it.
+
+    Attributes:
+        position: Commanded positions, shape (ticks, joints), in [rad].
+        velocity: Commanded velocities, shape (ticks, joints), in [rad/s].
+        offset: Error of the encoders, shape (ticks, joints), in [rad].
+        delay: Additional age of measurements, shape (ticks,), in ticks.
+        late: Additional age of commands, shape (ticks,), in ticks.
+        gain: Factor on the gains, shape (ticks, joints).
+        pushes: Forces on links.
+        throws: Thrown balls; their events are their contacts.
+        events: All other events.
+    """
+
+    position: Array
+    velocity: Array
+    offset: Array
+    delay: Array
+    late: Array
+    gain: Array
+    pushes: tuple[Push, ...] = ()
+    throws: tuple[Throw, ...] = ()
+    events: tuple[Event, ...] = ()
+
+
+def healthy(reference: Reference) -> Control:
+    """The control without any fault."""
+    ticks, joints = reference.position.shape
+    return Control(
+        position=reference.position,
+        velocity=reference.velocity,
+        offset=np.zeros((ticks, joints)),
+        delay=np.zeros(ticks, dtype=int),
+        late=np.zeros(ticks, dtype=int),
+        gain=np.ones((ticks, joints)),
+    )
+
+
+def draw(
+    rng: np.random.Generator,
+    kind: str,
+    reference: Reference,
+    sizes: Sizes,
+    *,
+    links: tuple[int, ...],
+    rate: float,
+) -> Control:
+    """A control with a few faults of one kind, at times that are at least a second apart.
+
+    Args:
+        rng: Source of times, joints and sizes.
+        kind: One of ``KINDS``.
+        reference: The motion.
+        sizes: Ranges of the faults.
+        links: Links that can be pushed or hit.
+        rate: Ticks per second, in [Hz].
+
+    Returns:
+        The control.
+    """
+    control = healthy(reference)
+    ticks = len(reference.position)
+    count = max(1, round((ticks / rate - 1.5) / 2.8))
+    slots = np.linspace(1.0, ticks / rate - 0.7, count + 1)
+    starts = slots[:-1] + rng.uniform(0.1, 0.5, count) * np.diff(slots)
+    for start in starts.tolist():
+        control = ADD[kind](control, rng, round(start * rate), sizes, links, rate)
+    return control
+
+
+def _push(control, rng, tick, sizes, links, rate):
+    force = rng.uniform(*sizes.force) * _direction(rng)
+    stop = tick + max(2, round(rng.uniform(0.01, 0.06) * rate))
+    push = Push(tick, stop, int(rng.choice(links)), force)
+    event = _event("impact", "push", tick, stop, rate, force=float(np.linalg.norm(force)))
+    return replace(control, pushes=(*control.pushes, push), events=(*control.events, event))
+
+
+def _throw(control, rng, tick, sizes, links, rate):
+    if sizes.ball is None:
+        return _push(control, rng, tick, sizes, links, rate)
+    soft = 10 ** rng.uniform(3.3, 4.3) if rng.random() < 0.5 else None
+    velocity = rng.uniform(2.0, 4.0) * _direction(rng) * (1.0, 1.0, 0.4)
+    throw = Throw(tick, int(rng.choice(links)), velocity, rng.uniform(*sizes.ball), soft)
+    return replace(control, throws=(*control.throws, throw))
+
+
+def _latency(control, rng, tick, sizes, links, rate):
+    stop = tick + round(rng.uniform(0.3, 0.6) * rate)
+    age = rng.uniform(*sizes.delay)
+    if not sizes.late_commands:
+        delay = control.delay.copy()
+        delay[tick:stop] = max(1, round(age * rate))
+        label = "highaccelerations" if sizes.slow else "oscillations"
+        event = _event(label, "late measurements", tick, stop, rate, delay=age)
+        return replace(control, delay=delay, events=(*control.events, event))
+    late = control.late.copy()
+    for first in range(tick, stop, round(0.05 * rate)):  # each packet has a delay of its own
+        late[first : min(first + round(0.05 * rate), stop)] = round(age * rng.uniform() * rate)
+    event = _event("highaccelerations", "late commands", tick, stop, rate, delay=age)
+    return replace(control, late=late, events=(*control.events, event))
+
+
+def _chatter(control, rng, tick, sizes, links, rate):
+    stop = tick + round(rng.uniform(0.25, 0.6) * rate)
+    joint, factor = int(rng.integers(control.gain.shape[1])), rng.uniform(*sizes.gain)
+    gain = control.gain.copy()
+    gain[tick:stop, joint] = factor
+    event = _event("oscillations", "high gains", tick, stop, rate, joint=joint, factor=factor)
+    return replace(control, gain=gain, events=(*control.events, event))
+
+
+def _jump(control, rng, tick, sizes, links, rate):
+    joint = int(rng.integers(control.gain.shape[1]))
+    jump = rng.uniform(*sizes.jump) * rng.choice((-1.0, 1.0))
+    shift = np.ones(len(control.position) - tick)
+    back = round(rng.uniform(0.2, 0.5) * rate)  # holds, then returns as smoothly as it can
+    shift[back:] = 0.5 + 0.5 * np.cos(np.pi * np.clip(np.arange(len(shift) - back) / rate, 0, 1))
+    position, velocity = control.position.copy(), control.velocity.copy()
+    position[tick:, joint] += jump * shift
+    velocity[tick + 1 :, joint] += jump * np.diff(shift) * rate
+    event = _event("highaccelerations", "reference jump", tick, tick + 1, rate, joint=joint,
+                   jump=float(jump))  # fmt: skip
+    return replace(control, position=position, velocity=velocity, events=(*control.events, event))
+
+
+def _hold(control, rng, tick, sizes, links, rate):
+    stop = tick + round(rng.uniform(*sizes.hold) * rate)
+    position, velocity = control.position.copy(), control.velocity.copy()
+    position[tick:stop], velocity[tick:stop] = position[tick], 0.0
+    event = _event("highaccelerations", "held command", tick, stop, rate)
+    return replace(control, position=position, velocity=velocity, events=(*control.events, event))
+
+
+def _decalibration(control, rng, tick, sizes, links, rate):
+    joint = int(rng.integers(control.gain.shape[1]))
+    angle = rng.uniform(*sizes.offset) * rng.choice((-1.0, 1.0))
+    slip = max(1, round(0.01 * rate))
+    offset = control.offset.copy()
+    offset[tick:, joint] += angle * np.clip(np.arange(len(offset) - tick) / slip, 0.0, 1.0)
+    event = _event("highaccelerations", "encoder slips, and keeps its offset", tick, tick + slip,
+                   rate, joint=joint, angle=float(angle))  # fmt: skip
+    return replace(control, offset=offset, events=(*control.events, event))
+
+
+ADD: Mapping = MappingProxyType(
+    dict(
+        zip(
+            KINDS,
+            (_push, _throw, _latency, _chatter, _jump, _hold, _decalibration),
+            strict=True,
+        )
+    )
+)
+"""Function that adds a fault to a control, by kind."""
+
+
+def _event(
+    label: str, cause: str, start: int, stop: int, rate: float, **facts: float
+) -> Event:
+    return Event(label, cause, start / rate, stop / rate, facts)
+
+
+def _direction(rng: np.random.Generator) -> Array:
+    direction = rng.normal(size=3)
+    return direction / np.linalg.norm(direction)

@@ -1,0 +1,43 @@
+"""What a simulator elsewhere returns, and why it may not."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from noisemodel.types import Array
+from scenarios.events import Event
+
+FASTEST = 60.0
+"""Joint speed beyond which a simulation has diverged, in [rad/s]."""
+
+
+class DroppedError(Exception):
+    """A run that is not kept, such as one in which the robot fell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recorded:
+    """Simulated motion, without sensors.
+
+    Attributes:
+        position: Joint positions, shape (samples, joints), in [rad].
+        velocity: Joint velocities, shape (samples, joints), in [rad/s].
+        effort: Joint torques, shape (samples, joints), in [N m].
+        events: Contacts with thrown balls.
+    """
+
+    position: Array
+    velocity: Array
+    effort: Array
+    events: tuple[Event, ...] = ()
+
+    def checked(self, rate: float) -> "Recorded":
+        """The same.
+
+        Raises:
+            DroppedError: If the simulation diverged.
+        """
+        wild = ~(np.abs(self.velocity) < FASTEST).all(axis=1)
+        if wild.any():
+            raise DroppedError(f"diverged after {np.argmax(wild) / rate:.2f} s")
+        return self
