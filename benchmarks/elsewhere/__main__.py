@@ -106,16 +106,16 @@ def make(task: Task, output: Path, duration: float) -> None:
 
 def report(every: list[Task], output: Path) -> None:
     """Print what there is, what was dropped, and how many faults the robots felt."""
-    print(f"{'domain':18}{'good':>6}{'faulty':>8}{'dropped':>9}{'faults':>8}{'felt':>6}{'masked':>8}")
+    print(
+        f"{'domain':18}{'good':>6}{'faulty':>8}{'dropped':>9}{'faults':>8}{'felt':>6}{'masked':>8}"
+    )
     kinds: Counter[str] = Counter()
     felt: Counter[str] = Counter()
     dropped: list[str] = []
     for domain in dict.fromkeys(task.domain for task in every):
         own = [task for task in every if task.domain == domain]
         runs = {
-            task: Run.load(path)
-            for task in own
-            if (path := output / f"{task.name}.npz").exists()
+            task: Run.load(path) for task in own if (path := output / f"{task.name}.npz").exists()
         }
         dropped += [task.name for task in own if task not in runs]
         events = [(task.kind, event) for task, run in runs.items() for event in run.meta["events"]]

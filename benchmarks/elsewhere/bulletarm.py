@@ -9,9 +9,8 @@ from benchmarks.elsewhere.faults import Control
 from benchmarks.elsewhere.recorded import Recorded
 from noisemodel.types import Array
 
-
-CHATTER_GAIN, CHATTER_LAG = 20.0, 0.004
-"""Of the loop of a joint that chatters, in [1/s] and [s]: unstable at a product of 1.6."""
+CHATTER_GAIN, CHATTER_LAG = 20.0, 0.003
+"""Of the loop of a joint that chatters, in [1/s] and [s]: unstable from a product of 1.6 on."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +44,7 @@ class Motors:
         lag: Age of the measurements of that loop, in ticks.
         payload: Mass added to the last link, in [kg].
         damping: Viscous friction of the joints, in [N m s].
+        feedforward: Whether the motors are given a velocity; a log has zeros otherwise.
     """
 
     mode: str
@@ -52,6 +52,7 @@ class Motors:
     lag: int
     payload: float
     damping: float
+    feedforward: bool
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> "Motors":
@@ -59,7 +60,14 @@ class Motors:
         mode = str(rng.choice(("position", "velocity")))
         gain = 10 ** rng.uniform(-1.7, -0.7) if mode == "position" else rng.uniform(8.0, 40.0)
         payload = rng.choice((0.0, rng.uniform(0.3, 2.0)))
-        return cls(mode, float(gain), int(rng.integers(1, 4)), float(payload), rng.uniform(0, 0.5))
+        return cls(
+            mode,
+            float(gain),
+            lag=int(rng.integers(1, 4)),
+            payload=float(payload),
+            damping=rng.uniform(0.0, 0.5),
+            feedforward=mode == "velocity" or bool(rng.random() < 0.5),
+        )
 
 
 def simulate(arm: BulletArm, motors: Motors, control: Control, rate: float) -> Recorded:
@@ -68,9 +76,7 @@ def simulate(arm: BulletArm, motors: Motors, control: Control, rate: float) -> R
     client, robot = world.client, world.robot
     joints = [world.names[name] for name in arm.joints]
     link = world.names[arm.payload]
-    client.changeDynamics(
-        robot, link, mass=client.getDynamicsInfo(robot, link)[0] + motors.payload
-    )
+    client.changeDynamics(robot, link, mass=client.getDynamicsInfo(robot, link)[0] + motors.payload)
     for joint, angle in zip(joints, control.position[0], strict=True):
         client.changeDynamics(robot, joint, jointDamping=motors.damping)
         client.resetJointState(robot, joint, angle)
@@ -95,7 +101,7 @@ def simulate(arm: BulletArm, motors: Motors, control: Control, rate: float) -> R
             np.array(joints)[which].tolist(),
             client.VELOCITY_CONTROL,
             targetVelocities=speed[which].tolist(),
-            forces=force[which].tolist(),
+            forces=(np.where(control.gain[tick] > 1, 0.4, 1.0) * force)[which].tolist(),
         )
 
     everyone = np.ones(count, dtype=bool)

@@ -1,6 +1,8 @@
 """A PyBullet world with one robot, which can be pushed and hit by balls."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -32,7 +34,8 @@ class World:
         from pybullet_utils.bullet_client import BulletClient
 
         self.rate = rate
-        self.client: Any = BulletClient(pybullet.DIRECT)
+        with _silent():
+            self.client: Any = BulletClient(pybullet.DIRECT)
         self.client.setAdditionalSearchPath(pybullet_data.getDataPath())
         self.client.setGravity(0.0, 0.0, -9.81)
         self.client.setTimeStep(1 / rate)
@@ -103,8 +106,23 @@ class World:
             ticks = np.array(contacts, dtype=int)
             parts = np.split(ticks, np.flatnonzero(np.diff(ticks) > APART * self.rate) + 1)
             events += [
-                Event("impact", "ball", float(part[0] / self.rate), float((part[-1] + 1) / self.rate))
+                Event(
+                    "impact", "ball", float(part[0] / self.rate), float((part[-1] + 1) / self.rate)
+                )
                 for part in parts
                 if len(part)
             ]
         return tuple(sorted(events, key=lambda event: event.start))
+
+
+@contextmanager
+def _silent() -> Iterator[None]:
+    """Without what PyBullet prints when it starts, past Python."""
+    kept, null = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+        os.close(null)

@@ -1,7 +1,7 @@
 """The domains elsewhere, and their runs: drawn, simulated, sensed and labelled."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from importlib import metadata
 from types import MappingProxyType
@@ -41,6 +41,12 @@ class Scene:
     links: tuple[int, ...]
     simulate: Callable[[Control], Recorded]
 
+    def given(self, control: Control) -> Control:
+        """The control, without velocities if the controller takes none."""
+        if getattr(self.settings, "feedforward", True):
+            return control
+        return replace(control, velocity=np.zeros_like(control.velocity))
+
 
 @dataclass(frozen=True)
 class Domain:
@@ -78,7 +84,12 @@ def _bullet_arm(arm: bulletarm.BulletArm) -> Callable[..., Scene]:
         motors = bulletarm.Motors.draw(rng)
         lagging = motors.mode == "velocity"
         sizes = Sizes(
-            delay=(0.02, 0.06), gain=(20.0, 40.0), force=(60.0, 300.0), late_commands=not lagging
+            force=(200.0, 800.0),
+            ball=(1.0, 5.0),
+            delay=(0.02, 0.06),
+            gain=(20.0, 35.0),
+            jump=(0.02, 0.1) if lagging else (0.005, 0.05),
+            late_commands=not lagging,
         )
         words = "PyBullet's position motors" if not lagging else "loop around velocity motors"
         return Scene(reference, motors, words, sizes, arm.links,
@@ -91,8 +102,8 @@ def _bullet_legs(legs: bulletlegs.BulletLegs) -> Callable[..., Scene]:
     def scene(rng: np.random.Generator, seed: int, duration: float, rate: float) -> Scene:
         gait = bulletlegs.Gait.draw(rng, legs, duration)
         sizes = Sizes(
-            delay=(0.002, 0.006), slow=False, gain=(8.0, 20.0), jump=(0.05, 0.2), offset=(0.05, 0.15),
-            hold=(0.05, 0.15), force=(50.0, 200.0),
+            force=(50.0, 200.0), delay=(0.003, 0.006), slow=False, gain=(8.0, 20.0),
+            jump=(0.05, 0.2), hold=(0.05, 0.15), offset=(0.05, 0.15),
         )  # fmt: skip
         return Scene(bulletlegs.reference(legs, gait, duration, rate), gait,
                      "soft joint PD around open-loop foot paths", sizes, legs.links,
@@ -108,7 +119,13 @@ def _drake_arm(arm: drakearm.DrakeArm) -> Callable[..., Scene]:
             rng, kind, np.array(arm.home), reach=0.5, duration=duration, rate=rate
         )
         loop = drakearm.Loop.draw(rng)
-        sizes = Sizes(ball=None, delay=(0.02, 0.05), gain=(15.0, 40.0))
+        sizes = Sizes(
+            force=(80.0, 300.0),
+            ball=None,
+            delay=(0.02, 0.05),
+            jump=(0.05, 0.2),
+            offset=(0.1, 0.25),
+        )
         return Scene(reference, loop, f"Drake's {arm.controller}", sizes, arm.links,
                      lambda control: drakearm.simulate(arm, loop, control, rate))  # fmt: skip
 
@@ -126,7 +143,7 @@ PANDA = bulletarm.BulletArm(
 IIWA = bulletarm.BulletArm(
     "kuka_iiwa/model.urdf",
     tuple(f"lbr_iiwa_joint_{number}" for number in range(1, 8)),
-    (300.0,) * 4 + (100.0,) * 3,
+    (320.0, 320.0, 176.0, 176.0, 110.0, 40.0, 40.0),
     (0.0, 0.6, 0.0, -1.2, 0.0, 0.8, 0.0),
     "lbr_iiwa_joint_7",
     (3, 5, 6),
@@ -216,12 +233,11 @@ def make(domain: Domain, kind: str, seed: int, *, rate: float = 1000.0, duration
         DroppedError: If the robot fell, or the simulation diverged.
     """
     scene, twin = _twin(domain.name, seed, rate, duration)
-    control, recorded = faults.healthy(scene.reference), twin
+    control, recorded = scene.given(faults.healthy(scene.reference)), twin
     if kind != "good":
         rng = _random(domain, seed, 2 + faults.KINDS.index(kind))
-        control = faults.draw(
-            rng, kind, scene.reference, scene.sizes, links=scene.links, rate=rate
-        )
+        control = faults.draw(rng, kind, scene.reference, scene.sizes, links=scene.links, rate=rate)
+        control = scene.given(control)
         recorded = scene.simulate(control)
     sensor = sensing.SENSORS[(seed + 2 * list(DOMAINS).index(domain.name)) % len(sensing.SENSORS)]
     position, velocity = sensing.sensed(
@@ -267,7 +283,7 @@ def _twin(name: str, seed: int, rate: float, duration: float) -> tuple[Scene, Re
     """Scene of a seed, and its run without a fault."""
     domain = DOMAINS[name]
     scene = domain.scene(_random(domain, seed, 0), seed, duration, rate)
-    return scene, scene.simulate(faults.healthy(scene.reference))
+    return scene, scene.simulate(scene.given(faults.healthy(scene.reference)))
 
 
 def _random(domain: Domain, seed: int, stream: int) -> np.random.Generator:

@@ -1,6 +1,6 @@
 """Faults of the domains elsewhere, on the border between a controller and its robot."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TypeAlias
@@ -138,86 +138,101 @@ def draw(
     slots = np.linspace(1.0, ticks / rate - 0.7, count + 1)
     starts = slots[:-1] + rng.uniform(0.1, 0.5, count) * np.diff(slots)
     for start in starts.tolist():
-        control = ADD[kind](control, rng, round(start * rate), sizes, links, rate)
+        control = ADD[kind](control, _Place(rng, round(start * rate), sizes, links, rate))
     return control
 
 
-def _push(control, rng, tick, sizes, links, rate):
-    force = rng.uniform(*sizes.force) * _direction(rng)
-    stop = tick + max(2, round(rng.uniform(0.01, 0.06) * rate))
-    push = Push(tick, stop, int(rng.choice(links)), force)
-    event = _event("impact", "push", tick, stop, rate, force=float(np.linalg.norm(force)))
+@dataclass(frozen=True)
+class _Place:
+    """Where a fault may act, from which tick on, and what draws its size."""
+
+    rng: np.random.Generator
+    tick: int
+    sizes: Sizes
+    links: tuple[int, ...]
+    rate: float
+
+
+def _push(control: Control, at: _Place) -> Control:
+    force = at.rng.uniform(*at.sizes.force) * _direction(at.rng)
+    stop = at.tick + max(2, round(at.rng.uniform(0.01, 0.06) * at.rate))
+    push = Push(at.tick, stop, int(at.rng.choice(at.links)), force)
+    event = _event("impact", "push", at.tick, stop, at.rate, force=float(np.linalg.norm(force)))
     return replace(control, pushes=(*control.pushes, push), events=(*control.events, event))
 
 
-def _throw(control, rng, tick, sizes, links, rate):
-    if sizes.ball is None:
-        return _push(control, rng, tick, sizes, links, rate)
-    soft = 10 ** rng.uniform(3.3, 4.3) if rng.random() < 0.5 else None
-    velocity = rng.uniform(2.0, 4.0) * _direction(rng) * (1.0, 1.0, 0.4)
-    throw = Throw(tick, int(rng.choice(links)), velocity, rng.uniform(*sizes.ball), soft)
+def _throw(control: Control, at: _Place) -> Control:
+    if at.sizes.ball is None:
+        return _push(control, at)
+    soft = 10 ** at.rng.uniform(3.3, 4.3) if at.rng.random() < 0.5 else None
+    velocity = at.rng.uniform(3.0, 5.0) * _direction(at.rng) * (1.0, 1.0, 0.4)
+    throw = Throw(
+        at.tick, int(at.rng.choice(at.links)), velocity, at.rng.uniform(*at.sizes.ball), soft
+    )
     return replace(control, throws=(*control.throws, throw))
 
 
-def _latency(control, rng, tick, sizes, links, rate):
-    stop = tick + round(rng.uniform(0.3, 0.6) * rate)
-    age = rng.uniform(*sizes.delay)
-    if not sizes.late_commands:
+def _latency(control: Control, at: _Place) -> Control:
+    stop = at.tick + round(at.rng.uniform(0.3, 0.6) * at.rate)
+    age = at.rng.uniform(*at.sizes.delay)
+    if not at.sizes.late_commands:
         delay = control.delay.copy()
-        delay[tick:stop] = max(1, round(age * rate))
-        label = "highaccelerations" if sizes.slow else "oscillations"
-        event = _event(label, "late measurements", tick, stop, rate, delay=age)
+        delay[at.tick : stop] = max(1, round(age * at.rate))
+        label = "highaccelerations" if at.sizes.slow else "oscillations"
+        event = _event(label, "late measurements", at.tick, stop, at.rate, delay=age)
         return replace(control, delay=delay, events=(*control.events, event))
     late = control.late.copy()
-    for first in range(tick, stop, round(0.05 * rate)):  # each packet has a delay of its own
-        late[first : min(first + round(0.05 * rate), stop)] = round(age * rng.uniform() * rate)
-    event = _event("highaccelerations", "late commands", tick, stop, rate, delay=age)
+    for first in range(at.tick, stop, round(0.05 * at.rate)):  # each packet has a delay of its own
+        late[first : min(first + round(0.05 * at.rate), stop)] = round(
+            age * at.rng.uniform() * at.rate
+        )
+    event = _event("highaccelerations", "late commands", at.tick, stop, at.rate, delay=age)
     return replace(control, late=late, events=(*control.events, event))
 
 
-def _chatter(control, rng, tick, sizes, links, rate):
-    stop = tick + round(rng.uniform(0.25, 0.6) * rate)
-    joint, factor = int(rng.integers(control.gain.shape[1])), rng.uniform(*sizes.gain)
+def _chatter(control: Control, at: _Place) -> Control:
+    stop = at.tick + round(at.rng.uniform(0.25, 0.6) * at.rate)
+    joint, factor = int(at.rng.integers(control.gain.shape[1])), at.rng.uniform(*at.sizes.gain)
     gain = control.gain.copy()
-    gain[tick:stop, joint] = factor
-    event = _event("oscillations", "high gains", tick, stop, rate, joint=joint, factor=factor)
+    gain[at.tick : stop, joint] = factor
+    event = _event("oscillations", "high gains", at.tick, stop, at.rate, joint=joint, factor=factor)
     return replace(control, gain=gain, events=(*control.events, event))
 
 
-def _jump(control, rng, tick, sizes, links, rate):
-    joint = int(rng.integers(control.gain.shape[1]))
-    jump = rng.uniform(*sizes.jump) * rng.choice((-1.0, 1.0))
-    shift = np.ones(len(control.position) - tick)
-    back = round(rng.uniform(0.2, 0.5) * rate)  # holds, then returns as smoothly as it can
-    shift[back:] = 0.5 + 0.5 * np.cos(np.pi * np.clip(np.arange(len(shift) - back) / rate, 0, 1))
+def _jump(control: Control, at: _Place) -> Control:
+    joint = int(at.rng.integers(control.gain.shape[1]))
+    jump = at.rng.uniform(*at.sizes.jump) * at.rng.choice((-1.0, 1.0))
+    shift = np.ones(len(control.position) - at.tick)
+    back = round(at.rng.uniform(0.2, 0.5) * at.rate)  # holds, then returns as smoothly as it can
+    shift[back:] = 0.5 + 0.5 * np.cos(np.pi * np.clip(np.arange(len(shift) - back) / at.rate, 0, 1))
     position, velocity = control.position.copy(), control.velocity.copy()
-    position[tick:, joint] += jump * shift
-    velocity[tick + 1 :, joint] += jump * np.diff(shift) * rate
-    event = _event("highaccelerations", "reference jump", tick, tick + 1, rate, joint=joint,
-                   jump=float(jump))  # fmt: skip
+    position[at.tick :, joint] += jump * shift
+    velocity[at.tick + 1 :, joint] += jump * np.diff(shift) * at.rate
+    event = _event("highaccelerations", "reference jump", at.tick, at.tick + 1, at.rate,
+                   joint=joint, jump=float(jump))  # fmt: skip
     return replace(control, position=position, velocity=velocity, events=(*control.events, event))
 
 
-def _hold(control, rng, tick, sizes, links, rate):
-    stop = tick + round(rng.uniform(*sizes.hold) * rate)
+def _hold(control: Control, at: _Place) -> Control:
+    stop = at.tick + round(at.rng.uniform(*at.sizes.hold) * at.rate)
     position, velocity = control.position.copy(), control.velocity.copy()
-    position[tick:stop], velocity[tick:stop] = position[tick], 0.0
-    event = _event("highaccelerations", "held command", tick, stop, rate)
+    position[at.tick : stop], velocity[at.tick : stop] = position[at.tick], 0.0
+    event = _event("highaccelerations", "held command", at.tick, stop, at.rate)
     return replace(control, position=position, velocity=velocity, events=(*control.events, event))
 
 
-def _decalibration(control, rng, tick, sizes, links, rate):
-    joint = int(rng.integers(control.gain.shape[1]))
-    angle = rng.uniform(*sizes.offset) * rng.choice((-1.0, 1.0))
-    slip = max(1, round(0.01 * rate))
+def _decalibration(control: Control, at: _Place) -> Control:
+    joint = int(at.rng.integers(control.gain.shape[1]))
+    angle = at.rng.uniform(*at.sizes.offset) * at.rng.choice((-1.0, 1.0))
+    slip = max(1, round(0.01 * at.rate))
     offset = control.offset.copy()
-    offset[tick:, joint] += angle * np.clip(np.arange(len(offset) - tick) / slip, 0.0, 1.0)
-    event = _event("highaccelerations", "encoder slips, and keeps its offset", tick, tick + slip,
-                   rate, joint=joint, angle=float(angle))  # fmt: skip
+    offset[at.tick :, joint] += angle * np.clip(np.arange(len(offset) - at.tick) / slip, 0.0, 1.0)
+    event = _event("highaccelerations", "encoder slips for good", at.tick, at.tick + slip,
+                   at.rate, joint=joint, angle=float(angle))  # fmt: skip
     return replace(control, offset=offset, events=(*control.events, event))
 
 
-ADD: Mapping = MappingProxyType(
+ADD: Mapping[str, Callable[[Control, _Place], Control]] = MappingProxyType(
     dict(
         zip(
             KINDS,
@@ -229,9 +244,7 @@ ADD: Mapping = MappingProxyType(
 """Function that adds a fault to a control, by kind."""
 
 
-def _event(
-    label: str, cause: str, start: int, stop: int, rate: float, **facts: float
-) -> Event:
+def _event(label: str, cause: str, start: int, stop: int, rate: float, **facts: float) -> Event:
     return Event(label, cause, start / rate, stop / rate, facts)
 
 

@@ -1,0 +1,108 @@
+"""Runs of other simulators; those that simulate need the extra `elsewhere`."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def domains(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmarks.elsewhere import domains
+
+    return domains
+
+
+def faulty(domains, name, kind, seed):
+    return domains.make(domains.DOMAINS[name], kind, seed, duration=3.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "module"), [("pybullet-panda", "pybullet"), ("drake-ur5", "pydrake")]
+)
+def test_the_labels_of_a_run_hold_its_fault(domains, name, module):
+    pytest.importorskip(module, reason="needs the extra elsewhere")
+    run = faulty(domains, name, "chatter", 1)
+    (event,) = run.meta["events"]
+    (block,) = [block for block in run.blocks if block.label != "ok"]
+    assert block.label == event["label"] == "oscillations"
+    assert event["start"] - 0.05 < block.start < event["stop"]
+    assert run.rate == 1000
+    assert run.meta["simulator"].split()[0] == name.split("-")[0]
+
+
+def test_equal_seeds_give_equal_runs(domains):
+    pytest.importorskip("pydrake", reason="needs the extra elsewhere")
+    one = faulty(domains, "drake-ur5", "jump", 1)
+    domains._twin.cache_clear()
+    other = faulty(domains, "drake-ur5", "jump", 1)
+    np.testing.assert_array_equal(one.velocity, other.velocity)
+
+
+def test_a_foot_is_where_inverse_kinematics_puts_it(domains):
+    legs = domains.A1
+    place = [np.full((1, 4), each) for each in (0.05, 0.0, -0.3)]
+    place[1] = place[1] + domains.bulletlegs.SIDES * 0.1
+    hip, upper, knee = np.moveaxis(domains.bulletlegs.angles(legs, *place), 2, 0)
+    lateral, thigh, calf = domains.bulletlegs.SIDES * legs.lengths[0], *legs.lengths[1:]
+    depth = thigh * np.cos(upper) + calf * np.cos(upper + knee)
+    ahead = -thigh * np.sin(upper) - calf * np.sin(upper + knee)
+    np.testing.assert_allclose(ahead, place[0])
+    np.testing.assert_allclose(lateral * np.cos(hip) + depth * np.sin(hip), place[1])
+    np.testing.assert_allclose(lateral * np.sin(hip) - depth * np.cos(hip), place[2])
+
+
+def test_references_start_at_rest_and_are_their_velocity_s_integral(domains):
+    for kind in domains.references.KINDS:
+        rng = np.random.default_rng(3)
+        motion = domains.references.draw(
+            rng, kind, np.ones(3), reach=0.5, duration=4.0, rate=1000.0
+        )
+        np.testing.assert_allclose(motion.position[0], 1.0)
+        assert np.abs(motion.velocity[0]).max() < 1e-3
+        moved = np.cumsum(motion.velocity, axis=0) / 1000 + 1.0
+        np.testing.assert_allclose(moved, motion.position, atol=2e-3)
+
+
+def test_a_fault_below_the_sensor_s_noise_loses_its_label(domains):
+    from noisemodel import Block
+
+    time = np.arange(1000) / 1000
+    noise = 0.02 * np.random.default_rng(0).standard_normal((1000, 1))
+    tone = np.sin(2 * np.pi * 45 * time)[:, None]
+    blocks = (Block(0.0, 0.2, "ok"), Block(0.3, 0.6, "oscillations"))
+    assert domains.visible(blocks, 0.05 * tone, noise, 1000.0) == blocks
+    assert domains.visible(blocks, 0.0005 * tone, noise, 1000.0) == blocks[:1]
+    assert domains.visible(blocks, 0.0005 * tone, 0 * noise, 1000.0) == blocks
+
+
+def test_without_the_simulators_one_line_says_what_to_install(tmp_path):
+    code = (
+        "import sys; sys.argv[1:] = ['out']; from benchmarks.elsewhere import __main__ as script;"
+        " script.installed = lambda: {'drake'}; script.main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert done.stderr == (
+        "pybullet not installed; run `pip install 'noise-inspector[elsewhere]'`\n"
+    )
+    assert not (ROOT / "out").exists()
+
+
+def test_an_unknown_domain_is_answered_with_those_there_are():
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks.elsewhere", "out", "--domains", "gazebo"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "no domain 'gazebo'; there are pybullet-panda, " in done.stderr
