@@ -84,7 +84,7 @@ def test_a_fault_below_the_sensor_s_noise_loses_its_label(domains):
 def test_without_the_simulators_one_line_says_what_to_install(tmp_path):
     code = (
         "import sys; sys.argv[1:] = ['out']; from benchmarks.elsewhere import __main__ as script;"
-        " script.installed = lambda: {'drake'}; script.main()"
+        " script.installed = lambda: {'drake', 'dm-control'}; script.main()"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
@@ -106,3 +106,29 @@ def test_an_unknown_domain_is_answered_with_those_there_are():
     )
     assert done.returncode == 2
     assert "no domain 'gazebo'; there are pybullet-panda, " in done.stderr
+
+
+def test_a_run_that_is_dropped_is_named_and_not_tried_again(domains, monkeypatch, tmp_path, capsys):
+    from benchmarks.elsewhere import __main__ as script
+    from benchmarks.elsewhere.recorded import DroppedError
+
+    def fall(*_, **__):
+        raise DroppedError("fell after 1.00 s")
+
+    monkeypatch.setattr(domains, "make", fall)
+    (task, *_) = script.tasks(["pybullet-a1"], 1)
+    for _ in range(2):
+        script.make(task, tmp_path, 3.0)
+    assert capsys.readouterr().out == "dropped pybullet-a1/a1/good-000: fell after 1.00 s\n"
+    script.report([task], tmp_path)
+    table = capsys.readouterr().out
+    assert table.endswith("dropped: pybullet-a1/a1/good-000 (fell after 1.00 s)\n")
+
+
+def test_a_simulation_that_diverges_is_dropped(domains):
+    from benchmarks.elsewhere.recorded import DroppedError, Recorded
+
+    velocity = np.zeros((100, 2))
+    velocity[50:, 1] = np.inf
+    with pytest.raises(DroppedError, match=r"diverged after 0\.50 s"):
+        Recorded(velocity, velocity, velocity).checked(100.0)

@@ -85,7 +85,7 @@ def main() -> None:
 
 def installed() -> set[str]:
     """The simulators that are there."""
-    modules = {"pybullet": "pybullet", "drake": "pydrake"}
+    modules = {"pybullet": "pybullet", "drake": "pydrake", "dm-control": "dm_control"}
     return {package for package, module in modules.items() if find_spec(module)}
 
 
@@ -117,7 +117,7 @@ def report(every: list[Task], output: Path) -> None:
         runs = {
             task: Run.load(path) for task in own if (path := output / f"{task.name}.npz").exists()
         }
-        dropped += [task.name for task in own if task not in runs]
+        dropped += [f"{task.name} ({problem(task, output)})" for task in own if task not in runs]
         events = [(task.kind, event) for task, run in runs.items() for event in run.meta["events"]]
         kinds.update(kind for kind, _ in events)
         felt.update(kind for kind, event in events if event["labelled"] > 0)
@@ -130,6 +130,11 @@ def report(every: list[Task], output: Path) -> None:
     print("\nfelt by kind: " + ", ".join(f"{kind} {felt[kind]} of {kinds[kind]}" for kind in kinds))
     if dropped:
         print("dropped: " + ", ".join(dropped))
+
+
+def problem(task: Task, output: Path) -> str:
+    """Why a run was dropped."""
+    return str(json.loads((output / f"{task.name}.dropped.json").read_text())["problem"])
 
 
 if __name__ == "__main__":

@@ -2,14 +2,22 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import metadata
 from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from benchmarks.elsewhere import bulletarm, bulletlegs, drakearm, faults, references, sensing
+from benchmarks.elsewhere import (
+    bulletarm,
+    bulletlegs,
+    dmarm,
+    drakearm,
+    faults,
+    references,
+    sensing,
+)
 from benchmarks.elsewhere.faults import Control, Sizes
 from benchmarks.elsewhere.recorded import Recorded
 from benchmarks.elsewhere.references import Reference
@@ -132,6 +140,17 @@ def _drake_arm(arm: drakearm.DrakeArm) -> Callable[..., Scene]:
     return scene
 
 
+def _jaco(rng: np.random.Generator, seed: int, duration: float, rate: float) -> Scene:
+    kind = references.KINDS[(seed + 2) % len(references.KINDS)]
+    reference = references.draw(
+        rng, kind, np.array(dmarm.HOME), reach=0.3, duration=duration, rate=rate, fastest=0.5
+    )
+    servos = dmarm.Servos.draw(rng)
+    sizes = Sizes(force=(50.0, 200.0), ball=None, delay=(0.04, 0.1), gain=(15.0, 30.0))
+    return Scene(reference, servos, "loop around dm_control's velocity servos", sizes, (4, 5, 6),
+                 lambda control: dmarm.simulate(servos, control, rate))  # fmt: skip
+
+
 PANDA = bulletarm.BulletArm(
     "franka_panda/panda.urdf",
     tuple(f"panda_joint{number}" for number in range(1, 8)),
@@ -211,6 +230,7 @@ DOMAINS: Mapping[str, Domain] = MappingProxyType(
             Domain("pybullet-laikago", "pybullet", "laikago", _LEGS, 500.0, _bullet_legs(LAIKAGO)),
             Domain("drake-ur5", "drake", "ur5", UR5.joints, 500.0, _drake_arm(UR5)),
             Domain("drake-kinova", "drake", "kinova", KINOVA.joints, 500.0, _drake_arm(KINOVA)),
+            Domain("dm-control-jaco", "dm-control", None, dmarm.JOINTS, 500.0, _jaco),
         )
     }
 )
@@ -240,16 +260,14 @@ def make(domain: Domain, kind: str, seed: int, *, rate: float = 1000.0, duration
         control = scene.given(control)
         recorded = scene.simulate(control)
     sensor = sensing.SENSORS[(seed + 2 * list(DOMAINS).index(domain.name)) % len(sensing.SENSORS)]
-    position, velocity = sensing.sensed(
-        recorded.position + control.offset,
-        recorded.velocity,
-        sensor,
-        rate=rate,
-        rng=_random(domain, seed, 1),
+    measure = partial(sensing.sensed, sensor=sensor, rate=rate)
+    position, velocity = measure(
+        recorded.position + control.offset, recorded.velocity, rng=_random(domain, seed, 1)
     )
+    _, healthy = measure(twin.position, twin.velocity, rng=_random(domain, seed, 1))
     events = tuple(sorted(control.events + recorded.events, key=lambda event: event.start))
     blocks, traces = annotate(recorded.velocity, twin.velocity, events, rate=rate)
-    kept = visible(blocks, recorded.velocity - twin.velocity, velocity - recorded.velocity, rate)
+    kept = visible(blocks, recorded.velocity - twin.velocity, healthy - twin.velocity, rate)
     version = metadata.version(domain.package)
     return Run(
         time=np.arange(len(velocity)) / rate,
@@ -313,7 +331,7 @@ def visible(
     Args:
         blocks: The blocks of a run.
         deviation: Velocities less those of the twin, shape (samples, joints), in [rad/s].
-        error: Error of the sensor, same shape, in [rad/s].
+        error: Error of the sensor in the twin, same shape, in [rad/s].
         rate: Sample rate, in [Hz].
     """
     return tuple(

@@ -224,7 +224,7 @@ def _hold(control: Control, at: _Place) -> Control:
 def _decalibration(control: Control, at: _Place) -> Control:
     joint = int(at.rng.integers(control.gain.shape[1]))
     angle = at.rng.uniform(*at.sizes.offset) * at.rng.choice((-1.0, 1.0))
-    slip = max(1, round(0.01 * at.rate))
+    slip = max(1, round(0.03 * at.rate))
     offset = control.offset.copy()
     offset[at.tick :, joint] += angle * np.clip(np.arange(len(offset) - at.tick) / slip, 0.0, 1.0)
     event = _event("highaccelerations", "encoder slips for good", at.tick, at.tick + slip,

@@ -25,7 +25,14 @@ class Reference:
 
 
 def draw(
-    rng: np.random.Generator, kind: str, home: Array, *, reach: float, duration: float, rate: float
+    rng: np.random.Generator,
+    kind: str,
+    home: Array,
+    *,
+    reach: float,
+    duration: float,
+    rate: float,
+    fastest: float = 1.2,
 ) -> Reference:
     """A motion around a posture, which starts at rest there.
 
@@ -36,6 +43,7 @@ def draw(
         reach: Greatest distance from it, in [rad].
         duration: Duration, in [s].
         rate: Sample rate, in [Hz].
+        fastest: Highest speed from place to place, in [rad/s].
 
     Returns:
         The motion.
@@ -48,7 +56,7 @@ def draw(
         start = np.clip(time / 1.5, 0.0, 1.0)
         ramp = (start**2 * (3 - 2 * start))[:, None]
         return _differentiated(kind, home + ramp * size * np.sin(phase), rate)
-    speed, pause = rng.uniform(0.3, 1.2), rng.uniform(0.0, 0.6)
+    speed, pause = rng.uniform(0.25 * fastest, fastest), rng.uniform(0.0, 0.6)
     knots, places = [0.0, 0.3], [home, home]
     while knots[-1] < duration:
         place = home + rng.uniform(-reach, reach, len(home))

@@ -17,7 +17,7 @@ SENSORS = (*NOISE, *BITS)
 
 
 def sensed(
-    position: Array, velocity: Array, sensor: str, *, rate: float, rng: np.random.Generator
+    position: Array, velocity: Array, *, sensor: str, rate: float, rng: np.random.Generator
 ) -> tuple[Array, Array]:
     """Positions and velocities as a sensor measures them.
 
