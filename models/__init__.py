@@ -35,6 +35,7 @@ from models.errors import (
 )
 from models.evaluation.assessment import Assessment, assess
 from models.evaluation.framescore import evaluate
+from models.evaluation.predictions import Unanswered
 from models.examples import Examples
 from models.features import features
 from models.framing import frame
@@ -45,7 +46,7 @@ from models.novelty.frames import GoodMotion
 from models.novelty.limit import Limit
 from models.novelty.training import Learnt, learn_baseline
 from models.profile import CLASSES, Profile
-from models.recording import Block, Recording
+from models.recording import Block, Fault, Recording
 from models.signals import NOISE, Signals
 from models.splitting import check_apart, folds, group_of, held_out, leave_one_out
 from models.stream import Stream
@@ -68,6 +69,7 @@ __all__ = [
     "Evaluation",
     "Event",
     "Examples",
+    "Fault",
     "FileError",
     "GoodMotion",
     "Labels",
@@ -88,6 +90,7 @@ __all__ = [
     "SignalError",
     "Signals",
     "Stream",
+    "Unanswered",
     "UnknownLabelError",
     "assess",
     "check_apart",

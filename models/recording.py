@@ -1,7 +1,8 @@
 """A recording: noise signals with their annotated blocks."""
 
 import hashlib
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from itertools import combinations
 from math import inf, isfinite
 from typing import NamedTuple
@@ -24,6 +25,19 @@ class Block(NamedTuple):
     """Its class."""
 
 
+class Fault(NamedTuple):
+    """A fault that was injected into a recording, whether its effect is felt or not."""
+
+    start: float
+    """When its cause begins, in [s]."""
+    stop: float
+    """When its cause ends, in [s]."""
+    label: str
+    """The class of the failure that it leads to."""
+    felt: bool = True
+    """Whether it has an annotated block."""
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Annotated noise, checked when it is made.
@@ -37,6 +51,9 @@ class Recording:
         start: Time of the first sample, in [s].
         valid: False in gaps, shape (samples,); None if there are none.
         sha256: Hash of where the recording comes from; by default, that of its samples.
+        events: All faults that were injected, felt or not; empty if that is not known, or none
+            was.
+        facts: What else is known, by ``robot``, ``scenario`` and ``domain``.
 
     Raises:
         RecordingError: If shapes do not fit, a value is not finite, or a block is reversed, lies
@@ -50,6 +67,8 @@ class Recording:
     start: float = 0.0
     valid: Mask | None = None
     sha256: str = ""
+    events: tuple[Fault, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Check everything once, and hash what came without a hash."""

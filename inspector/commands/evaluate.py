@@ -6,11 +6,13 @@ from typing import Annotated
 import typer
 
 from inspector.commands.options import InPart, Inputs, Overwrite
-from inspector.training.part import Part
+from inspector.training.part import By, Part
 
 
 def evaluate(
-    model: Annotated[Path, typer.Argument(help="A model file.", show_default=False)],
+    model: Annotated[
+        Path, typer.Argument(help="A model file, or the name of a shipped one.", show_default=False)
+    ],
     inputs: Inputs,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     output: Annotated[
@@ -20,6 +22,9 @@ def evaluate(
         Path | None, typer.Option(help="Write a PNG (needs the extra `report`).")
     ] = None,
     part: InPart = Part.ALL,
+    by: Annotated[
+        By | None, typer.Option(help="Print one whole table: by robot, domain or scenario.")
+    ] = None,
     seen_too: Annotated[
         bool,
         typer.Option(
@@ -28,13 +33,16 @@ def evaluate(
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Evaluate a model on annotated runs that it was not trained on."""
+    """Evaluate a model on annotated runs that it was not trained on (docs/evaluation.md)."""
+    from inspector import assets
     from inspector.training.evaluation import Outputs
     from inspector.training.evaluation import as_json as json_of
     from inspector.training.evaluation import evaluate as evaluate_model
+    from models.evaluation.assessment import table
 
     outputs = Outputs(output, picture, overwrite=overwrite)
     outputs.check()
-    report = evaluate_model(model, inputs, part=part, seen_too=seen_too)
-    outputs.write(report, model)
-    typer.echo(json_of(report, model) if as_json else str(report))
+    (file,) = assets.model_files([model])
+    report = evaluate_model(file, inputs, part=part, seen_too=seen_too)
+    outputs.write(report, file)
+    typer.echo(json_of(report, file) if as_json else table(report, by or ""))

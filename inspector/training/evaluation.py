@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import models
+import noisemodel as nm
+from inspector.analysis.analyse import extents
 from inspector.colors import SERIES, Color, of_classes
 from inspector.comparison import picture
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.recordings import count, recordings
+from inspector.training.recordings import classified, count
 from models import Assessment
 from noisemodel.atomic import refuse_existing, replacing
 
@@ -36,15 +38,49 @@ def evaluate(
             such.
 
     Returns:
-        The measures of the paper, those of frames and those of events.
+        The measures of the protocol at the operating point that ships, those of the paper, of
+        frames and of events.
 
     Raises:
         SeenError: If it was trained on a run, unless ``seen_too``.
     """
     classifier = models.Classifier.load(model)
-    found = recordings(inputs, classifier.rate, part)
+    found = classified(inputs, classifier.rate, part)
     return models.assess(
-        classifier, progress(found, "evaluate", total=count(inputs)), seen_too=seen_too
+        classifier,
+        progress(found, "evaluate", total=count(inputs)),
+        seen_too=seen_too,
+        localise=localise,
+    )
+
+
+def localise(
+    recording: models.Recording, labels: models.Labels
+) -> tuple[tuple[models.Event, ...], tuple[models.Event, ...]]:
+    """Events of labels by their frames, and from onset to end, as `inspector classify` has them.
+
+    Args:
+        recording: The signals, at the rate of the model: its joints if it has them, else its noise.
+        labels: Of one frame or more.
+    """
+    return extents(_run(recording), labels)
+
+
+def _run(recording: models.Recording) -> nm.Run:
+    """A run of the joints of a recording, or of one joint that moves as its noise."""
+    signals = models.signals.named(recording.signal)
+    desired = None
+    if "measured_joints" in signals:
+        velocity = signals["measured_joints"].T
+        desired = signals["desired_joints"].T if "desired_joints" in signals else None
+    else:
+        velocity = models.signals.stacked(recording.signal, (models.NOISE,))[:, None]
+    return nm.Run(
+        time=recording.time,
+        velocity=velocity,
+        velocity_desired=desired,
+        joint_names=tuple(f"joint{number}" for number in range(velocity.shape[1])),
+        valid=recording.valid,
     )
 
 

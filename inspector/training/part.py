@@ -17,3 +17,11 @@ class Part(StrEnum):
             held_out: Result of ``models.held_out`` for its group.
         """
         return self is Part.ALL or held_out == (self is Part.TEST)
+
+
+class By(StrEnum):
+    """What the runs of an evaluation are grouped by."""
+
+    ROBOT = "robot"
+    DOMAIN = "domain"
+    SCENARIO = "scenario"

@@ -1,15 +1,36 @@
 """Recordings of run files, samples and NoisyTest folders, at the rate of a model."""
 
 import hashlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import models
 import noisemodel as nm
+from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.training.part import Part
 from scenarios.sample import Sample, is_sample
 from scenarios.signals import WHOLE
+
+SLOWER = 1e-3
+"""Relative difference below which a rate is not lower."""
+
+
+class SlowRunError(InspectorError):
+    """A run that was recorded at a lower rate than a model needs.
+
+    Args:
+        path: The run file.
+        own: Its rate, in [Hz].
+        wanted: The rate that is needed, in [Hz].
+        facts: Its robot, scenario and domain.
+    """
+
+    def __init__(self, path: Path, own: float, wanted: float, facts: Mapping[str, str]) -> None:
+        self.path, self.own, self.wanted, self.facts = path, own, wanted, facts
+        super().__init__(f"{path}: recorded at {own:g} Hz, the model needs {wanted:g} Hz")
 
 
 def recordings(
@@ -31,34 +52,94 @@ def recordings(
             yield recording
 
 
-def in_part(recording: models.Recording, part: Part) -> bool:
+def in_part(recording: models.Recording | models.Unanswered, part: Part) -> bool:
     """Whether a recording belongs to a part of a data set."""
     return part.has(held_out=models.held_out(models.group_of(recording.name)))
 
 
-def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recording]:
+def classified(
+    inputs: Sequence[Path], rate: float, part: Part = Part.ALL
+) -> Iterator[models.Recording | models.Unanswered]:
+    """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
+
+    A desired velocity that is a placeholder, and an error of zero throughout, are left out.
+
+    Args:
+        inputs: Files, and folders of them, however deep.
+        rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict.
+        part: The part of these recordings to read.
+    """
+    for recording in _recordings(inputs, rate, as_classified=True):
+        if in_part(recording, part):
+            yield recording
+
+
+def _recordings(
+    inputs: Sequence[Path], rate: float, *, as_classified: bool = False
+) -> Iterator[Any]:
+    taken: set[str] = set()
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
-            yield from models.noisytest.read_folder(path, rate=rate)
+            for each in models.noisytest.read_folder(path, rate=rate):
+                yield _apart(each, path / each.name, taken)
             continue
         for file in sorted(path.rglob("*.npz")) if path.is_dir() else [path]:
-            yield of_sample(file, rate) if is_sample(file) else of_annotated_run(file, rate)
+            yield _apart(_recording(file, rate, as_classified=as_classified), file, taken)
 
 
-def of_annotated_run(path: Path, rate: float) -> models.Recording:
+def _recording(
+    path: Path, rate: float, *, as_classified: bool
+) -> models.Recording | models.Unanswered:
+    try:
+        if is_sample(path):
+            found = of_sample(path, rate)
+        else:
+            found = of_annotated_run(path, rate, as_classified=as_classified)
+    except SlowRunError as error:
+        if not as_classified:
+            raise
+        reason = f"rate {error.own:g} Hz < {rate:g} Hz"
+        return models.Unanswered(path.stem, error.facts, reason)
+    if not as_classified or not isinstance(found.signal, dict):
+        return found
+    return replace(found, signal=models.signals.without_zero_error(found.signal))
+
+
+def _apart(
+    one: models.Recording | models.Unanswered, path: Path, taken: set[str]
+) -> models.Recording | models.Unanswered:
+    """Name a recording apart from others of its name, by as much of its folder as it takes.
+
+    A sample keeps its robot, scenario and seed, which tell the group.
+    """
+    name, depth = one.name, 0
+    folders = path.absolute().parent.parts[1:]
+    while name in taken and depth < len(folders):
+        depth += 1
+        folder = "/".join(folders[-depth:])
+        robot, _, rest = one.name.partition("/")
+        name = f"{robot}/{folder}/{rest}" if rest else f"{one.name} ({folder})"
+    taken.add(name)
+    return one if name == one.name else replace(one, name=name)
+
+
+def of_annotated_run(path: Path, rate: float, *, as_classified: bool = False) -> models.Recording:
     """Annotated noise of a run file.
 
     Args:
         path: A run file.
         rate: The rate to decimate it to, in [Hz].
+        as_classified: Whether to leave a desired velocity out that is a placeholder.
 
     Returns:
         Its norms and joints with its blocks.
 
     Raises:
-        InspectorError: If the run's rate is lower, or it has no blocks.
+        SlowRunError: If the run's rate is lower.
+        InspectorError: If it has no blocks.
     """
-    found = of_run(path, nm.Run.load(path), rate)
+    run = nm.Run.load(path)
+    found = of_run(path, without_placeholder(run)[0] if as_classified else run, rate)
     if not found.blocks:
         raise InspectorError(f"{path}: has no annotated blocks")
     return found
@@ -73,22 +154,27 @@ def of_run(path: Path, run: nm.Run, rate: float) -> models.Recording:
         rate: The rate to decimate it to, in [Hz].
 
     Returns:
-        Its norms and joints with its blocks, if it has any.
+        Its norms and joints with its blocks, if it has any, named as its file; with its robot
+        before, if the folder is named so.
 
     Raises:
-        InspectorError: If the run's rate is lower.
+        SlowRunError: If the run's rate is lower.
+        InspectorError: If the events of its meta are damaged.
     """
-    if run.rate < rate * (1 - 1e-3):
-        raise InspectorError(f"{path}: recorded at {run.rate:g} Hz, the model needs {rate:g} Hz")
+    known = facts(run.robot, run.meta)
+    if run.rate < rate * (1 - SLOWER):
+        raise SlowRunError(path, run.rate, rate, known)
     decimated = nm.decimated(run, rate)
     return models.Recording(
-        name=path.stem,
+        name=f"{run.robot}/{path.stem}" if path.parent.name == run.robot else path.stem,
         signal={**nm.norms(decimated), **nm.by_joint(decimated)},
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in decimated.blocks),
         start=float(decimated.time[0]),
         valid=decimated.mask,
         sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        events=faults(path, run.meta, run.blocks),
+        facts=known,
     )
 
 
@@ -105,16 +191,71 @@ def of_sample(path: Path, rate: float) -> models.Recording:
         and seed, with the hash of the run that it was made of.
 
     Raises:
+        SlowRunError: If its rate is lower.
         ScenarioError: If it cannot be read, or has no noise of that rate.
     """
-    sample = Sample.load(path, only=WHOLE).at(rate)
+    sample = Sample.load(path, only=WHOLE)
+    known = facts(sample.robot, sample.meta)
+    if sample.rate < rate * (1 - SLOWER):
+        raise SlowRunError(path, sample.rate, rate, known)
+    sample = sample.at(rate)
     return models.Recording(
         name=sample.name,
         signal={**{name: sample.signals[name] for name in WHOLE}, **sample.joints},
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in sample.blocks),
         sha256=str(sample.meta["sha256"]),
+        events=faults(path, sample.meta, sample.blocks),
+        facts=known,
     )
+
+
+def facts(robot: str | None, meta: Mapping[str, Any]) -> dict[str, str]:
+    """Robot, scenario and domain of a run, as far as they are known.
+
+    Args:
+        robot: Name of its robot, if it has one.
+        meta: What else is known of it. Its domain is the name in ``domain``, else its
+            ``simulator``, else its ``source``.
+    """
+    domain = meta.get("domain")
+    named = domain.get("name") if isinstance(domain, Mapping) else domain
+    found = {
+        "robot": robot,
+        "scenario": meta.get("scenario"),
+        "domain": named or meta.get("simulator") or meta.get("source"),
+    }
+    return {name: str(value) for name, value in found.items() if value}
+
+
+def faults(
+    path: Path, meta: Mapping[str, Any], blocks: Sequence[nm.Block]
+) -> tuple[models.Fault, ...]:
+    """All faults that were injected into a run, as the events of its meta have them.
+
+    Args:
+        path: Its file, for messages.
+        meta: What is known of the run. Each of its ``events`` has ``label``, ``start`` and
+            ``stop`` in [s], and ``labelled``, the time with its label; without that, it is felt if
+            a block of a failure overlaps it.
+        blocks: Annotated stretches of the run.
+
+    Raises:
+        InspectorError: If an event has no label, start or stop.
+    """
+    bad = [block for block in blocks if block.label != "ok"]
+    found = []
+    for event in meta.get("events") or ():
+        try:
+            label, start, stop = str(event["label"]), float(event["start"]), float(event["stop"])
+            overlaps = any(block.start <= stop and block.stop >= start for block in bad)
+            felt = float(event["labelled"]) > 0.0 if "labelled" in event else overlaps
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise InspectorError(
+                f"{path}: an event of its meta lacks label, start or stop as numbers in s"
+            ) from error
+        found.append(models.Fault(start, stop, label, felt))
+    return tuple(found)
 
 
 def count(inputs: Sequence[Path]) -> int:

@@ -9,22 +9,28 @@ from typing import Any
 import numpy as np
 
 from models.classifier import Classifier
-from models.errors import DatasetError, SeenError
-from models.evaluation import eventmeasures, eventscore, framescore
+from models.errors import DatasetError, SeenError, SignalError
+from models.evaluation import eventmeasures, eventscore, framescore, protocol
 from models.evaluation.calibration import Reliability, reliability
 from models.evaluation.eventmeasures import EventMeasures
 from models.evaluation.eventscore import EventScore
 from models.evaluation.framescore import FrameScore
 from models.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
 from models.evaluation.matching import Matched
-from models.evaluation.predictions import Predictions, predict
+from models.evaluation.outcomes import FALSE
+from models.evaluation.predictions import UNNAMED, Localise, Predictions, Unanswered, predict
+from models.evaluation.protocol import Protocol
+from models.evaluation.protocoltable import lines_of
 from models.evaluation.tradeoff import TradeOff, trade_off
+from models.labels import interval
 from models.recording import Recording
-from models.splitting import robot_of, seen
+from models.splitting import seen
 from models.types import Array
 
-FORMAT = "noise-evaluation/1"
+FORMAT = "noise-evaluation/2"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
+WORDS = ("of", "measure", "class", "robot", "domain", "scenario")
+"""Columns of the table of Arrow that name a row."""
 BUDGETS = (5.0, 20.0, 100.0)
 """False-alarm budgets, per hour, at which recall is read from the trade-off."""
 
@@ -40,9 +46,10 @@ class Assessment:
         runs_with: Recordings with such a block, of each class.
         copies: Recordings that were left out, and the equal one of each, by name.
         seen: Recordings that the model was trained on, and what of them, by name.
+        protocol: Measures of the findings as they are reported, robots weighed alike.
         frames: Measures of the frames that are cut from blocks.
         events: Measures of whole recordings.
-        by_robot: The same of each robot alone, if names contain it.
+        by_robot: The same of each robot alone.
         score: The events themselves.
         trade_off: Counts at falling thresholds.
         at_budgets: For each false-alarm budget, recall of failure frames and failures found.
@@ -56,6 +63,7 @@ class Assessment:
     runs_with: dict[str, int]
     copies: dict[str, str]
     seen: dict[str, str]
+    protocol: Protocol
     frames: FrameScore
     events: EventMeasures
     by_robot: dict[str, EventMeasures]
@@ -76,6 +84,7 @@ class Assessment:
             "runs_with": self.runs_with,
             "copies": self.copies,
             "seen": self.seen,
+            "protocol": self.protocol.as_dict(),
             "classes": list(evaluation.classes),
             "confusion": evaluation.confusion.tolist(),
             "frames": self.frames.as_dict(),
@@ -101,20 +110,21 @@ class Assessment:
 
         Returns:
             A ``pyarrow.Table`` with one row for each measure, and of it for each class and robot.
-            Columns: ``of`` (frames, events or scores), ``measure``, ``class``, ``robot``,
-            ``budget`` in false alarms per hour, ``value``, ``low``, ``high``, ``runs`` and
-            ``groups``; null where undefined.
+            Columns: ``of`` (protocol, pooled or chance, frames, events or scores), ``measure``,
+            ``class``, ``robot``, ``domain``, ``scenario``, ``budget`` in false alarms per hour,
+            ``value``, ``low``, ``high``, ``runs`` and ``groups``; null where undefined.
         """
         import pyarrow as pa
 
-        rows = [*_rows("frames", vars(self.frames)), *_rows("events", vars(self.events))]
+        rows = _protocol_rows(self.protocol)
+        rows += [*_rows("frames", vars(self.frames)), *_rows("events", vars(self.events))]
         for robot, events in self.by_robot.items():
             rows += _rows("events", vars(events), robot=robot)
         for budget, (recall, found) in self.at_budgets.items():
             measures = {"failure_recall": recall, "events_found": found}
             rows += _rows("scores", measures, budget=budget)
         rows += _rows("scores", {"calibration_error": self.calibration_error})
-        columns = {name: pa.string() for name in ("of", "measure", "class", "robot")}
+        columns = {name: pa.string() for name in WORDS}
         columns |= {name: pa.float64() for name in ("budget", "value", "low", "high")}
         columns |= {name: pa.int64() for name in ("runs", "groups")}
         return pa.Table.from_pylist(rows, schema=pa.schema(columns))
@@ -124,31 +134,42 @@ class Assessment:
 
 
 def assess(
-    classifier: Classifier, recordings: Iterable[Recording], *, seen_too: bool = False
+    classifier: Classifier,
+    recordings: Iterable[Recording | Unanswered],
+    *,
+    seen_too: bool = False,
+    localise: Localise | None = None,
 ) -> Assessment:
     """Assessment of a model on recordings, each of which is released once it is classified.
 
     Args:
         classifier: The model.
         recordings: Annotated noise at its rate, each of another name. Of recordings that are equal
-            bit for bit, the first counts.
+            bit for bit, the first counts. Those that have no verdict, because they came as such, do
+            not fit the model, or have no frame without a gap, are listed.
         seen_too: Whether recordings count that the model was trained on, or that share their
             motion with such; the assessment lists them.
+        localise: Estimates onset and end of the findings; else they last as their frames do.
 
     Returns:
         All measures.
 
     Raises:
         SeenError: If the model was trained on a recording, unless ``seen_too``.
-        DatasetError: If there is no annotated frame, or a name repeats.
-        ModelsError: If a recording does not fit the model.
+        DatasetError: If there is no annotated frame, no recording has a verdict, or a name repeats.
+        ModelsError: If a recording has another rate, or a label that is no class.
     """
     predictions: dict[str, Predictions] = {}
+    unanswered: dict[str, Unanswered] = {}
     first, copies, known = dict[str, str](), dict[str, str](), dict[str, str]()
     for recording in recordings:
-        name, digest = recording.name, recording.sha256
-        if name in predictions or name in copies:
+        name = recording.name
+        if name in predictions or name in copies or name in unanswered:
             raise DatasetError(f"two recordings are called {name!r}; name them apart")
+        if isinstance(recording, Unanswered):
+            unanswered[name] = recording
+            continue
+        digest = recording.sha256
         known |= seen(classifier.runs, {name: digest})
         if known and not seen_too:
             raise SeenError(known, 1, ADVICE)
@@ -156,13 +177,27 @@ def assess(
             copies[name] = first[digest]
         else:
             first[digest] = name
-            predictions[name] = predict(classifier, recording)
-    return measure(tuple(predictions.values()), copies=copies, known=known)
+            try:
+                found = predict(classifier, recording, localise)
+                reason = "" if len(found.labels) else NO_FRAME
+            except SignalError as error:
+                reason = str(error)
+            if reason:
+                unanswered[name] = Unanswered(name, recording.facts, reason)
+            else:
+                predictions[name] = found
+    return measure(
+        tuple(predictions.values()),
+        unanswered=tuple(unanswered.values()),
+        copies=copies,
+        known=known,
+    )
 
 
 def measure(
     predictions: Sequence[Predictions],
     *,
+    unanswered: Sequence[Unanswered] = (),
     copies: Mapping[str, str] | None = None,
     known: Mapping[str, str] | None = None,
 ) -> Assessment:
@@ -170,6 +205,7 @@ def measure(
 
     Args:
         predictions: Of a model, on recordings.
+        unanswered: Recordings without a verdict.
         copies: Recordings that were left out, and the equal one of each.
         known: Recordings that the model was trained on, and what of them.
 
@@ -177,14 +213,19 @@ def measure(
         All measures.
 
     Raises:
-        DatasetError: If there is no annotated frame.
+        DatasetError: If there is no annotated frame, or no recording has a verdict.
     """
+    if unanswered and not predictions:
+        first = unanswered[0]
+        raise DatasetError(
+            f"none of {len(unanswered)} recordings has a verdict; {first.name}: {first.reason}"
+        )
     if not any(len(one.truth) for one in predictions):
         raise DatasetError(f"no annotated frame in {len(predictions)} recordings; annotate blocks")
     groups = [one.group for one in predictions]
     resampling, matched = Resampling.of(groups), Matched.of(predictions)
     events, curve, table = eventscore.score(matched), trade_off(matched), reliability(matched)
-    robots = np.array([robot_of(one.name) for one in predictions])
+    robots = np.array([one.origin.robot for one in predictions])
     frames = framescore.score(predictions, resampling)
     owned = {
         label: [sum(block.label == label for block in one.blocks) for one in predictions]
@@ -197,11 +238,12 @@ def measure(
         runs_with={label: sum(map(bool, counts)) for label, counts in owned.items()},
         copies=dict(copies or {}),
         seen=dict(known or {}),
+        protocol=protocol.measure(predictions, resampling, unanswered),
         frames=frames,
         events=eventmeasures.measure(events, resampling),
         by_robot={
             robot: eventmeasures.measure(events, resampling, robots == robot)
-            for robot in sorted(set(robots.tolist()) - {""})
+            for robot in sorted(set(robots.tolist()) - {UNNAMED})
         },
         score=events,
         trade_off=curve,
@@ -209,6 +251,23 @@ def measure(
         reliability=table,
         calibration_error=table.error(resampling) if table else None,
     )
+
+
+def _protocol_rows(found: Protocol) -> list[dict[str, Any]]:
+    """Rows of the protocol: means over robots, runs pooled, by chance, and parts of the runs."""
+    ranking = {"auc": found.auc, "pauc": found.pauc, "official_score": found.official}
+    rows = _rows("protocol", {**found.alike, **ranking, "not_answered": found.not_answered})
+    rows += _rows("pooled", found.pooled)
+    rows += _rows("chance", found.by_chance)
+    for key in ("robot", "domain"):
+        for name, part in found.by[key].items():
+            rows += _rows("protocol", part.measures, **{key: name})
+    for second, parts in (("domain", found.cells), ("scenario", found.cases)):
+        for (robot, name), part in parts.items():
+            rows += _rows("protocol", part.measures, robot=robot, **{second: name})
+    for name, ranked in found.ranked.items():
+        rows += _rows("protocol", {"auc": ranked.auc, "pauc": ranked.pauc}, domain=name)
+    return rows
 
 
 def _rows(of: str, measures: Mapping[str, Any], **keys: str | float) -> list[dict[str, Any]]:
@@ -220,7 +279,7 @@ def _rows(of: str, measures: Mapping[str, Any], **keys: str | float) -> list[dic
             if isinstance(each, Estimate):
                 rows.append(row | each.as_dict())
             elif isinstance(each, (int, float)):
-                rows.append(row | {"value": float(each)})
+                rows.append(row | {"value": None if isnan(each) else float(each)})
     return rows
 
 
@@ -233,21 +292,25 @@ def _columns(table: Mapping[str, Array]) -> dict[str, list[float | None]]:
 
 NAME, CELL, COUNT = 24, 27, 10
 """Widths of the columns: names, figures with intervals, plain numbers."""
+NO_FRAME = "no frame without a gap"
 SHOWN = 5
 """Lines at most of missed failures, and of false alarms."""
 
 
-def table(assessment: Assessment) -> str:
-    """Table of an assessment, as text.
+def table(assessment: Assessment, by: str = "") -> str:
+    """Table of an assessment, as text: the protocol first, then all other measures.
 
     Args:
         assessment: The measures.
+        by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print, whole.
 
     Returns:
-        Lines of up to a hundred characters.
+        Lines of up to 140 characters.
     """
-    parts = [_head, _frames, _events, _errors, _by_robot, _scores, _paper, _confusion, _foot]
-    return "\n\n".join("\n".join(lines) for part in parts if (lines := part(assessment)))
+    parts = [_errors, _frames, _events, _paper, _confusion, _scores, _foot]
+    paragraphs = [_head(assessment), *lines_of(assessment.protocol, by)]
+    paragraphs += [lines for part in parts if (lines := part(assessment))]
+    return "\n\n".join("\n".join(lines) for lines in paragraphs)
 
 
 def percent(estimate: Estimate) -> str:
@@ -265,11 +328,13 @@ def number(estimate: Estimate, unit: str = "") -> str:
 
 
 def _head(assessment: Assessment) -> list[str]:
-    events = assessment.events
+    counts, by = assessment.protocol.counts, assessment.protocol.by
     lines = [
         f"{_many(assessment.runs, 'run')} in {_many(assessment.groups, 'group')} (runs of a group"
-        f" share their motion), {_many(len(assessment.score.found), 'failure')},"
-        f" {events.ok_hours:.3g} h of ok motion"
+        f" share their motion) of {_many(len(by['robot']), 'robot')} in"
+        f" {_many(len(by['domain']), 'domain')}",
+        f"{_many(int(counts['faults']), 'injected fault')} ({counts['felt']:.0f} felt),"
+        f" {counts['ok_hours']:.3g} h of ok time, {counts['unlabelled_hours']:.3g} h unlabelled",
     ]
     if assessment.seen:
         lines += [
@@ -307,7 +372,7 @@ def _frames(assessment: Assessment) -> list[str]:
 def _events(assessment: Assessment) -> list[str]:
     events = assessment.events
     lines = [
-        "Events in whole runs, classified from end to end",
+        "Whole runs by frames and annotated blocks, robots not weighed (`noise-evaluation/1`)",
         _row("", ["found", "by its own name"], ["failures", "", "runs"]),
     ]
     for label, found in events.found.items():
@@ -334,30 +399,21 @@ def _events(assessment: Assessment) -> list[str]:
 
 def _errors(assessment: Assessment) -> list[str]:
     missed = [
-        f"  {each['label']} in {each['run']}, {each['start']:.2f} s to {each['stop']:.2f} s"
-        for each in assessment.score.missed()
+        f"  {each['label']} in {each['run']}, {interval(each['start'], each['stop'])}"
+        for each in assessment.protocol.missed()
+        if each["felt"]
     ]
     false = [
-        f"  in {each['run']}, {each['start']:.2f} s to {each['stop']:.2f} s"
-        for each in assessment.score.false_alarms()
+        f"  {each['label']} in {each['run']}, {interval(each['start'], each['stop'])}"
+        for each in assessment.protocol.alarms(FALSE)
     ]
-    lines = ["Missed", *_few(missed)] if missed else []
+    lines = ["Missed, of the faults that are felt", *_few(missed)] if missed else []
     return lines + (["False alarms", *_few(false)] if false else [])
-
-
-def _by_robot(assessment: Assessment) -> list[str]:
-    if len(assessment.by_robot) < 2:
-        return []
-    lines = [_row("By robot", ["failures found", "recall of frames"], ["false alarms per hour"])]
-    for robot, events in assessment.by_robot.items():
-        figures = [percent(events.all_found), percent(events.failure_recall)]
-        lines.append(_row(robot, figures, [number(events.false_alarms_per_hour)]))
-    return lines
 
 
 def _scores(assessment: Assessment) -> list[str]:
     lines = [
-        "Trade-off at false-alarm budgets, with a threshold chosen on these very runs",
+        "NOT the operating point: trade-off with thresholds chosen on these very runs",
         _row("at most", ["failures found", "recall of frames"]),
     ]
     for budget, (recall, found) in assessment.at_budgets.items():

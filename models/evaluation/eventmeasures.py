@@ -95,8 +95,8 @@ def measure(score: EventScore, resampling: Resampling, only: Mask | None = None)
         named={name: share(score.named, own, failures.run) for name, own in of_class.items()},
         all_found=share(score.found, every, failures.run),
         all_named=share(score.named, every, failures.run),
-        delay=_quantile(delay, owner, 0.5, resampling),
-        late_delay=_quantile(delay, owner, LATE, resampling),
+        delay=quantile_of(delay, owner, 0.5, resampling),
+        late_delay=quantile_of(delay, owner, LATE, resampling),
         false_alarms=int(false.sum()),
         false_alarms_per_hour=resampling.rate(false, hours),
         wrong_stretches=int(wrong.sum()),
@@ -108,7 +108,7 @@ def measure(score: EventScore, resampling: Resampling, only: Mask | None = None)
     )
 
 
-def _quantile(values: Array, owner: Index, share: float, resampling: Resampling) -> Estimate:
+def quantile_of(values: Array, owner: Index, share: float, resampling: Resampling) -> Estimate:
     """Estimate a quantile of values that belong to recordings."""
     ascending = np.argsort(values, kind="stable")
     values, owner = values[ascending], owner[ascending]

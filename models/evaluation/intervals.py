@@ -10,6 +10,10 @@ from counting take over:
 - *events in a time*: the exact bounds of Garwood (1936), if they are wider; for 0 events the upper
   one is 3.7 over the time, and 3.0 with 95 % on this one side (the "rule of three").
 
+A mean over robots weighs each alike, whatever time or runs it has; that of rates has the bounds of
+Fay and Feuer (Confidence intervals for directly standardized rates, Statistics in Medicine 16,
+1997), if they are wider.
+
 With fewer than five groups, shares have no interval.
 """
 
@@ -101,6 +105,48 @@ class Resampling:
             low, high = min(low, drawn[0]), max(high, drawn[1])
         return Estimate(value, low, high, runs, groups)
 
+    def mean_share(self, part: Array, whole: Array, of: Sequence[Mask]) -> Estimate:
+        """Estimate the unweighted mean of the shares of several sets of recordings.
+
+        Args:
+            part: Numerator, shape (runs,).
+            whole: Denominator, shape (runs,).
+            of: The sets, each of shape (runs,); those without a denominator do not count.
+        """
+        behind = [own & (whole > 0) for own in of if (whole * own).sum() > 0]
+        if not behind:
+            return Estimate(nan, nan, nan, 0, 0)
+        value, drawn = self._mean(part, whole, behind)
+        return self.bounded(value, drawn, behind)
+
+    def mean_rate(self, events: Array, time: Array, of: Sequence[Mask]) -> Estimate:
+        """Estimate the unweighted mean of the rates of several sets of recordings.
+
+        Args:
+            events: Of each recording, shape (runs,).
+            time: Of each recording, shape (runs,).
+            of: The sets, each of shape (runs,); those without time do not count.
+        """
+        behind = [own & (time > 0) for own in of if (time * own).sum() > 0]
+        if not behind:
+            return Estimate(nan, nan, nan, 0, 0)
+        value, drawn = self._mean(events, time, behind)
+        weights = np.array([1.0 / (len(behind) * time[own].sum()) for own in behind])
+        low, high = fay_feuer(np.array([events[own].sum() for own in behind]), weights)
+        runs, groups = self._behind(np.any(behind, axis=0))
+        if groups >= LEAST_GROUPS:
+            middle = _middle(drawn)
+            low, high = min(low, middle[0]), max(high, middle[1])
+        return Estimate(value, low, high, runs, groups)
+
+    def _mean(self, part: Array, whole: Array, of: Sequence[Mask]) -> tuple[float, Array]:
+        """Mean ratio of sets of recordings, and that of each resample, shape (resamples,)."""
+        value = np.mean([part[own].sum() / whole[own].sum() for own in of])
+        shares = [ratio(self.weights @ (part * own), self.weights @ (whole * own)) for own in of]
+        each = np.array(shares)
+        known = ~np.isnan(each)
+        return float(value), ratio(np.where(known, each, 0.0).sum(axis=0), known.sum(axis=0))
+
     def bounded(self, value: float, drawn: Array, behind: Sequence[Mask]) -> Estimate:
         """Bounds of a share, or of a mean of shares, that was computed for all sets.
 
@@ -148,6 +194,25 @@ def garwood(events: float) -> tuple[float, float]:
     # F. Garwood, Fiducial limits for the Poisson distribution, Biometrika 28 (1936)
     low = float(gammaincinv(events, TAIL)) if events else 0.0
     return low, float(gammaincinv(events + 1.0, 1.0 - TAIL))
+
+
+def fay_feuer(events: Array, weights: Array) -> tuple[float, float]:
+    """Bounds of a weighted sum of the means of Poisson distributions.
+
+    Args:
+        events: How many there were of each, shape (distributions,).
+        weights: Weight of each, shape (distributions,).
+
+    Returns:
+        Lower and upper bound with 95 %; of equal weights, those of Garwood.
+    """
+    from scipy.special import gammaincinv
+
+    total, variance, most = weights @ events, weights**2 @ events, weights.max()
+    low = variance / total * gammaincinv(total**2 / variance, TAIL) if total else 0.0
+    total, variance = total + most, variance + most**2
+    high = variance / total * gammaincinv(total**2 / variance, 1.0 - TAIL)
+    return float(low), float(high)
 
 
 def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:

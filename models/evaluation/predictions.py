@@ -1,6 +1,8 @@
 """Predictions of a model on a recording: on its annotated blocks, and from end to end."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import inf
 
 import numpy as np
@@ -8,10 +10,51 @@ import numpy as np
 from models.classifier import Classifier
 from models.dataset import Dataset
 from models.errors import DatasetError
-from models.labels import ANOMALY, Labels
-from models.recording import Block, Recording
-from models.splitting import group_of
+from models.labels import ANOMALY, Event, Labels
+from models.recording import Block, Fault, Recording
+from models.splitting import group_of, robot_of
 from models.types import Words
+
+UNNAMED = "unnamed"
+"""Robot or domain of a recording that names none."""
+
+Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
+"""Gives the events of labels by their frames, and the same from onset to end."""
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a recording comes from."""
+
+    name: str
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def robot(self) -> str:
+        """Its robot."""
+        return self.facts.get("robot") or robot_of(self.name) or UNNAMED
+
+    @property
+    def domain(self) -> str:
+        """Its domain: simulator, drives, sensing and control together."""
+        return self.facts.get("domain") or UNNAMED
+
+    @property
+    def scenario(self) -> str:
+        """Its scenario: the name of what was made to happen."""
+        return self.facts.get("scenario") or UNNAMED
+
+
+@dataclass(frozen=True)
+class Unanswered(Origin):
+    """A recording that a model cannot classify."""
+
+    reason: str = ""
+
+    def as_dict(self) -> dict[str, str]:
+        """All of it for JSON."""
+        own = {"robot": self.robot, "domain": self.domain, "scenario": self.scenario}
+        return {"run": self.name, **own, "reason": self.reason}
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +69,9 @@ class Predictions:
         truth: Class of each frame that is cut from a block, shape (frames,).
         predicted: Predicted class of it, shape (frames,).
         labels: Predictions on the whole recording.
+        events: All injected faults; empty where they are not known.
+        facts: Robot, scenario and domain of the recording.
+        located: Findings by their frames, and from onset to end; those of the labels unless given.
     """
 
     name: str
@@ -35,14 +81,35 @@ class Predictions:
     truth: Words
     predicted: Words
     labels: Labels
+    events: tuple[Fault, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+    located: tuple[tuple[Event, ...], tuple[Event, ...]] | None = None
+
+    @cached_property
+    def origin(self) -> Origin:
+        """Where it comes from."""
+        return Origin(self.name, self.facts)
+
+    @cached_property
+    def spans(self) -> tuple[Event, ...]:
+        """Findings by their frames."""
+        return self.labels.events() if self.located is None else self.located[0]
+
+    @cached_property
+    def findings(self) -> tuple[Event, ...]:
+        """The same findings from onset to end, as they are reported."""
+        return self.spans if self.located is None else self.located[1]
 
 
-def predict(classifier: Classifier, recording: Recording) -> Predictions:
+def predict(
+    classifier: Classifier, recording: Recording, localise: Localise | None = None
+) -> Predictions:
     """Predictions of a model on a recording.
 
     Args:
         classifier: The model.
         recording: Annotated noise at its rate.
+        localise: Estimates onset and end of the findings; else they last as their frames do.
 
     Returns:
         Predictions; a recording whose blocks all lie in gaps has no frame of a block. For a
@@ -52,8 +119,11 @@ def predict(classifier: Classifier, recording: Recording) -> Predictions:
         ModelsError: If the recording does not fit the model.
     """
     if ANOMALY in classifier.classes:
-        recording = replace(recording, blocks=tuple(map(_unnamed, recording.blocks)))
+        blocks = tuple(map(_unnamed, recording.blocks))
+        events = tuple(fault._replace(label=ANOMALY) for fault in recording.events)
+        recording = replace(recording, blocks=blocks, events=events)
     truth, predicted = _of_blocks(classifier, recording)
+    labels = _whole(classifier, recording)
     return Predictions(
         recording.name,
         group_of(recording.name),
@@ -61,7 +131,10 @@ def predict(classifier: Classifier, recording: Recording) -> Predictions:
         _within(recording),
         truth,
         predicted,
-        _whole(classifier, recording),
+        labels,
+        recording.events,
+        recording.facts,
+        localise(recording, labels) if localise and len(labels) else None,
     )
 
 
