@@ -10,6 +10,7 @@ from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, per
 
 from inspector.training import evaluation
 from models.evaluation.assessment import measure
+from models.splitting import group_of
 
 
 def run(path, seed, *, label="oscillations"):
@@ -106,6 +107,94 @@ def test_a_folder_without_runs_is_refused(folder, tmp_path):
     status, _, err = call("evaluate", folder / "model.npz", tmp_path)
     assert (status, err.count("\n")) == (3, 1)
     assert "no annotated frame in 0 recordings" in err
+
+
+def simulated(path, seed, *, robot=None, rate=10_000, **meta):
+    """A run that swings from 1 s on, with what is known of it."""
+    run(path, seed)
+    with np.load(path) as archive:
+        arrays = dict(archive)
+    step = 10_000 // rate
+    arrays |= {name: arrays[name][::step] for name in ("time", "velocity")}
+    named = {"robot": robot} if robot else {}
+    np.savez(path, **arrays, **named, meta=json.dumps(meta))
+    return path
+
+
+def test_runs_of_several_domains_have_a_row_each_with_all_their_injected_faults(folder, tmp_path):
+    events = [
+        {"label": "oscillations", "start": 1.0, "stop": 1.9, "labelled": 1.0},
+        {"label": "oscillations", "start": 0.1, "stop": 0.3, "labelled": 0.0},
+    ]
+    known = {"scenario": "swing", "events": events}
+    simulated(tmp_path / "a.npz", 20, robot="panda", domain={"name": "soft"}, **known)
+    simulated(tmp_path / "b.npz", 21, robot="ur5", simulator="drake", **known)
+    simulated(tmp_path / "c.npz", 22, robot="ur5", source="field")
+    status, out, err = call("evaluate", folder / "model.npz", tmp_path, "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out)["protocol"]
+    assert list(found["by_domain"]) == ["drake", "field", "soft"]
+    assert list(found["by_robot"]) == ["panda", "ur5"]
+    assert (found["counts"]["faults"], found["counts"]["felt"]) == (5, 3)
+    assert found["robots_alike"]["recall_felt"]["value"] == 1.0
+    assert found["robots_alike"]["recall_injected"]["value"] == pytest.approx((1 / 2 + 2 / 3) / 2)
+    assert found["pooled"]["onset_within"]["value"] == 1.0
+    status, out, _ = call("evaluate", folder / "model.npz", tmp_path, "--by", "domain")
+    assert status == 0
+    assert "of 2 robots (panda, ur5) in 3 domains (drake, field, soft)" in out
+    assert "By domain" in out
+    assert "By robot" not in out
+
+
+def test_findings_are_those_that_classify_reports(folder, tmp_path):
+    from inspector.analysis.analyse import analyse
+    from inspector.library import load_library
+
+    path = simulated(tmp_path / "fast.npz", 30, robot="panda")
+    report = evaluation.evaluate(folder / "model.npz", [path])
+    (outcome,) = report.protocol.outcomes
+    expected = analyse(path, load_library([folder / "model.npz"]))
+    assert outcome.run.findings == expected.findings
+    assert outcome.run.spans == expected.spans
+    assert len(expected.findings) == 1
+
+
+def test_runs_below_the_rate_of_the_model_are_listed_as_not_answered(folder, tmp_path):
+    slow = simulated(tmp_path / "slow.npz", 40, robot="a1", rate=200)
+    status, out, err = call("evaluate", folder / "model.npz", folder / "test", slow)
+    assert (status, err) == (0, "")
+    assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of a1" in out
+    status, out, _ = call("evaluate", folder / "model.npz", folder / "test", slow, "--json")
+    (listed,) = json.loads(out)["protocol"]["unanswered"]
+    assert (listed["run"], listed["robot"]) == ("slow", "a1")
+    status, _, err = call("evaluate", folder / "model.npz", slow)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "none of 1 recordings has a verdict; slow: rate 200 Hz < 1000 Hz" in err
+
+
+def test_runs_of_one_name_in_two_folders_are_told_apart(folder, tmp_path):
+    for number, place in enumerate(("one", "two")):
+        (tmp_path / place / "panda").mkdir(parents=True)
+        simulated(tmp_path / place / "run.npz", 50 + number)
+        simulated(tmp_path / place / "panda" / "soft-007.npz", 60 + number, robot="panda")
+    inputs = tmp_path / "one", tmp_path / "two"
+    report = evaluation.evaluate(folder / "model.npz", inputs)
+    names = [outcome.run.name for outcome in report.protocol.outcomes]
+    assert names == ["panda/soft-007", "run", "panda/two/soft-007", "run (two)"]
+    assert [group_of(name) for name in names] == ["panda-007", "run", "panda-007", "run (two)"]
+
+
+def test_damaged_events_are_refused_in_one_line(folder, tmp_path):
+    path = simulated(tmp_path / "odd.npz", 70, events=[{"label": "impact"}])
+    status, _, err = call("evaluate", folder / "model.npz", path)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "odd.npz: an event of its meta lacks label, start or stop as numbers in s" in err
+
+
+def test_a_model_that_ships_is_taken_by_its_name(tmp_path):
+    status, _, err = call("evaluate", "joints-1kHz", tmp_path)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "joints-1kHz: no such model; name a file, or one that ships: general-10khz" in err
 
 
 def test_a_picture_is_drawn(folder, tmp_path):

@@ -7,7 +7,7 @@ from predicted_runs import CLASSES, GOOD, IMPACT, many, predicted
 
 import models
 from models.confusion import Evaluation
-from models.evaluation.assessment import measure
+from models.evaluation.assessment import WORDS, measure
 
 RATE = 1000.0
 PROFILE = models.LogBands(classes=("ok", "oscillations")).at(RATE)
@@ -115,12 +115,31 @@ def test_a_run_that_equals_another_is_no_more_evidence(classifier):
 
 def test_names_that_repeat_and_runs_without_blocks_are_refused(classifier):
     run = fresh()[0]
+    short = replace(run, signal=run.signal[:100], blocks=(), sha256="")
+    with pytest.raises(
+        models.DatasetError,
+        match="none of 1 recordings has a verdict; panda/swing-010: .* too short",
+    ):
+        models.assess(classifier, [short])
     with pytest.raises(models.DatasetError, match="two recordings are called 'panda/swing-010'"):
         models.assess(classifier, [run, replace(run, signal=run.signal + 1.0, sha256="")])
     with pytest.raises(models.DatasetError, match="no annotated frame in 1 recordings"):
         models.assess(classifier, [replace(run, blocks=())])
     with pytest.raises(models.DatasetError, match="no annotated frame in 0 recordings"):
         models.assess(classifier, [])
+
+
+def test_a_run_without_a_verdict_is_listed_and_not_left_out_in_silence(classifier):
+    short = replace(fresh()[0], name="panda/short-010", signal=np.ones(100), blocks=(), sha256="")
+    slow = models.Unanswered("slow", {"robot": "ur5"}, "rate 200 Hz < 1000 Hz")
+    found = models.assess(classifier, [*fresh(), short, slow])
+    assert found.runs == 12
+    assert found.protocol.not_answered == pytest.approx(2 / 14)
+    text = str(found)
+    assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of ur5" in text
+    assert "is too short: a frame takes 400) of panda" in text
+    with pytest.raises(models.DatasetError, match="two recordings are called 'slow'"):
+        models.assess(classifier, [slow, slow])
 
 
 def test_a_run_whose_blocks_lie_in_gaps_is_classified_from_end_to_end(classifier):
@@ -140,7 +159,7 @@ def count_frames(classifier):
 def test_everything_goes_through_json(classifier):
     plain = models.assess(classifier, fresh()).as_dict()
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
-    assert plain["format"] == "noise-evaluation/1"
+    assert plain["format"] == "noise-evaluation/2"
     assert plain["calibration_error"] is plain["reliability"] is None
     assert plain["events"]["false_alarms_per_hour"]["value"] == 0.0
     assert len(plain["curve"]["threshold"]) == len(plain["curve"]["failure_recall"])
@@ -159,7 +178,7 @@ def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
     alarms = [line for line in lines if line.startswith("False alarms 1, or")]
     assert len(alarms) == 1
     assert "per hour [" in alarms[0]
-    assert "in talos/good-009, 0.00 s to 5.00 s" in lines
+    assert "impact in talos/good-009, 0.00 s to 5.00 s" in lines
     assert "Calibration error - (the scores are no probabilities)" in lines
     assert "highaccelerations - - 0 0 0" in lines
 
@@ -183,8 +202,8 @@ def test_several_robots_have_a_row_each():
     )
     assert "By robot" not in str(measure(one))
     lines = text_of(measure([*one, *other]))
-    assert "go2 0.0% [0.0, 45.9] 0.0% [0.0, 45.9] 0 [0, 553]" in lines
-    assert any(line.startswith("talos 100.0% [73.5, 100.0]") for line in lines)
+    assert "go2 6 0.00667 0 0.0% 0 0.0% 0.0% 0.0% -" in lines
+    assert any(line.startswith("talos 18 ") for line in lines)
 
 
 def test_lines_are_short_and_lists_too():
@@ -198,16 +217,19 @@ def test_a_table_of_arrow_has_all_measures_in_long_form():
     found = measure([*many(6), *many_robots])
     table = found.to_arrow()
     assert table.column_names[:4] == ["of", "measure", "class", "robot"]
-    rows = {
-        (row["of"], row["measure"], row["class"], row["robot"], row["budget"]): row
-        for row in table.to_pylist()
-    }
+    rows = {tuple(row[name] for name in (*WORDS, "budget")): row for row in table.to_pylist()}
     assert len(rows) == len(table)
-    recall = rows["frames", "recall", "impact", None, None]
+    recall = rows["frames", "recall", "impact", None, None, None, None]
     expected = found.frames.recall["impact"].as_dict()
     assert {name: recall[name] for name in expected} == expected
-    assert rows["events", "false_alarms", None, "talos", None]["value"] == 0.0
-    assert rows["events", "all_found", None, "go2", None]["value"] is None  # it has no failures
-    at_budget = rows["scores", "events_found", None, None, 5.0]
+    assert rows["events", "false_alarms", None, "talos", None, None, None]["value"] == 0.0
+    assert (
+        rows["events", "all_found", None, "go2", None, None, None]["value"] is None
+    )  # it has no failures
+    at_budget = rows["scores", "events_found", None, None, None, None, 5.0]
     assert at_budget["value"] == found.at_budgets[5.0][1].value
+    f1 = found.protocol.alike["class_f1"]
+    assert rows["protocol", "class_f1", None, None, None, None, None]["value"] == f1.value
+    assert rows["protocol", "recall_felt", None, "talos", None, None, None]["value"] == 1.0
+    assert rows["chance", "class_f1", None, None, None, None, None]["value"] < f1.value
     assert {row["class"] for row in rows.values()} == {None, *CLASSES}

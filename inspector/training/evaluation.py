@@ -1,6 +1,6 @@
 """The measures of a model on annotated runs, printed, as JSON and as a picture."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from json import dumps
 from pathlib import Path
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 
     from models.evaluation.intervals import Estimate
 
+Located = tuple[tuple[models.Event, ...], tuple[models.Event, ...]]
+"""Findings by their frames, and from onset to end."""
+
 
 def evaluate(
     model: Path, inputs: Sequence[Path], *, part: Part = Part.ALL, seen_too: bool = False
@@ -45,29 +48,27 @@ def evaluate(
         SeenError: If it was trained on a run, unless ``seen_too``.
     """
     classifier = models.Classifier.load(model)
-    found = classified(inputs, classifier.rate, part)
+    source: dict[str, nm.Run | None] = {}
+
+    def read() -> Iterator[models.Recording | models.Unanswered]:
+        for recording, run in classified(inputs, classifier.rate, part):
+            source.clear()  # one run at a time stays in memory
+            source[recording.name] = run
+            yield recording
+
+    def localise(recording: models.Recording, labels: models.Labels) -> Located:
+        return extents(source[recording.name] or _run(recording), labels)
+
     return models.assess(
         classifier,
-        progress(found, "evaluate", total=count(inputs)),
+        progress(read(), "evaluate", total=count(inputs)),
         seen_too=seen_too,
         localise=localise,
     )
 
 
-def localise(
-    recording: models.Recording, labels: models.Labels
-) -> tuple[tuple[models.Event, ...], tuple[models.Event, ...]]:
-    """Events of labels by their frames, and from onset to end, as `inspector classify` has them.
-
-    Args:
-        recording: The signals, at the rate of the model: its joints if it has them, else its noise.
-        labels: Of one frame or more.
-    """
-    return extents(_run(recording), labels)
-
-
 def _run(recording: models.Recording) -> nm.Run:
-    """A run of the joints of a recording, or of one joint that moves as its noise."""
+    """A run of what a sample keeps: its joints, or its noise as the motion of one joint."""
     signals = models.signals.named(recording.signal)
     desired = None
     if "measured_joints" in signals:

@@ -1,7 +1,7 @@
 """Recordings of run files, samples and NoisyTest folders, at the rate of a model."""
 
 import hashlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -33,6 +33,10 @@ class SlowRunError(InspectorError):
         super().__init__(f"{path}: recorded at {own:g} Hz, the model needs {wanted:g} Hz")
 
 
+Read = tuple[models.Recording | models.Unanswered, nm.Run | None]
+"""A recording, and the run file that it is of."""
+
+
 def recordings(
     inputs: Sequence[Path], rate: float, part: Part = Part.ALL
 ) -> Iterator[models.Recording]:
@@ -57,9 +61,7 @@ def in_part(recording: models.Recording | models.Unanswered, part: Part) -> bool
     return part.has(held_out=models.held_out(models.group_of(recording.name)))
 
 
-def classified(
-    inputs: Sequence[Path], rate: float, part: Part = Part.ALL
-) -> Iterator[models.Recording | models.Unanswered]:
+def classified(inputs: Sequence[Path], rate: float, part: Part = Part.ALL) -> Iterator[Read]:
     """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
 
     A desired velocity that is a placeholder, and an error of zero throughout, are left out.
@@ -68,41 +70,50 @@ def classified(
         inputs: Files, and folders of them, however deep.
         rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict.
         part: The part of these recordings to read.
+
+    Yields:
+        Each recording, and the run that it is of if that is a run file.
     """
-    for recording in _recordings(inputs, rate, as_classified=True):
+    for recording, run in _read(inputs, lambda path: _as_classified(path, rate), rate):
         if in_part(recording, part):
+            yield recording, run
+
+
+def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recording]:
+    def read(path: Path) -> Read:
+        return of_sample(path, rate) if is_sample(path) else of_annotated_run(path, rate), None
+
+    for recording, _ in _read(inputs, read, rate):
+        if isinstance(recording, models.Recording):
             yield recording
 
 
-def _recordings(
-    inputs: Sequence[Path], rate: float, *, as_classified: bool = False
-) -> Iterator[Any]:
+def _read(inputs: Sequence[Path], read: Callable[[Path], Read], rate: float) -> Iterator[Read]:
     taken: set[str] = set()
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
             for each in models.noisytest.read_folder(path, rate=rate):
-                yield _apart(each, path / each.name, taken)
+                yield _apart(each, path / each.name, taken), None
             continue
         for file in sorted(path.rglob("*.npz")) if path.is_dir() else [path]:
-            yield _apart(_recording(file, rate, as_classified=as_classified), file, taken)
+            recording, run = read(file)
+            yield _apart(recording, file, taken), run
 
 
-def _recording(
-    path: Path, rate: float, *, as_classified: bool
-) -> models.Recording | models.Unanswered:
+def _as_classified(path: Path, rate: float) -> Read:
+    run = None
     try:
         if is_sample(path):
             found = of_sample(path, rate)
         else:
-            found = of_annotated_run(path, rate, as_classified=as_classified)
+            run, _ = without_placeholder(nm.Run.load(path))
+            found = _annotated(path, run, rate)
     except SlowRunError as error:
-        if not as_classified:
-            raise
         reason = f"rate {error.own:g} Hz < {rate:g} Hz"
-        return models.Unanswered(path.stem, error.facts, reason)
-    if not as_classified or not isinstance(found.signal, dict):
-        return found
-    return replace(found, signal=models.signals.without_zero_error(found.signal))
+        return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
+    if isinstance(found.signal, dict):
+        found = replace(found, signal=models.signals.without_zero_error(found.signal))
+    return found, run
 
 
 def _apart(
@@ -113,23 +124,23 @@ def _apart(
     A sample keeps its robot, scenario and seed, which tell the group.
     """
     name, depth = one.name, 0
+    robot, _, rest = name.partition("/")
     folders = path.absolute().parent.parts[1:]
+    folders = folders[:-1] if rest and folders[-1:] == (robot,) else folders
     while name in taken and depth < len(folders):
         depth += 1
         folder = "/".join(folders[-depth:])
-        robot, _, rest = one.name.partition("/")
         name = f"{robot}/{folder}/{rest}" if rest else f"{one.name} ({folder})"
     taken.add(name)
     return one if name == one.name else replace(one, name=name)
 
 
-def of_annotated_run(path: Path, rate: float, *, as_classified: bool = False) -> models.Recording:
+def of_annotated_run(path: Path, rate: float) -> models.Recording:
     """Annotated noise of a run file.
 
     Args:
         path: A run file.
         rate: The rate to decimate it to, in [Hz].
-        as_classified: Whether to leave a desired velocity out that is a placeholder.
 
     Returns:
         Its norms and joints with its blocks.
@@ -138,8 +149,11 @@ def of_annotated_run(path: Path, rate: float, *, as_classified: bool = False) ->
         SlowRunError: If the run's rate is lower.
         InspectorError: If it has no blocks.
     """
-    run = nm.Run.load(path)
-    found = of_run(path, without_placeholder(run)[0] if as_classified else run, rate)
+    return _annotated(path, nm.Run.load(path), rate)
+
+
+def _annotated(path: Path, run: nm.Run, rate: float) -> models.Recording:
+    found = of_run(path, run, rate)
     if not found.blocks:
         raise InspectorError(f"{path}: has no annotated blocks")
     return found
@@ -166,7 +180,7 @@ def of_run(path: Path, run: nm.Run, rate: float) -> models.Recording:
         raise SlowRunError(path, run.rate, rate, known)
     decimated = nm.decimated(run, rate)
     return models.Recording(
-        name=f"{run.robot}/{path.stem}" if path.parent.name == run.robot else path.stem,
+        name=_name(path, run.robot),
         signal={**nm.norms(decimated), **nm.by_joint(decimated)},
         rate=rate,
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in decimated.blocks),
@@ -208,6 +222,11 @@ def of_sample(path: Path, rate: float) -> models.Recording:
         events=faults(path, sample.meta, sample.blocks),
         facts=known,
     )
+
+
+def _name(path: Path, robot: str | None) -> str:
+    """Name of a run file: with its robot before, if its folder is named so."""
+    return f"{robot}/{path.stem}" if path.parent.name == robot else path.stem
 
 
 def facts(robot: str | None, meta: Mapping[str, Any]) -> dict[str, str]:

@@ -331,8 +331,8 @@ def _head(assessment: Assessment) -> list[str]:
     counts, by = assessment.protocol.counts, assessment.protocol.by
     lines = [
         f"{_many(assessment.runs, 'run')} in {_many(assessment.groups, 'group')} (runs of a group"
-        f" share their motion) of {_many(len(by['robot']), 'robot')} in"
-        f" {_many(len(by['domain']), 'domain')}",
+        f" share their motion) of {_named(by['robot'], 'robot')} in"
+        f" {_named(by['domain'], 'domain')}",
         f"{_many(int(counts['faults']), 'injected fault')} ({counts['felt']:.0f} felt),"
         f" {counts['ok_hours']:.3g} h of ok time, {counts['unlabelled_hours']:.3g} h unlabelled",
     ]
@@ -477,6 +477,13 @@ def _per_hour(count: int, rate: Estimate) -> str:
 def _row(name: str, figures: Sequence[str], counts: Sequence[object] = ()) -> str:
     line = name.ljust(NAME) + "".join(figure.ljust(CELL) for figure in figures)
     return (line + "".join(str(count).rjust(COUNT) for count in counts)).rstrip()
+
+
+def _named(names: Iterable[str], what: str) -> str:
+    """How many there are, with their names if they are few."""
+    names = list(names)
+    few = f" ({', '.join(names)})" if len(names) <= SHOWN else ""
+    return f"{_many(len(names), what)}{few}"
 
 
 def _few(lines: Sequence[str]) -> list[str]:

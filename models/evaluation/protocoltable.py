@@ -9,7 +9,7 @@ from models.evaluation.protocol import RATES, WORST, Part, Protocol
 NAME, WIDE, NARROW = 38, 26, 12
 SHOWN = 12
 """Rows of a table by robot or domain at most; the JSON has all."""
-LONGEST = 34
+LONGEST = 32
 """Characters of a name at most."""
 ROWS = (
     ("False alarms per hour of ok time", "false_alarms_per_hour", "false_alarms"),
@@ -71,12 +71,12 @@ def _summary(protocol: Protocol) -> list[str]:
     return [
         *lines,
         _line("Delay until a live listener knows", figures),
-        _line("AUC of runs, mean over domains", [_share(protocol.auc)], ["50.0%"]),
-        _line("pAUC (FPR up to 10 %)", [_share(protocol.pauc)], ["50.0%"]),
-        _line("Score of DCASE task 2 (harmonic mean)", [_share(protocol.official)], ["50.0%"]),
+        _line("AUC of runs, mean over domains", [_share(protocol.auc), ""], ["50.0%"]),
+        _line("pAUC (FPR up to 10 %)", [_share(protocol.pauc), ""], ["50.0%"]),
+        _line("Score of DCASE task 2 (harmonic mean)", [_share(protocol.official), ""], ["50.0%"]),
         _line(
             "Runs without a verdict",
-            [_share(protocol.not_answered)],
+            [_share(protocol.not_answered), ""],
             ["", f"{len(protocol.unanswered)} of {_runs(protocol)}"],
         ),
     ]
@@ -137,10 +137,11 @@ def _table(protocol: Protocol, key: str, *, whole: bool) -> list[str]:
     if not whole and len(names) > SHOWN:
         left = len(names) - SHOWN
         names = sorted(names, key=lambda name: _order(parts[name]))[:SHOWN]
-    head = f"By {key}" + (f", the worst {SHOWN} of {len(parts)} by F1 of the class" if left else "")
+    head = f"By {key}, the worst {SHOWN} of {len(parts)} by F1 of the class"
     ranked = protocol.ranked if key == "domain" else {}
     titles = [title for title, _ in COLUMNS] + (["AUC", "pAUC"] if ranked else [])
-    lines = [_cells(head, ["runs", "ok h", *titles])]
+    titles = ["runs", "ok h", *titles]
+    lines = [head, _cells("", titles, titles)] if left else [_cells(f"By {key}", titles, titles)]
     for name in names:
         part = parts[name]
         figures = [_figure(measure, part.measures[measure]) for _, measure in COLUMNS]
@@ -149,7 +150,8 @@ def _table(protocol: Protocol, key: str, *, whole: bool) -> list[str]:
             figures += [_share(own.auc), _share(own.pauc)] if own else ["-", "-"]
         counts = part.counts
         runs = f"{counts['runs']:.0f}" + (f"+{part.unanswered}" if part.unanswered else "")
-        lines.append(_cells(_short(name), [runs, f"{counts['ok_hours']:.3g}", *figures]))
+        figures = [runs, f"{counts['ok_hours']:.3g}", *figures]
+        lines.append(_cells(_short(name), figures, titles))
     if any(part.unanswered for part in parts.values()):
         lines.append("(+n: runs without a verdict)")
     return lines
@@ -179,7 +181,7 @@ def _time(value: float) -> str:
 
 def _ranged(estimate: Estimate, form: Callable[[float], str]) -> str:
     bounds = "" if isnan(estimate.low) else f" [{form(estimate.low)}, {form(estimate.high)}]"
-    return form(estimate.value) + bounds.replace("%,", ",").replace("%]", "]")
+    return form(estimate.value) + bounds.replace("%", "").replace(" s", "")
 
 
 def _runs(protocol: Protocol) -> int:
@@ -191,8 +193,11 @@ def _line(name: str, figures: Sequence[str], others: Sequence[str] = ()) -> str:
     return (line + "".join(other.ljust(NARROW) for other in others)).rstrip()
 
 
-def _cells(name: str, cells: Sequence[str]) -> str:
-    return name.ljust(LONGEST) + "".join(cell.rjust(11) for cell in cells)
+def _cells(name: str, cells: Sequence[str], titles: Sequence[str]) -> str:
+    """A row, each cell as wide as its title or a figure."""
+    widths = [max(len(title), 7) + 2 for title in titles]
+    figures = (cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
+    return name.ljust(LONGEST) + "".join(figures)
 
 
 def _short(name: str) -> str:

@@ -1,0 +1,362 @@
+"""The protocol: findings as they are reported, beside all injected faults, robots weighed alike."""
+
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+import pytest
+from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, many, predicted
+
+from models.evaluation import assessment, protocol, spans
+from models.evaluation.intervals import Resampling, fay_feuer, garwood
+from models.evaluation.outcomes import Outcome, confirmed_at, one_to_one
+from models.evaluation.predictions import Unanswered
+from models.evaluation.protocoltable import lines_of
+from models.evaluation.ranking import auc, harmonic_mean, partial_auc, run_score
+from models.labels import Event, Labels
+from models.recording import Fault
+
+COUNT = len(frames())
+
+
+def reporting(name, annotated, findings, *, faults=(), seconds=5.0, **facts):
+    """A run with findings of these labels, starts and stops."""
+    events = tuple(Event(label, start, stop, 1.0) for label, start, stop in findings)
+    one = predicted(name, annotated, ["ok"] * len(frames(seconds)), seconds=seconds)
+    return replace(one, located=(events, events), events=tuple(faults), facts=facts)
+
+
+def exact(name, annotated, **facts):
+    """A run whose findings are its failures, to the sample."""
+    found = [(b.label, b.start, b.stop) for b in annotated if b.label != "ok"]
+    return reporting(name, annotated, found, **facts)
+
+
+def measured(runs, unanswered=()):
+    return protocol.measure(runs, Resampling.of([run.group for run in runs]), unanswered)
+
+
+def perfect(seeds=4, robot="talos", **facts):
+    return [
+        exact(f"{robot}/{scenario}-{seed:03d}", annotated, scenario=scenario, **facts)
+        for seed in range(seeds)
+        for scenario, annotated in (("good", GOOD), ("blow", IMPACT), ("swing", OSCILLATION))
+    ]
+
+
+def always(name, annotated, label="impact"):
+    return reporting(name, annotated, [(label, 0.0, 5.0)])
+
+
+def test_perfect_findings_score_one_without_false_alarms():
+    found = measured(perfect())
+    for name in protocol.SHARES:
+        assert found.alike[name].value == (0.0 if name == "ok_flagged" else 1.0), name
+    assert found.alike["false_alarms_per_hour"].value == 0.0
+    assert found.alike["alarms_in_unlabelled_per_hour"].value == 0.0
+    assert found.missed() == found.alarms("false") == found.alarms("unlabelled") == []
+    assert found.worst(found.cases, "recall_injected") == []
+
+
+def test_a_run_that_is_flagged_throughout_has_all_of_its_ok_time_flagged():
+    runs = [always(run.name, run.blocks) for run in perfect()]
+    found = measured(runs)
+    assert found.alike["ok_flagged"].value == pytest.approx(1.0)
+    assert found.alike["recall_injected"].value == 1.0
+    # The good run's alone overlaps no failure.
+    assert found.counts["false_alarms"] == 4
+    assert found.alike["class_f1"].value == pytest.approx(2 * 4 / (12 + 8))
+
+
+def test_no_findings_find_nothing():
+    found = measured([replace(run, located=((), ())) for run in perfect()])
+    assert found.alike["recall_injected"].value == found.alike["class_f1"].value == 0.0
+    assert np.isnan(found.alike["class_precision"].value)
+    assert np.isnan(found.alike["delay"].value)
+    assert found.alike["false_alarms_per_hour"].high > 0.0
+
+
+def test_shifted_findings_score_less_than_those_that_are_right():
+    found = measured(perfect(12))
+    for name in ("recall_injected", "class_f1", "any_f1", "onset_within"):
+        assert found.by_chance[name] < 0.9 * found.alike[name].value, name
+    flagged = measured([always(run.name, run.blocks) for run in perfect(12)])
+    assert flagged.by_chance["recall_injected"] == 1.0  # what flags everything needs no knowledge
+
+
+def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault():
+    # It meets the fault if it begins within 0.2 + 0.1 s before and 0.1 + 0.2 s after its start.
+    annotated = blocks((0.0, 2.0, "ok"), (2.5, 2.6, "impact"), (3.0, 5.0, "ok"))
+    runs = [exact(f"a{number}", annotated) for number in range(300)]
+    expected = (0.1 + 0.1 + 2 * 0.2) / 5.0
+    assert measured(runs).by_chance["recall_injected"] == pytest.approx(expected, rel=0.1)
+
+
+def test_a_robot_with_ten_times_as_many_runs_weighs_the_same():
+    deaf = [reporting(f"go2/blow-{seed:03d}", IMPACT, []) for seed in range(2)]
+    few, lots = measured([*perfect(2), *deaf]), measured([*perfect(20), *deaf])
+    assert few.alike["recall_injected"].value == lots.alike["recall_injected"].value == 0.5
+    assert few.pooled["recall_injected"].value < lots.pooled["recall_injected"].value
+
+
+def test_how_much_time_a_robot_has_does_not_change_its_weight():
+    def runs(hours):
+        long = blocks((0.0, 5.0 * hours, "ok"))
+        calm = [reporting("panda/good-000", long, [], seconds=5.0 * hours)]
+        return [*calm, reporting("go2/good-000", GOOD, [("impact", 1.0, 1.5)])]
+
+    one, other = measured(runs(1)), measured(runs(20))
+    assert one.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
+    assert other.alike["false_alarms_per_hour"].value == pytest.approx(3600.0 / 5.0 / 2)
+    assert other.pooled["false_alarms_per_hour"].value < one.pooled["false_alarms_per_hour"].value
+
+
+def test_the_order_of_the_runs_does_not_matter():
+    runs = [*perfect(3), *[reporting("go2/x-001", IMPACT, [("impact", 0.3, 0.7)])]]
+    assert measured(runs).as_dict()["by_robot"] == measured(runs[::-1]).as_dict()["by_robot"]
+    one, other = measured(runs).alike, measured(runs[::-1]).alike
+    assert one == pytest.approx(other, nan_ok=True) or str(one) == str(other)
+
+
+def test_two_findings_on_one_fault_are_one_found_and_one_false():
+    twice = [("impact", 2.0, 2.1), ("impact", 2.15, 2.2)]
+    counts = Outcome.of(reporting("a", IMPACT, twice)).counts
+    assert (counts["matched"], counts["findings"], counts["faults"]) == (1.0, 2, 1)
+    measures = measured([reporting("a", IMPACT, twice)]).pooled
+    assert measures["class_precision"].value == 0.5
+    assert measures["class_recall"].value == 1.0
+    assert measures["false_alarms_per_hour"].value == 0.0  # both are on the fault
+
+
+def test_one_finding_on_two_faults_finds_both_but_matches_one():
+    faults = (Fault(1.0, 1.1, "impact"), Fault(1.5, 1.6, "impact"))
+    outcome = Outcome.of(reporting("a", GOOD[:0], [("impact", 0.9, 1.7)], faults=faults))
+    assert outcome.found.tolist() == [True, True]
+    assert outcome.counts["matched"] == 1.0
+
+
+def test_one_to_one_is_the_best_of_all_assignments():
+    random = np.random.default_rng(3)
+    for _ in range(40):
+        met = random.random((1, random.integers(1, 5), random.integers(1, 5))) < 0.4
+        rows, columns = met.shape[1:]
+        wide = met[0] if rows <= columns else met[0].T
+        best = max(
+            sum(wide[row, column] for row, column in enumerate(order))
+            for order in permutations(range(max(rows, columns)), min(rows, columns))
+        )
+        assert one_to_one(met).tolist() == [best]
+    stacked = np.stack([np.eye(3, dtype=bool), np.zeros((3, 3), dtype=bool)])
+    assert one_to_one(stacked).tolist() == [3.0, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "kind"),
+    [
+        (0.5, 0.6, "false"),
+        (2.1, 2.15, "met"),
+        (2.35, 2.4, "met"),  # less than a collar after the end
+        (2.45, 2.6, "unlabelled"),
+        (2.9, 3.2, "false"),  # runs into ok time
+        (1.5, 4.0, "met"),
+    ],
+)
+def test_a_finding_is_on_a_fault_or_false_or_in_unlabelled_time(start, stop, kind):
+    outcome = Outcome.of(reporting("a", IMPACT, [("oscillations", start, stop)]))
+    assert outcome.kind.tolist() == [kind]
+
+
+def test_time_without_a_label_is_counted_beside_ok_time():
+    counts = Outcome.of(exact("a", IMPACT)).counts
+    assert counts["ok_hours"] * 3600 == pytest.approx(4.0)
+    assert counts["unlabelled_hours"] * 3600 == pytest.approx(0.03 + 0.8)
+    faint = Fault(2.5, 2.9, "impact", felt=False)
+    both = Outcome.of(exact("a", IMPACT, faults=(Fault(2.03, 2.2, "impact"), faint))).counts
+    assert both["unlabelled_hours"] * 3600 == pytest.approx(0.03 + 0.4)
+
+
+def test_faults_that_are_not_felt_count_among_all_that_were_injected():
+    faults = (Fault(2.03, 2.2, "impact"), Fault(4.0, 4.2, "impact", felt=False))
+    run = exact("talos/blow-001", IMPACT, faults=faults, scenario="blow")
+    found = measured([run])
+    assert found.pooled["recall_injected"].value == 0.5
+    assert found.pooled["recall_felt"].value == 1.0
+    assert [each["felt"] for each in found.missed()] == [False]
+    assert found.worst(found.cases, "recall_injected") == [("talos", "blow")]
+
+
+@pytest.mark.parametrize(
+    ("start", "share"), [(2.03, 1.0), (2.2, 1.0), (1.84, 1.0), (1.8, 0.0), (2.3, 0.0)]
+)
+def test_an_onset_is_right_within_a_fifth_of_a_second(start, share):
+    found = measured([reporting("a", IMPACT, [("impact", start, 2.6)])])
+    assert found.pooled["onset_within"].value == share
+
+
+def probable(evidence, *, apart=()):
+    """Labels of frames that are evidence of an impact by their numbers."""
+    starts = frames() + np.searchsorted(apart, np.arange(COUNT), side="right") * 10.0
+    above = np.isin(np.arange(COUNT), evidence)
+    names = np.where(above, "impact", "ok")
+    scores = np.where(above[:, None], [0.1, 0.9, 0, 0], [0.9, 0.1, 0, 0])
+    return Labels(starts, starts + 0.4, names, scores, CLASSES, above)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "delay"),
+    [
+        ((17, 18, 19), 2.2 - 2.03),  # frame 17 ends at 2.1 s, and the next one confirms it
+        ((19, 20), 2.4 - 2.03),
+        (range(5, 25), 2.1 - 2.03),  # known before; the first frame that holds any of it
+    ],
+)
+def test_a_live_listener_knows_at_the_end_of_the_frame_that_confirms(evidence, delay):
+    run = replace(predicted("a", IMPACT), labels=probable(evidence))
+    assert Outcome.of(run).delay.tolist() == pytest.approx([delay])
+
+
+def test_a_frame_at_the_beginning_or_beside_a_gap_confirms_itself():
+    assert confirmed_at(probable([0, 1])).tolist()[:2] == [0, 0]
+    assert confirmed_at(probable([5, 6, 7])).tolist()[5:8] == [6, 6, 6]
+    assert confirmed_at(probable([10, 11], apart=[10])).tolist()[10:12] == [10, 10]
+
+
+def test_the_score_of_a_run_is_that_which_two_neighbouring_frames_reach():
+    scores = np.full((COUNT, 4), 0.0)
+    scores[:, 0] = 1.0
+    for frame, risk in ((7, 0.9), (20, 0.6), (21, 0.5)):
+        scores[frame] = [1.0 - risk, risk, 0.0, 0.0]
+    labels = replace(probable([]), scores=scores)
+    assert run_score(labels) == pytest.approx(0.5)
+    assert run_score(replace(labels, above_threshold=None)) == pytest.approx(0.9)
+    scores[0] = [0.2, 0.8, 0.0, 0.0]
+    assert run_score(replace(labels, scores=scores)) == pytest.approx(0.8)
+
+
+def test_auc_is_the_share_of_pairs_in_order_with_ties_as_halves():
+    random = np.random.default_rng(5)
+    good, faulty = random.integers(0, 9, 30) / 8, random.integers(2, 11, 20) / 8
+    pairs = faulty[:, None] - good
+    assert auc(good, faulty) == pytest.approx(((pairs > 0) + 0.5 * (pairs == 0)).mean())
+    assert auc(np.zeros(3), np.ones(2)) == partial_auc(np.zeros(3), np.ones(2)) == 1.0
+    assert np.isnan(auc(np.zeros(0), np.ones(2)))
+    assert np.isnan(partial_auc(np.zeros(2), np.ones(0)))
+
+
+def test_partial_auc_of_scores_without_information_is_a_half():
+    random = np.random.default_rng(0)
+    good, faulty = random.random(20_000), random.random(20_000)
+    assert partial_auc(good, faulty) == pytest.approx(0.5, abs=0.005)
+    assert partial_auc(np.zeros(5), np.zeros(5)) == pytest.approx(0.5)
+
+
+def test_partial_auc_counts_the_faulty_runs_above_a_tenth_of_the_good_ones():
+    good, faulty = np.arange(10.0), np.array([10.0, 8.5])
+    area = 0.1 * 0.5  # up to one good run of ten, half of the faulty ones are above
+    expected = (1 + (area - 0.005) / (0.1 - 0.005)) / 2
+    assert partial_auc(good, faulty) == pytest.approx(expected)
+
+
+def test_partial_auc_is_that_of_scikit_learn():
+    metrics = pytest.importorskip("sklearn.metrics")
+    random = np.random.default_rng(1)
+    for size in (7, 23, 60):
+        good, faulty = random.normal(size=size), random.normal(1.0, size=size // 2)
+        truth = np.append(np.zeros(len(good)), np.ones(len(faulty)))
+        theirs = metrics.roc_auc_score(truth, np.append(good, faulty), max_fpr=0.1)
+        assert partial_auc(good, faulty) == pytest.approx(theirs)
+
+
+def test_the_harmonic_mean_is_that_of_what_is_defined():
+    assert harmonic_mean([0.5, 1.0, float("nan")]) == pytest.approx(2 / 3)
+    assert harmonic_mean([0.0, 1.0]) == 0.0
+    assert np.isnan(harmonic_mean([]))
+
+
+def test_domains_are_ranked_apart_and_summarised_by_their_harmonic_mean():
+    def runs(domain, sign):
+        scores = np.tile([[0.9, 0.1, 0.0, 0.0]], (COUNT, 1))
+        loud = np.tile([[0.9 - sign * 0.2, 0.1 + sign * 0.2, 0.0, 0.0]], (COUNT, 1))
+        return [
+            replace(
+                predicted(f"{domain}/{name}-{seed:03d}", annotated, ["ok"] * COUNT, scores=own),
+                facts={"domain": domain},
+            )
+            for seed in range(3)
+            for name, annotated, own in (("good", GOOD, scores), ("blow", IMPACT, loud))
+        ]
+
+    found = measured([*runs("a", 1), *runs("b", 0)])
+    assert (found.ranked["a"].auc, found.ranked["b"].auc) == (1.0, 0.5)
+    assert found.auc == pytest.approx(2 / 3)
+    assert found.ranked["a"].pauc == 1.0
+    assert found.official == pytest.approx(harmonic_mean([1.0, 0.5, 1.0, 0.5]))
+
+
+def test_bounds_of_a_mean_rate_are_those_of_garwood_where_all_weigh_the_same():
+    for events in (0, 1, 7):
+        low, high = fay_feuer(np.array([events, 0.0]), np.array([1.0, 1.0]))
+        assert (low, high) == pytest.approx(garwood(events))
+    low, high = fay_feuer(np.array([3.0, 1.0]), np.array([0.5, 5.0]))
+    assert low < 6.5 < high
+
+
+def test_spans_are_merged_and_shared_as_on_a_fine_grid():
+    random = np.random.default_rng(2)
+    for _ in range(20):
+        one, other = (np.sort(random.integers(0, 40, (4, 2)), axis=1) / 4 for _ in range(2))
+        grid = np.arange(0, 10, 1 / 8) + 1 / 16
+
+        def inside(each, grid=grid):
+            return ((each[:, :1] < grid) & (grid < each[:, 1:])).any(axis=0)
+
+        assert spans.duration(one) == pytest.approx(inside(one).sum() / 8)
+        both = inside(one) & inside(other)
+        assert spans.duration(spans.common(one, other)) == pytest.approx(both.sum() / 8)
+    assert spans.duration(np.zeros((0, 2))) == 0.0
+
+
+def test_runs_without_a_verdict_are_counted_and_listed_with_their_robots():
+    slow = [
+        Unanswered(f"slow{number}", {"robot": "a1", "domain": "field"}, "rate 200 Hz < 1000 Hz")
+        for number in range(3)
+    ]
+    found = measured(perfect(1), slow)
+    assert found.not_answered == 0.5
+    assert found.by["robot"]["a1"].unanswered == 3
+    assert np.isnan(found.by["robot"]["a1"].measures["recall_injected"])
+    assert found.alike["recall_injected"].value == 1.0
+    text = [line for lines in lines_of(found) for line in lines]
+    assert "not answered: 3 runs (rate 200 Hz < 1000 Hz) of a1" in text
+    (share,) = (line for line in text if line.startswith("Runs without a verdict"))
+    assert share.split()[4:] == ["50.0%", "3", "of", "6"]
+    assert found.as_dict()["unanswered"][0]["robot"] == "a1"
+
+
+def test_the_table_has_one_line_for_each_robot_domain_or_scenario():
+    odd = reporting("go2/blow-001", IMPACT, [], scenario="blow", domain="soft")
+    found = measured([*perfect(domain="stiff"), odd])
+    heads = [lines[0].split("  ")[0] for lines in lines_of(found)]
+    assert heads[-2:] == ["By robot", "By domain"]
+    (table,) = (lines for lines in lines_of(found, "scenario") if lines[0].startswith("By "))
+    assert [line.split()[0] for line in table[1:]] == ["blow", "good", "swing"]
+    worst = next(lines for lines in lines_of(found) if lines[0].startswith("The worst"))
+    assert " ".join(worst[1].split()) == "go2 blow 0.0% 0 of 1 injected, 0 of 1 felt"
+
+
+def test_long_tables_have_the_worst_and_long_names_keep_both_ends():
+    names = [f"domain-with-a-name-that-is-far-too-long-{number:02d}" for number in range(20)]
+    runs = [exact("a/blow-001", IMPACT, domain=name) for name in names]
+    runs.append(reporting("a/blow-002", IMPACT, [], domain="zz-" + names[0]))
+    (table,) = (lines for lines in lines_of(measured(runs)) if lines[0].startswith("By domain"))
+    assert len(table) == 2 + 12
+    assert table[0] == "By domain, the worst 12 of 21 by F1 of the class"
+    assert table[2].startswith("zz-domain")
+    assert table[2].split()[0].endswith("long-00")
+    assert max(map(len, table)) <= 140
+
+
+def test_the_report_begins_with_the_protocol():
+    text = str(assessment.measure(many(6)))
+    first, frames_of = text.index("At the operating point"), text.index("Frames that are cut")
+    assert 0 < first < frames_of < text.index("NOT the operating point")
