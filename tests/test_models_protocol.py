@@ -157,7 +157,8 @@ def test_one_to_one_is_the_best_of_all_assignments():
         (2.1, 2.15, "met"),
         (2.35, 2.4, "met"),  # less than a collar after the end
         (2.45, 2.6, "unlabelled"),
-        (2.9, 3.2, "false"),  # runs into ok time
+        (2.9, 3.2, "false"),  # most of it in ok time
+        (2.5, 3.2, "unlabelled"),  # ends in ok time
         (1.5, 4.0, "met"),
     ],
 )

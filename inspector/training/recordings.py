@@ -64,7 +64,8 @@ def in_part(recording: models.Recording | models.Unanswered, part: Part) -> bool
 def classified(inputs: Sequence[Path], rate: float, part: Part = Part.ALL) -> Iterator[Read]:
     """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
 
-    A desired velocity that is a placeholder, and an error of zero throughout, are left out.
+    A desired velocity that is a placeholder, and an error of zero throughout, are left out of run
+    files; samples have a desired motion of their own.
 
     Args:
         inputs: Files, and folders of them, however deep.
@@ -101,19 +102,16 @@ def _read(inputs: Sequence[Path], read: Callable[[Path], Read], rate: float) -> 
 
 
 def _as_classified(path: Path, rate: float) -> Read:
-    run = None
     try:
         if is_sample(path):
-            found = of_sample(path, rate)
-        else:
-            run, _ = without_placeholder(nm.Run.load(path))
-            found = _annotated(path, run, rate)
+            return of_sample(path, rate), None
+        run, _ = without_placeholder(nm.Run.load(path))
+        found = _annotated(path, run, rate)
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {rate:g} Hz"
         return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
-    if isinstance(found.signal, dict):
-        found = replace(found, signal=models.signals.without_zero_error(found.signal))
-    return found, run
+    signals = models.signals.without_zero_error(models.signals.named(found.signal))
+    return replace(found, signal=signals), run
 
 
 def _apart(

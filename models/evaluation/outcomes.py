@@ -6,8 +6,9 @@ many as can be, so that two findings on one fault are one found and one false, a
 two faults finds one of them (collar and matching as in sed_eval: Mesaros, Heittola and Virtanen,
 Metrics for polyphonic sound event detection, Applied Sciences 6, 2016).
 
-A finding that meets no fault and touches no failure block is a *false alarm* if some of it lies in
-`ok` time, and an *alarm in unlabelled time* otherwise.
+A finding that meets no fault and touches no failure block is a *false alarm* if half of it or more
+lies in `ok` time, and an *alarm in unlabelled time* otherwise: that which follows a fault often
+ends in `ok` time. What it flags there counts in the share of ok time that is flagged.
 
 The level of *chance* is what the same findings score where they mean nothing: shifted circularly
 within their run, all by the same random time.
@@ -166,7 +167,7 @@ def _kind(run: Predictions, spans: Array, met: Mask) -> Words:
     bad = spans_of([block for block in run.blocks if block.label != OK])
     ok = union(spans_of([block for block in run.blocks if block.label == OK]))
     on_fault = met.any(axis=1) | (overlap(spans, bad) > slack[:, None]).any(axis=1)
-    in_ok = (overlap(spans, ok) > slack[:, None]).any(axis=1)
+    in_ok = overlap(spans, ok).sum(axis=1) >= (spans[:, 1] - spans[:, 0]) / 2.0
     return np.where(on_fault, MET, np.where(in_ok, FALSE, UNLABELLED))
 
 
