@@ -87,9 +87,9 @@ def test_shifted_findings_score_less_than_those_that_are_right():
 def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault():
     # It meets the fault if it begins within 0.2 + 0.1 s before and 0.1 + 0.2 s after its start.
     annotated = blocks((0.0, 2.0, "ok"), (2.5, 2.6, "impact"), (3.0, 5.0, "ok"))
-    runs = [exact(f"a{number}", annotated) for number in range(300)]
+    runs = [exact(f"a{number}", annotated) for number in range(120)]
     expected = (0.1 + 0.1 + 2 * 0.2) / 5.0
-    assert measured(runs).by_chance["recall_injected"] == pytest.approx(expected, rel=0.1)
+    assert measured(runs).by_chance["recall_injected"] == pytest.approx(expected, rel=0.15)
 
 
 def test_a_robot_with_ten_times_as_many_runs_weighs_the_same():
@@ -361,3 +361,52 @@ def test_the_report_begins_with_the_protocol():
     text = str(assessment.measure(many(6)))
     first, frames_of = text.index("At the operating point"), text.index("Frames that are cut")
     assert 0 < first < frames_of < text.index("NOT the operating point")
+
+
+def by_hand(run, collar=0.2, step=0.001):
+    """Counts of a run on a grid of milliseconds and by all assignments."""
+    time = np.arange(0.0, 5.0, step) + step / 2
+
+    def during(start, stop):
+        return (time > start) & (time < stop)
+
+    ok = np.any([during(b.start, b.stop) for b in run.blocks if b.label == "ok"], axis=0)
+    bad = [b for b in run.blocks if b.label != "ok"]
+    kinds, flagged = [], np.zeros(len(time), dtype=bool)
+    near = [
+        [f.start - collar <= e.stop and e.start <= f.stop + collar for f in run.events]
+        for e in run.findings
+    ]
+    for finding, met in zip(run.findings, near, strict=True):
+        own = during(finding.start, finding.stop)
+        flagged |= own
+        if any(met) or any((own & during(b.start, b.stop)).any() for b in bad):
+            kinds.append("met")
+        else:
+            kinds.append("false" if 2 * (own & ok).sum() >= own.sum() else "unlabelled")
+    best = 0
+    rows, columns = len(run.findings), len(run.events)
+    for order in permutations(range(max(rows, columns)), rows) if rows else ():
+        pairs = [(row, column) for row, column in enumerate(order) if column < columns]
+        best = max(best, sum(near[row][column] for row, column in pairs))
+    return kinds, np.sum(flagged & ok) * step, np.any(near, axis=0) if rows else [], best
+
+
+def test_counts_are_those_of_a_count_by_hand():
+    random = np.random.default_rng(11)
+    annotated = blocks((0.0, 1.5, "ok"), (1.8, 2.0, "impact"), (2.6, 4.0, "ok"), (4.4, 5.0, "ok"))
+    faults = (
+        Fault(1.75, 1.9, "impact"),
+        Fault(2.2, 2.3, "impact", felt=False),
+        Fault(4.1, 4.15, "oscillations", felt=False),
+    )
+    for number in range(60):
+        edges = np.sort(np.round(random.uniform(0.0, 5.0, (random.integers(0, 5), 2)), 3), axis=1)
+        found = [("impact", start, stop + 0.003) for start, stop in edges.tolist()]
+        found = [each for each in found if each[2] < 5.0]
+        outcome = Outcome.of(reporting(f"a{number}", annotated, found, faults=faults))
+        kinds, flagged, hit, best = by_hand(outcome.run)
+        assert outcome.kind.tolist() == kinds
+        assert outcome.counts["ok_hours_flagged"] * 3600 == pytest.approx(flagged, abs=2e-3)
+        assert outcome.found.tolist() == (list(hit) or [False] * 3)
+        assert outcome.counts["matched"] == best
