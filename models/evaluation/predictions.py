@@ -46,14 +46,25 @@ class Origin:
 
 
 @dataclass(frozen=True)
-class Unanswered(Origin):
+class Unanswered:
     """A recording that a model cannot classify."""
 
+    name: str
+    """Its name."""
+    facts: Mapping[str, str] = field(default_factory=dict)
+    """Its robot, scenario and domain."""
     reason: str = ""
+    """Why there is no verdict, in a few words."""
+
+    @cached_property
+    def origin(self) -> Origin:
+        """Where it comes from."""
+        return Origin(self.name, self.facts)
 
     def as_dict(self) -> dict[str, str]:
         """All of it for JSON."""
-        own = {"robot": self.robot, "domain": self.domain, "scenario": self.scenario}
+        origin = self.origin
+        own = {"robot": origin.robot, "domain": origin.domain, "scenario": origin.scenario}
         return {"run": self.name, **own, "reason": self.reason}
 
 

@@ -225,7 +225,7 @@ def measure(
         def key(origin: Origin) -> tuple[str, ...]:
             return tuple(KEYS[name](origin) for name in keys)
 
-        mine, others = [key(each) for each in origins], [key(each) for each in unanswered]
+        mine, others = [key(each) for each in origins], [key(each.origin) for each in unanswered]
         return {
             name: part(
                 np.array([each == name for each in mine]),

@@ -86,7 +86,7 @@ def _not_answered(protocol: Protocol) -> list[str]:
     """Reasons why runs have no verdict, each with its runs and robots."""
     reasons: dict[str, list[str]] = {}
     for each in protocol.unanswered:
-        reasons.setdefault(each.reason, []).append(each.robot)
+        reasons.setdefault(each.reason, []).append(each.origin.robot)
     return [
         f"not answered: {_many(len(robots), 'run')} ({reason}) of {_few(sorted(set(robots)))}"
         for reason, robots in reasons.items()
