@@ -184,6 +184,18 @@ def test_runs_of_one_name_in_two_folders_are_told_apart(folder, tmp_path):
     assert [group_of(name) for name in names] == ["panda-007", "run", "panda-007", "run (two)"]
 
 
+def test_a_run_with_injected_faults_needs_no_blocks(folder, tmp_path):
+    event = {"label": "oscillations", "start": 1.0, "stop": 2.0}
+    path = simulated(tmp_path / "bare.npz", 80, events=[event])
+    with np.load(path) as archive:
+        arrays = {name: archive[name] for name in archive.files if "block" not in name}
+    np.savez(path, **arrays)
+    report = evaluation.evaluate(folder / "model.npz", [path, folder / "test"])
+    first = report.protocol.outcomes[0]
+    assert (first.found.tolist(), first.faults[0].felt) == ([True], False)
+    assert first.counts["ok_hours"] == 0.0
+
+
 def test_damaged_events_are_refused_in_one_line(folder, tmp_path):
     path = simulated(tmp_path / "odd.npz", 70, events=[{"label": "impact"}])
     status, _, err = call("evaluate", folder / "model.npz", path)

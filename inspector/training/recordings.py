@@ -106,10 +106,12 @@ def _as_classified(path: Path, rate: float) -> Read:
         if is_sample(path):
             return of_sample(path, rate), None
         run, _ = without_placeholder(nm.Run.load(path))
-        found = _annotated(path, run, rate)
+        found = of_run(path, run, rate)
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {rate:g} Hz"
         return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
+    if not (found.blocks or found.events):
+        raise InspectorError(f"{path}: has no annotated blocks")
     signals = models.signals.without_zero_error(models.signals.named(found.signal))
     return replace(found, signal=signals), run
 
@@ -147,11 +149,7 @@ def of_annotated_run(path: Path, rate: float) -> models.Recording:
         SlowRunError: If the run's rate is lower.
         InspectorError: If it has no blocks.
     """
-    return _annotated(path, nm.Run.load(path), rate)
-
-
-def _annotated(path: Path, run: nm.Run, rate: float) -> models.Recording:
-    found = of_run(path, run, rate)
+    found = of_run(path, nm.Run.load(path), rate)
     if not found.blocks:
         raise InspectorError(f"{path}: has no annotated blocks")
     return found
