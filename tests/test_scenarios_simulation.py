@@ -13,6 +13,7 @@ from noisemodel import Run
 from scenarios import simulation
 from scenarios.case import Case
 from scenarios.defects import Multisine, Obstacles
+from scenarios.labels import deviation
 from scenarios.motions import Picks
 
 SEEDS = (5, 10)
@@ -102,6 +103,16 @@ def test_each_defect_shows_first_in_the_stage_where_it_acts(runs):
         run = runs[name, 5]
         before = [first_difference(run, healthy, other) for other in order[: order.index(stage)]]
         assert first_difference(run, healthy, stage) < min([np.inf, *before])
+
+
+def test_after_an_obstacle_the_tool_is_quieter_than_when_a_good_one_moves(runs):
+    run, healthy = runs["obstacle-full", 5], runs["straight", 5]
+    fast = deviation(run.velocity, healthy.velocity, rate=run.rate)
+    good = deviation(healthy.velocity, np.zeros_like(healthy.velocity), rate=run.rate)
+    (impact,) = (block for block in run.blocks if block.label == "impact")
+    after = np.linalg.norm(fast[run.time > impact.stop + 0.05], axis=1).max()
+    assert after < np.linalg.norm(good, axis=1).max()
+    assert after < 0.25 * np.linalg.norm(fast, axis=1).max()
 
 
 def test_a_run_is_complete_and_uniform(runs):

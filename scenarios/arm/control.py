@@ -9,11 +9,18 @@ from noisemodel.types import Array
 from scenarios.arm.picking import Plan
 from scenarios.clock import TICK
 from scenarios.loop import Reference
+from scenarios.paths import minimum_jerk
 
 HIGHEST_ACCELERATION = 30.0
 """Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²]."""
-FURTHEST = 0.03
+FURTHEST = 0.1
 """Largest offset of the tool by force control, in [m]."""
+GUARD = 80.0
+"""Contact force beyond which the tool yields while it descends, in [N]."""
+TOUCHING = 5.0
+"""Contact force that no noise of a sensor reaches, in [N]."""
+UNLOADING = 0.4
+"""Time in which force control unloads a tool that touched before it started, in [s]."""
 
 
 class ToolControl:
@@ -47,7 +54,8 @@ class ToolControl:
         self._upright = self._data.oMf[self._frame].rotation.copy()
         self._plan, self._gain = plan, gain
         self._share = TICK / (time_constant + TICK)
-        self._force = self._offset = self._left = 0.0
+        self._force = self._offset = self._left = self._excess = 0.0
+        self._pressing = 0  # ticks of force control so far
         self._joints = [rest] * 3  # of the last three ticks
         self._velocity = self._planned = np.zeros(len(rest))
         self._velocities = np.gradient(plan.position, TICK, axis=0)
@@ -94,11 +102,23 @@ class ToolControl:
         self._force += self._share * (force - self._force)
         desired = self._plan.force[number]
         if np.isnan(desired):
-            self._offset = self._left * self._plan.keep[number]
-        else:
-            rise = TICK * float(self._gain[number]) * (self._force - desired)
-            self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
+            self._pressing = 0
+            self._offset = self._left * self._plan.keep[number] or self._guarded(number)
+            return self._offset
+        if not self._pressing:
+            self._excess = self._force if self._force > TOUCHING else 0.0
+        if self._excess:  # bumpless transfer: the desired force starts at the measured one
+            share = min(self._pressing * TICK / UNLOADING, 1.0)
+            desired += self._excess * (1 - minimum_jerk(np.float64(share)))
+        self._pressing += 1
+        rise = TICK * float(self._gain[number]) * (self._force - desired)
+        self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
         return self._offset
+
+    def _guarded(self, number: int) -> float:
+        """Height offset of a tool that descends: it yields to an unplanned contact, in [m]."""
+        rise = TICK * float(self._gain[number]) * (self._force - GUARD)
+        return min(max(self._offset + rise, 0.0), FURTHEST)
 
     def _solve(self, tip: Array, yaw: float) -> tuple[Array, Array]:
         """Joints after a Newton step towards a pose of the tool, and the inverse Jacobian.
