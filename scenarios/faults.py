@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from noisemodel.types import Array
 from scenarios.events import Event
+from scenarios.loads import Load
 from scenarios.shapes import Box
 
 Integers: TypeAlias = NDArray[np.int64]
@@ -30,6 +31,7 @@ class Faults:
             (samples, effectors, 2), in [m] and [m/s].
         sensors: Added to the values of sensors, by name: time to shape (ticks, values).
         gain: Scale of the force control's gains: time to shape (ticks,).
+        loads: Forces from outside, other than those of boxes.
         events: Events that are defined before the simulation.
         facts: The drawn values, for the metadata of the run.
     """
@@ -41,6 +43,7 @@ class Faults:
     overlay: Signal | None = None
     sensors: Mapping[str, Signal] = field(default_factory=dict)
     gain: Signal = np.ones_like
+    loads: tuple[Load, ...] = ()
     events: tuple[Event, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
 

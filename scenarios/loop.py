@@ -12,6 +12,7 @@ from scenarios.clock import STEPS, TICK
 from scenarios.collision import set_collision
 from scenarios.drives import Drives
 from scenarios.errors import DivergedError, FallenError
+from scenarios.events import Event
 
 FASTEST = 50.0
 """A joint that is faster than this has diverged, in [rad/s] or [m/s]."""
@@ -64,6 +65,18 @@ class Control(Protocol):
         ...
 
 
+class Force(Protocol):
+    """A force on the robot from outside, other than that of contacts."""
+
+    def apply(self, data: Any, sample: int) -> None:
+        """Add to ``data.qfrc_applied`` before a step, its sample counted from the recording."""
+        ...
+
+    def events(self) -> tuple[Event, ...]:
+        """The events that it was the cause of so far."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """A robot in its environment, ready to be simulated.
@@ -78,6 +91,7 @@ class Scene:
         noise: Standard deviation of each sensor's noise per tick, shape (sensors,).
         changes: Boxes that appear or vanish: geoms, and whether they are present, by ticks of the
             recording.
+        forces: Forces from outside.
     """
 
     model: Any
@@ -87,6 +101,12 @@ class Scene:
     settling: int
     noise: Array
     changes: Mapping[int, Sequence[tuple[int, bool]]] = field(default_factory=dict)
+    forces: tuple[Force, ...] = ()
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events that forces from outside were the cause of so far."""
+        return tuple(event for force in self.forces for event in force.events())
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +208,10 @@ def record(
             motion.torque[sample] = acting
             if base:
                 motion.base_pose[sample], motion.base_velocity[sample] = base_pose, base_velocity
+            if scene.forces:
+                data.qfrc_applied[:] = 0.0
+                for force in scene.forces:
+                    force.apply(data, sample - scene.settling * STEPS)
             mujoco.mj_step(model, data)
             readings[step], motion.contact[sample] = sensed, effector_force
         sensors = readings.mean(axis=0)

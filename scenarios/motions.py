@@ -30,6 +30,33 @@ class Picks:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Reach:
+    """An arm moves its joints in the air, from rest to rest.
+
+    Attributes:
+        kind: Its movements: "minimum-jerk", "trapezoid" (of the velocity), "spline" (through
+            way points), "sines", or "teleoperation" (a hand that wanders and hesitates).
+        speed: Highest speed of a movement's fastest joint, in [rad/s].
+        acceleration: Largest acceleration of a joint, in [rad/s²].
+        spread: Furthest distance of a joint from its position at rest, in [rad].
+        pause: Time between two movements; some are longer, in [s].
+        stops: Emergency stops per second, in [1/s]; the arm goes on after each.
+        payload: Mass that it picks up and puts down, times the robot's unit of force, in [kg];
+            (0, 0) for none.
+        duration: Default duration of a run, in [s].
+    """
+
+    kind: str = "minimum-jerk"
+    speed: Range = (0.3, 1.0)
+    acceleration: float = 10.0
+    spread: float = 0.6
+    pause: Range = (0.05, 0.4)
+    stops: float = 0.0
+    payload: Range = (0.0, 0.0)
+    duration: float = 6.0
+
+
+@dataclass(frozen=True, kw_only=True)
 class Walk:
     """A humanoid walks.
 
@@ -73,5 +100,5 @@ class Trot:
     duration: float = 5.0
 
 
-Motion: TypeAlias = Picks | Walk | Trot
+Motion: TypeAlias = Picks | Reach | Walk | Trot
 """A motion of any family."""

@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, Protocol
 
+import numpy as np
 import pinocchio as pin
 
 from noisemodel import Robot
+from noisemodel.types import Array
 from scenarios.drivetrain import Drivetrain
 from scenarios.errors import UnsupportedModelError
 
@@ -47,6 +49,21 @@ def reduced_model(robot: Reducible) -> Any:
     return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
 
 
+def configuration(model: Any, joints: Array) -> Array:
+    """Pinocchio's configuration of a robot with a fixed base.
+
+    Args:
+        model: The ``pinocchio.Model``.
+        joints: Joint positions, shape (joints,), in [rad].
+
+    Returns:
+        The same, but for continuous joints, which have a cosine and a sine.
+    """
+    if model.nq == model.nv:
+        return joints
+    return np.asarray(pin.integrate(model, pin.neutral(model), joints))
+
+
 @lru_cache(maxsize=8)
 def _reduced(
     name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...], scale: float
@@ -65,7 +82,8 @@ def _reduced(
         for joint in model.names[1:]
         if joint not in moved and model.joints[model.getJointId(joint)].nv == 1
     ]
-    reduced = pin.buildReducedModel(model, fixed, posture)
+    # Pinocchio refuses models with a joint and a body of one name, even if no joint is locked.
+    reduced = pin.buildReducedModel(model, fixed, posture) if fixed else model
     if tuple(reduced.names)[-len(moved) :] != moved:
         raise UnsupportedModelError(
             f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"

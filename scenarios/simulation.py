@@ -181,9 +181,8 @@ def _trial(robot: Simulated, case: Case, seed: int, duration: float) -> Trial:
     faults = case.defect.draw(defect, plan)
     scene = family.scene(robot, plan, faults, imperfections)
     recorded = _record(robot, scene, plan, faults, imperfections, sensors)
-    return Trial(
-        recorded, faults.events + unplanned(recorded.contact, plan.contacts), faults, imperfections
-    )
+    events = faults.events + unplanned(recorded.contact, plan.contacts) + scene.events
+    return Trial(recorded, events, faults, imperfections)
 
 
 def _record(

@@ -10,6 +10,7 @@ from scenarios.arm.picking import Plan
 from scenarios.clock import TICK
 from scenarios.loop import Reference
 from scenarios.paths import minimum_jerk
+from scenarios.reduced import configuration
 
 HIGHEST_ACCELERATION = 30.0
 """Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²]."""
@@ -50,7 +51,7 @@ class ToolControl:
     ) -> None:
         self._model, self._data = model, model.createData()
         self._frame, self._point = model.getFrameId(frame), point
-        pin.framesForwardKinematics(model, self._data, rest)
+        pin.framesForwardKinematics(model, self._data, configuration(model, rest))
         self._upright = self._data.oMf[self._frame].rotation.copy()
         self._plan, self._gain = plan, gain
         self._share = TICK / (time_constant + TICK)
@@ -84,7 +85,7 @@ class ToolControl:
             torque=pin.rnea(
                 self._model,
                 self._data,
-                here,
+                configuration(self._model, here),
                 velocity,
                 np.clip(acceleration, -HIGHEST_ACCELERATION, HIGHEST_ACCELERATION),
             ),
@@ -108,8 +109,8 @@ class ToolControl:
         if not self._pressing:
             self._excess = self._force if self._force > TOUCHING else 0.0
         if self._excess:  # bumpless transfer: the desired force starts at the measured one
-            share = min(self._pressing * TICK / UNLOADING, 1.0)
-            desired += self._excess * (1 - minimum_jerk(np.float64(share)))
+            share = np.array(min(self._pressing * TICK / UNLOADING, 1.0))
+            desired += self._excess * (1 - float(minimum_jerk(share)))
         self._pressing += 1
         rise = TICK * float(self._gain[number]) * (self._force - desired)
         self._offset = self._left = min(max(self._offset + rise, -FURTHEST), FURTHEST)
@@ -126,7 +127,7 @@ class ToolControl:
         One step per tick is enough: the tool moves by a millimetre in that time.
         """
         joints = self._joints[-1]
-        pin.computeJointJacobians(self._model, self._data, joints)
+        pin.computeJointJacobians(self._model, self._data, configuration(self._model, joints))
         placement = pin.updateFramePlacement(self._model, self._data, self._frame)
         lever = placement.rotation @ self._point
         jacobian = pin.getFrameJacobian(

@@ -8,12 +8,15 @@ from noisemodel.types import Array
 from scenarios.clock import TICK, times
 from scenarios.contacts import Contact
 from scenarios.defects.plan import Units
+from scenarios.loads import Payload
 from scenarios.motions import Picks
 from scenarios.paths import bump, minimum_jerk
 from scenarios.shapes import Box, Effector, Rod
 
 NEAR = 0.002
 """Height over the table at which force control starts, in [m]."""
+METRIC = Units()
+"""Metres and newtons."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +31,7 @@ class Plan:
         contacts: The planned contacts.
         effectors: The tool.
         ground: The table.
+        units: The units of the robot.
     """
 
     position: Array
@@ -37,6 +41,7 @@ class Plan:
     contacts: tuple[Contact, ...]
     effectors: tuple[Effector, ...]
     ground: tuple[Box, ...]
+    units: Units = METRIC
 
     @property
     def time(self) -> Array:
@@ -44,9 +49,9 @@ class Plan:
         return times(len(self.yaw), TICK)
 
     @property
-    def units(self) -> Units:
-        """Metres and newtons, as the scenarios of arms have them."""
-        return Units()
+    def payloads(self) -> tuple[Payload, ...]:
+        """None."""
+        return ()
 
     @property
     def duration(self) -> float:
@@ -86,6 +91,7 @@ def pick(
     table: float,
     reach: tuple[tuple[float, float], tuple[float, float]],
     duration: float,
+    units: Units = METRIC,
 ) -> Plan:
     """Plan of picks, one after the other.
 
@@ -97,6 +103,7 @@ def pick(
         table: Height of the table, in [m].
         reach: Ranges of x and y on the table, in [m].
         duration: Duration of the plan, in [s].
+        units: The units of the robot, by which forces are multiplied.
 
     Returns:
         The plan; the beginning of a plan does not depend on its duration.
@@ -123,11 +130,12 @@ def pick(
     return Plan(
         position,
         yaw,
-        force,
+        force * units.force,
         keep,
         contacts=tuple(contact for contact in contacts if contact.start < duration),
         effectors=(tool,),
         ground=(Box(centre=(0.5, 0.0, table - 0.05), half=(0.6, 1.0, 0.05)),),
+        units=units,
     )
 
 

@@ -1,4 +1,4 @@
-"""Scene of an arm, its table and its controller."""
+"""Scene of an arm, its table if it picks, and its controller."""
 
 from dataclasses import replace
 from typing import Any
@@ -6,25 +6,32 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from noisemodel import Robot
 from noisemodel.types import Array
-from scenarios.arm.control import ToolControl
+from scenarios.arm import reaching
+from scenarios.arm.control import HIGHEST_ACCELERATION, ToolControl
+from scenarios.arm.following import JointControl
 from scenarios.arm.picking import Plan, pick
 from scenarios.arm.robots import Arm
 from scenarios.clock import STEP
 from scenarios.collision import box_changes
+from scenarios.errors import UnsupportedModelError
 from scenarios.faults import Faults
+from scenarios.forces import forces
 from scenarios.imperfections import Imperfections, real_model
-from scenarios.loop import Scene
-from scenarios.motions import Picks
+from scenarios.loop import Control, Scene
+from scenarios.motions import Picks, Reach
 from scenarios.mujoco_model import build
 from scenarios.physics import Physics
-from scenarios.reduced import reduced_model
+from scenarios.reduced import configuration, reduced_model
 
 SETTLING = 300
 """Ticks before the recording during which the arm comes to rest under its unknown load."""
 
 
-def plan(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> Plan:
+def plan(
+    arm: Arm, motion: Picks | Reach, rng: np.random.Generator, duration: float
+) -> Plan | reaching.Plan:
     """Plan of the motion of one run.
 
     Args:
@@ -35,10 +42,20 @@ def plan(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> 
 
     Returns:
         The plan.
+
+    Raises:
+        UnsupportedModelError: If the arm cannot move like that.
     """
     model = reduced_model(arm)
+    if isinstance(motion, Reach):
+        ability = _ability(arm)
+        return reaching.reach(
+            motion, rng, ability=ability, tool=arm.tool, units=arm.units, duration=duration
+        )
+    if arm.reach is None:
+        raise UnsupportedModelError(f"{arm.name} has no table to pick from")
     data = model.createData()
-    pin.framesForwardKinematics(model, data, np.array(arm.rest))
+    pin.framesForwardKinematics(model, data, configuration(model, np.array(arm.rest)))
     start = data.oMf[model.getFrameId(arm.tool.frame)].act(_tip(arm))
     return pick(
         motion,
@@ -48,10 +65,13 @@ def plan(arm: Arm, motion: Picks, rng: np.random.Generator, duration: float) -> 
         table=arm.table,
         reach=arm.reach,
         duration=duration,
+        units=arm.units,
     )
 
 
-def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
+def scene(
+    arm: Arm, plan: Plan | reaching.Plan, faults: Faults, imperfections: Imperfections
+) -> Scene:
     """Scene of one run.
 
     Args:
@@ -66,24 +86,62 @@ def scene(arm: Arm, plan: Plan, faults: Faults, imperfections: Imperfections) ->
     model, rest = reduced_model(arm), np.array(arm.rest)
     boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
     world = _world(arm, model, boxes, imperfections)
-    gain = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge")
-    control = ToolControl(
-        model,
-        arm.tool.frame,
-        _tip(arm),
-        rest,
-        _shifted(plan, faults).after(SETTLING),
-        gain=arm.force_gain * imperfections.force_gain * gain,
-        time_constant=arm.force_filter,
-    )
     return Scene(
         model=world,
         start=rest - faults.offsets(len(rest)),  # the encoders read the rest position
-        control=control,
+        control=_control(arm, model, plan, faults, imperfections),
         effectors=1,
         settling=SETTLING,
         noise=np.array([imperfections.force_noise]),
         changes=box_changes(world, boxes),
+        forces=forces(world, (*plan.payloads, *faults.loads)),
+    )
+
+
+def _control(
+    arm: Arm, model: Any, plan: Plan | reaching.Plan, faults: Faults, imperfections: Imperfections
+) -> Control:
+    """Controller of the tool, or of the joints, that rests at first."""
+    if isinstance(plan, reaching.Plan):
+        shift = faults.shift(plan.time)[:, 0] if faults.shift else np.zeros_like(plan.position)
+        rest = ((SETTLING, 0), (0, 0))
+        return JointControl(
+            model,
+            arm.tool,
+            np.pad(plan.joints, rest, "edge"),
+            np.pad(shift, rest),
+            fastest=HIGHEST_ACCELERATION if plan.foreseen else 0.0,
+        )
+    gain = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge")
+    return ToolControl(
+        model,
+        arm.tool.frame,
+        _tip(arm),
+        np.array(arm.rest),
+        _shifted(plan, faults).after(SETTLING),
+        gain=arm.force_gain * imperfections.force_gain * gain,
+        time_constant=arm.force_filter,
+    )
+
+
+def _ability(arm: Arm) -> reaching.Ability:
+    """What an arm can do, by its URDF and its drives."""
+    model, rest = Robot.load(arm.name, floating_base=False).model, np.array(arm.rest)
+    joints = [model.joints[model.getJointId(name)] for name in arm.drives.joints]
+    low, high = rest - reaching.TURN, rest + reaching.TURN
+    for index, joint in enumerate(joints):
+        if joint.nq == 1:  # a continuous joint has no limits
+            low[index] = max(low[index], model.lowerPositionLimit[joint.idx_q] + reaching.MARGIN)
+            high[index] = min(high[index], model.upperPositionLimit[joint.idx_q] - reaching.MARGIN)
+    speed = np.array([model.velocityLimit[joint.idx_v] for joint in joints])
+    return reaching.Ability(
+        reduced_model(arm),
+        rest,
+        low=np.minimum(low, rest),
+        high=np.maximum(high, rest),
+        speed=reaching.SHARE * np.where(speed > 0, speed, np.inf),
+        torque=np.array(arm.drives.torque),
+        armature=np.array(arm.drives.armature),
     )
 
 

@@ -1,9 +1,10 @@
 """Defects of a robot or its world: settings from which a seed draws faults.
 
-A defect acts in one of five places: ground, encoder, planned motion, sensors, gains. It depends on
-the plan only by time, ground and contacts, not on the robot.
+A defect acts in one of six places: ground, encoder, planned motion, sensors, gains, forces from
+outside. It depends on the plan only by time, ground, contacts and motion, not on the robot.
 """
 
+from scenarios.defects.air import Collisions, JointStops
 from scenarios.defects.edge import Overhang, StepDown
 from scenarios.defects.ground import GivingWay, Obstacles
 from scenarios.defects.plan import Defect, NoDefect, Plan, Range, Units
@@ -17,10 +18,12 @@ from scenarios.defects.signals import (
 )
 
 __all__ = [
+    "Collisions",
     "Decalibration",
     "Defect",
     "ForceGain",
     "GivingWay",
+    "JointStops",
     "Multisine",
     "NoDefect",
     "Obstacles",
