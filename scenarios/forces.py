@@ -18,8 +18,11 @@ SLOWEST = 0.03
 """Least speed of an effector that collides, in [m/s]."""
 PATIENCE = 0.5
 """How long an obstacle waits for an effector to be that fast, in [s]."""
-RELEASE = 0.2
-"""Time in which an obstacle gives way, in [s]."""
+LOOSE = 0.08
+"""Time in which an obstacle breaks loose, in [s]."""
+SLIDING = 0.25
+"""Share of its force that it resists with from then on: drives that hold it off for long would be
+saturated, and let the arm fly off at the end."""
 DISSIPATION = 1.5
 """Damping of a contact per depth and stiffness, in [s/m] (Hunt and Crossley, Coefficient of
 restitution interpreted as damping in vibroimpact, J. Applied Mechanics 1975): no force at the
@@ -134,10 +137,12 @@ class _Obstacle:
             if speed < SLOWEST or self._done:
                 return
             self._face, self._across, self._since = place, velocity / speed, time
-        share = min(max((time - self._since - load.hold) / RELEASE, 0.0), 1.0)
-        limit = load.limit * (1 - float(minimum_jerk(np.array(share))))
+        loose, fade = minimum_jerk(
+            np.clip((time - self._since) / np.array([LOOSE, LOOSE + load.hold]), 0, 1)
+        )
+        limit = load.limit * (1 - (1 - SLIDING) * loose) * (1 - fade)
         depth = float((place - self._face) @ self._across)
-        self._done = share == 1.0
+        self._done = fade == 1.0
         if depth <= 0:
             return
         rate = float(velocity @ self._across)

@@ -27,12 +27,14 @@ class Payload:
 class Collision:
     """An obstacle in the air, where an effector is at that time, that it pushes away.
 
+    It breaks loose at its limit of force, then resists with less, and at last not at all.
+
     Attributes:
         frame: Name of the effector's frame.
         start: When the effector meets it; if it is slow then, as soon as it is fast, in [s].
-        hold: Time until the obstacle gives way, in [s].
+        hold: Time in which its resistance fades, in [s].
         stiffness: In [N/m].
-        limit: Force beyond which it yields, in [N].
+        limit: Force at which it breaks loose, in [N].
     """
 
     frame: str

@@ -58,7 +58,7 @@ def motion(rng: np.random.Generator, wildness: float, arm: Arm | None = None) ->
         spread=0.2 + wide * (0.3 + 0.7 * wildness),
         pause=(0.0, 0.1 + 0.5 * pace),
         stops=0.3 * wildness if stops < 0.5 * wildness else 0.0,
-        payload=(0.1, 0.5 + 2.5 * wildness) if carries < 0.2 + 0.4 * wildness else (0.0, 0.0),
+        payload=(0.1, 0.5 + 1.5 * wildness) if carries < 0.2 + 0.4 * wildness else (0.0, 0.0),
     )
 
 

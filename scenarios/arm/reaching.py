@@ -22,6 +22,8 @@ from scenarios.shapes import Box, Effector
 
 MARGIN = 0.1
 """Distance from the joints' limits, in [rad]."""
+OVER = 0.08
+"""How far splines and waves may reach into that margin, in [rad]."""
 SHORTEST = 0.2
 """Shortest movement, in [s]."""
 TURN = np.pi
@@ -42,6 +44,8 @@ RESUMING = 0.4
 """Time in which the motion gets back to its speed, in [s]."""
 CARRYING = (0.5, 2.5)
 """Time between picking up and putting down, and until the next time, in [s]."""
+GRASPING = (0.06, 0.15)
+"""Time in which the tool takes over a weight, in [s]."""
 SINES = (0.05, 1.5)
 """Frequencies of sines, in [Hz]."""
 HAND = (0.4, 1.5)
@@ -250,10 +254,14 @@ def _spline(
     points = np.array([start, *(_goal(motion, rng, ability) for _ in range(rng.integers(3, 6)))])
     lengths = np.abs(np.diff(points, axis=0)).max(axis=1) + 0.05
     knots = np.concatenate(([0.0], np.cumsum(lengths))) / lengths.sum()
-    path = CubicSpline(knots, points, bc_type="clamped")
+    for shrink in (1.0, 0.7, 0.4, 0.1):  # splines overshoot; into the margin they may
+        path = CubicSpline(knots, start + shrink * (points - start), bc_type="clamped")
+        fine = path(np.linspace(0, 1, 500))
+        if (fine >= ability.low - OVER).all() and (fine <= ability.high + OVER).all():
+            break
 
     def movement(duration: float) -> Array:
-        return np.clip(path(_shares(duration)), ability.low, ability.high)
+        return np.asarray(path(_shares(duration)))
 
     return movement, float(np.abs(path(np.linspace(0, 1, 500), 1)).max())
 
@@ -320,14 +328,14 @@ def _shares(duration: float) -> Array:
 def _bounded(path: Array, start: Array, ability: Ability) -> Array:
     """Path around its start, drawn together where it would exceed a limit."""
     away = path - start
-    room = np.where(away > 0, ability.high - start, start - ability.low)
-    excess = np.abs(away).max(axis=0) / np.maximum(room.min(axis=0), 1e-6)
+    room = np.where(away > 0, ability.high - start, start - ability.low) + OVER
+    excess = np.abs(away).max(axis=0) / room.min(axis=0)
     return np.asarray(start + away / np.maximum(excess, 1.0))
 
 
 def _wander(rng: np.random.Generator, shape: tuple[int, int], deviation: float) -> Array:
     """Low-passed white noise of about unit amplitude; deviation of the filter in ticks."""
-    smooth = gaussian_filter1d(rng.normal(size=shape), deviation, axis=0, mode="nearest")
+    smooth = gaussian_filter1d(rng.normal(size=shape), deviation, axis=0, mode="wrap")
     return np.asarray(smooth * np.sqrt(2 * np.sqrt(np.pi) * deviation))
 
 
@@ -359,7 +367,7 @@ def _payloads(
     payloads, now = [], float(rng.uniform(*CARRYING))
     while motion.payload[1] and now < duration:
         mass = units.force * float(rng.uniform(*motion.payload))
-        stop, rise = now + float(rng.uniform(*CARRYING)), float(rng.uniform(0.05, 0.1))
+        stop, rise = now + float(rng.uniform(*CARRYING)), float(rng.uniform(*GRASPING))
         payloads.append(Payload(frame=tool.frame, start=now, stop=stop, mass=mass, rise=rise))
         now = stop + rise + float(rng.uniform(*CARRYING))
     return tuple(payloads)

@@ -156,19 +156,16 @@ def nominal(
     )
 
 
-def _units(drives: Drivetrain, reach: float) -> Units:
-    """Torque and, at the arm's reach in [m], force of the strongest drive, as shares of Panda's."""
-    torque = max(drives.torque) / max(PANDA.drives.torque)
-    return Units(force=torque * 0.85 / reach, torque=torque)
-
-
 def _numbered(pattern: str, count: int) -> tuple[str, ...]:
     return tuple(pattern.format(number) for number in range(1, count + 1))
 
 
-def _arm(name: str, drives: Drivetrain, span: float, tool: Rod, **settings: Any) -> Arm:
-    """An arm by its drives, its reach in [m] and its tool."""
-    units = _units(drives, span)
+def _arm(name: str, drives: Drivetrain, capacity: float, tool: Rod, **settings: Any) -> Arm:
+    """An arm by its drives, and the force at the tool, in any direction, that they bear at rest.
+
+    Units of force and torque are 1 for Panda, which bears 47 N.
+    """
+    units = Units(force=capacity / 47.0, torque=max(drives.torque) / max(PANDA.drives.torque))
     return Arm(
         name=name,
         drives=drives,
@@ -187,7 +184,7 @@ XARM7 = _arm(
         inertia=(0.4, 0.91, 0.53, 0.45, 0.004, 0.012, 0.0),
         torque=(50.0, 50.0, 30.0, 30.0, 30.0, 20.0, 20.0),
     ),
-    0.7,
+    37.0,
     Rod(frame="link_eef", length=0.08, radius=0.01),
     rest=(0.0, -0.262, 0.0, 0.982, 0.0, 1.244, 0.0),
     table=0.1,
@@ -202,7 +199,7 @@ UR3 = _arm(
         inertia=(0.21, 0.39, 0.13, 0.008, 0.003, 0.001),
         torque=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),
     ),
-    0.5,
+    67.0,
     Rod(frame="tool0", length=0.06, radius=0.01),
     rest=(-0.359, -1.566, 1.583, -1.588, -1.571, 1.45),
     table=0.05,
@@ -217,7 +214,7 @@ BAXTER = _arm(
         inertia=(2.09, 2.3, 0.86, 0.62, 0.104, 0.093, 0.041),
         torque=(80.0, 80.0, 50.0, 50.0, 15.0, 15.0, 15.0),
     ),
-    1.0,
+    31.0,
     Rod(frame="left_gripper", length=0.08, radius=0.01),
     rest=(-0.648, -1.184, 0.008, 1.275, -0.003, 1.479, 0.0),
     table=-0.05,
@@ -229,10 +226,10 @@ KINOVA = _arm(
     "kinova",
     nominal(
         _numbered("j2s6s200_joint_{}", 6),
-        inertia=(0.15, 0.3, 0.24, 0.028, 0.031, 0.001),
+        inertia=(0.32, 0.69, 0.24, 0.028, 0.031, 0.001),
         torque=(40.0, 80.0, 40.0, 20.0, 20.0, 20.0),
     ),
-    0.9,
+    69.0,
     Rod(frame="j2s6s200_end_effector", length=0.05, radius=0.01),
     rest=(1.16, 3.03, 5.0, -0.69, 4.37, 0.27),
 )
@@ -241,10 +238,10 @@ Z1 = _arm(
     "z1",
     nominal(
         _numbered("joint{}", 6),
-        inertia=(0.32, 0.56, 0.17, 0.053, 0.022, 0.001),
+        inertia=(0.28, 0.63, 0.27, 0.053, 0.022, 0.001),
         torque=(30.0, 60.0, 30.0, 30.0, 30.0, 30.0),
     ),
-    0.7,
+    64.0,
     Rod(frame="link06", length=0.05, radius=0.01),
     rest=(0.0, 1.6, -1.5, 0.5, 0.0, 0.0),
 )
@@ -254,7 +251,7 @@ _SO = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll"
 SO100 = _arm(
     "so100",
     nominal(_SO, inertia=(0.012, 0.012, 0.007, 0.001, 0.0, 0.0), torque=(3.0,) * 6),
-    0.35,
+    11.0,
     Rod(frame="jaw", length=0.03, radius=0.005),
     rest=(0.0, 1.8, -1.6, 0.6, 0.0, 0.3),
 )
@@ -262,7 +259,7 @@ SO100 = _arm(
 SO101 = _arm(
     "so101",
     nominal(_SO, inertia=(0.01, 0.01, 0.008, 0.001, 0.0, 0.0), torque=(3.0,) * 6),
-    0.35,
+    8.0,
     Rod(frame="gripper_frame_link", length=0.03, radius=0.005),
     rest=(0.0, -0.3, 0.4, 0.6, 0.0, 0.3),
 )
@@ -274,7 +271,7 @@ TIAGO = _arm(
         inertia=(1.1, 0.68, 0.19, 0.17, 0.001, 0.001, 0.0),
         torque=(39.0, 39.0, 18.0, 18.0, 7.0, 7.0, 7.0),
     ),
-    0.8,
+    37.0,
     Rod(frame="arm_tool_link", length=0.05, radius=0.01),
     rest=(0.67, 0.42, -2.15, 1.35, 0.79, -0.66, 1.23),
 )
@@ -286,7 +283,7 @@ TIAGO_PRO = _arm(
         inertia=(0.68, 0.38, 0.3, 0.27, 0.015, 0.016, 0.001),
         torque=(43.0, 43.0) + (26.0,) * 5,
     ),
-    0.8,
+    64.0,
     Rod(frame="arm_left_tool_link", length=0.05, radius=0.01),
     rest=(2.38, -1.23, -1.78, -1.76, -2.4, 2.25, 0.0),
 )

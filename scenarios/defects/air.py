@@ -32,8 +32,8 @@ class Collisions:
     Attributes:
         every: Mean time between two collisions, in [s].
         stiffness: In [N/m], times the robot's unit of force.
-        limit: Force at which an obstacle yields, in [N], times the robot's unit of force.
-        hold: Time until an obstacle gives way, in [s].
+        limit: Force at which an obstacle breaks loose, in [N], times the robot's unit of force.
+        hold: Time in which its resistance fades, in [s].
     """
 
     every: float = 2.0
@@ -80,7 +80,7 @@ class JointStops:
         least: Least range of a joint's motion, in [rad].
     """
 
-    overshoot: Range = (0.02, 0.15)
+    overshoot: Range = (0.05, 0.4)
     stiffness: Range = (3e3, 3e4)
     least: float = 0.1
 
@@ -96,7 +96,7 @@ class JointStops:
             return Faults()
         side, joint = chosen[int(index * len(chosen))].tolist()
         way = float(furthest[side, joint])
-        over = min(_between(self.overshoot, share), 0.8 * way)
+        over = min(_between(self.overshoot, share), 0.7 * way)
         sign = 2 * side - 1
         stop = JointStop(
             joint=joint,
