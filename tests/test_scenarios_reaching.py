@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scenarios import simulation
-from scenarios.arm.domains import DEFECTS, motion, scaled
+from scenarios.arm.domains import DEFECTS, motion, scaled, suited
 from scenarios.arm.reaching import KINDS, Plan
 from scenarios.arm.robots import ARMS, PANDA, SO101, Arm
 from scenarios.arm.scene import plan
@@ -212,6 +212,8 @@ def test_every_fault_suits_every_motion(name):
         drawn = plan(PANDA, one, RNG(0), 3.0)
         faults = DEFECTS[name].draw(RNG(1), drawn)
         assert all(0 <= event.start < event.stop for event in faults.events)
+        acts = bool(faults.events or faults.loads or faults.boxes)
+        assert acts == (name in suited(one))
 
 
 def test_a_collision_is_drawn_while_the_tool_moves():

@@ -50,12 +50,12 @@ def motion(rng: np.random.Generator, wildness: float, arm: Arm | None = None) ->
             hover=(0.005, 0.01 + 0.02 * wildness),
             force=(low, low + 20.0),
         )
-    fastest = SLOWEST * (_mixed(FASTEST, wildness) / SLOWEST) ** (0.3 + 0.7 * fast)
+    fastest = SLOWEST * (_mixed(FASTEST, wildness) / SLOWEST) ** (0.45 + 0.55 * fast)
     return Reach(
         kind=tuple(KINDS)[int(kind * len(KINDS))],
-        speed=(max(SLOWEST, fastest / 4), fastest),
-        acceleration=3.0 + hard * (3.0 + 14.0 * wildness),
-        spread=0.2 + wide * (0.3 + 0.7 * wildness),
+        speed=(max(SLOWEST, fastest / 3), fastest),
+        acceleration=4.0 + hard * (4.0 + 12.0 * wildness),
+        spread=0.3 + wide * (0.3 + 0.7 * wildness),
         pause=(0.0, 0.1 + 0.5 * pace),
         stops=0.3 * wildness if stops < 0.5 * wildness else 0.0,
         payload=(0.1, 0.5 + 1.5 * wildness) if carries < 0.2 + 0.4 * wildness else (0.0, 0.0),
@@ -77,8 +77,25 @@ DEFECTS: Mapping[str, Defect] = {
     "reference-jump": ReferenceJumps(distance=(0.0005, 0.006), speed=(0.05, 2.0)),
     "multisine": Multisine(BANDS, (0.00005, 0.002), fastest=1.0),
 }
-"""Faults by name. Those of contacts do nothing in motions without any, and stops of joints do
-nothing in picks, whose joints are not planned."""
+"""Faults by name; `suited` has those that can act in a motion."""
+
+_ON_CONTACT = ("obstacle", "giving-way", "force-gain", "force-jump")
+
+
+def suited(motion: Picks | Reach) -> tuple[str, ...]:
+    """Names of the faults that can act in a motion.
+
+    Args:
+        motion: The motion.
+
+    Returns:
+        Names in ``DEFECTS``: without those of contacts if it has none, and without end stops if its
+        joints are not planned; the others draw nothing for it.
+    """
+    idle: tuple[str, ...] = _ON_CONTACT if isinstance(motion, Reach) else ("joint-stop",)
+    if isinstance(motion, Picks) and motion.way == "directions":
+        idle += _ON_CONTACT
+    return tuple(name for name in DEFECTS if name not in idle)
 
 
 def scaled(arm: Arm, factor: float) -> Arm:

@@ -50,7 +50,7 @@ class Collisions:
         loads = []
         for span in np.array_split(np.arange(len(speed)), count):
             middle = span[len(span) // 8 : -(len(span) // 4)]
-            moving = middle[speed[middle] > MOVING]
+            moving = middle[speed[middle] > max(MOVING, 0.5 * speed[middle].max())]
             share, *values = rng.uniform(size=4).tolist()
             if not moving.size:
                 continue
