@@ -23,6 +23,8 @@ LOOSE = 0.08
 SLIDING = 0.25
 """Share of its force that it resists with from then on: drives that hold it off for long would be
 saturated, and let the arm fly off at the end."""
+RELEASED = 0.2
+"""Least duration of a contact whose end is an event of its own, in [s]."""
 DISSIPATION = 1.5
 """Damping of a contact per depth and stiffness, in [s/m] (Hunt and Crossley, Coefficient of
 restitution interpreted as damping in vibroimpact, J. Applied Mechanics 1975): no force at the
@@ -90,6 +92,16 @@ class _Touches:
                   {"force": force, "impulse": impulse, **facts})
             for start, last, force, impulse in self._touches
         )  # fmt: skip
+
+    def releases(self, **facts: float) -> tuple[Event, ...]:
+        """The end of each contact of some duration: the joints catch up with their references."""
+        return tuple(
+            Event(
+                "highaccelerations", f"release from the {self._cause}", last, last + IMPACT, facts
+            )
+            for start, last, _, _ in self._touches
+            if last > start + RELEASED
+        )
 
 
 class _Weight:
@@ -177,5 +189,6 @@ class _Stop:
         data.qfrc_applied[load.joint] -= load.side * torque
 
     def events(self) -> tuple[Event, ...]:
-        """An impact each time that the joint meets the stop."""
-        return self._touches.events(joint=self._load.joint, stiffness=self._load.stiffness)
+        """An impact each time that the joint meets the stop, and its release if that is later."""
+        facts = {"joint": self._load.joint, "stiffness": self._load.stiffness}
+        return self._touches.events(**facts) + self._touches.releases(**facts)

@@ -202,6 +202,9 @@ def test_an_end_stop_holds_its_joint():
     assert (side * (held.motion.position[:, joint] - angle)).max() < 0.01
     event = held.events[0]
     assert (event.label, event.cause) == ("impact", "end stop of a joint")
+    for later in held.events[1:]:
+        assert later.label in ("impact", "highaccelerations")
+        assert later.start > event.start
     onset = round(event.start * 10_000)
     np.testing.assert_array_equal(held.motion.velocity[:onset], free.motion.velocity[:onset])
 

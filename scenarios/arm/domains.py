@@ -67,7 +67,7 @@ def _mixed(span: Range, share: float) -> float:
 
 
 DEFECTS: Mapping[str, Defect] = {
-    "collision-soft": Collisions(stiffness=(1e3, 1e4)),
+    "collision-soft": Collisions(stiffness=(1e3, 1e4), limit=(10.0, 80.0)),
     "collision-hard": Collisions(stiffness=(1e4, 1e5), limit=(30.0, 150.0)),
     "joint-stop": JointStops(),
     "obstacle": Obstacles((0.004, 0.06), (0.05, 0.05), share=0.7),
