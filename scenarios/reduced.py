@@ -82,8 +82,12 @@ def _reduced(
         for joint in model.names[1:]
         if joint not in moved and model.joints[model.getJointId(joint)].nv == 1
     ]
-    # Pinocchio refuses models with a joint and a body of one name, even if no joint is locked.
-    reduced = pin.buildReducedModel(model, fixed, posture) if fixed else model
+    try:
+        reduced = pin.buildReducedModel(model, fixed, posture)
+    except ValueError:  # Pinocchio refuses models with a joint and a body of one name
+        if fixed:
+            raise
+        reduced = model
     if tuple(reduced.names)[-len(moved) :] != moved:
         raise UnsupportedModelError(
             f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"
