@@ -82,7 +82,7 @@ class Walk:
 
 @dataclass(frozen=True, kw_only=True)
 class Trot:
-    """A quadruped trots.
+    """A quadruped trots, or goes in another gait.
 
     Attributes:
         way: Its path: "straight", in a "curve", in other "directions" (sideways or
@@ -91,6 +91,12 @@ class Trot:
         period: Time of a cycle, as a share of the robot's nominal period.
         jitter: By which share each cycle's time varies.
         duration: Default duration of a run, in [s].
+        gait: A name in ``scenarios.quadruped.gait.GAITS``, or "stand".
+        speed: Highest speed, as a share of the robot's; turning too.
+        pauses: How often it stops and stands within the run.
+        pause: How long it stands each time, in [s].
+        posing: Roll, pitch, height and shift of the body, as a share of the largest, see
+            ``scenarios.quadruped.posing``.
     """
 
     way: str = "straight"
@@ -98,6 +104,11 @@ class Trot:
     period: Range = (0.8, 1.2)
     jitter: float = 0.1
     duration: float = 5.0
+    gait: str = "trot"
+    speed: float = 1.0
+    pauses: int = 0
+    pause: Range = (0.5, 1.0)
+    posing: Range = (0.0, 0.0)
 
 
 Motion: TypeAlias = Picks | Reach | Walk | Trot

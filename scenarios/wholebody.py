@@ -110,6 +110,12 @@ class WholeBody:
         return self.inverse[6:, self._heights].T
 
     @property
+    def planes(self) -> Array:
+        """Rates of the effectors' x and y per velocity, shape (2 effectors, nv)."""
+        rows = [row for height in self._heights for row in (height - 2, height - 1)]
+        return self._jacobian[rows]
+
+    @property
     def heights(self) -> Array:
         """Rates of the effectors' heights per velocity, shape (effectors, nv)."""
         return self._jacobian[self._heights]

@@ -12,7 +12,7 @@ from scenarios.quadruped.estimation import StateEstimate
 from scenarios.quadruped.feet import Feet
 from scenarios.quadruped.robots import Quadruped
 from scenarios.quadruped.standing import Standing
-from scenarios.quadruped.trotting import Plan
+from scenarios.quadruped.trotting import Plan, turned
 from scenarios.wholebody import WholeBody
 
 HIGHEST_ACCELERATION = 1500.0
@@ -87,11 +87,14 @@ class TrotControl:
         plan, estimate = self._plan, self._estimate
         centre, yaw = plan.centre[number].copy(), float(plan.yaw[number])
         velocity = self._rates[number, _CENTRE]
-        estimate.update(sensors, place=centre[:2], velocity=velocity, yaw=yaw)
+        tilt = plan.tilt[number]
+        estimate.update(sensors, place=centre[:2], velocity=velocity, yaw=yaw, tilt=tilt)
         centre[:2] += estimate.position_correction
         lean = -self._lean
         base = pin.rpy.rpyToMatrix(
-            lean * estimate.roll, lean * estimate.pitch, yaw + estimate.yaw_correction
+            tilt[0] + lean * estimate.roll,
+            tilt[1] + lean * estimate.pitch,
+            yaw + estimate.yaw_correction,
         )
         return self._body.follow(self._feet.places(number, estimate), (), centre, base)
 
@@ -102,7 +105,8 @@ class TrotControl:
         acceleration = np.minimum(np.maximum(acceleration, -highest), highest)
         torque = pin.rnea(self._model, self._data, configuration, velocity, acceleration)
         load = self._plan.weight * self._plan.load[number]
-        return np.asarray((torque - load @ self._body.heights)[6:])
+        push = np.outer(load, self._plan.push[number]).ravel()
+        return np.asarray((torque - load @ self._body.heights - push @ self._body.planes)[6:])
 
 
 _CENTRE = slice(-6, -4)
@@ -116,7 +120,6 @@ def _rates(plan: Plan) -> Array:
         Shape (ticks, equations), in [m/s] and [rad/s].
     """
     feet = plan.feet.reshape(len(plan.yaw), -1)
-    level = np.zeros((len(plan.yaw), 2))
-    return np.asarray(
-        np.gradient(np.column_stack((feet, plan.centre, level, plan.yaw)), TICK, axis=0)
-    )
+    rates = np.gradient(np.column_stack((feet, plan.centre, plan.tilt, plan.yaw)), TICK, axis=0)
+    rates[:, -3:-1] = turned(plan.yaw, rates[:, -3:-1])  # of small tilts
+    return np.asarray(rates)

@@ -24,8 +24,8 @@ class StateEstimate:
         sensors: Slice of each sensor.
 
     Attributes:
-        roll: Low-passed, in [rad].
-        pitch: Low-passed, in [rad].
+        roll: Low-passed, less the planned one, in [rad].
+        pitch: Low-passed, less the planned one, in [rad].
         slip: Low-passed velocity of the centre of mass less the planned one, shape (2,), in [m/s].
         position_correction: Correction of the path towards the plan, shape (2,), in [m].
         yaw_correction: Correction of the direction towards the plan, in [rad].
@@ -41,7 +41,9 @@ class StateEstimate:
         self.slip, self.position_correction = np.zeros(2), np.zeros(2)
         self.force = np.zeros(len(robot.feet))
 
-    def update(self, sensors: Array, *, place: Array, velocity: Array, yaw: float) -> None:
+    def update(
+        self, sensors: Array, *, place: Array, velocity: Array, yaw: float, tilt: Array
+    ) -> None:
         """Update the estimate with the sensors of one tick.
 
         Args:
@@ -49,13 +51,15 @@ class StateEstimate:
             place: Planned position of the centre of mass, shape (2,), in [m].
             velocity: Its planned velocity, shape (2,), in [m/s].
             yaw: The planned direction of the body, in [rad].
+            tilt: Its planned roll and pitch, shape (2,), in [rad].
         """
+        rolled, pitched = tilt.tolist()
         w, x, y, z = sensors[self._where["base.turn"]].tolist()
         roll = atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
         pitch = asin(max(-1.0, min(1.0, 2 * (w * y - z * x))))
         off = yaw - atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-        self.roll += self._tilt_share * (roll - self.roll)
-        self.pitch += self._tilt_share * (pitch - self.pitch)
+        self.roll += self._tilt_share * (roll - rolled - self.roll)
+        self.pitch += self._tilt_share * (pitch - pitched - self.pitch)
         self.yaw_correction += TICK * POSITION_GAIN * atan2(sin(off), cos(off))
         self.position_correction += (
             TICK * POSITION_GAIN * (place - sensors[self._where["centre.place"]][:2])

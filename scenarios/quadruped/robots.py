@@ -1,6 +1,7 @@
 """Quadrupeds that can be simulated, as data."""
 
 from dataclasses import dataclass, field
+from math import sqrt
 
 from scenarios.drivetrain import Drivetrain
 from scenarios.shapes import Ball
@@ -26,7 +27,7 @@ class Quadruped:
         payload: Largest mass on its back that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         held: Positions of the locked joints that are not at zero, by name.
-        length_scale: Scale of all lengths of the URDF.
+        length_scale: Factor on all lengths of its URDF.
     """
 
     name: str
@@ -140,3 +141,108 @@ ANYMAL = Quadruped(
     payload=1.0,
     force_noise=2.0,
 )
+
+
+def _similar(
+    name: str,
+    joints: tuple[str, ...],
+    feet: str,
+    *,
+    mass: float,
+    leg: float,
+    rest: tuple[float, ...] = GO2.rest,
+    torque: tuple[float, ...] = (),
+    held: dict[str, float] | None = None,
+) -> Quadruped:
+    """A robot that is dynamically similar to Go2, at equal Froude numbers.
+
+    Lengths grow with the leg, forces with the mass, times with the square root of the leg (Alexander
+    and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J. Zoology
+    1983); gains, limits and losses follow from their units.
+
+    Args:
+        name: Its name in ``noisemodel.ROBOTS``.
+        joints: Its joints, in the order of the URDF's.
+        feet: Frames of its feet: front left, front right, rear left, rear right.
+        mass: Of the whole robot, in [kg].
+        leg: Length of thigh and shank, in [m].
+        rest: Joint positions when it stands, in [rad].
+        torque: Limits of the drives of one leg, in [N m]; by default similar ones.
+        held: Positions of the locked joints that are not at zero, by name.
+
+    Returns:
+        The robot.
+    """
+    length, force = leg / _GO2_LEG, mass / _GO2_MASS
+    time, moment = sqrt(length), force * length
+    drives, count = GO2.drives, len(joints)
+    limits = torque * 4 or tuple(moment * limit for limit in drives.torque)
+    return Quadruped(
+        name=name,
+        drives=Drivetrain(
+            joints=joints,
+            stiffness=(moment * drives.stiffness[0],) * count,
+            damping=(moment * time * drives.damping[0],) * count,
+            torque=limits,
+            armature=(moment * length * drives.armature[0],) * count,
+            friction=(moment * drives.friction[0],) * count,
+            viscous=(moment * time * drives.viscous[0],) * count,
+        ),
+        feet=_feet(feet, length * GO2.feet[0].radius),
+        rest=rest,
+        period=time * GO2.period,
+        height=length * GO2.height,
+        speed=length / time * GO2.speed,
+        turning=GO2.turning / time,
+        attitude_gain=GO2.attitude_gain,
+        attitude_filter=GO2.attitude_filter,
+        force_gain=length / time / force * GO2.force_gain,
+        force_filter=GO2.force_filter,
+        payload=force * GO2.payload,
+        force_noise=force * GO2.force_noise,
+        held=held or {},
+    )
+
+
+_GO2_LEG, _GO2_MASS = 0.426, 16.085
+_UNITREE = "FL_foot FR_foot RL_foot RR_foot"
+_ANYBOTICS = "LF_FOOT RF_FOOT LH_FOOT RH_FOOT"
+_INWARD = (0.0, 0.75, -1.5, 0.0, -0.75, 1.5) * 2
+"""Knees of the front legs to the rear, those of the rear legs to the front."""
+
+A1 = _similar("a1", GO2.drives.joints, _UNITREE, mass=13.741, leg=0.4, torque=(33.5,) * 3)
+GO1 = _similar(
+    "go1", GO2.drives.joints, _UNITREE, mass=13.101, leg=0.426, torque=(23.7, 23.7, 35.55)
+)
+B1 = _similar("b1", GO2.drives.joints, _UNITREE, mass=55.689, leg=0.7, torque=(91.0, 93.3, 140.0))
+LAIKAGO = _similar("laikago", GO2.drives.joints, _UNITREE, mass=25.433, leg=0.5)
+ANYMAL_C = _similar(
+    "anymal_c", ANYMAL.drives.joints, _ANYBOTICS, mass=52.135, leg=0.6516, rest=_INWARD
+)
+HYQ = _similar(
+    "hyq",
+    _joints("lf lh rf rh", "haa_joint hfe_joint kfe_joint"),
+    "lf_foot rf_foot lh_foot rh_foot",
+    mass=86.774,
+    leg=0.696,
+    rest=_INWARD,
+)
+B1_Z1 = _similar(
+    "b1_z1", GO2.drives.joints, _UNITREE, mass=60.910, leg=0.7, torque=(91.0, 93.3, 140.0)
+)
+ANYMAL_KINOVA = _similar(
+    "anymal_kinova",
+    ANYMAL.drives.joints,
+    _ANYBOTICS,
+    mass=35.693,
+    leg=0.6098,
+    rest=_INWARD,
+    held={
+        "j2s6s200_joint_2": 3.0,
+        "j2s6s200_joint_3": 1.0,
+        "j2s6s200_joint_5": 3.0,
+    },
+)
+
+QUADRUPEDS = (GO2, SOLO12, ANYMAL, A1, GO1, B1, LAIKAGO, ANYMAL_C, HYQ, B1_Z1, ANYMAL_KINOVA)
+"""Those that stand up in simulation."""

@@ -1,5 +1,7 @@
 """Path of a trot: a sequence of velocity commands."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from noisemodel.types import Array
@@ -14,7 +16,12 @@ HOLD = (1.5, 3.0)
 
 
 def steer(
-    time: Array, way: str, robot: Quadruped, rng: np.random.Generator, *, start: float, stop: float
+    time: Array,
+    way: str,
+    robot: Quadruped,
+    rng: np.random.Generator,
+    *,
+    bouts: Sequence[tuple[float, float]],
 ) -> tuple[Array, Array]:
     """Path and direction of the body by random commands, from rest to rest.
 
@@ -23,20 +30,20 @@ def steer(
         way: As `scenarios.motions.Trot` has it.
         robot: The robot.
         rng: Random number generator.
-        start: Start of the motion, in [s].
-        stop: End of the motion, in [s].
+        bouts: Start and end of each motion, in [s].
 
     Returns:
         Path of the body over the ground, shape (times, 2), in [m], and its direction, shape
         (times,), in [rad].
     """
     velocity = np.zeros((len(time), 3))  # ahead, to the left, turning
-    now, before = start, np.zeros(3)
-    while now < stop - 2 * CHANGE:
-        command = _command(way, robot, rng)
-        velocity += _onset(time, now) * (command - before)
-        now, before = now + float(rng.uniform(*HOLD)), command
-    velocity -= _onset(time, stop - CHANGE) * before
+    for start, stop in bouts:
+        now, before = start, np.zeros(3)
+        while now < stop - 2 * CHANGE:
+            command = _command(way, robot, rng)
+            velocity += _onset(time, now) * (command - before)
+            now, before = now + float(rng.uniform(*HOLD)), command
+        velocity -= _onset(time, stop - CHANGE) * before
     ahead, aside, turning = velocity.T
     yaw = np.cumsum(turning) * TICK
     cosine, sine = np.cos(yaw), np.sin(yaw)

@@ -60,7 +60,7 @@ def footholds(
     Returns:
         Where the foot stands at first, and after each beat.
     """
-    ends = [*(beat.lift for beat in beats[1:]), np.inf]
+    ends = [*(beat.lift for beat in beats), np.inf][1:]
     middles = [(beat.touch + end) / 2 for beat, end in zip(beats, ends, strict=True)]
     ticks = [0, *(round(min(stop, middle) / TICK) for middle in middles)]
     out = []

@@ -1,4 +1,4 @@
-"""Plan of a trot over flat ground: the path of the body and the feet."""
+"""Plan of a gait over flat ground: the path of the body and the feet."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,11 +9,13 @@ from noisemodel.types import Array, Mask
 from scenarios.clock import TICK, times
 from scenarios.contacts import Contact
 from scenarios.defects.plan import Units
+from scenarios.humanoid.walking import centre_of_mass
 from scenarios.motions import Trot
 from scenarios.quadruped import steps
-from scenarios.quadruped.gait import PAIRS, beats, loads, swings
+from scenarios.quadruped.gait import GAITS, TROT, beats, loads, swings
+from scenarios.quadruped.posing import poses
 from scenarios.quadruped.robots import Quadruped
-from scenarios.quadruped.standing import Standing
+from scenarios.quadruped.standing import GRAVITY, Standing
 from scenarios.quadruped.steering import steer
 from scenarios.shapes import Ball, Box
 
@@ -28,6 +30,8 @@ class Plan:
     Attributes:
         centre: Centre of mass, shape (ticks, 3), in [m].
         yaw: Direction of the body, shape (ticks,), in [rad].
+        tilt: Roll and pitch of the body, shape (ticks, 2), in [rad].
+        push: Planned horizontal force of a foot per vertical force on it, shape (ticks, 2).
         feet: Centres of the feet, shape (ticks, feet, 3), in [m].
         swing: Whether each foot is in the air, shape (ticks, feet).
         progress: Completed share of the path of each foot; 1 in stance, shape (ticks, feet).
@@ -41,6 +45,8 @@ class Plan:
 
     centre: Array
     yaw: Array
+    tilt: Array
+    push: Array
     feet: Array
     swing: Mask
     progress: Array
@@ -76,6 +82,8 @@ class Plan:
             self,
             centre=rested(self.centre),
             yaw=rested(self.yaw),
+            tilt=rested(self.tilt),
+            push=rested(self.push),
             feet=rested(self.feet),
             swing=rested(self.swing),
             progress=rested(self.progress),
@@ -91,7 +99,7 @@ def trot(
     rng: np.random.Generator,
     duration: float,
 ) -> Plan:
-    """Plan of a trot from rest to rest.
+    """Plan of a gait from rest to rest.
 
     Args:
         robot: The robot.
@@ -101,35 +109,82 @@ def trot(
         duration: Duration of the plan, in [s].
 
     Returns:
-        The plan; until the robot stops, it does not depend on the duration.
+        The plan; until the robot stops, a trot does not depend on the duration.
     """
-    shapes, steering = rng.spawn(2)
+    shapes, steering, bending = rng.spawn(3)
+    gait = GAITS.get(motion.gait, TROT)
     height = robot.height * float(shapes.uniform(*motion.height))
-    period = robot.period * float(shapes.uniform(*motion.period))
-    timing = beats(shapes, begin=REST, end=duration - REST, period=period, jitter=motion.jitter)
+    period = gait.period * robot.period * float(shapes.uniform(*motion.period))
+    bouts = [
+        beats(shapes, begin=begin, end=end, period=period, jitter=motion.jitter, gait=gait)
+        for begin, end in _bouts(shapes, motion, duration)
+    ]
+    bouts = [bout for bout in bouts if bout]
+    timing = tuple(beat for bout in bouts for beat in bout)
     time = times(round(duration / TICK), TICK)
-    stop = timing[-1].touch
-    way, yaw = steer(time, motion.way, robot, steering, start=REST, stop=stop)
-    share = swings(time, timing)
+    stop = timing[-1].touch if timing else duration
+    speed = motion.speed / gait.period
+    driven = replace(robot, speed=speed * robot.speed, turning=speed * robot.turning)
+    spans = [(bout[0].begin, bout[-1].touch) for bout in bouts]
+    way, yaw = steer(time, motion.way, driven, steering, bouts=spans)
+    share = swings(time, timing, gait)
     progress = steps.progress(share)
     feet = np.zeros((len(time), len(robot.feet), 3))
     feet[..., 2] = standing.feet[:, 2] + height * steps.height(share)
     contacts = []
-    for foot, pair in enumerate(PAIRS):
-        own = [beat for beat in timing if beat.pair == pair]
+    for foot, group in enumerate(gait.groups):
+        own = [beat for beat in timing if beat.group == group]
         places = steps.footholds(own, standing.feet[foot, :2], way=way, yaw=yaw, stop=stop)
         feet[:, foot, :2] = steps.path(time, own, places, progress[:, foot])
         contacts += steps.contacts(foot, own, places)
+    load = loads(time, timing, gait)
+    push = np.zeros((len(time), 2))
+    if not gait.level and timing:
+        zmp = np.einsum("tf,tfa->ta", load, feet[..., :2])
+        way = centre_of_mass(zmp, float(np.sqrt(GRAVITY / standing.height)))
+        push = (way - zmp) / standing.height
+    bend = float(bending.uniform(*motion.posing))
+    pose = poses(time, bending, bend, size=standing.height)
+    if bend:
+        load = load * (1 + _acceleration(pose.shift[:, 2:]) / GRAVITY)
+        shift = turned(yaw, pose.shift[:, :2])
+        way, push = way + shift, push + _acceleration(shift) / GRAVITY
     return Plan(
-        np.column_stack((way, np.full(len(time), standing.height))),
+        np.column_stack((way, standing.height + pose.shift[:, 2])),
         yaw,
+        pose.tilt,
+        push,
         feet,
         share < 1,
         progress,
-        loads(time, timing),
+        load,
         contacts=tuple(sorted(contacts, key=lambda contact: contact.start)),
         effectors=robot.feet,
         ground=(Box(centre=(0.0, 0.0, -0.5), half=(20.0, 20.0, 0.5)),),
         size=standing.height,
         weight=standing.weight,
     )
+
+
+def _bouts(rng: np.random.Generator, motion: Trot, duration: float) -> list[tuple[float, float]]:
+    """Start and end of each time of stepping, in [s]; none if the robot stands."""
+    if motion.gait == "stand":
+        return []
+    pauses = [float(rng.uniform(*motion.pause)) for _ in range(motion.pauses)]
+    each = (duration - 2 * REST - sum(pauses)) / (1 + len(pauses))
+    if not pauses or each <= 0:
+        return [(REST, duration - REST)]
+    begins = REST + each * np.arange(1 + len(pauses)) + np.cumsum([0.0, *pauses])
+    return [(begin, begin + each) for begin in begins.tolist()]
+
+
+def _acceleration(path: Array) -> Array:
+    """Second derivative along axis 0."""
+    return np.asarray(np.gradient(np.gradient(path, TICK, axis=0), TICK, axis=0))
+
+
+def turned(yaw: Array, plane: Array) -> Array:
+    """Vectors of the body's axes in the world's, both of shape (ticks, 2)."""
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    x, y = plane.T
+    return np.stack((cosine * x - sine * y, sine * x + cosine * y), axis=1)
