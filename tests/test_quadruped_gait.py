@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.clock import TICK, times
 from scenarios.quadruped import steps
-from scenarios.quadruped.gait import DUTY, PAIRS, beats, loads, swings
+from scenarios.quadruped.gait import GAITS, TROT, beats, loads, swings
 from scenarios.quadruped.robots import GO2
 from scenarios.quadruped.steering import CHANGE, steer
 
@@ -21,7 +21,7 @@ def timing():
 
 
 def test_pairs_swing_in_turn_and_never_together(timing):
-    assert [beat.pair for beat in timing] == [0, 1] * (len(timing) // 2)
+    assert [beat.group for beat in timing] == [0, 1] * (len(timing) // 2)
     for one, two in pairwise(timing):
         assert one.touch == two.begin < two.lift < two.touch
     assert timing[0].begin == 0.5
@@ -34,7 +34,7 @@ def test_cycles_vary_by_the_given_share(timing):
     assert cycles.max() <= 0.55
     assert np.ptp(cycles) > 0.02
     stands = [two.lift - one.touch for one, two in zip(timing, timing[2:], strict=False)]
-    assert np.mean(stands) / cycles.mean() == pytest.approx(DUTY, abs=0.02)
+    assert np.mean(stands) / cycles.mean() == pytest.approx(TROT.duty, abs=0.02)
 
 
 def test_the_feet_share_the_weight_and_feet_in_the_air_bear_none(timing):
@@ -44,7 +44,7 @@ def test_the_feet_share_the_weight_and_feet_in_the_air_bear_none(timing):
     assert not load[share < 1].any()
     np.testing.assert_array_equal(load[[0, -1]], 0.25)
     assert np.abs(np.diff(load, axis=0)).max() < 0.02  # weight goes over, it does not jump
-    np.testing.assert_array_equal(load[:, 0], load[:, PAIRS.index(0, 1)])
+    np.testing.assert_array_equal(load[:, 0], load[:, TROT.groups.index(0, 1)])
 
 
 def test_a_foot_goes_up_and_comes_down_softly():
@@ -67,7 +67,7 @@ def test_a_foot_is_over_its_place_before_it_may_touch():
 def test_feet_come_down_at_the_neutral_point(timing):
     speed, hip = 0.4, np.array([0.2, 0.1])
     way = np.column_stack((speed * TIME, np.zeros_like(TIME)))
-    own = [beat for beat in timing if beat.pair == 0]
+    own = [beat for beat in timing if beat.group == 0]
     places = steps.footholds(own, hip, way=way, yaw=np.zeros_like(TIME), stop=6.0 - TICK)
     assert places[0] == (*hip, 0.0)
     for (beat, following), place in zip(pairwise(own), places[1:-1], strict=True):
@@ -79,7 +79,7 @@ def test_feet_come_down_at_the_neutral_point(timing):
 
 def test_feet_turn_with_the_body(timing):
     yaw = 0.3 * TIME
-    own = [beat for beat in timing if beat.pair == 1]
+    own = [beat for beat in timing if beat.group == 1]
     places = steps.footholds(own, np.array([0.2, 0.1]), way=np.zeros((6000, 2)), yaw=yaw, stop=5.5)
     for place in places:
         turned = (0.2 + 0.1j) * np.exp(1j * place.yaw)
@@ -90,7 +90,7 @@ def test_feet_turn_with_the_body(timing):
 @pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
 def test_the_body_goes_from_rest_to_rest_its_way(way):
     rng = np.random.default_rng(1)
-    path, yaw = steer(TIME, way, GO2, rng, start=0.5, stop=5.5)
+    path, yaw = steer(TIME, way, GO2, rng, bouts=[(0.5, 5.5)])
     velocity = np.gradient(path, TICK, axis=0)
     speed = np.linalg.norm(velocity, axis=1)
     ahead = velocity[:, 0] * np.cos(yaw) + velocity[:, 1] * np.sin(yaw)
@@ -105,3 +105,41 @@ def test_the_body_goes_from_rest_to_rest_its_way(way):
     else:
         assert ahead[(TIME > 1) & (TIME < 4)].min() > 0.3 * GO2.speed
         assert (np.ptp(yaw) > 0.2) == (way == "curve")
+
+
+@pytest.mark.parametrize(
+    ("name", "together"),
+    [("trot", {(0, 3), (1, 2)}), ("pace", {(0, 2), (1, 3)}), ("bound", {(0, 1), (2, 3)})],
+)
+def test_two_feet_swing_at_once_in_a_trot_a_pace_and_a_bound(name, together):
+    swing = _swing(name)
+    assert {tuple(np.flatnonzero(now).tolist()) for now in swing if now.any()} == together
+
+
+def test_a_walk_lifts_one_foot_at_a_time_in_the_lateral_sequence():
+    swing = _swing("walk")
+    assert swing.sum(axis=1).max() == 1
+    order = [int(np.argmax(now)) for now in swing if now.any()]
+    sequence = [foot for foot, after in pairwise(order) if foot != after]
+    assert sequence[:8] == [2, 0, 3, 1] * 2  # rear left, front left, rear right, front right
+    inside = (TIME > 1.5) & (TIME < 4.5)
+    assert swing[inside].mean() == pytest.approx(1 - GAITS["walk"].duty, abs=0.02)
+
+
+@pytest.mark.parametrize("name", GAITS)
+def test_the_feet_on_the_ground_share_the_weight_in_every_gait(name):
+    gait = GAITS[name]
+    timing = _timing(gait)
+    load, share = loads(TIME, timing, gait), swings(TIME, timing, gait)
+    np.testing.assert_allclose(load.sum(axis=1), 1, atol=1e-12)
+    assert not load[share < 1].any()
+
+
+def _timing(gait):
+    rng = np.random.default_rng(4)
+    return beats(rng, begin=0.5, end=5.5, period=0.7, jitter=0.1, gait=gait)
+
+
+def _swing(name):
+    gait = GAITS[name]
+    return swings(TIME, _timing(gait), gait) < 1

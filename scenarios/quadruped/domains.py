@@ -81,21 +81,42 @@ def steady(motion: Trot) -> Trot:
 
 @dataclass(frozen=True, kw_only=True)
 class Bearable:
-    """The worst drives on which at least 80 % of healthy runs stay upright, one at a time.
+    """Drives on which at least 80 % of healthy runs of steady motions stay upright.
 
     Attributes:
-        stiffness: Lowest scale of the position gains.
-        damping: Lowest scale of the velocity gains.
-        delay: Longest delay of the torques, in [s].
+        stiffness: Scale of the position gains.
+        damping: Scale of the velocity gains.
         hold: Longest time for which targets are held, in [s].
         feedforward: Lowest share of the model's torques.
+        delay: Longest delay of the torques, whatever the gains, in [s].
     """
 
-    stiffness: float
-    damping: float
-    delay: float
-    hold: float
-    feedforward: float
+    stiffness: Range = (0.1, 1.5)
+    damping: Range = (0.15, 1.5)
+    hold: float = 0.02
+    feedforward: float = 0.6
+    delay: float = 0.01
+
+
+LIMITS = Bearable()
+"""Common to all quadrupeds; the delay is also limited by `longest_delay`."""
+
+
+def longest_delay(robot: Quadruped, *, stiffness: float, damping: float) -> float:
+    """Longest delay of the torques with which joints are damped, in [s].
+
+    A delay of t takes k t of the damping d, and the loop of the velocity has its own margin, d t / J
+    < pi / 2 for an inertia J, of which the rotor's is a part.
+
+    Args:
+        robot: The robot.
+        stiffness: Scale of the position gains.
+        damping: Scale of the velocity gains.
+    """
+    gains = (robot.drives.stiffness, robot.drives.damping, robot.drives.armature)
+    k, d, inertia = (np.array(gain) for gain in gains)
+    k, d = stiffness * k, damping * d
+    return min(LIMITS.delay, float((0.5 * d / k).min()), float((0.6 * inertia / d).min()))
 
 
 def scaled(robot: Quadruped, factor: float) -> Quadruped:

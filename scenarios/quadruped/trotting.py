@@ -21,6 +21,8 @@ from scenarios.shapes import Ball, Box
 
 REST = 0.5
 """Time of standing before and after the trot, in [s]."""
+CYCLES = 2.5
+"""Least time from one pause to the next, in periods; a short run has fewer pauses."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,7 @@ def trot(
     period = gait.period * robot.period * float(shapes.uniform(*motion.period))
     bouts = [
         beats(shapes, begin=begin, end=end, period=period, jitter=motion.jitter, gait=gait)
-        for begin, end in _bouts(shapes, motion, duration)
+        for begin, end in _bouts(shapes, motion, duration, period)
     ]
     bouts = [bout for bout in bouts if bout]
     timing = tuple(beat for bout in bouts for beat in bout)
@@ -166,14 +168,20 @@ def trot(
     )
 
 
-def _bouts(rng: np.random.Generator, motion: Trot, duration: float) -> list[tuple[float, float]]:
+def _bouts(
+    rng: np.random.Generator, motion: Trot, duration: float, period: float
+) -> list[tuple[float, float]]:
     """Start and end of each time of stepping, in [s]; none if the robot stands."""
     if motion.gait == "stand":
         return []
     pauses = [float(rng.uniform(*motion.pause)) for _ in range(motion.pauses)]
-    each = (duration - 2 * REST - sum(pauses)) / (1 + len(pauses))
-    if not pauses or each <= 0:
-        return [(REST, duration - REST)]
+    while True:
+        each = (duration - 2 * REST - sum(pauses)) / (1 + len(pauses))
+        if not pauses:
+            return [(REST, duration - REST)]
+        if each > CYCLES * period:
+            break
+        pauses.pop()
     begins = REST + each * np.arange(1 + len(pauses)) + np.cumsum([0.0, *pauses])
     return [(begin, begin + each) for begin in begins.tolist()]
 
