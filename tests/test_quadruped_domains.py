@@ -7,12 +7,11 @@ import pytest
 from scenarios import drives, simulation
 from scenarios.case import Case
 from scenarios.motions import Trot
-from scenarios.quadruped import domains, robots, scene
+from scenarios.quadruped import domains, scene
 from scenarios.quadruped.posing import SHIFT, TILT, poses
 from scenarios.quadruped.robots import A1, ANYMAL_C, GO2, HYQ, QUADRUPEDS
 from scenarios.quadruped.standing import GRAVITY, stand
 from scenarios.reduced import reduced_model
-from scenarios.tasks import Motion
 
 SIMILAR = [robot for robot in QUADRUPEDS if robot.name not in ("go2", "solo12", "anymal")]
 
@@ -30,11 +29,210 @@ def upright(trial):
     return 2 * np.hypot(x, y).max() < 0.2
 
 
-def touchdowns(trial, planned):
-    """Vertical speeds of the feet where they are planned to touch, in [m/s]."""
-    force = trial.motion.contact
-    return [
-        force[round(contact.start * 1e4) :][:800, contact.effector].max() / planned.weight
-        for contact in planned.contacts
-        if 0 < contact.start < planned.duration - 0.1
+def touchdowns(trial, robot):
+    """Downward speed of each foot 2 ms before it touches the ground after a swing, in [m/s]."""
+    motion, model = trial.motion, reduced_model(robot)
+    data, axes, out = model.createData(), pin.LOCAL_WORLD_ALIGNED, []
+    for foot, touching in zip(robot.feet, motion.contact.T > 0, strict=True):
+        frame = model.getFrameId(foot.frame)
+        for sample in np.flatnonzero(np.diff(np.flatnonzero(touching)) > 500):
+            before = np.flatnonzero(touching)[sample + 1] - 20
+            pose, velocity = motion.base_pose[before], motion.base_velocity[before]
+            quaternion = pose[[4, 5, 6, 3]]
+            turn = pin.Quaternion(quaternion).toRotationMatrix()
+            q = np.concatenate((pose[:3], quaternion, motion.position[before]))
+            v = np.concatenate((turn.T @ velocity[:3], velocity[3:], motion.velocity[before]))
+            pin.forwardKinematics(model, data, q, v)
+            out.append(-pin.getFrameVelocity(model, data, frame, axes).linear[2])
+    return out
+
+
+@pytest.mark.parametrize("robot", SIMILAR, ids=lambda robot: robot.name)
+def test_mass_and_leg_of_a_similar_robot_are_those_of_its_model(robot):
+    model, foot = reduced_model(robot), robot.feet[0]
+    frame = model.frames[model.getFrameId(foot.frame)]
+    thigh = model.jointPlacements[frame.parentJoint].translation
+    leg = np.linalg.norm(thigh) + np.linalg.norm(frame.placement.translation)
+    assert leg / foot.radius == pytest.approx(0.426 / GO2.feet[0].radius, rel=1e-3)
+    mass = stand(robot).weight / GRAVITY
+    assert mass / robot.payload == pytest.approx(16.085 / GO2.payload, rel=1e-3)
+
+
+@pytest.mark.parametrize("robot", QUADRUPEDS, ids=lambda robot: robot.name)
+def test_every_quadruped_stands_with_its_mass_over_its_feet_and_within_its_limits(robot):
+    standing, model = stand(robot), reduced_model(robot)
+    joints = standing.configuration[7:]
+    assert (model.lowerPositionLimit[7:] < joints).all()
+    assert (joints < model.upperPositionLimit[7:]).all()
+    assert standing.height > 0.5 * (robot.feet[0].radius * 0.426 / 0.022)
+    assert standing.feet[:, :2].mean(axis=0) == pytest.approx([0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize(("robot", "gait"), [(A1, "walk"), (HYQ, "trot")])
+def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
+    motion = Trot(gait=gait)
+    trial = run(robot, motion)
+    assert upright(trial)
+    assert trial.events == ()
+    rng = np.random.default_rng(np.random.SeedSequence(1).spawn(1)[0])
+    planned = scene.plan(robot, motion, rng, 3.0)
+    way = trial.motion.base_pose[::10, :2] - trial.motion.base_pose[0, :2]
+    assert np.abs(way - planned.centre[:, :2]).max() < 0.12 * planned.size
+    speeds = touchdowns(trial, robot)
+    assert len(speeds) >= 4
+    assert max(speeds) < 1.5  # m/s; a foot that falls from its lift lands at 1 m/s
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gait", ["stand", "trot", "walk", "pace"])
+@pytest.mark.parametrize("robot", QUADRUPEDS, ids=lambda robot: robot.name)
+def test_every_quadruped_stays_upright_in_every_gait(robot, gait):
+    assert upright(run(robot, Trot(gait=gait, posing=(0.5, 0.5) if gait == "stand" else (0, 0))))
+
+
+def test_the_body_of_a_walk_moves_as_its_feet_push_it():
+    walk = plan(gait="walk")
+    zmp = np.einsum("tf,tfa->ta", walk.load, walk.feet[..., :2])
+    acceleration = np.gradient(np.gradient(walk.centre[:, :2], 1e-3, axis=0), 1e-3, axis=0)
+    expected = GRAVITY / walk.size * (walk.centre[:, :2] - zmp)
+    np.testing.assert_allclose(acceleration[5:-5], expected[5:-5], atol=0.05)
+    np.testing.assert_allclose(walk.push[5:-5], acceleration[5:-5] / GRAVITY, atol=0.01)
+
+
+def test_a_standing_robot_lifts_no_foot_and_moves_its_body():
+    still = plan(gait="stand", posing=(1.0, 1.0))
+    assert not still.swing.any()
+    assert not np.ptp(still.feet, axis=0).any()
+    assert 0.02 < np.abs(still.tilt).max() <= max(TILT)
+    assert 0.01 < np.ptp(still.centre, axis=0).max() / still.size < 2 * max(SHIFT)
+    np.testing.assert_array_equal(still.tilt[[0, -1]], 0)
+
+
+def test_poses_are_smooth_and_none_without_an_amplitude():
+    time = np.arange(4000) * 1e-3
+    moved = poses(time, np.random.default_rng(1), 1.0, size=0.3)
+    rates = np.gradient(np.hstack(moved), 1e-3, axis=0)
+    assert 0 < np.abs(rates).max() < 1.5
+    assert not np.hstack(poses(time, np.random.default_rng(1), 0.0, size=0.3)).any()
+
+
+def test_a_pause_is_without_steps_and_a_short_run_has_none():
+    stopping = plan(duration=7.0, pauses=1, pause=(0.8, 0.8))
+    stepping = stopping.swing.any(axis=1)
+    gaps = np.flatnonzero(np.diff(np.flatnonzero(stepping)) > 600)
+    assert len(gaps) == 1
+    before = np.flatnonzero(stepping)[gaps[0]] + 300
+    np.testing.assert_allclose(
+        np.diff(stopping.centre[before : before + 300], axis=0), 0, atol=1e-9
+    )
+    assert plan(duration=3.0, pauses=2).swing.any()
+
+
+def test_a_robot_of_another_size_is_similar():
+    large = domains.scaled(GO2, 1.15)
+    one, other = stand(GO2), stand(large)
+    assert other.height == pytest.approx(1.15 * one.height)
+    assert other.weight == pytest.approx(one.weight)
+    np.testing.assert_allclose(other.feet, 1.15 * one.feet, atol=1e-9)
+    small, model = reduced_model(domains.scaled(GO2, 0.85)), reduced_model(GO2)
+    turned = pin.neutral(model)
+    turned[7:] = one.configuration[7:]
+    inertia = [pin.crba(m, m.createData(), turned)[3:6, 3:6] for m in (small, model)]
+    np.testing.assert_allclose(inertia[0], 0.85**2 * inertia[1], rtol=1e-9)
+
+
+def test_motions_of_the_domain_are_wider_the_wilder():
+    rng = np.random.default_rng(0)
+    mild = [domains.motion(rng, 0.0) for _ in range(200)]
+    wild = [domains.motion(rng, 1.0) for _ in range(200)]
+    assert {motion.gait for motion in wild} == set(domains.GAITS)
+    assert {motion.pauses for motion in mild} == {0}
+    assert {motion.pauses for motion in wild} == {0, 1, 2}
+    for name in ("period", "height"):
+        narrow, wide = ([getattr(m, name)[0] for m in motions] for motions in (mild, wild))
+        assert np.ptp(narrow) < 0.21 < 0.5 < np.ptp(wide)
+    periods = [GO2.period * motion.period[0] for motion in wild]
+    assert min(periods) < 0.35
+    assert domains.motion(np.random.default_rng(3), 0.5) == domains.motion(
+        np.random.default_rng(3), 0.5
+    )
+
+
+@pytest.mark.parametrize("name", domains.DEFECTS)
+def test_a_defect_can_be_drawn_for_every_motion(name):
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        motion = domains.motion(rng, seed / 11)
+        planned = scene.plan(ANYMAL_C, motion, rng, 3.0)
+        faults = domains.DEFECTS[name].draw(rng, planned)
+        assert all(event.start < event.stop for event in faults.events)
+        lift = np.ptp(planned.feet[..., 2])
+        assert all(box.top <= 0.65 * lift for box in faults.boxes)
+
+
+@pytest.mark.parametrize("name", ["obstacle-full", "platform", "force-jump"])
+def test_a_defect_of_steps_draws_nothing_where_the_robot_stands(name):
+    faults = domains.DEFECTS[name].draw(np.random.default_rng(1), plan(gait="stand"))
+    assert (faults.boxes, faults.ground, faults.events) == ((), None, ())
+
+
+def test_a_step_down_is_not_drawn_for_a_robot_on_the_spot():
+    step = domains.DEFECTS["platform"]
+    assert step.draw(np.random.default_rng(1), plan(way="spot")).ground is None
+    assert step.draw(np.random.default_rng(1), plan(way="straight")).ground is not None
+
+
+def test_the_delay_that_drives_bear_is_shorter_with_less_damping_or_more_of_it():
+    delays = [
+        domains.longest_delay(GO2, stiffness=0.5, damping=damping) for damping in (0.01, 0.4, 1.5)
     ]
+    assert delays == pytest.approx([2e-4, 5e-3, 0.6 * 0.02 / 9])
+
+
+def soften(monkeypatch, **scales):
+    """Replace the drives by soft ones that hold targets, with a delay."""
+
+    class Soft(drives.Drives):
+        def __init__(self, start, *, stiffness, damping, **others):
+            self._targets, self._number = (), 0
+            super().__init__(
+                start,
+                stiffness=scales["stiffness"] * stiffness,
+                damping=scales["damping"] * damping,
+                **others,
+            )
+
+        def torque(self, position, velocity, desired, rate, feedforward):
+            if self._number % round(scales["hold"] * 1e4) == 0:
+                self._targets = desired.copy(), rate.copy(), scales["feedforward"] * feedforward
+            self._number += 1
+            return super().torque(position, velocity, *self._targets)
+
+    monkeypatch.setattr(drives, "Drives", Soft)
+
+
+def at_the_limits(robot, monkeypatch, gait):
+    limits = domains.LIMITS
+    soften(
+        monkeypatch,
+        stiffness=limits.stiffness[0],
+        damping=limits.damping[0],
+        hold=limits.hold,
+        feedforward=limits.feedforward,
+    )
+    return run(robot, domains.steady(Trot(gait=gait)))
+
+
+def test_go2_trots_on_the_softest_drives(monkeypatch):
+    trial = at_the_limits(GO2, monkeypatch, "trot")
+    assert upright(trial)
+    error = trial.motion.velocity - trial.motion.velocity_desired
+    assert 0.5 < np.sqrt((error**2).mean()) < 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gait", ["trot", "walk"])
+@pytest.mark.parametrize("robot", QUADRUPEDS, ids=lambda robot: robot.name)
+def test_every_quadruped_stays_upright_on_the_softest_drives(robot, gait, monkeypatch):
+    trial = at_the_limits(robot, monkeypatch, gait)
+    assert len(trial.motion.velocity) == 30000

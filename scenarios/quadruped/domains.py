@@ -105,8 +105,8 @@ LIMITS = Bearable()
 def longest_delay(robot: Quadruped, *, stiffness: float, damping: float) -> float:
     """Longest delay of the torques with which joints are damped, in [s].
 
-    A delay of t takes k t of the damping d, and the loop of the velocity has its own margin, d t / J
-    < pi / 2 for an inertia J, of which the rotor's is a part.
+    A delay of t takes k t of the damping d, and the loop of the velocity is stable up to d t / J =
+    pi / 2 with an inertia J, of which the rotor's is a part.
 
     Args:
         robot: The robot.

@@ -113,9 +113,7 @@ def loads(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
     knots = [[-1.0] for _ in range(gait.count)]
     bearing = [[1.0] for _ in range(gait.count)]
     ends = [beat.touch + 0.1 for beat in timing]
-    ends[:-1] = [
-        min(following.lift, beat.touch + LONGEST) for beat, following in pairwise(timing)
-    ]
+    ends[:-1] = [min(following.lift, beat.touch + LONGEST) for beat, following in pairwise(timing)]
     for beat, taken in zip(timing, ends, strict=True):
         knots[beat.group].extend((beat.begin, beat.lift, beat.touch, taken))
         bearing[beat.group].extend((1.0, 0.0, 0.0, 1.0))

@@ -156,9 +156,9 @@ def _similar(
 ) -> Quadruped:
     """A robot that is dynamically similar to Go2, at equal Froude numbers.
 
-    Lengths grow with the leg, forces with the mass, times with the square root of the leg (Alexander
-    and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J. Zoology
-    1983); gains, limits and losses follow from their units.
+    Lengths grow with the leg, forces with the mass, times with the square root of the leg
+    (Alexander and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J.
+    Zoology 1983); gains, limits and losses follow from their units.
 
     Args:
         name: Its name in ``noisemodel.ROBOTS``.
