@@ -24,6 +24,14 @@ class UnknownScenarioError(ScenarioError):
         )
 
 
+class UnknownGaitError(ScenarioError):
+    """A motion names a gait that quadrupeds do not have."""
+
+    def __init__(self, gait: str, known: Iterable[str]) -> None:
+        self.gait, self.known = gait, tuple(known)
+        super().__init__(f"no gait {gait!r}; there are {', '.join(self.known)}")
+
+
 class UnsimulatedRobotError(ScenarioError):
     """A robot that cannot be simulated.
 

@@ -6,6 +6,7 @@ import pytest
 
 from scenarios import drives, simulation
 from scenarios.case import Case
+from scenarios.errors import UnknownGaitError
 from scenarios.motions import Trot
 from scenarios.quadruped import domains, scene
 from scenarios.quadruped.posing import SHIFT, TILT, poses
@@ -108,6 +109,11 @@ def test_a_standing_robot_lifts_no_foot_and_moves_its_body():
     np.testing.assert_array_equal(still.tilt[[0, -1]], 0)
 
 
+def test_an_unknown_gait_is_refused():
+    with pytest.raises(UnknownGaitError, match="no gait 'gallop'; there are trot, walk, pace, bo"):
+        plan(gait="gallop")
+
+
 def test_poses_are_smooth_and_none_without_an_amplitude():
     time = np.arange(4000) * 1e-3
     moved = poses(time, np.random.default_rng(1), 1.0, size=0.3)
@@ -156,6 +162,13 @@ def test_motions_of_the_domain_are_wider_the_wilder():
     assert domains.motion(np.random.default_rng(3), 0.5) == domains.motion(
         np.random.default_rng(3), 0.5
     )
+
+
+def test_steps_on_soft_drives_are_quick_trots_or_walks():
+    assert domains.steady(Trot(gait="pace")) == Trot(period=(domains.QUICK, domains.QUICK))
+    assert domains.steady(Trot(gait="walk")) == Trot(gait="walk")
+    fast = Trot(period=(0.5, 0.6))
+    assert domains.steady(fast) == fast
 
 
 @pytest.mark.parametrize("name", domains.DEFECTS)

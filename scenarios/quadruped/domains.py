@@ -72,11 +72,14 @@ def motion(rng: np.random.Generator, wildness: float) -> Trot:
 
 
 def steady(motion: Trot) -> Trot:
-    """The motion on soft drives: a trot with quick steps, which catch the body in time."""
+    """The motion on soft drives: a trot with quick steps, which catch the body in time.
+
+    A pace, in which feet rattle, becomes a trot; a walk and a stand stay.
+    """
     if motion.gait not in ("trot", "pace"):
         return motion
     quick = min(motion.period[1], QUICK)
-    return replace(motion, period=(min(motion.period[0], quick), quick))
+    return replace(motion, gait="trot", period=(min(motion.period[0], quick), quick))
 
 
 @dataclass(frozen=True, kw_only=True)

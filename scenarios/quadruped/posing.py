@@ -43,7 +43,9 @@ def poses(time: Array, rng: np.random.Generator, share: float, *, size: float) -
     if not share:
         return Poses(np.zeros((len(time), 2)), np.zeros((len(time), 3)))
     largest = share * np.array((*TILT, *(size * shift for shift in SHIFT)))
-    rates = 2 * np.pi * np.exp(rng.uniform(*np.log(FREQUENCY), (SINES, len(largest))))
+    lowest, highest = FREQUENCY
+    spread = (highest / lowest) ** rng.uniform(size=(SINES, len(largest)))
+    rates = 2 * np.pi * lowest * spread
     phases = rng.uniform(0, 2 * np.pi, rates.shape)
     weights = rng.dirichlet(np.ones(SINES), len(largest)).T / (rates / rates.min(axis=0))
     inside = np.clip(np.minimum(time - time[0], time[-1] - time) / FADE, 0, 1)

@@ -9,10 +9,11 @@ from noisemodel.types import Array, Mask
 from scenarios.clock import TICK, times
 from scenarios.contacts import Contact
 from scenarios.defects.plan import Units
+from scenarios.errors import UnknownGaitError
 from scenarios.humanoid.walking import centre_of_mass
 from scenarios.motions import Trot
 from scenarios.quadruped import steps
-from scenarios.quadruped.gait import GAITS, TROT, beats, loads, swings
+from scenarios.quadruped.gait import GAITS, TROT, Gait, beats, loads, swings
 from scenarios.quadruped.posing import poses
 from scenarios.quadruped.robots import Quadruped
 from scenarios.quadruped.standing import GRAVITY, Standing
@@ -21,6 +22,8 @@ from scenarios.shapes import Ball, Box
 
 REST = 0.5
 """Time of standing before and after the trot, in [s]."""
+STAND = "stand"
+"""Name of the gait without steps."""
 CYCLES = 2.5
 """Least time from one pause to the next, in periods; a short run has fewer pauses."""
 
@@ -112,9 +115,12 @@ def trot(
 
     Returns:
         The plan; until the robot stops, a trot does not depend on the duration.
+
+    Raises:
+        UnknownGaitError: If there is no such gait.
     """
     shapes, steering, bending = rng.spawn(3)
-    gait = GAITS.get(motion.gait, TROT)
+    gait = _gait(motion.gait)
     height = robot.height * float(shapes.uniform(*motion.height))
     period = gait.period * robot.period * float(shapes.uniform(*motion.period))
     bouts = [
@@ -168,11 +174,19 @@ def trot(
     )
 
 
+def _gait(name: str) -> Gait:
+    if name == STAND:
+        return TROT
+    if name not in GAITS:
+        raise UnknownGaitError(name, (*GAITS, STAND))
+    return GAITS[name]
+
+
 def _bouts(
     rng: np.random.Generator, motion: Trot, duration: float, period: float
 ) -> list[tuple[float, float]]:
     """Start and end of each time of stepping, in [s]; none if the robot stands."""
-    if motion.gait == "stand":
+    if motion.gait == STAND:
         return []
     pauses = [float(rng.uniform(*motion.pause)) for _ in range(motion.pauses)]
     while True:
