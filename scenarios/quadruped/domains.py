@@ -33,8 +33,8 @@ SPREAD: Mapping[str, tuple[Range, Range]] = MappingProxyType(
     }
 )
 """Range of each setting of `scenarios.motions.Trot`, mild and wild."""
-QUICK = 0.75
-"""Longest period of a trot on soft drives, as a share of the robot's nominal one."""
+QUICK: Mapping[str, float] = MappingProxyType({"trot": 0.7, "walk": 0.8})
+"""Longest period of each gait on soft drives, as `scenarios.motions.Trot` has it."""
 ADVANCE = 0.3
 """Shortest way over which a step down may come, as a share of the height of the robot."""
 
@@ -72,14 +72,15 @@ def motion(rng: np.random.Generator, wildness: float) -> Trot:
 
 
 def steady(motion: Trot) -> Trot:
-    """The motion on soft drives: a trot with quick steps, which catch the body in time.
+    """The motion on soft drives: quick steps, which catch the body in time.
 
-    A pace, in which feet rattle, becomes a trot; a walk and a stand stay.
+    A pace, in which feet rattle, becomes a trot; a stand stays.
     """
-    if motion.gait not in ("trot", "pace"):
+    gait = "trot" if motion.gait == "pace" else motion.gait
+    if gait not in QUICK:
         return motion
-    quick = min(motion.period[1], QUICK)
-    return replace(motion, gait="trot", period=(min(motion.period[0], quick), quick))
+    shortest, longest = (min(period, QUICK[gait]) for period in motion.period)
+    return replace(motion, gait=gait, period=(shortest, longest))
 
 
 @dataclass(frozen=True, kw_only=True)
