@@ -2,7 +2,8 @@
 
 The equations, in this order, all in the world's axes: for each effector the place of its point,
 and, if it is a sole, its turn; then the centre of mass; then the turn of the base. A biped with
-six joints per leg and a quadruped with three per leg have as many unknowns as that.
+six joints per leg and a quadruped with three per leg have as many unknowns as that. Each joint of a
+moving upper body adds one unknown and one equation, its position.
 """
 
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ class WholeBody:
         model: A ``pinocchio.Model`` on a free-flyer.
         effectors: The parts that it stands on.
         start: Configuration to start from, shape (nq,).
+        upper: How many joints, the last ones, move on their own.
 
     Attributes:
         configuration: The present configuration, as Pinocchio has it, shape (nq,).
@@ -34,7 +36,9 @@ class WholeBody:
             unknowns.
     """
 
-    def __init__(self, model: Any, effectors: Sequence[Effector], start: Array) -> None:
+    def __init__(
+        self, model: Any, effectors: Sequence[Effector], start: Array, *, upper: int = 0
+    ) -> None:
         self._model = model.copy()
         self._frames = [_add_point(self._model, effector) for effector in effectors]
         self._data = self._model.createData()
@@ -42,20 +46,29 @@ class WholeBody:
         ends = np.cumsum(widths).tolist()
         self._rows = [slice(end - width, end) for width, end in zip(widths, ends, strict=True)]
         self._heights = [rows.start + 2 for rows in self._rows]
-        equations = ends[-1] + 6
+        equations = ends[-1] + 6 + upper
         if equations != model.nv:
             raise UnsupportedModelError(
                 f"{len(widths)} effectors make {equations} equations, the robot has {model.nv}"
                 " unknowns; lock all joints that are not in its legs"
             )
-        self._centre, self._base = slice(ends[-1], ends[-1] + 3), slice(ends[-1] + 3, equations)
+        self._centre, self._base = slice(ends[-1], ends[-1] + 3), slice(ends[-1] + 3, ends[-1] + 6)
+        self._upper = slice(ends[-1] + 6, equations)
         self._jacobian = np.zeros((equations, equations))
+        self._jacobian[self._upper, equations - upper :] = np.eye(upper)
         self._error = np.zeros(equations)
         self.configuration = np.array(start, dtype=np.float64)
         self.inverse = np.zeros((equations, equations))
 
     def follow(
-        self, places: Array, turns: Sequence[Array], centre: Array, base: Array, *, steps: int = 1
+        self,
+        places: Array,
+        turns: Sequence[Array],
+        centre: Array,
+        base: Array,
+        *,
+        upper: Array | None = None,
+        steps: int = 1,
     ) -> Array:
         """Configuration after Newton steps; one is enough for targets that moved by millimetres.
 
@@ -64,6 +77,8 @@ class WholeBody:
             turns: Rotation matrix of each sole, shape (3, 3); those of balls are ignored.
             centre: Of mass, shape (3,), in [m].
             base: Rotation matrix of the base, shape (3, 3).
+            upper: Positions of the upper body's joints, shape (upper,), in [rad]; by default they
+                stay.
             steps: Number of Newton steps.
 
         Returns:
@@ -86,6 +101,8 @@ class WholeBody:
             rotation = data.oMi[1].rotation
             jacobian[self._base, 3:6] = rotation
             error[self._base] = _turn(rotation, base)
+            if upper is not None:
+                error[self._upper] = upper - self.configuration[model.nq - len(upper) :]
             self.inverse = np.linalg.inv(jacobian)
             self.configuration = pin.integrate(model, self.configuration, self.inverse @ error)
         return self.configuration

@@ -42,6 +42,7 @@ class WalkControl:
         self._body, self._stabilizer = body, stabilizer
         self._places, self._yaws = plan.places, plan.yaws.tolist()
         self._centre, self._heading = plan.centre, plan.heading.tolist()
+        self._upper = plan.upper
         self._rates, self._bearing, self._weight = _rates(plan), bearing(plan), weight
         self._place, self._turn = where["base.place"], where["base.turn"]
         rest = body.configuration[7:]
@@ -68,7 +69,8 @@ class WalkControl:
             for (roll, pitch), yaw in zip(tilts, self._yaws[number], strict=True)
         ]
         base = pin.rpy.rpyToMatrix(0.0, 0.0, self._heading[number])
-        after = self._body.follow(places, turns, self._centre[number], base)[7:]
+        upper = self._upper[number]
+        after = self._body.follow(places, turns, self._centre[number], base, upper=upper)[7:]
         before, here = self._here, after
         velocity = (after - self._before) / (2 * TICK)
         planned = self._body.inverse[6:] @ self._rates[number]
@@ -91,7 +93,7 @@ class WalkControl:
 
 
 def _rates(plan: Plan) -> Array:
-    """Planned rates of all equations of `WholeBody`, shape (ticks, 18)."""
+    """Planned rates of all equations of `WholeBody`, shape (ticks, equations)."""
     ticks = len(plan.centre)
     soles = np.zeros((ticks, 2, 6))
     soles[:, :, :3] = np.gradient(plan.places, TICK, axis=0)
@@ -99,7 +101,8 @@ def _rates(plan: Plan) -> Array:
     turning = np.zeros((ticks, 3))
     turning[:, 2] = np.gradient(plan.heading, TICK)
     moving = np.gradient(plan.centre, TICK, axis=0)
-    return np.hstack((soles.reshape(ticks, 12), moving, turning))
+    upper = np.gradient(plan.upper, TICK, axis=0)
+    return np.hstack((soles.reshape(ticks, 12), moving, turning, upper))
 
 
 def bearing(plan: Plan) -> Array:

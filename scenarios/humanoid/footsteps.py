@@ -1,9 +1,10 @@
 """Footsteps of a humanoid: foot, place and time; drawn by a seed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from scenarios.humanoid.motions import Stroll
 from scenarios.humanoid.robots import Humanoid
 from scenarios.motions import Walk
 
@@ -80,6 +81,37 @@ def footsteps(
         ground = -drop if number > last else 0.0
         steps.append(Step(foot, (*place, ground), yaw, now, start, stop, height))
         now, foot = stop, 1 - foot
+    return tuple(steps)
+
+
+def stopping(
+    robot: Humanoid, motion: Stroll, rng: np.random.Generator, duration: float
+) -> tuple[Step, ...]:
+    """Footsteps of a walk with stops.
+
+    Args:
+        robot: The humanoid, its feet side by side at x = 0.
+        motion: The motion.
+        rng: Random number generator.
+        duration: Duration of the run, in [s].
+
+    Returns:
+        The steps; fewer stops than wanted where the run is too short for walking between them.
+    """
+    pauses = rng.uniform(*motion.pause, motion.stops)
+    pauses = pauses[np.cumsum(pauses) < duration / 2]
+    steps = list(footsteps(robot, motion.walk, rng, duration - float(pauses.sum())))
+    stops = rng.choice(len(steps), min(len(pauses), len(steps) - 1), replace=False)
+    for stop, pause in zip(stops.tolist(), pauses.tolist(), strict=False):
+        steps[stop + 1 :] = [
+            replace(
+                step,
+                shift=step.shift + pause,
+                start=step.start + pause,
+                stop=step.stop + pause,
+            )
+            for step in steps[stop + 1 :]
+        ]
     return tuple(steps)
 
 

@@ -22,6 +22,7 @@ class Plan:
         swinging: The foot in the air, or -1, shape (ticks,).
         zmp: Zero-moment point, x and y, shape (ticks, 2), in [m].
         centre: Centre of mass, shape (ticks, 3), in [m].
+        upper: Positions of the upper body's joints, shape (ticks, joints), in [rad].
         rate: Natural frequency of the inverted pendulum, in [rad/s].
         contacts: The planned contacts.
         effectors: Left and right sole.
@@ -34,6 +35,7 @@ class Plan:
     swinging: Integers
     zmp: Array
     centre: Array
+    upper: Array
     rate: float
     contacts: tuple[Contact, ...]
     effectors: tuple[Effector, ...]
@@ -82,5 +84,6 @@ class Plan:
             swinging=np.pad(self.swinging, (ticks, 0), "edge"),
             zmp=later(self.zmp),
             centre=later(self.centre),
+            upper=later(self.upper),
             contacts=tuple(contact.later(ticks * TICK) for contact in self.contacts),
         )

@@ -1,9 +1,14 @@
 """Humanoids that can be simulated, as data."""
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from scenarios.drivetrain import Drivetrain
 from scenarios.shapes import Sole
+
+LEGS = 12
+"""How many of a humanoid's drives, the first ones, are in its legs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,11 +37,12 @@ class Gains:
 
 @dataclass(frozen=True, kw_only=True)
 class Humanoid:
-    """A humanoid that walks on two soles, its upper body held still.
+    """A humanoid that walks on two soles.
 
     Attributes:
         name: Its name in ``noisemodel.ROBOTS``.
-        drives: Its drives, in the order of the URDF's joints: left leg, right leg.
+        drives: Its drives, in the order of the URDF's joints: left leg, right leg, and those of its
+            upper body that move.
         effectors: Left and right sole.
         rest: Joint positions near those in which it stands, in [rad].
         centre: Height of the centre of mass over the soles, in [m].
@@ -49,7 +55,8 @@ class Humanoid:
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
         size: Its size, relative to that which the defects of the scenarios are defined for.
         held: Positions of the locked joints that are not at zero, by name.
-        length_scale: Scale of all lengths of the URDF.
+        reach: Largest deviation of each moving joint of the upper body from its rest, in [rad].
+        length_scale: Scale of all lengths of its description.
     """
 
     name: str
@@ -66,6 +73,7 @@ class Humanoid:
     force_noise: float
     size: float = 1.0
     held: dict[str, float] = field(default_factory=dict)
+    reach: tuple[float, ...] = ()
     length_scale: float = 1.0
 
     @property
@@ -149,3 +157,211 @@ G1 = Humanoid(
         "right_elbow_joint": 0.6,
     },
 )  # fmt: skip
+
+
+TALOS_MASS = 90.3
+"""In [kg]."""
+UPPER = {
+    "stiffness": 0.2, "damping": 0.2, "torque": 0.25,
+    "armature": 0.2, "friction": 0.2, "viscous": 0.2,
+}  # fmt: skip
+"""Drives of an upper body, relative to those of the legs."""
+
+
+def similar(name: str, mass: float, joints: tuple[str, ...], centre: float, **own: Any) -> Humanoid:
+    """A humanoid with TALOS's drives, steps and stabilizer, scaled to its mass and height.
+
+    Dynamic similarity: with lengths in proportion to the height of the centre of mass and times to
+    the period of a pendulum of that length, two robots of one shape have the same motion (Alexander
+    and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J. Zool. 1983).
+
+    Args:
+        name: Its name in ``noisemodel.ROBOTS``.
+        mass: In [kg].
+        joints: Of the left and of the right leg.
+        centre: Height of the centre of mass over the soles, in [m].
+        own: The fields that no scale gives.
+
+    Returns:
+        The humanoid.
+    """
+    length, weight = centre / TALOS.centre, mass / TALOS_MASS
+    time, torque = length**0.5, weight * length
+    scales = {
+        "stiffness": torque, "damping": torque * time, "torque": torque,
+        "armature": torque * length, "friction": torque, "viscous": torque * time,
+    }  # fmt: skip
+    drives = {
+        field: tuple(scale * value for value in getattr(TALOS.drives, field))
+        for field, scale in scales.items()
+    }
+    along, across, turn = TALOS.stride
+    return Humanoid(
+        name=name,
+        drives=Drivetrain(joints=joints, **drives),
+        centre=centre,
+        stride=(along * length, across * length, turn),
+        pace=time,
+        gains=replace(
+            TALOS.gains,
+            tilt=TALOS.gains.tilt / (torque * time),
+            height=TALOS.gains.height * length / (weight * time),
+        ),
+        payload=TALOS.payload * weight,
+        force_noise=TALOS.force_noise * weight,
+        size=length,
+        **own,
+    )
+
+
+def moving(robot: Humanoid, upper: Mapping[str, tuple[float, float]]) -> Humanoid:
+    """The same humanoid with an upper body that moves.
+
+    Args:
+        robot: A humanoid whose legs move.
+        upper: Rest and largest deviation of each joint of the upper body that is to move, in the
+            order of the URDF's joints, in [rad].
+
+    Returns:
+        The humanoid, its upper body's drives as `UPPER` has them.
+    """
+    drives = {
+        field: (
+            *getattr(robot.drives, field),
+            *(share * getattr(robot.drives, field)[0],) * len(upper),
+        )
+        for field, share in UPPER.items()
+    }
+    rest, reach = zip(*upper.values(), strict=True)
+    return replace(
+        robot,
+        drives=Drivetrain(joints=(*robot.drives.joints, *upper), **drives),
+        rest=(*robot.rest, *rest),
+        reach=reach,
+        held={joint: angle for joint, angle in robot.held.items() if joint not in upper},
+    )
+
+
+def _sides(names: str, left: str, right: str) -> tuple[str, ...]:
+    """Names with {} for the side, first of the left, then of the right one."""
+    return tuple(name.format(side) for side in (left, right) for name in names.split())
+
+
+_SWING = 0.5
+"""Largest deviation of a shoulder or an elbow from its rest, in [rad]."""
+_HEAVY = 0.2
+"""The same for arms whose links have 1 kg m² each."""
+_TWIST = 0.25
+"""Largest deviation of a waist from its rest, in [rad]."""
+
+G1_MOVING = moving(
+    replace(G1, name="g1_with_hands"),
+    {
+        "waist_yaw_joint": (0.0, _TWIST),
+        "left_shoulder_pitch_joint": (0.2, _SWING),
+        "left_shoulder_roll_joint": (0.3, 0.25),
+        "left_elbow_joint": (0.6, _SWING),
+        "right_shoulder_pitch_joint": (0.2, _SWING),
+        "right_shoulder_roll_joint": (-0.3, 0.25),
+        "right_elbow_joint": (0.6, _SWING),
+    },
+)
+ALEXANDER = moving(
+    similar(
+        "alexander",
+        49.1,
+        _sides("{}_HIP_X {}_HIP_Z {}_HIP_Y {}_KNEE_Y {}_ANKLE_Y {}_ANKLE_X", "LEFT", "RIGHT"),
+        effectors=(
+            Sole("LEFT_FOOT", (0.1, 0.045), (0.05, 0.0, -0.0715)),
+            Sole("RIGHT_FOOT", (0.1, 0.045), (0.05, 0.0, -0.0715)),
+        ),
+        rest=(0.0, 0.0, -0.4, 0.8, -0.4, 0.0) * 2,
+        centre=0.6,
+        apart=0.11,
+        carrier="TORSO_LINK",
+    ),
+    {"SPINE_Z": (0.0, 2 * _TWIST)},
+)
+# The inertias of Romeo's right arm are no body's (A + B < C): it is held, as a part of the trunk.
+ROMEO = moving(
+    similar(
+        "romeo_small",
+        40.5,
+        _sides("{}HipYaw {}HipRoll {}HipPitch {}KneePitch {}AnklePitch {}AnkleRoll", "L", "R"),
+        effectors=(
+            Sole("l_sole", (0.095, 0.06), (0.024, 0.0075, 0.0)),
+            Sole("r_sole", (0.095, 0.06), (0.024, -0.0075, 0.0)),
+        ),
+        rest=(0.0, 0.0, -0.4, 0.8, -0.4, 0.0) * 2,
+        centre=0.65,
+        apart=0.1,
+        carrier="torso",
+    ),
+    {
+        "TrunkYaw": (0.0, _TWIST),
+        "LShoulderPitch": (1.3, _SWING),
+        "LShoulderYaw": (0.3, 0.25),
+        "LElbowYaw": (-0.7, _SWING),
+    },
+)
+SIMPLE = moving(
+    similar(
+        "simple_humanoid",
+        130.8,
+        _sides(
+            "{}LEG_HIP_R {}LEG_HIP_P {}LEG_HIP_Y {}LEG_KNEE {}LEG_ANKLE_P {}LEG_ANKLE_R", "L", "R"
+        ),
+        effectors=(
+            Sole("l_ankle", (0.12, 0.06), (0.03, 0.0, -0.1)),
+            Sole("r_ankle", (0.12, 0.06), (0.03, 0.0, -0.1)),
+        ),
+        rest=(0.0, -0.4, 0.0, 0.8, -0.4, 0.0) * 2,
+        centre=0.74,
+        apart=0.09,
+        carrier="torso",
+    ),
+    {
+        "CHEST": (0.0, _TWIST),
+        "LARM_SHOULDER_P": (0.2, _HEAVY),
+        "LARM_SHOULDER_R": (0.3, 0.25),
+        "LARM_ELBOW": (-0.7, _HEAVY),
+        "RARM_SHOULDER_P": (0.2, _HEAVY),
+        "RARM_SHOULDER_R": (-0.3, 0.25),
+        "RARM_ELBOW": (-0.7, _HEAVY),
+    },
+)
+
+HUMANOIDS = (TALOS, G1, G1_MOVING, ALEXANDER, ROMEO, SIMPLE)
+"""All humanoids that can be simulated."""
+
+
+def scaled(robot: Humanoid, factor: float) -> Humanoid:
+    """The same humanoid with all lengths times a factor.
+
+    Args:
+        robot: The humanoid.
+        factor: The factor.
+
+    Returns:
+        The humanoid; drives, gains and the times of its steps stay.
+    """
+    along, across, turn = robot.stride
+    left, right = robot.effectors
+    return replace(
+        robot,
+        effectors=(_scaled(left, factor), _scaled(right, factor)),
+        centre=factor * robot.centre,
+        apart=factor * robot.apart,
+        stride=(factor * along, factor * across, turn),
+        length_scale=factor * robot.length_scale,
+    )
+
+
+def _scaled(sole: Sole, factor: float) -> Sole:
+    (along, across), (x, y, z) = sole.patch, sole.point
+    return Sole(
+        sole.frame,
+        (factor * along, factor * across),
+        (factor * x, factor * y, factor * z),
+        factor * sole.thickness,
+    )

@@ -11,10 +11,13 @@ from scenarios.clock import STEP
 from scenarios.collision import box_changes
 from scenarios.faults import Faults
 from scenarios.humanoid.control import WalkControl
-from scenarios.humanoid.footsteps import footsteps
+from scenarios.humanoid.footsteps import footsteps, stopping
+from scenarios.humanoid.gesture import gesture
+from scenarios.humanoid.motions import Stand, Stroll
 from scenarios.humanoid.plan import Plan
-from scenarios.humanoid.robots import Humanoid
+from scenarios.humanoid.robots import LEGS, Humanoid
 from scenarios.humanoid.stabilizer import Stabilizer
+from scenarios.humanoid.standing import stand
 from scenarios.humanoid.walking import GRAVITY, walk
 from scenarios.imperfections import Imperfections, real_model
 from scenarios.loop import Scene
@@ -31,7 +34,9 @@ LEVER = 0.05
 """Noise of torque sensors per noise of force sensors, in [m]."""
 
 
-def plan(robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: float) -> Plan:
+def plan(
+    robot: Humanoid, motion: Walk | Stroll | Stand, rng: np.random.Generator, duration: float
+) -> Plan:
     """Plan of the motion of one run.
 
     Args:
@@ -43,7 +48,12 @@ def plan(robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: floa
     Returns:
         The plan.
     """
-    return walk(robot, footsteps(robot, motion, rng, duration), duration)
+    if isinstance(motion, Walk):
+        return walk(robot, footsteps(robot, motion, rng, duration), duration)
+    if isinstance(motion, Stroll):
+        steps = stopping(robot, motion, rng, duration)
+        return walk(robot, steps, duration, upper=gesture(robot, motion.upper, rng, duration))
+    return stand(robot, motion, rng, duration)
 
 
 def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
@@ -89,9 +99,11 @@ def standing(robot: Humanoid, model: Any, plan: Plan) -> WholeBody:
     """The robot, standing as a plan starts."""
     start = pin.neutral(model)
     start[2], start[7:] = robot.centre, robot.rest
-    body = WholeBody(model, robot.effectors, start)
+    body = WholeBody(model, robot.effectors, start, upper=len(robot.drives.joints) - LEGS)
     level = np.eye(3)
-    body.follow(plan.places[0], [level, level], plan.centre[0], level, steps=20)
+    body.follow(
+        plan.places[0], [level, level], plan.centre[0], level, upper=plan.upper[0], steps=20
+    )
     return body
 
 

@@ -10,7 +10,7 @@ from scenarios.clock import TICK, times
 from scenarios.humanoid.feet import contacts, ground, paths
 from scenarios.humanoid.footsteps import CLOSE, Step
 from scenarios.humanoid.plan import Plan
-from scenarios.humanoid.robots import Humanoid
+from scenarios.humanoid.robots import LEGS, Humanoid
 
 GRAVITY = 9.81
 """In [m/s²]."""
@@ -22,13 +22,17 @@ BESIDE = 0.005
 """Inward offset of the zero-moment point from the centre of a sole, in [m]."""
 
 
-def walk(robot: Humanoid, steps: Sequence[Step], duration: float) -> Plan:
+def walk(
+    robot: Humanoid, steps: Sequence[Step], duration: float, *, upper: Array | None = None
+) -> Plan:
     """Plan of a walk over footsteps.
 
     Args:
         robot: The humanoid, its feet side by side at x = 0.
         steps: The footsteps.
         duration: Duration of the plan, in [s].
+        upper: Positions of the upper body's joints, shape (ticks, joints), in [rad]; by default at
+            rest.
 
     Returns:
         The plan.
@@ -45,12 +49,18 @@ def walk(robot: Humanoid, steps: Sequence[Step], duration: float) -> Plan:
         swinging,
         zmp,
         centre,
+        resting(robot, len(time)) if upper is None else upper,
         rate,
         contacts=contacts(robot, steps, duration),
         effectors=robot.effectors,
         ground=ground(robot, steps),
         size=robot.size,
     )
+
+
+def resting(robot: Humanoid, ticks: int) -> Array:
+    """Positions of an upper body at rest, shape (ticks, joints), in [rad]."""
+    return np.tile(robot.rest[LEGS:], (ticks, 1))
 
 
 def centre_of_mass(zmp: Array, rate: float) -> Array:
@@ -73,10 +83,20 @@ def centre_of_mass(zmp: Array, rate: float) -> Array:
 
 
 def _zero_moment_point(robot: Humanoid, steps: Sequence[Step], time: Array) -> Array:
-    """Zero-moment point: from foot to foot, and to the middle of both at the end."""
+    """Zero-moment point: from foot to foot, and to the middle of both at a stop."""
     standing = [(0.0, robot.apart, 0.0), (0.0, -robot.apart, 0.0)]  # x, y, yaw of each foot
     knots, points = [0.0], [(0.0, 0.0)]
+
+    def stop(end: float) -> None:
+        knots.extend((end + SMOOTH / 2, end + CLOSE))
+        points.append(points[-1])
+        points.append(tuple(np.mean([foot[:2] for foot in standing], axis=0).tolist()))
+
+    end = 0.0
     for step in steps:
+        if step is not steps[0] and step.shift - end > CLOSE:
+            stop(end)
+        end = step.stop
         other = 1 - step.foot
         x, y, yaw = standing[other]
         inward = BESIDE if other == 1 else -BESIDE
@@ -85,10 +105,7 @@ def _zero_moment_point(robot: Humanoid, steps: Sequence[Step], time: Array) -> A
         knots += [step.shift + SMOOTH / 2, step.start - SMOOTH / 2]
         points += [points[-1], point]
         standing[step.foot] = (*step.place[:2], step.yaw)
-    end = max((step.stop for step in steps), default=0.0)
-    knots += [end + SMOOTH / 2, end + CLOSE]
-    points.append(points[-1])
-    points.append(tuple(np.mean([foot[:2] for foot in standing], axis=0).tolist()))
+    stop(end)
     return np.column_stack(
         [np.interp(time, knots, [point[axis] for point in points]) for axis in (0, 1)]
     )
