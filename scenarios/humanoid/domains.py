@@ -24,13 +24,13 @@ from scenarios.humanoid.motions import Gesture, Stand, Stroll
 from scenarios.humanoid.robots import LEGS, scaled
 from scenarios.motions import Walk
 
-__all__ = ["DEFECTS", "GAITS", "LIMITS", "motion", "scaled"]
+__all__ = ["DEFECTS", "GAITS", "LIMITS", "SOFT", "motion", "scaled"]
 
 GAITS: Mapping[str, Walk] = MappingProxyType(
     {
         "walk": Walk(),
-        "slow": Walk(single=(0.9, 1.3), double=(0.4, 0.7)),
-        "brisk": Walk(single=(0.4, 0.55), double=(0.1, 0.13)),
+        "slow": Walk(single=(0.7, 1.0), double=(0.5, 0.8)),
+        "brisk": Walk(single=(0.45, 0.6), double=(0.085, 0.1)),
         "shuffle": Walk(height=(0.025, 0.035), single=(0.3, 0.4), double=(0.12, 0.18)),
         "march": Walk(way="spot", height=(0.06, 0.09), single=(0.4, 0.8), double=(0.1, 0.3)),
         "platform": Walk(drop=0.06, height=(0.07, 0.07), single=(0.75, 0.9)),
@@ -78,8 +78,13 @@ DEFECTS: Mapping[str, Defect] = MappingProxyType(
 """The humanoids' own faults, by name; those of steps do nothing while a robot only stands."""
 
 
-LIMITS = Limits(stiffness=(0.2, 2.0), damping=(0.3, 2.0), delay=0.002, hold=0.005)
-"""..."""
+LIMITS = Limits(stiffness=(0.05, 1.0), damping=(0.2, 0.5), delay=0.004, hold=0.01)
+"""Of 30 runs drawn within, over all robots and motions, 29 stayed upright, with velocity errors
+below 0.2 rad/s rms. A delay is too long where the position loop (delay > 0.015 s * damping /
+stiffness) or the velocity loop (delay > 0.002 s / damping) becomes unstable: that shakes the robot
+before it falls."""
+SOFT = Limits(stiffness=(0.05, 0.3), damping=(0.1, 0.25), delay=0.01, hold=0.02)
+"""The same for late and coarse drives, which have to be softer: 21 of 24 runs."""
 
 
 def motion(rng: np.random.Generator, wildness: float) -> Stroll | Stand:

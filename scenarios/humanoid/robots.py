@@ -249,8 +249,6 @@ def _sides(names: str, left: str, right: str) -> tuple[str, ...]:
 
 _SWING = 0.5
 """Largest deviation of a shoulder or an elbow from its rest, in [rad]."""
-_HEAVY = 0.2
-"""The same for arms whose links have 1 kg m² each."""
 _TWIST = 0.25
 """Largest deviation of a waist from its rest, in [rad]."""
 
@@ -304,31 +302,21 @@ ROMEO = moving(
         "LElbowYaw": (-0.7, _SWING),
     },
 )
-SIMPLE = moving(
-    similar(
-        "simple_humanoid",
-        130.8,
-        _sides(
-            "{}LEG_HIP_R {}LEG_HIP_P {}LEG_HIP_Y {}LEG_KNEE {}LEG_ANKLE_P {}LEG_ANKLE_R", "L", "R"
-        ),
-        effectors=(
-            Sole("l_ankle", (0.12, 0.06), (0.03, 0.0, -0.1)),
-            Sole("r_ankle", (0.12, 0.06), (0.03, 0.0, -0.1)),
-        ),
-        rest=(0.0, -0.4, 0.0, 0.8, -0.4, 0.0) * 2,
-        centre=0.74,
-        apart=0.09,
-        carrier="torso",
+# Each link of its arms has an inertia of 1 kg m², more than drives of an arm can move: they are held.
+# It has no shapes; its soles are our choice.
+SIMPLE = similar(
+    "simple_humanoid",
+    130.8,
+    _sides("{}LEG_HIP_R {}LEG_HIP_P {}LEG_HIP_Y {}LEG_KNEE {}LEG_ANKLE_P {}LEG_ANKLE_R", "L", "R"),
+    0.74,
+    effectors=(
+        Sole("l_ankle", (0.12, 0.06), (0.03, 0.0, -0.1)),
+        Sole("r_ankle", (0.12, 0.06), (0.03, 0.0, -0.1)),
     ),
-    {
-        "CHEST": (0.0, _TWIST),
-        "LARM_SHOULDER_P": (0.2, _HEAVY),
-        "LARM_SHOULDER_R": (0.3, 0.25),
-        "LARM_ELBOW": (-0.7, _HEAVY),
-        "RARM_SHOULDER_P": (0.2, _HEAVY),
-        "RARM_SHOULDER_R": (-0.3, 0.25),
-        "RARM_ELBOW": (-0.7, _HEAVY),
-    },
+    rest=(0.0, -0.4, 0.0, 0.8, -0.4, 0.0) * 2,
+    apart=0.09,
+    carrier="torso",
+    held={"LARM_ELBOW": -0.7, "RARM_ELBOW": -0.7},
 )
 
 HUMANOIDS = (TALOS, G1, G1_MOVING, ALEXANDER, ROMEO, SIMPLE)
