@@ -302,7 +302,7 @@ ROMEO = moving(
         "LElbowYaw": (-0.7, _SWING),
     },
 )
-# Each link of its arms has an inertia of 1 kg m², more than drives of an arm can move: they are held.
+# Its arms are held: each of their links has an inertia of 1 kg m², too much for drives of an arm.
 # It has no shapes; its soles are our choice.
 SIMPLE = similar(
     "simple_humanoid",
