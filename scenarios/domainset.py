@@ -56,7 +56,7 @@ def tasks(
 
 
 def _faults(robot: str, seed: int, count: int) -> list[str]:
-    names = faults_of(robot)
+    names = faults_of(robot, seed)
     rng = np.random.default_rng((seed, crc32(robot.encode()), 2))
     chosen = rng.choice(len(names), min(count, len(names)), replace=False)
     return [names[index] for index in sorted(chosen.tolist())]

@@ -1,22 +1,27 @@
-"""How soft and how late the drives of a family may be without the robot falling."""
+"""How soft, late and coarse drives may be before robots of a family fall."""
 
 from dataclasses import dataclass
+from typing import TypeAlias
 
-Range = tuple[float, float]
+Range: TypeAlias = tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Limits:
-    """Limits of what a domain draws for a family of robots.
+    """Drives with which a family's robots stay upright in at least four of five runs.
 
     Attributes:
-        stiffness: Scale of the nominal position gains, least and most.
-        damping: Scale of the nominal velocity gains, least and most.
-        delay: Longest delay from a reading to its torque, in [s].
+        stiffness: Scale of the position gains.
+        damping: Scale of the velocity gains.
+        delay: Longest time from a reading to its torque, in [s].
         hold: Longest time for which targets are held, in [s].
+        feedforward: Least share of the model's torques.
+        flexibility: Lowest natural frequency of rotors on elastic gears, in [Hz].
     """
 
     stiffness: Range = (0.0, float("inf"))
     damping: Range = (0.0, float("inf"))
     delay: float = float("inf")
     hold: float = float("inf")
+    feedforward: float = 0.0
+    flexibility: float = 0.0

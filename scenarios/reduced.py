@@ -45,10 +45,23 @@ def reduced_model(robot: Reducible) -> Any:
     Raises:
         UnsupportedModelError: If the URDF lacks a joint.
     """
-    scale = float(getattr(robot, "length_scale", 1.0))
     held = tuple(sorted(robot.held.items()))
-    reduced = _reduced(robot.name, robot.drives.joints, held)
-    return reduced if scale == 1 else _resized(robot.name, robot.drives.joints, held, scale)
+    return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
+
+
+def configuration(model: Any, joints: Array) -> Array:
+    """Pinocchio's configuration of a robot with a fixed base.
+
+    Args:
+        model: The ``pinocchio.Model``.
+        joints: Joint positions, shape (joints,), in [rad].
+
+    Returns:
+        The same, but for continuous joints, which have a cosine and a sine.
+    """
+    if model.nq == model.nv:
+        return joints
+    return np.asarray(pin.integrate(model, pin.neutral(model), joints))
 
 
 @lru_cache(maxsize=8)
@@ -69,28 +82,33 @@ def _reduced(
         for joint in model.names[1:]
         if joint not in moved and model.joints[model.getJointId(joint)].nv == 1
     ]
-    # Pinocchio refuses two frames of one name, as in anymal_c, which needs no reduction.
-    unique = len({frame.name for frame in model.frames}) == model.nframes
-    reduced = pin.buildReducedModel(model, fixed, posture) if fixed or unique else model
+    # Pinocchio refuses two frames of one name, as in anymal_c, and a joint and a body of one name.
+    try:
+        reduced = pin.buildReducedModel(model, fixed, posture)
+    except ValueError:
+        if fixed:
+            raise
+        reduced = model
     if tuple(reduced.names)[-len(moved) :] != moved:
         raise UnsupportedModelError(
             f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"
         )
-    return reduced
+    return reduced if scale == 1.0 else _scaled(reduced, scale)
 
 
-@lru_cache(maxsize=8)
-def _resized(
-    name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...], scale: float
-) -> Any:
-    """The model with all lengths times a scale, its masses as they are."""
-    model = _reduced(name, moved, held).copy()
-    for joint in range(model.njoints):
-        inertia = model.inertias[joint]
-        model.inertias[joint] = pin.Inertia(
-            inertia.mass, scale * inertia.lever, scale**2 * inertia.inertia
+def _scaled(model: Any, scale: float) -> Any:
+    """A copy of a model with all lengths scaled, its masses unchanged."""
+    scaled = model.copy()
+    for index in range(1, model.njoints):
+        scaled.jointPlacements[index] = _moved(model.jointPlacements[index], scale)
+        given = model.inertias[index]
+        scaled.inertias[index] = pin.Inertia(
+            given.mass, scale * given.lever, scale**2 * given.inertia
         )
-        model.jointPlacements[joint].translation = scale * model.jointPlacements[joint].translation
-    for frame in model.frames:
-        frame.placement.translation = scale * frame.placement.translation
-    return model
+    for index in range(model.nframes):
+        scaled.frames[index].placement = _moved(model.frames[index].placement, scale)
+    return scaled
+
+
+def _moved(placement: Any, scale: float) -> Any:
+    return pin.SE3(placement.rotation, scale * placement.translation)

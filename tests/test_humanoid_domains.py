@@ -13,7 +13,7 @@ from scenarios.clock import STEPS, TICK
 from scenarios.contacts import unplanned
 from scenarios.drives import Drives
 from scenarios.faults import Faults
-from scenarios.humanoid.domains import DEFECTS, GAITS, SOFT, motion, scaled
+from scenarios.humanoid.domains import DEFECTS, GAITS, LIMITS, motion, scaled
 from scenarios.humanoid.footsteps import stopping
 from scenarios.humanoid.motions import Gesture, Stand, Stroll
 from scenarios.humanoid.robots import (
@@ -217,7 +217,7 @@ def test_lengths_are_scaled_and_nothing_else():
 def test_a_soft_and_late_robot_walks_on():
     _, run = simulated(
         G1, Stroll(walk=GAITS["walk"]), duration=3.0,
-        stiffness=SOFT.stiffness[0], damping=SOFT.damping[1], delay=SOFT.delay / 2,
+        stiffness=LIMITS.stiffness[0], damping=LIMITS.damping[1], delay=LIMITS.delay / 2,
     )  # fmt: skip
     error = np.abs(run.position - run.position_desired).max()
     assert 0.01 < error < 0.3

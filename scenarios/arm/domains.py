@@ -19,6 +19,7 @@ from scenarios.defects import (
     ReferenceJumps,
     SensorJumps,
 )
+from scenarios.limits import Limits
 from scenarios.motions import Picks, Range, Reach
 
 PICKS = 0.35
@@ -29,13 +30,16 @@ FASTEST = (0.5, 2.5)
 """Highest peak speed, mild and wild, in [rad/s]."""
 
 
-def motion(rng: np.random.Generator, wildness: float, arm: Arm | None = None) -> Picks | Reach:
+def motion(
+    rng: np.random.Generator, wildness: float, arm: Arm | None = None, *, soft: bool = False
+) -> Picks | Reach:
     """Motion of an arm.
 
     Args:
         rng: Random number generator.
         wildness: 0 for slow and smooth motion without stops and payloads, to 1.
         arm: The arm; one that cannot pick moves in the air only.
+        soft: Whether its drives are soft; it moves alike.
 
     Returns:
         The motion.
@@ -60,6 +64,10 @@ def motion(rng: np.random.Generator, wildness: float, arm: Arm | None = None) ->
         stops=0.3 * wildness if stops < 0.5 * wildness else 0.0,
         payload=(0.1, 0.5 + 1.5 * wildness) if carries < 0.2 + 0.4 * wildness else (0.0, 0.0),
     )
+
+
+LIMITS = Limits(flexibility=12.0)
+"""An arm does not fall."""
 
 
 def _mixed(span: Range, share: float) -> float:

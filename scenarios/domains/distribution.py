@@ -248,13 +248,12 @@ class Distribution:
                 problem = f"expected within {least:g} to {most:g}{unit}"
                 raise DistributionError(each.name, ends, problem)
 
-    def domain(self, rng: np.random.Generator, limits: Limits, *, softest: float = 0.0) -> Domain:
+    def domain(self, rng: np.random.Generator, limits: Limits) -> Domain:
         """Draw the domain of one run.
 
         Args:
             rng: Random number generator.
             limits: What the robot's family bears.
-            softest: Least share of the model's torque that is fed forward.
 
         Returns:
             The domain.
@@ -274,7 +273,7 @@ class Distribution:
             payload=draw("payload"),
             gear=draw.far("gear"),
             ripple=draw("ripple") if elastic else 0.0,
-            flexibility=draw("flexibility") if elastic else 0.0,
+            flexibility=max(draw("flexibility"), limits.flexibility) if elastic else 0.0,
             backlash=draw("backlash") if elastic and draw.present() else 0.0,
             cogging=draw("cogging") if draw.present() else 0.0,
             stiction=draw("stiction") if draw.present() else 1.0,
@@ -287,7 +286,7 @@ class Distribution:
             control=control,
             stiffness=stiffness,
             damping=damping,
-            feedforward=max(softest, draw("feedforward")) if control == "pd" else 1.0,
+            feedforward=max(draw("feedforward"), limits.feedforward) if control == "pd" else 1.0,
             policy_rate=max(draw("policy_rate"), 1 / limits.hold) if control == "policy" else 0.0,
             encoder_bits=round(draw("loop_bits")),
             encoder_bandwidth=draw("loop_bandwidth"),

@@ -137,17 +137,18 @@ def latency(rng: np.random.Generator, drives: Drivetrain, duration: float) -> Dr
 
 
 def chatter(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
-    """Draw gains that are too high for a while."""
+    """Draw gains that are too high for a while, for a delay that is a little longer, too."""
     joints = _some(rng, len(drives.joints))
-    factor = _log(rng, 2.0, 40.0)
+    factor, delay = _log(rng, 4.0, 60.0), _log(rng, 0.5e-3, 4e-3)
     start, stop = _when(rng, duration, float(rng.uniform(0.4, 2.0)))
-    facts = {"factor": factor, "joints": joints.tolist()}
+    facts = {"factor": factor, "delay": delay, "joints": joints.tolist()}
     gains = np.where(joints > 0, factor, 1.0)
     soft = rng.uniform() < 0.3
     return DriveFault(
         event=Event("oscillations", "too high gains", start, stop, facts),
         stiffness=gains,
         damping=1.0 if soft else gains,
+        delay=delay,
     )
 
 

@@ -10,6 +10,7 @@ from zlib import crc32
 import numpy as np
 
 from noisemodel import Run, decimated
+from noisemodel.types import Array
 from scenarios.clock import RATE, STEP, TICK, times
 from scenarios.contacts import unplanned
 from scenarios.domains.distribution import DISTRIBUTION, Distribution
@@ -48,27 +49,48 @@ FAST_SHARE = 0.15
 """Share of the seeds whose runs are kept at 10 kHz."""
 
 
+LAG = 0.6
+"""Most phase that delay and filters take from a velocity loop at its crossover, in [rad]."""
+MARGIN = 0.5
+"""Most of the damping that they take from a position loop."""
+SOFT = 0.5
+"""Scale of the position gains below which a robot moves as one with soft drives."""
+SAME = 0.1
+"""Contacts of a run and of its twin are the same if they start so close together, in [s]."""
+
+
+RATTLE = 0.15
+"""Share of a fault-free motion above ``FAST`` from which on its drives rattle: no good run."""
+FAST, AUDIBLE = 40.0, 0.3
+"""Lowest frequency of rattling, in [Hz], and its least level, in [rad/s]."""
+
+
 @dataclass(frozen=True, eq=False)
 class Trial:
     """One simulated run without labels."""
 
     motion: "Motion"
-    events: tuple[Event, ...]
+    injected: tuple[Event, ...]
+    contacts: tuple[Event, ...]
     facts: Mapping[str, Any]
     domain: Domain
     description: str
 
 
-def faults_of(robot: str) -> tuple[str, ...]:
+def faults_of(robot: str, seed: int | None = None) -> tuple[str, ...]:
     """Names of the faults of a robot: of its drives and commands, and its family's own.
 
     Args:
         robot: A name in ``scenarios.robots.WIDE``.
+        seed: Only those that can act in the motion of this seed.
 
     Raises:
         UnsimulatedRobotError: If there is no such robot.
     """
-    return (*FAULTS, *_family(_look_up(robot)).DEFECTS)
+    entry = _look_up(robot)
+    family = _family(entry)
+    own = family.DEFECTS if seed is None else family.suited(_draw(entry, seed).motion)
+    return (*FAULTS, *own)
 
 
 def simulate(
@@ -109,7 +131,8 @@ def simulate(
         trial = twin if fault == GOOD else _trial(entry, fault, seed, seconds, distribution)
     except DivergedError as error:
         raise SimulationError(robot, fault, seed, error.time, error.problem) from error
-    blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, trial.events, rate=RATE)
+    events = () if fault == GOOD else (*trial.injected, *_further(trial, twin))
+    blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, events, rate=RATE)
     rate = RATE if np.random.default_rng((seed, 1)).uniform() < FAST_SHARE else SLOW
     return kept(
         trial.motion,
@@ -162,6 +185,19 @@ def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
     )
 
 
+def _further(trial: Trial, twin: Trial) -> list[Event]:
+    """Unplanned contacts of a run that its twin does not have: soft legs scuff."""
+    return [
+        contact
+        for contact in trial.contacts
+        if not any(
+            abs(contact.start - other.start) < SAME
+            and contact.facts["effector"] == other.facts["effector"]
+            for other in twin.contacts
+        )
+    ]
+
+
 def _look_up(robot: str) -> Simulated:
     if robot not in WIDE:
         raise UnsimulatedRobotError(robot, WIDE)
@@ -174,7 +210,25 @@ def _family(robot: Simulated) -> Any:
 
 @lru_cache(maxsize=1)
 def _twin(robot: str, seed: int, duration: float, distribution: Distribution) -> Trial:
-    return _trial(WIDE[robot], GOOD, seed, duration, distribution)
+    twin = _trial(WIDE[robot], GOOD, seed, duration, distribution)
+    _refuse_rattling(twin.motion.velocity)
+    return twin
+
+
+def _refuse_rattling(velocity: Array) -> None:
+    """Refuse a run without a fault whose drives rattle all the same.
+
+    Raises:
+        DivergedError: If most of the time the motion above ``FAST`` is too large a share of it.
+    """
+    from scipy.signal import butter, sosfilt
+
+    fast = sosfilt(butter(2, FAST, "highpass", fs=RATE, output="sos"), velocity, axis=0)
+    level, whole = (
+        float(np.sqrt(np.median(np.square(signal).sum(axis=1)))) for signal in (fast, velocity)
+    )
+    if level > max(AUDIBLE, RATTLE * whole):
+        raise DivergedError(0.0, f"it rattles without a fault, at {level:.2g} rad/s")
 
 
 def _trial(
@@ -184,12 +238,9 @@ def _trial(
     from scenarios.domains.drives import DomainDrives
 
     family, module = _family(nominal), import_module(f"scenarios.{nominal.family}.scene")
-    streams = np.random.SeedSequence((seed, crc32(nominal.name.encode()))).spawn(7)
-    drawn, moving, planned, body, gears, sensors, faulty = map(np.random.default_rng, streams)
-    limits: Limits = family.LIMITS
-    domain = distribution.domain(drawn, limits, softest=family.FEEDFORWARD)
-    robot = _changed(family.scaled(nominal, domain.length), domain)
-    motion = family.motion(moving, domain.wildness)
+    drawn = _draw(nominal, seed, distribution)
+    planned, body, gears, sensors, faulty = drawn.streams
+    robot, domain, motion = drawn.robot, drawn.domain, drawn.motion
     plan = module.plan(robot, motion, planned, duration)
     imperfections = _imperfections(robot, domain, body, bodies=module.bodies(robot))
     faults, drive = Faults(), NONE
@@ -208,27 +259,45 @@ def _trial(
         settling=scene.settling * TICK,
         rng=gears,
     )
-    motion_made = recorded(scene, drives, plan, faults, imperfections, sensors)
-    events = (*faults.events, *([drive.event] if drive.event else ()))
+    recording = recorded(scene, drives, plan, faults, imperfections, sensors)
+    injected = (*faults.events, *([drive.event] if drive.event else ()), *scene.events)
     return Trial(
-        motion_made,
-        events + unplanned(motion_made.contact, plan.contacts),
+        recording,
+        injected,
+        unplanned(recording.contact, plan.contacts),
         {**faults.facts, **drive.facts},
         domain,
         repr(motion),
     )
 
 
-LAG = 0.6
-"""Most phase that delay and filters take from a velocity loop at its crossover, in [rad]."""
+@dataclass(frozen=True)
+class Drawn:
+    """What a seed draws before the plan."""
+
+    robot: Simulated
+    domain: Domain
+    motion: Any
+    streams: tuple[np.random.Generator, ...]
 
 
-def _changed(robot: Simulated, domain: Domain) -> Simulated:
-    """The robot with the drives of the domain, its gains no higher than its delays allow.
+def _draw(nominal: Simulated, seed: int, distribution: Distribution = DISTRIBUTION) -> Drawn:
+    family = _family(nominal)
+    streams = np.random.SeedSequence((seed, crc32(nominal.name.encode()))).spawn(7)
+    domains, motions, *others = map(np.random.default_rng, streams)
+    limits: Limits = family.LIMITS
+    robot, domain = _changed(nominal, distribution.domain(domains, limits))
+    soft = domain.stiffness < SOFT or domain.policy_rate > 0
+    motion = family.motion(motions, domain.wildness, nominal, soft=soft)
+    return Drawn(family.scaled(robot, domain.length), domain, motion, tuple(others))
 
-    A velocity loop of gain d on an inertia J crosses over at d/J; whoever tunes a robot lowers its
-    gains until the lag there leaves a margin. The rotor alone is the least inertia that a loop
-    can have.
+
+def _changed(robot: Simulated, domain: Domain) -> tuple[Simulated, Domain]:
+    """The robot with the drives of the domain, its delay no longer than its gains bear.
+
+    A velocity loop of gain d on an inertia J crosses over at d/J, and a delay t takes t k of the
+    damping d: whoever builds a robot leaves a margin to both. The rotor alone is the least
+    inertia that a loop can have. Where filters of the velocity leave no margin, gains are lower.
     """
     from scenarios.domains.drives import LOAD_SHARE
 
@@ -236,10 +305,13 @@ def _changed(robot: Simulated, domain: Domain) -> Simulated:
         return tuple(factor * value for value in values)
 
     nominal = robot.drives
-    lag = STEP + domain.delay + domain.torque_rise / 2 + 1 / (np.pi * domain.encoder_bandwidth)
     inertia = np.array(nominal.armature) * domain.rotor
+    lag = STEP + domain.torque_rise / 2 + 1 / (np.pi * domain.encoder_bandwidth)
     damping = np.minimum(domain.damping * np.array(nominal.damping), LAG * inertia / lag)
-    stiffness = np.minimum(domain.stiffness * np.array(nominal.stiffness), damping**2 / inertia)
+    stiffness = domain.stiffness * np.array(nominal.stiffness)
+    stiffness = np.minimum(stiffness, np.minimum(damping**2 / inertia, MARGIN * damping / lag))
+    bearable = np.minimum(LAG * inertia / damping, MARGIN * damping / stiffness).min() - lag
+    domain = replace(domain, delay=float(np.clip(domain.delay, 0.0, max(bearable, 0.0))))
     rotor = domain.rotor * (LOAD_SHARE if domain.flexibility else 1.0)
     drives = Drivetrain(
         joints=nominal.joints,
@@ -250,7 +322,7 @@ def _changed(robot: Simulated, domain: Domain) -> Simulated:
         friction=scaled(nominal.friction, domain.friction),
         viscous=scaled(nominal.viscous, domain.viscous),
     )
-    return replace(robot, drives=drives)
+    return replace(robot, drives=drives), domain
 
 
 def _imperfections(

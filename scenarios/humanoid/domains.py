@@ -19,12 +19,12 @@ from scenarios.defects import (
     Scaled,
     SensorJumps,
 )
-from scenarios.domains.limits import Limits, Range
 from scenarios.humanoid.motions import Gesture, Stand, Stroll
-from scenarios.humanoid.robots import LEGS, scaled
+from scenarios.humanoid.robots import LEGS, Humanoid, scaled
+from scenarios.limits import Limits, Range
 from scenarios.motions import Walk
 
-__all__ = ["DEFECTS", "GAITS", "LIMITS", "SOFT", "motion", "scaled"]
+__all__ = ["DEFECTS", "GAITS", "LIMITS", "motion", "scaled", "suited"]
 
 GAITS: Mapping[str, Walk] = MappingProxyType(
     {
@@ -78,21 +78,42 @@ DEFECTS: Mapping[str, Defect] = MappingProxyType(
 """The humanoids' own faults, by name; those of steps do nothing while a robot only stands."""
 
 
-LIMITS = Limits(stiffness=(0.05, 1.0), damping=(0.2, 0.5), delay=0.004, hold=0.01)
-"""Of 30 runs drawn within, over all robots and motions, 29 stayed upright, with velocity errors
-below 0.2 rad/s rms. A delay is too long where the position loop (delay > 0.015 s * damping /
-stiffness) or the velocity loop (delay > 0.002 s / damping) becomes unstable: that shakes the robot
-before it falls."""
-SOFT = Limits(stiffness=(0.05, 0.3), damping=(0.1, 0.25), delay=0.01, hold=0.02)
-"""The same for late and coarse drives, which have to be softer: 21 of 24 runs."""
+LIMITS = Limits(
+    stiffness=(0.05, 1.0), damping=(0.2, 0.5), delay=0.004, hold=0.01, feedforward=0.9,
+    flexibility=40.0,
+)  # fmt: skip
+"""Of 30 runs drawn within stiffness, damping, delay and hold, over all robots and motions, 29
+stayed upright, with velocity errors below 0.2 rad/s rms."""
 
 
-def motion(rng: np.random.Generator, wildness: float) -> Stroll | Stand:
+def suited(motion: Stroll | Stand) -> tuple[str, ...]:
+    """Names of the faults that can act in a motion.
+
+    Args:
+        motion: The motion.
+
+    Returns:
+        Names in ``DEFECTS``: those of steps only if it walks, that of an edge only if there is one.
+    """
+    steps = tuple(name for name in DEFECTS if name.startswith("obstacle"))
+    idle = (*steps, "edge") if isinstance(motion, Stand) else () if motion.walk.drop else ("edge",)
+    return tuple(name for name in DEFECTS if name not in idle)
+
+
+def motion(
+    rng: np.random.Generator,
+    wildness: float,
+    robot: Humanoid | None = None,
+    *,
+    soft: bool = False,
+) -> Stroll | Stand:
     """Draw a motion.
 
     Args:
         rng: Random number generator.
         wildness: From 0 (slow walks without stops, an upper body that hardly moves) to 1.
+        robot: The robot; all of them walk and stand.
+        soft: Whether its drives are soft; it moves alike.
 
     Returns:
         The motion.

@@ -10,6 +10,7 @@ import numpy as np
 
 from scenarios.defects import Decalibration, Defect, Obstacles, Plan, Range
 from scenarios.faults import Faults
+from scenarios.limits import Limits
 from scenarios.motions import Trot
 from scenarios.quadruped.cases import QUADRUPED
 from scenarios.quadruped.robots import Quadruped
@@ -39,12 +40,20 @@ ADVANCE = 0.3
 """Shortest way over which a step down may come, as a share of the height of the robot."""
 
 
-def motion(rng: np.random.Generator, wildness: float) -> Trot:
+def motion(
+    rng: np.random.Generator,
+    wildness: float,
+    robot: Quadruped | None = None,
+    *,
+    soft: bool = False,
+) -> Trot:
     """Random motion.
 
     Args:
         rng: Random number generator.
         wildness: From 0, near today's trot, to 1, slow to fast, with stops and moving body.
+        robot: The robot; all of them have all gaits.
+        soft: Whether its drives are soft, so that its steps have to be quick.
 
     Returns:
         The motion; each setting is drawn between its mild and its wild range.
@@ -58,7 +67,7 @@ def motion(rng: np.random.Generator, wildness: float) -> Trot:
     period, height, posing = draw("period"), draw("height"), draw("posing")
     moves_body = gait == "stand" or float(rng.uniform()) < 0.4 * wildness
     pauses = int(rng.binomial(2, 0.4 * wildness)) if gait != "stand" else 0
-    return Trot(
+    drawn = Trot(
         gait=gait,
         way=str(rng.choice(WAYS)),
         period=(period, period),
@@ -69,6 +78,7 @@ def motion(rng: np.random.Generator, wildness: float) -> Trot:
         pauses=pauses,
         duration=5.0 + 1.5 * pauses,
     )
+    return steady(drawn) if soft else drawn
 
 
 def steady(motion: Trot) -> Trot:
@@ -83,44 +93,24 @@ def steady(motion: Trot) -> Trot:
     return replace(motion, gait=gait, period=(shortest, longest))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Bearable:
-    """Drives on which at least 80 % of healthy runs of steady motions stay upright.
-
-    Attributes:
-        stiffness: Scale of the position gains.
-        damping: Scale of the velocity gains.
-        hold: Longest time for which targets are held, in [s].
-        feedforward: Lowest share of the model's torques.
-        delay: Longest delay of the torques, whatever the gains, in [s].
-    """
-
-    stiffness: Range = (0.1, 1.5)
-    damping: Range = (0.15, 1.5)
-    hold: float = 0.02
-    feedforward: float = 0.6
-    delay: float = 0.01
+LIMITS = Limits(
+    stiffness=(0.1, 1.5), damping=(0.15, 1.5), delay=0.01, hold=0.02, feedforward=0.6,
+    flexibility=40.0,
+)  # fmt: skip
+"""Common to all quadrupeds, with delays no longer than their gains bear."""
 
 
-LIMITS = Bearable()
-"""Common to all quadrupeds; the delay is also limited by `longest_delay`."""
-
-
-def longest_delay(robot: Quadruped, *, stiffness: float, damping: float) -> float:
-    """Longest delay of the torques with which joints are damped, in [s].
-
-    A delay of t takes k t of the damping d, and the loop of the velocity is stable up to d t / J =
-    pi / 2 with an inertia J, of which the rotor's is a part.
+def suited(motion: Trot) -> tuple[str, ...]:
+    """Names of the faults that can act in a motion.
 
     Args:
-        robot: The robot.
-        stiffness: Scale of the position gains.
-        damping: Scale of the velocity gains.
+        motion: The motion.
+
+    Returns:
+        Names in ``DEFECTS``: without those of steps if it only stands.
     """
-    gains = (robot.drives.stiffness, robot.drives.damping, robot.drives.armature)
-    k, d, inertia = (np.array(gain) for gain in gains)
-    k, d = stiffness * k, damping * d
-    return min(LIMITS.delay, float((0.5 * d / k).min()), float((0.6 * inertia / d).min()))
+    steps = tuple(name for name, defect in DEFECTS.items() if isinstance(defect, Underfoot | Ahead))
+    return tuple(name for name in DEFECTS if motion.gait != "stand" or name not in steps)
 
 
 def scaled(robot: Quadruped, factor: float) -> Quadruped:
