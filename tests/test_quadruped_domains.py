@@ -197,13 +197,6 @@ def test_a_step_down_is_not_drawn_for_a_robot_on_the_spot():
     assert step.draw(np.random.default_rng(1), plan(way="straight")).ground is not None
 
 
-def test_the_delay_that_drives_bear_is_shorter_with_less_damping_or_more_of_it():
-    delays = [
-        domains.longest_delay(GO2, stiffness=0.5, damping=damping) for damping in (0.01, 0.4, 1.5)
-    ]
-    assert delays == pytest.approx([2e-4, 5e-3, 0.6 * 0.02 / 9])
-
-
 def soften(monkeypatch, **scales):
     """Replace the drives by soft ones that hold targets, with a delay."""
 

@@ -1,0 +1,196 @@
+"""Runs of wide domains: equal seeds give equal runs, faults act in time, errors are named."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import scenarios
+from noisemodel import Run
+from scenarios.dataset import make
+from scenarios.domains import DISTRIBUTION, GOOD, faults_of, simulate, simulation
+from scenarios.domains.domain import Domain, Logger
+from scenarios.domainset import is_target, logs, tasks, write
+from scenarios.errors import DivergedError
+from scenarios.folder import Folder
+from scenarios.limits import Limits
+from scenarios.quadruped.robots import GO2
+from scenarios.robots import TARGETS, WIDE
+from scenarios.statistics import Statistics
+from scenarios.tasks import Task
+
+SECONDS = 3.0
+
+
+def drawn(seed=1, **changes):
+    domain = DISTRIBUTION.domain(np.random.default_rng(seed), Limits())
+    return replace(domain, **changes)
+
+
+@pytest.fixture(scope="module")
+def good():
+    return simulate("ur5", GOOD, 10_000, duration=SECONDS)
+
+
+@pytest.fixture(scope="module")
+def tone():
+    return simulate("ur5", "tone", 10_001, duration=SECONDS)
+
+
+def test_there_are_enough_robots_of_each_family_and_targets_of_each():
+    count = dict.fromkeys(("arm", "quadruped", "humanoid"), 0)
+    for robot in WIDE.values():
+        count[robot.family] += 1
+    assert count["arm"] >= 10
+    assert count["quadruped"] >= 8
+    assert count["humanoid"] >= 3
+    targets = [WIDE[name].family for name in TARGETS]
+    assert targets.count("arm") >= 1
+    assert targets.count("quadruped") >= 2
+    assert targets.count("humanoid") >= 1
+
+
+def test_equal_seeds_give_equal_runs_and_others_do_not(good):
+    again = simulate("ur5", GOOD, 10_000, duration=SECONDS)
+    assert np.array_equal(again.velocity, good.velocity)
+    assert np.array_equal(again.position, good.position)
+    other = simulate("ur5", GOOD, 10_001, duration=SECONDS)
+    assert other.meta["domain"] != good.meta["domain"]
+
+
+def test_a_good_run_has_no_event_and_nothing_but_ok(good):
+    assert good.meta["events"] == []
+    assert {block.label for block in good.blocks} == {"ok"}
+    assert good.duration == pytest.approx(SECONDS, abs=0.01)
+    assert good.meta["domain"]["name"].startswith("mujoco-")
+
+
+def test_a_run_equals_its_twin_until_its_fault_begins(tone):
+    twin = simulate("ur5", GOOD, 10_001, duration=SECONDS)
+    start = tone.meta["events"][0]["start"]
+    before = tone.time < start - 0.02  # the low-pass of what is kept is not causal
+    np.testing.assert_allclose(tone.velocity[before], twin.velocity[before], atol=1e-4)
+    assert np.abs(tone.velocity - twin.velocity).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        (("ur6", GOOD, 10_000), r"robot 'ur6' cannot be simulated \(did you mean 'ur5'\?\)"),
+        (
+            ("ur5", "tonne", 10_000),
+            "scenario 'tonne' does not exist for 'ur5'; it has good, latency",
+        ),
+        (("ur5", GOOD, 3), "seed 3: expected at least 10000"),
+    ],
+)
+def test_unknown_names_and_seeds_are_refused(arguments, problem):
+    with pytest.raises(scenarios.ScenarioError, match=problem):
+        simulate(*arguments)
+
+
+def test_a_robot_that_rattles_without_a_fault_is_no_good_run():
+    time = np.arange(20_000) / 10_000
+    smooth = np.sin(2 * np.pi * 0.5 * time)[:, None] * np.ones(3)
+    simulation._refuse_rattling(smooth)
+    with pytest.raises(DivergedError, match="it rattles without a fault, at .* rad/s"):
+        simulation._refuse_rattling(smooth + np.sin(2 * np.pi * 90 * time)[:, None])
+
+
+def test_delays_are_no_longer_than_the_gains_bear():
+    late = drawn(delay=0.05, stiffness=1.0, damping=1.0, encoder_bandwidth=700.0)
+    soft = replace(late, stiffness=0.1, damping=0.3)
+    delays = [simulation._changed(GO2, domain)[1].delay for domain in (late, soft)]
+    assert 0 <= delays[0] < delays[1] < 0.05
+
+
+def test_gains_are_lower_where_filters_leave_no_margin():
+    slow = drawn(stiffness=1.0, damping=1.0, encoder_bandwidth=30.0)
+    fast = replace(slow, encoder_bandwidth=700.0)
+    damping = [simulation._changed(GO2, domain)[0].drives.damping[0] for domain in (slow, fast)]
+    assert damping[0] < 0.5 * damping[1]
+
+
+def test_tasks_are_drawn_by_seed_and_share_their_twin():
+    chosen = tasks(["ur5", "go2"], seeds=3, faults=2)
+    assert chosen == tasks(["ur5", "go2"], seeds=3, faults=2)
+    assert len(chosen) == 2 * 3 * 3
+    assert sum(task.scenario == GOOD for task in chosen) == 6
+    for task in chosen:
+        assert task.scenario == GOOD or task.scenario in faults_of(task.robot, task.seed)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "problem"),
+    [
+        ({"robots": ["pandda"]}, r"did you mean 'panda'"),
+        ({"first": 0}, "the first seed is 0, expected 10000 or more"),
+        ({"seeds": 0}, "0 seeds with 2 faults each, expected 1 or more, 0 or more"),
+    ],
+)
+def test_bad_requests_are_refused(arguments, problem):
+    with pytest.raises(scenarios.ScenarioError, match=problem):
+        tasks(**arguments)
+
+
+def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypatch, tmp_path):
+    def fall(robot, fault, seed, **_):
+        if fault == GOOD and seed == 10_001:
+            raise scenarios.SimulationError(robot, fault, seed, 1.0, "it fell")
+        time = np.arange(4000) / 2000
+        still = np.zeros((4000, 1), dtype=np.float32)
+        return Run(
+            time=time,
+            joint_names=("shoulder_pan_joint",),
+            velocity=still,
+            velocity_desired=still,
+            position=still,
+            stages={"planned": still},
+            robot="ur5",
+            meta={"domain": drawn(control="pd").as_dict(), "events": []},
+        )
+
+    monkeypatch.setattr("scenarios.domains.simulate", fall)
+    folder = Folder.opened(tmp_path / "data", format_name="domains")
+    wanted = [Task("ur5", name, seed) for seed in (10_000, 10_001) for name in (GOOD, "tone")]
+    assert sorted(make(folder, wanted)) == sorted(wanted)
+    assert folder.missing(wanted) == []
+    text = str(Statistics.of(folder))
+    assert "4 runs, 1 of which fell" in text
+    names = [name for name, _ in write(logs(folder, rate=500.0), tmp_path / "logs")]
+    assert names == ["ur5/good-10000", "ur5/tone-10000"]
+    assert Run.load(tmp_path / "logs/ur5/tone-10000.npz").rate == pytest.approx(500.0)
+
+
+def test_targets_are_robots_domains_and_loggers_apart():
+    domain = drawn(control="pd")
+    fine = Logger(
+        rate=1000.0, velocity="measured", bits=20, cutoff=300.0, noise=0.0, jitter=0.0, lost=0.0,
+        repeated=0.0, hold=1, ripple=0.0, gear=100.0, resonances=(), desired="planned",
+    )  # fmt: skip
+    assert not is_target("ur5", domain, fine)
+    assert is_target("xarm7", domain, fine)
+    assert is_target("ur5", replace(domain, control="impedance"), fine)
+    assert is_target("ur5", domain, replace(fine, bits=12))
+    assert is_target("ur5", domain, replace(fine, hold=5))
+
+
+def test_domains_are_kept_as_they_were_drawn(good):
+    facts = dict(good.meta["domain"])
+    facts.pop("name")
+    assert re.match("wildness", str(Domain(**facts)).splitlines()[1])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", WIDE)
+def test_every_robot_has_a_good_run_among_its_first_seeds(robot):
+    for seed in range(10_000, 10_006):
+        try:
+            run = simulate(robot, GOOD, seed, duration=SECONDS)
+        except scenarios.SimulationError:
+            continue
+        assert np.isfinite(run.velocity).all()
+        assert run.joint_names == WIDE[robot].drives.joints
+        return
+    pytest.fail("it fell in all of them")
