@@ -21,6 +21,7 @@ PLAIN = Logger(
     repeated=0.0,
     hold=1,
     ripple=0.0,
+    roughness=0.0,
     gear=100.0,
     resonances=(),
     desired="commanded",

@@ -167,7 +167,8 @@ def test_targets_are_robots_domains_and_loggers_apart():
     domain = drawn(control="pd")
     fine = Logger(
         rate=1000.0, velocity="measured", bits=20, cutoff=300.0, noise=0.0, jitter=0.0, lost=0.0,
-        repeated=0.0, hold=1, ripple=0.0, gear=100.0, resonances=(), desired="planned",
+        repeated=0.0, hold=1, ripple=0.0, roughness=0.0, gear=100.0, resonances=(),
+        desired="planned",
     )  # fmt: skip
     assert not is_target("ur5", domain, fine)
     assert is_target("xarm7", domain, fine)

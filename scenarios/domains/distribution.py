@@ -218,6 +218,26 @@ class Distribution:
             log=True,
         ),
     )
+    log_ripple: Ends = field(
+        default=(0.0005, 0.02),
+        metadata=_about(
+            "",
+            "velocity ripple of a log by joint speed, at any wildness",
+            f"{_PANDA}: 0.5 to 1.3 % at the strongest order",
+            (0.0, 0.1),
+            log=True,
+        ),
+    )
+    roughness: Ends = field(
+        default=(0.0001, 0.005),
+        metadata=_about(
+            "",
+            "broadband noise by joint speed",
+            f"{_PANDA}, between its orders",
+            (0.0, 0.1),
+            log=True,
+        ),
+    )
     jitter: Ends = field(
         default=(0.0, 0.2),
         metadata=_about("", "stamps, by sample time", f"{_PANDA} has jittering stamps", (0.0, 0.5)),
@@ -325,7 +345,8 @@ class Distribution:
             lost=draw("lost") if draw.present() else 0.0,
             repeated=draw("repeated") if draw.present() else 0.0,
             hold=max(1, round(draw.far("hold"))) if held else 1,
-            ripple=draw("ripple") if not domain.ripple else 0.0,
+            ripple=draw.far("log_ripple"),
+            roughness=draw("roughness"),
             gear=domain.gear,
             resonances=tuple(draw.far("resonance") for _ in range(rng.integers(RESONANCES + 1))),
             desired=str(  # type: ignore[arg-type]

@@ -102,7 +102,8 @@ class Logger:
         lost: Share of lost samples, between which velocities are interpolated.
         repeated: Share of samples that repeat the one before.
         hold: Samples for which each one is held; 1 for none.
-        ripple: Velocity ripple, as a share of the joint's speed; 0 if it was simulated.
+        ripple: Velocity ripple, as a share of the joint's speed.
+        roughness: Standard deviation of broadband noise, as a share of the joint's speed.
         gear: Ratio of the gears, to which the ripple is locked.
         resonances: Frequencies that the ripple excites, in [Hz].
         desired: What the desired velocities are: those that the drives follow (with feedback),
@@ -119,6 +120,7 @@ class Logger:
     repeated: float
     hold: int
     ripple: float
+    roughness: float
     gear: float
     resonances: tuple[float, ...]
     desired: Desired

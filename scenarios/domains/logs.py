@@ -147,6 +147,7 @@ def _log(run: Run, logger: Logger, seed: int) -> Run:
     jitter = rng.standard_normal(count) * logger.jitter / logger.rate
     noise = logger.noise * rng.standard_normal((count, joints))
     lost, repeated = rng.uniform(size=(2, count))
+    rough = logger.roughness * rng.standard_normal((count, joints))
     stamps = np.maximum.accumulate(_stamps(run, logger) + jitter)
     assert run.position is not None
     position, velocity = (s.astype(np.float64) for s in (run.position, run.velocity))
@@ -161,7 +162,8 @@ def _log(run: Run, logger: Logger, seed: int) -> Run:
     else:
         if logger.velocity == "filtered":
             velocity = _low_pass(velocity, logger.cutoff, run.rate)
-        velocity = _sampled(velocity, run.rate, stamps) + noise
+        velocity = _sampled(velocity, run.rate, stamps)
+        velocity += noise + rough * velocity
     velocity[_again(repeated < logger.repeated)] = velocity[_before(repeated < logger.repeated)]
     gaps = lost < logger.lost
     if gaps.any() and not gaps.all():
