@@ -281,7 +281,7 @@ def test_a_model_is_trained_and_evaluated(inspector, tmp_path):
     call = ["train", *runs, "-o", model, "--rate", 1000]
     status, _, err = inspector(*call)
     assert (status, err.count("\n")) == (3, 1)
-    assert "no signal desired, error; there is noise, measured; --profile scalar takes" in err
+    assert "left out: 2 runs without desired velocities, e.g. run0; --profile scalar" in err
     status, out, _ = inspector(*call, "--profile", "scalar")
     assert status == 0
     assert "Subset accuracy" in out

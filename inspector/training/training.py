@@ -1,13 +1,14 @@
 """Classifiers trained on annotated runs, from files."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import models
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.recordings import count, recordings
+from inspector.training.recordings import classified, count
 from noisemodel.atomic import refuse_existing
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
@@ -22,6 +23,63 @@ PROFILES: dict[str, Callable[[float], models.Profile]] = {
 }
 """Profiles by name, at a rate in [Hz]."""
 
+LACKING = {
+    "measured": "without measured velocities",
+    "desired": "without desired velocities",
+    "error": "without tracking errors",
+}
+"""Why a run is left out, by the first signal that it lacks."""
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """Runs that a profile cannot be trained on.
+
+    Attributes:
+        runs: Their names, by reason.
+    """
+
+    runs: dict[str, list[str]] = field(default_factory=dict)
+
+    def without(
+        self, found: Iterable[models.Recording | models.Unanswered], profile: models.Profile
+    ) -> Iterator[models.Recording]:
+        """Recordings that have all signals of a profile, at its rate; notes the others.
+
+        Args:
+            found: Recordings at the profile's rate, and runs below it.
+            profile: What is to be trained.
+        """
+        for each in found:
+            if reason := _lacking(each, profile):
+                self.runs.setdefault(reason, []).append(each.name)
+            elif isinstance(each, models.Recording):
+                yield each
+
+    def __str__(self) -> str:
+        if not self.runs:
+            return "no run was left out"
+        counts = [f"{len(names)} {reason}" for reason, names in self.runs.items()]
+        first = next(iter(self.runs.values()))
+        counts[0] = counts[0].replace(" ", " run " if len(first) == 1 else " runs ", 1)
+        return f"left out: {', '.join(counts)}, e.g. {first[0]}"
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What training has to say.
+
+    Attributes:
+        evaluation: Measures of the model on its own training frames.
+        left_out: Runs that it was not trained on.
+    """
+
+    evaluation: models.Evaluation
+    left_out: LeftOut
+
+    def __str__(self) -> str:
+        return f"{self.evaluation}\n{self.left_out}"
+
 
 def train(
     inputs: Sequence[Path],
@@ -31,8 +89,11 @@ def train(
     *,
     part: Part = Part.ALL,
     overwrite: bool = False,
-) -> models.Evaluation:
+) -> Trained:
     """Train a model and write it.
+
+    Runs below the rate, and those that lack a signal of the profile, are left out; a desired
+    velocity that is a placeholder is none, as in `inspector classify`.
 
     Args:
         inputs: Annotated run files, samples, folders of them, or NoisyTest folders.
@@ -43,23 +104,30 @@ def train(
         overwrite: Whether a file that exists may be replaced.
 
     Returns:
-        The measures of the model on its own training frames.
+        The measures of the model on its own training frames, and the runs that were left out.
 
     Raises:
-        InspectorError: If there is no such profile, or it does not exist at this rate.
+        InspectorError: If there is no such profile, it does not exist at this rate, or all runs
+            are left out.
         OutputError: If the file exists or cannot be written.
     """
     chosen = profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
-    found = progress(recordings(inputs, rate, part), "read", total=count(inputs))
+    left_out = LeftOut()
+    read = progress(classified(inputs, rate, part), "read", total=count(inputs))
     try:
-        examples = models.Examples.read(found, chosen)
-    except models.MissingSignalError as error:
-        raise InspectorError(f"{error}; --profile scalar takes the noise alone") from error
+        usable = left_out.without((recording for recording, _ in read), chosen)
+        examples = models.Examples.read(usable, chosen)
+    except models.NoFrameError as error:
+        if error.count or not left_out.runs:
+            raise
+        hint = "; --profile scalar takes the noise alone" if _lack_signals(left_out) else ""
+        raise InspectorError(f"no run to train {profile} on; {left_out}{hint}") from error
     classifier = models.Classifier.train(examples, chosen)
     classifier.save(output, overwrite=overwrite)
     predicted = classifier.predict_features(examples.features)
-    return models.Evaluation.of(examples.labels, predicted, classifier.classes)
+    evaluation = models.Evaluation.of(examples.labels, predicted, classifier.classes)
+    return Trained(evaluation, left_out)
 
 
 def profile_at(name: str, rate: float) -> models.Profile:
@@ -78,3 +146,18 @@ def profile_at(name: str, rate: float) -> models.Profile:
     if found.rate != rate:
         raise InspectorError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")
     return found
+
+
+def _lacking(each: models.Recording | models.Unanswered, profile: models.Profile) -> str:
+    """Why a run cannot be trained on, in a few words; empty if it can."""
+    if isinstance(each, models.Unanswered):
+        return f"below {profile.rate:g} Hz"
+    there = models.signals.named(each.signal)
+    if models.signals.feeds(there, profile.signals):
+        return ""
+    lacking = [name for name in profile.signals if name not in there]
+    return next((LACKING[name] for name in lacking if name in LACKING), "without joints")
+
+
+def _lack_signals(left_out: LeftOut) -> bool:
+    return any(reason.startswith("without") for reason in left_out.runs)

@@ -1,0 +1,75 @@
+"""Training on many logs: those that a profile cannot be trained on are left out, and counted."""
+
+import numpy as np
+import pytest
+from commandline import call
+
+import models
+
+
+def log(path, *, rate=1000.0, desired="planned", seed=0):
+    """Two joints that follow a sine, and vibrate in the second half of four seconds."""
+    time = np.arange(round(4 * rate)) / rate
+    planned = np.stack([np.sin(2 * np.pi * 0.5 * time), np.cos(2 * np.pi * 0.5 * time)], axis=1)
+    noise = 1e-3 * np.random.default_rng(seed).normal(size=planned.shape)
+    velocity = planned + noise
+    velocity[len(time) // 2 :, 0] += 0.5 * np.sin(2 * np.pi * 60 * time[len(time) // 2 :])
+    columns = {"planned": planned, "zero": np.zeros_like(planned), "measured": velocity}
+    given = {} if desired == "missing" else {"velocity_desired": columns[desired]}
+    np.savez(
+        path,
+        time=time,
+        velocity=velocity,
+        **given,
+        block_start=[0.0, 2.0],
+        block_stop=[2.0, 4.0],
+        block_label=["ok", "oscillations"],
+    )
+    return path
+
+
+def train(*inputs, output, profile="joints"):
+    return call("train", *inputs, "-o", output, "--profile", profile, "--rate", 1000)
+
+
+def test_logs_that_a_profile_cannot_be_trained_on_are_left_out_and_counted(tmp_path):
+    (tmp_path / "logs").mkdir()
+    for seed in range(2):
+        log(tmp_path / "logs" / f"good{seed}.npz", seed=seed)
+    log(tmp_path / "logs" / "missing.npz", desired="missing")
+    log(tmp_path / "logs" / "placeholder.npz", desired="zero")
+    log(tmp_path / "logs" / "slow.npz", rate=500.0)
+    log(tmp_path / "logs" / "same.npz", desired="measured")
+    status, out, err = train(tmp_path / "logs", output=tmp_path / "m.npz")
+    assert (status, err) == (0, "")
+    counts = "2 runs without desired velocities, 1 without tracking errors, 1 below 1000 Hz"
+    assert f"\nleft out: {counts}, e.g. missing\n" in out
+    assert set(models.Classifier.load(tmp_path / "m.npz").runs) == {"good0", "good1"}
+
+
+def test_the_noise_alone_can_be_trained_on_without_desired_velocities(tmp_path):
+    path = log(tmp_path / "missing.npz", desired="missing")
+    status, out, _ = train(path, output=tmp_path / "m.npz", profile="scalar")
+    assert (status, "no run was left out" in out) == (0, True)
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        (
+            {"desired": "zero"},
+            "no run to train joints on; left out: 1 run without desired velocities, e.g. run;"
+            " --profile scalar takes the noise alone\n",
+        ),
+        (
+            {"rate": 500.0},
+            "no run to train joints on; left out: 1 run below 1000 Hz, e.g. run\n",
+        ),
+    ],
+)
+def test_nothing_left_to_train_on_is_one_line(tmp_path, changes, text):
+    path = log(tmp_path / "run.npz", **changes)
+    status, _, err = train(path, output=tmp_path / "m.npz")
+    assert status == 3
+    assert err.endswith(text)
+    assert err.count("\n") == 1
