@@ -163,25 +163,7 @@ class Classifier:
         """
         if not abs(rate / self.rate - 1.0) <= TOLERANCE:
             raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
-        samples = stacked(signal, self.profile.signals).astype(np.float64, copy=False)
-        count = samples.shape[-1]
-        valid = np.ones(count, dtype=bool) if valid is None else np.asarray(valid, bool)
-        first, length = int(self.profile.drop_first_sample), self.profile.length
-        check(samples, valid)
-        if count < first + length:
-            raise SignalError(
-                f"a signal of {count} samples is too short: a frame takes {first + length}"
-            )
-        starts = first + frame_starts(
-            count - first,
-            length=length,
-            hop=self.profile.hop,
-            flush_end=self.profile.flush_end,
-        )
-        gaps = np.concatenate(([0], np.cumsum(~valid)))
-        starts = starts[gaps[starts + length] == gaps[starts]]
-        windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=-1)
-        view = np.moveaxis(windows, -2, 0)
+        view, starts = all_frames(signal, self.profile, valid)
         return self.labels(self._decide(view, starts), starts, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
@@ -285,6 +267,41 @@ class Classifier:
 
     def _score(self, decisions: Array) -> Array:
         return self.estimator.score(decisions)
+
+
+def all_frames(signal: Signals, profile: Profile, valid: Mask | None = None) -> tuple[Real, Index]:
+    """Frames of a whole signal, as `Classifier.classify` cuts them.
+
+    Args:
+        signal: The noise estimate, shape (samples,), or signals by name, each of that shape.
+        profile: How it is framed.
+        valid: False in gaps, shape (samples,); frames that touch a gap are left out.
+
+    Returns:
+        A view of the frames that begin at each sample, shape (samples - length + 1, length), or
+        (samples - length + 1, rows, length) if the profile has several signals; and the samples at
+        which the frames begin, shape (frames,).
+
+    Raises:
+        SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
+            profile needs another one.
+    """
+    samples = stacked(signal, profile.signals).astype(np.float64, copy=False)
+    count = samples.shape[-1]
+    valid = np.ones(count, dtype=bool) if valid is None else np.asarray(valid, bool)
+    first, length = int(profile.drop_first_sample), profile.length
+    check(samples, valid)
+    if count < first + length:
+        raise SignalError(
+            f"a signal of {count} samples is too short: a frame takes {first + length}"
+        )
+    starts = first + frame_starts(
+        count - first, length=length, hop=profile.hop, flush_end=profile.flush_end
+    )
+    gaps = np.concatenate(([0], np.cumsum(~valid)))
+    starts = starts[gaps[starts + length] == gaps[starts]]
+    windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=-1)
+    return np.moveaxis(windows, -2, 0), starts
 
 
 def _examples(dataset: Dataset | Examples, profile: Profile) -> Examples:

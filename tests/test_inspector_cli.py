@@ -302,7 +302,7 @@ def test_a_profile_that_does_not_exist_at_a_rate_is_one_line(inspector, tmp_path
     status, _, err = inspector(*arguments, "best")
     assert (status, "no profile 'best'; there are joints, general" in err) == (3, True)
     status, _, err = inspector("train", run, "-o", tmp_path / "m.npz")
-    assert (status, "has no annotated blocks" in err) == (3, True)
+    assert (status, "left out: 1 run without annotated blocks" in err) == (3, True)
 
 
 def test_robots_are_listed(inspector):

@@ -61,7 +61,9 @@ def in_part(recording: models.Recording | models.Unanswered, part: Part) -> bool
     return part.has(held_out=models.held_out(models.group_of(recording.name)))
 
 
-def classified(inputs: Sequence[Path], rate: float, part: Part = Part.ALL) -> Iterator[Read]:
+def classified(
+    inputs: Sequence[Path], rate: float, part: Part = Part.ALL, *, bare_too: bool = False
+) -> Iterator[Read]:
     """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
 
     A desired velocity that is a placeholder, and an error of zero throughout, are left out of run
@@ -71,11 +73,19 @@ def classified(inputs: Sequence[Path], rate: float, part: Part = Part.ALL) -> It
         inputs: Files, and folders of them, however deep.
         rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict.
         part: The part of these recordings to read.
+        bare_too: Whether to yield run files without any annotation, in place of an error.
 
     Yields:
         Each recording, and the run that it is of if that is a run file.
+
+    Raises:
+        InspectorError: If a run file has neither blocks nor events, unless ``bare_too``.
     """
-    for recording, run in _read(inputs, lambda path: _as_classified(path, rate), rate):
+
+    def read(path: Path) -> Read:
+        return _as_classified(path, rate, bare_too=bare_too)
+
+    for recording, run in _read(inputs, read, rate):
         if in_part(recording, part):
             yield recording, run
 
@@ -101,7 +111,7 @@ def _read(inputs: Sequence[Path], read: Callable[[Path], Read], rate: float) -> 
             yield _apart(recording, file, taken), run
 
 
-def _as_classified(path: Path, rate: float) -> Read:
+def _as_classified(path: Path, rate: float, *, bare_too: bool) -> Read:
     try:
         if is_sample(path):
             return of_sample(path, rate), None
@@ -110,7 +120,7 @@ def _as_classified(path: Path, rate: float) -> Read:
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {rate:g} Hz"
         return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
-    if not (found.blocks or found.events):
+    if not (found.blocks or found.events or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
     signals = models.signals.without_zero_error(models.signals.named(found.signal))
     return replace(found, signal=signals), run

@@ -51,7 +51,7 @@ class LeftOut:
             profile: What is to be trained.
         """
         for each in found:
-            if reason := _lacking(each, profile):
+            if reason := lacking(each, profile):
                 self.runs.setdefault(reason, []).append(each.name)
             elif isinstance(each, models.Recording):
                 yield each
@@ -92,8 +92,8 @@ def train(
 ) -> Trained:
     """Train a model and write it.
 
-    Runs below the rate, and those that lack a signal of the profile, are left out; a desired
-    velocity that is a placeholder is none, as in `inspector classify`.
+    Runs below the rate, those that lack a signal of the profile, and those without an annotation
+    are left out; a desired velocity that is a placeholder is none, as in `inspector classify`.
 
     Args:
         inputs: Annotated run files, samples, folders of them, or NoisyTest folders.
@@ -114,14 +114,15 @@ def train(
     chosen = profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
     left_out = LeftOut()
-    read = progress(classified(inputs, rate, part), "read", total=count(inputs))
+    read = progress(classified(inputs, rate, part, bare_too=True), "read", total=count(inputs))
     try:
         usable = left_out.without((recording for recording, _ in read), chosen)
         examples = models.Examples.read(usable, chosen)
     except models.NoFrameError as error:
         if error.count or not left_out.runs:
             raise
-        hint = "; --profile scalar takes the noise alone" if _lack_signals(left_out) else ""
+        scalar = set(LACKING.values()) & left_out.runs.keys()
+        hint = "; --profile scalar takes the noise alone" if scalar else ""
         raise InspectorError(f"no run to train {profile} on; {left_out}{hint}") from error
     classifier = models.Classifier.train(examples, chosen)
     classifier.save(output, overwrite=overwrite)
@@ -148,16 +149,14 @@ def profile_at(name: str, rate: float) -> models.Profile:
     return found
 
 
-def _lacking(each: models.Recording | models.Unanswered, profile: models.Profile) -> str:
-    """Why a run cannot be trained on, in a few words; empty if it can."""
+def lacking(each: models.Recording | models.Unanswered, profile: models.Profile) -> str:
+    """Why a profile cannot be trained on a run, in a few words; empty if it can."""
     if isinstance(each, models.Unanswered):
         return f"below {profile.rate:g} Hz"
+    if not each.blocks:
+        return "without annotated blocks"
     there = models.signals.named(each.signal)
     if models.signals.feeds(there, profile.signals):
         return ""
-    lacking = [name for name in profile.signals if name not in there]
-    return next((LACKING[name] for name in lacking if name in LACKING), "without joints")
-
-
-def _lack_signals(left_out: LeftOut) -> bool:
-    return any(reason.startswith("without") for reason in left_out.runs)
+    gone = [name for name in profile.signals if name not in there]
+    return next((LACKING[name] for name in gone if name in LACKING), "without joints")

@@ -10,7 +10,7 @@ first one is where the walk would have led (C. Lucchese et al., *QuickScorer: A 
 Rank Documents with Additive Ensembles of Regression Trees*, 2015).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar, Self
@@ -85,6 +85,29 @@ class Trees(Probable):
         Returns:
             The trees; equal input gives equal trees. Those of one group are not calibrated.
         """
+        return cls.staged(features, targets, groups, profile, (profile.rounds,))[0]
+
+    @classmethod
+    def staged(
+        cls,
+        features: Array,
+        targets: Index,
+        groups: Words,
+        profile: Profile,
+        rounds: Sequence[int],
+    ) -> list["Trees"]:
+        """Train trees once for several numbers of rounds.
+
+        Args:
+            features: Standardised, shape (frames, features).
+            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
+            groups: Runs of a group share their motion, shape (frames,).
+            profile: Most rounds, and size of the trees.
+            rounds: Numbers of rounds, none above the profile's.
+
+        Returns:
+            For each number, the trees that `fit` gives for it.
+        """
         from joblib import Parallel, delayed
 
         parts = _parts(targets, groups)
@@ -94,13 +117,22 @@ class Trees(Probable):
             delayed(_fit)(features, targets, train, profile)
             for train in (everything, *(train for train, _ in parts))
         )
-        trees, *others = fitted
         seen = [of_seen_classes(targets, train, test) for train, test in parts]
-        if not sum(map(len, seen)):
-            return trees
-        logits = [one.logits(features[those]) for one, those in zip(others, seen, strict=True)]
-        truth = targets[np.concatenate(seen)]
-        return replace(trees, calibration=calibrate(np.concatenate(logits), truth))
+        found = []
+        for count in rounds:
+            trees, *others = (each.first(count) for each in fitted)
+            if sum(map(len, seen)):
+                logits = [one.logits(features[own]) for one, own in zip(others, seen, strict=True)]
+                truth = targets[np.concatenate(seen)]
+                trees = replace(trees, calibration=calibrate(np.concatenate(logits), truth))
+            found.append(trees)
+        return found
+
+    def first(self, rounds: int) -> "Trees":
+        """Trees of the first rounds of boosting, with the same calibration."""
+        count = rounds * len(self.prior)
+        own = {name: getattr(self, name)[:count] for name in ("feature", "threshold", "leaf")}
+        return replace(self, left=self.left[:, :count], **own)
 
     @classmethod
     def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:

@@ -139,7 +139,7 @@ def predict(
         recording.name,
         group_of(recording.name),
         1.0 / recording.rate,
-        _within(recording),
+        within(recording),
         truth,
         predicted,
         labels,
@@ -169,7 +169,8 @@ def _of_blocks(classifier: Classifier, recording: Recording) -> tuple[Words, Wor
     return dataset.labels, classifier.predict(dataset.frames)
 
 
-def _within(recording: Recording) -> tuple[Block, ...]:
+def within(recording: Recording) -> tuple[Block, ...]:
+    """Blocks of a recording, in order; each ends with the recording at the latest."""
     end = recording.start + len(recording.time) / recording.rate
     return tuple(
         sorted(

@@ -1,0 +1,213 @@
+"""The choice of estimator and threshold on robots that are left out in turn."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import models
+from inspector.errors import InspectorError
+from models.estimators.calibration import identity
+from models.estimators.trees import Trees
+from noisemodel import Run
+from scenarios.robots import TARGETS, WIDE
+
+with pytest.MonkeyPatch.context() as patch:
+    patch.syspath_prepend(Path(__file__).parents[1])
+    from benchmarks import leftout
+    from benchmarks.leftout import Candidates, Linear, Measured, TargetError, Threshold
+
+PROFILE = models.EACH.at(1000.0)
+LOGGER = {
+    **dict.fromkeys(("cutoff", "noise", "jitter", "lost", "repeated", "ripple", "gear"), 0.0),
+    "rate": 1000.0,
+    "velocity": "measured",
+    "bits": 19,
+    "hold": 1,
+    "resonances": (),
+    "desired": "planned",
+}
+
+
+def recording(robot, seed, *, faulty):
+    """Two joints that follow a sine, one of which vibrates for a second if it is faulty."""
+    time = np.arange(4000) / 1000
+    desired = np.stack([np.sin(np.pi * time + seed), np.cos(np.pi * time)])
+    error = 1e-3 * np.random.default_rng([seed, faulty]).normal(size=desired.shape)
+    blocks, events = [models.Block(0.0, 4.0, "ok")], ()
+    if faulty:
+        error[0, 2000:3000] += np.sin(2 * np.pi * 60 * time[:1000])
+        ends = (0.0, 1.9, "ok"), (2.0, 3.0, "oscillations"), (3.2, 4.0, "ok")
+        blocks, events = [models.Block(*each) for each in ends], (models.Fault(*ends[1]),)
+    joints = {"desired": desired, "measured": desired - error, "error": error}
+    signal = {name: np.linalg.norm(each, axis=0) for name, each in joints.items()}
+    signal |= {f"{name}_joints": each for name, each in joints.items()}
+    return models.Recording(
+        f"{robot}/{'fault' if faulty else 'good'}-{seed}",
+        signal,
+        1000.0,
+        tuple(blocks),
+        events=events,
+        facts={"robot": robot},
+    )
+
+
+@pytest.fixture(scope="module")
+def runs():
+    """Good and faulty runs of four robots of three families."""
+    return [
+        leftout.of_recording(recording(robot, seed, faulty=faulty), PROFILE)
+        for robot in ("ur5", "panda", "anymal", "g1")
+        for seed in range(2)
+        for faulty in (False, True)
+    ]
+
+
+def perfect(offset=0.0):
+    """A candidate that takes the loudest norm of the error for the probability of a failure."""
+
+    def fit(scaled, targets, groups):
+        classes, features = targets.max() + 1, scaled.shape[1]
+        weights = np.zeros((features, classes))
+        best = np.argmax(scaled[targets == 1].mean(axis=0) - scaled[targets == 0].mean(axis=0))
+        weights[best, 1] = 4.0
+        middle = (scaled[targets == 1, best].min() + scaled[targets == 0, best].max()) / 2
+        return [
+            Linear(
+                weights=weights,
+                offset=np.array([0.0, offset - 4.0 * middle]),
+                known=np.full(features, np.inf),
+                calibration=identity(classes),
+                frequency=np.bincount(targets) / len(targets),
+                alarm=0.5,
+            )
+        ]
+
+    return Candidates(("perfect",), fit)
+
+
+def test_no_line_of_robots_is_on_both_sides_and_families_are_spread():
+    robots = [robot for robot in WIDE for _ in range(3) if robot not in TARGETS]
+    split = leftout.robot_folds(robots, 6)
+    assert sorted(np.concatenate([test for _, test in split])) == list(range(len(robots)))
+    for train, test in split:
+        lines = [{leftout.line_of(robots[index]) for index in side} for side in (train, test)]
+        assert not lines[0] & lines[1]
+        assert len({type(WIDE[robots[index]]) for index in test}) >= 2
+    assert leftout.line_of("anymal_kinova") == leftout.line_of("anymal_c") == "anymal"
+    assert leftout.line_of("ur10") == leftout.line_of("ur5") == "ur"
+
+
+@pytest.mark.parametrize(
+    ("robot", "meta", "what"),
+    [
+        ("talos", {}, "robot talos"),
+        ("ur5", {"domain": {"control": "impedance"}}, "control impedance"),
+        ("ur5", {"logger": {**LOGGER, "bits": 12}}, "a log of 12 bit whose samples are held 1"),
+        ("ur5", {"logger": {**LOGGER, "hold": 5}}, "a log of 19 bit whose samples are held 5"),
+        ("panda", {"simulator": "pybullet 3.2"}, "simulator pybullet 3.2"),
+    ],
+)
+def test_runs_of_target_domains_are_refused(tmp_path, robot, meta, what):
+    time = np.arange(1000) / 1000
+    path = tmp_path / "run-001.npz"
+    motion = np.sin(time)[:, None]
+    Run(
+        time=time,
+        joint_names=("a",),
+        velocity=motion,
+        velocity_desired=motion + 1e-3,
+        robot=robot,
+        meta={**meta, "events": [{"label": "impact", "start": 0.1, "stop": 0.2}]},
+    ).save(path)
+    with pytest.raises(TargetError, match=f"run-001: {what}.* is of the target domains; nothing"):
+        leftout.read([path], PROFILE)
+
+
+def test_runs_of_source_domains_are_no_targets():
+    meta = {"domain": {"control": "pd"}, "logger": LOGGER, "simulator": "mujoco"}
+    assert not leftout.target("ur5", meta)
+
+
+def test_a_run_without_a_robot_is_refused(tmp_path):
+    time = np.arange(1000) / 1000
+    ends = {"block_start": [0.0], "block_stop": [1.0], "block_label": ["ok"]}
+    np.savez(tmp_path / "run.npz", time=time, velocity=np.sin(time)[:, None], **ends)
+    with pytest.raises(InspectorError, match=r"run\.npz: names no robot"):
+        leftout.read([tmp_path / "run.npz"], PROFILE)
+
+
+def test_a_perfect_candidate_has_a_pauc_of_one_and_no_false_alarm(runs):
+    split = leftout.robot_folds([run.robot for run in runs], 3)
+    (found,) = leftout.measure(runs, split, [perfect()], PROFILE, [Threshold(0.5, np.inf)])
+    assert found.ranking(leftout.partial_auc) == found.ranking(leftout.auc) == 1.0
+    assert found.mean("found_felt", "felt") == 1.0
+    assert found.mean("false_alarms", "ok_hours") == 0.0
+    assert found.chosen(0.0) == 0
+
+
+def test_a_model_predicts_robots_that_it_was_not_trained_on(runs):
+    seen = []
+
+    def fit(scaled, targets, groups):
+        seen.append({name.rpartition("-")[0] for name in groups.tolist()})
+        return perfect().fit(scaled, targets, groups)
+
+    split = leftout.robot_folds([run.robot for run in runs], 2)
+    candidate = Candidates(("own",), fit)
+    leftout.measure(runs, split, [candidate], PROFILE, [Threshold(0.5, 2.0)])
+    for robots, (_, test) in zip(seen, split, strict=True):
+        assert robots.isdisjoint(runs[index].robot for index in test)
+
+
+def test_fewer_ok_frames_give_the_same_odds(runs):
+    run = runs[0]
+    cut, labels = run.thinned(3)
+    assert len(cut) == len(labels) == -(-len(run.labels) // 3)
+    (estimator,) = perfect().fit(np.eye(4), np.array([0, 0, 0, 1]), np.array(["a"] * 4))
+    thinned = leftout.unthinned(estimator, 3)
+    odds = [np.subtract(*each.decision(np.eye(4)[:1])[0, :2]) for each in (estimator, thinned)]
+    assert odds[1] - odds[0] == pytest.approx(np.log(3))
+
+
+def measured(false, found):
+    """Two robots with one hour of ok motion and ten faults each."""
+    counts = {name: np.full((len(false), 2), 10.0) for name in leftout.COUNTS}
+    counts |= {"false_alarms": np.array(false), "found_felt": np.array(found)}
+    counts["ok_hours"][:] = 1.0
+    thresholds = [Threshold(each, 2.0) for each in np.linspace(0.2, 0.8, len(false))]
+    return Measured("one", np.array(["a", "b"]), np.zeros(2), thresholds, counts, 0.0)
+
+
+def test_the_threshold_finds_most_within_the_budget():
+    one = measured(
+        false=[[90, 10], [59, 1], [20, 0], [10, 0]], found=[[9, 9], [8, 8], [8, 8], [7, 8]]
+    )
+    assert one.chosen(60.0) == 0
+    assert one.chosen(30.0) == 2  # as many as at 30 per hour, with fewer false alarms
+    assert one.chosen(5.0) == 3
+    assert one.chosen(4.9) is None
+    for budget in (5.0, 10.0, 30.0, 60.0):
+        assert one.mean("false_alarms", "ok_hours")[one.chosen(budget)] <= budget
+
+
+def test_robots_weigh_alike_in_the_report():
+    one = measured(false=[[58, 2]], found=[[10, 0]])
+    text = "\n".join(leftout.report([one], 30.0))
+    assert "| 0.2 | 2 | 50.0 % | 100.0 % | 100.0 % | 30.0 | a 58 |" in text
+    assert "| none | - |" in "\n".join(leftout.report([one], 29.0))
+
+
+def test_trees_of_fewer_rounds_are_trained_with_those_of_more():
+    first, second = leftout.candidates(PROFILE, ["rounds=2,3", "leaves=2,4"])
+    assert first.names == ("rounds 2, leaves 2", "rounds 3, leaves 2")
+    generator = np.random.default_rng(0)
+    features, targets = generator.normal(size=(200, 4)), np.arange(200) % 2
+    features[:, 0] += targets
+    groups = np.repeat(["a-1", "b-2", "c-3"], [100, 50, 50])
+    few, _ = second.fit(features, targets, groups)
+    alone = replace(PROFILE, rounds=2, leaves=4)
+    expected = Trees.fit(features, targets, groups, alone)
+    for name, array in few.arrays().items():
+        np.testing.assert_array_equal(array, expected.arrays()[name])
