@@ -19,7 +19,7 @@ per hour is within the budget; of equal ones, those with the fewest false alarms
 import argparse
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, product
 from pathlib import Path
@@ -31,6 +31,7 @@ from joblib import Parallel, delayed
 
 import models
 from inspector.errors import InspectorError
+from inspector.progress import progress
 from inspector.training.recordings import classified
 from inspector.training.training import LeftOut, lacking, profile_at
 from models.classifier import CHUNK, all_frames
@@ -47,6 +48,7 @@ from models.features import features, standard
 from models.labels import Labels
 from models.splitting import folds, group_of
 from models.tuning.grid import Grid
+from noisemodel import NoiseModelError
 from scenarios.domains.domain import TARGET_CONTROL, Logger
 from scenarios.robots import ROBOTS, TARGETS, WIDE
 
@@ -85,6 +87,10 @@ class TargetError(InspectorError):
     def __init__(self, name: str, what: str) -> None:
         self.name, self.what = name, what
         super().__init__(f"{name}: {what} is of the target domains; nothing is chosen on them")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Let it come from another process."""
+        return TargetError, (self.name, self.what)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,7 +279,8 @@ def main() -> None:
             print(f"fold {number} leaves out {len(test)} runs of {', '.join(robots)}", flush=True)
         began = perf_counter()
         thresholds = [Threshold(*each) for each in product(given.alarms, given.novelty)]
-        measured = measure(runs, split, several, profile, thresholds, thin=given.thin)
+        shown = progress(split, "fold", total=len(split))
+        measured = measure(runs, shown, several, profile, thresholds, thin=given.thin)
     except (InspectorError, models.ModelsError) as error:
         sys.exit(str(error))
     print(f"trained and measured in {perf_counter() - began:.0f} s\n")
@@ -314,6 +321,15 @@ def read(
 
 def known(path: Path, profile: models.Profile) -> Known | tuple[str, str]:
     """Features of a run; its name and a reason if it cannot be used."""
+    try:
+        return _known(path, profile)
+    except TargetError:
+        raise
+    except (InspectorError, models.ModelsError, NoiseModelError) as error:
+        raise InspectorError(str(error)) from None  # not all errors can come from a process
+
+
+def _known(path: Path, profile: models.Profile) -> Known | tuple[str, str]:
     ((recording, run),) = classified([path], profile.rate, bare_too=True)
     robot = recording.facts.get("robot", "")
     if what := target(robot, run.meta if run else {}):
@@ -450,7 +466,7 @@ def logistic(profile: models.Profile) -> Candidates:
 
 def measure(
     runs: Sequence[Known],
-    split: Sequence[tuple[np.ndarray, np.ndarray]],
+    split: Iterable[tuple[np.ndarray, np.ndarray]],
     several: Sequence[Candidates],
     profile: models.Profile,
     thresholds: Sequence[Threshold],

@@ -1,5 +1,6 @@
 """The choice of estimator and threshold on robots that are left out in turn."""
 
+import pickle
 from dataclasses import replace
 from pathlib import Path
 
@@ -123,6 +124,15 @@ def test_runs_of_target_domains_are_refused(tmp_path, robot, meta, what):
     ).save(path)
     with pytest.raises(TargetError, match=f"run-001: {what}.* is of the target domains; nothing"):
         leftout.read([path], PROFILE)
+    refused = pickle.loads(pickle.dumps(TargetError("run", what)))
+    assert str(refused).startswith(f"run: {what}")
+
+
+def test_a_damaged_file_is_one_line(tmp_path):
+    (tmp_path / "run.npz").write_bytes(b"damaged")
+    with pytest.raises(InspectorError, match=r"run\.npz: .*") as raised:
+        leftout.read([tmp_path / "run.npz"], PROFILE)
+    assert str(pickle.loads(pickle.dumps(raised.value))) == str(raised.value)
 
 
 def test_runs_of_source_domains_are_no_targets():
