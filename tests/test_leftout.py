@@ -10,7 +10,10 @@ import pytest
 import models
 from inspector.errors import InspectorError
 from models.estimators.calibration import identity
+from models.estimators.probabilistic import NOVELTY_LIMIT
 from models.estimators.trees import Trees
+from models.evaluation.outcomes import Outcome
+from models.evaluation.predictions import predict
 from noisemodel import Run
 from scenarios.robots import TARGETS, WIDE
 
@@ -169,6 +172,21 @@ def test_a_model_predicts_robots_that_it_was_not_trained_on(runs):
     leftout.measure(runs, split, [candidate], PROFILE, [Threshold(0.5, 2.0)])
     for robots, (_, test) in zip(seen, split, strict=True):
         assert robots.isdisjoint(runs[index].robot for index in test)
+
+
+def test_counts_at_the_shipped_thresholds_are_those_of_the_protocol():
+    profile = replace(PROFILE, rounds=5, leaves=4)
+    every = [recording("ur5", seed, faulty=seed % 2 > 0) for seed in range(4)]
+    classifier = models.Classifier.train(models.Examples.read(every[:2], profile), profile)
+    for one in every:
+        expected = Outcome.of(predict(classifier, one))
+        run = leftout.of_recording(one, profile)
+        decisions = classifier.decide(run.whole)
+        shipped = Threshold(profile.alarm, NOVELTY_LIMIT)
+        score, counts = leftout.counted(run, classifier, decisions, [shipped])
+        assert score == pytest.approx(expected.score)
+        found = dict(zip(leftout.COUNTS, counts[:, 0], strict=True))
+        assert {name: expected.counts.get(name, found[name]) for name in found} == found
 
 
 def test_fewer_ok_frames_give_the_same_odds(runs):
