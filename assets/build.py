@@ -26,7 +26,7 @@ from scenarios.simulation import RECIPE
 from scenarios.tasks import DatasetSpec, Task, choose
 
 HERE = Path(__file__).parent
-DOMAINS = 12
+DOMAINS = 10
 """Seeds of every robot in wide domains, each with a good run and two with faults."""
 HOME = ("panda", "go2", "solo12", "anymal", "g1")
 """Robots whose scenarios at home are learnt from, too."""
