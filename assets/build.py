@@ -28,13 +28,13 @@ from scenarios.tasks import DatasetSpec, Task, choose
 HERE = Path(__file__).parent
 DOMAINS = 10
 """Seeds of every robot in wide domains, each with a good run and two with faults."""
-FAST = (10_018, 10_021)
-"""Further ones, the first whose runs are kept at 10 kHz."""
+FAST = (10_018,)
+"""A further one, the first whose runs are kept at 10 kHz."""
 HOME = ("panda", "go2", "solo12", "anymal", "g1")
 """Robots whose scenarios at home are learnt from, too."""
 SEEDS = 2
 """Their seeds in every scenario, from 0."""
-TEST, FIRST, LAST = ("panda", "go2", "talos"), 55, 57
+TEST, FIRST, LAST = ("panda", "go2", "talos"), 55, 56
 """Robots whose scenarios at home are measured on, their first seed, and the one after the last."""
 RATES = {"1khz": 1000.0, "10khz": 10_000.0}
 COPIES = {"1khz": 2, "10khz": 2}
@@ -84,7 +84,7 @@ def main() -> None:
         sections = {
             "Other seeds of the same robots, in wide domains": [source],
             "Robots, control and sensing that were never learnt from": [target],
-            f"The scenarios at home, seeds {FIRST} to {LAST - 1}": [test.path],
+            f"The scenarios at home, seed {FIRST}": [test.path],
         }
         write_card(name, path, sections)
     demo().save(HERE / "runs" / "demo.npz", overwrite=True)
