@@ -69,3 +69,16 @@ def test_the_page_says_what_is_never_learnt_from():
     ):
         assert words in section
     assert f"seeds start at {FIRST}" in PAGE
+
+
+def test_robots_are_learnt_from_if_their_licences_allow_it():
+    page = (Path(__file__).parents[1] / "docs" / "robots.md").read_text(encoding="utf-8")
+    cells = [[c.strip() for c in line.strip("|").split("|")] for line in page.splitlines()]
+    said = {
+        name.strip("` "): row[4]
+        for row in cells
+        if len(row) == 6 and row[4] in ("yes", "no")
+        for name in row[0].split(",")
+    }
+    for name in WIDE:
+        assert said[name] == ("no" if name in TARGETS else "yes"), name
