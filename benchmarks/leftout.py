@@ -28,6 +28,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from joblib import Parallel, delayed
+from threadpoolctl import threadpool_limits
 
 import models
 from inspector.errors import InspectorError
@@ -49,7 +50,7 @@ from models.labels import Labels
 from models.splitting import folds, group_of
 from models.tuning.grid import Grid
 from noisemodel import NoiseModelError
-from scenarios.domains.domain import TARGET_CONTROL, Logger
+from scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
 from scenarios.robots import ROBOTS, TARGETS, WIDE
 
 ALARMS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)
@@ -281,9 +282,10 @@ def main() -> None:
         began = perf_counter()
         thresholds = [Threshold(*each) for each in product(given.alarms, given.novelty)]
         shown = progress(split, "fold", total=len(split))
-        measured = measure(
-            runs, shown, several, profile, thresholds, thin=given.thin, quick=given.quick
-        )
+        with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
+            measured = measure(
+                runs, shown, several, profile, thresholds, thin=given.thin, quick=given.quick
+            )
     except (InspectorError, models.ModelsError) as error:
         sys.exit(str(error))
     print(f"trained and measured in {perf_counter() - began:.0f} s\n")
@@ -398,8 +400,8 @@ def target(robot: str, meta: Mapping[str, Any]) -> str:
     domain, logger = meta.get("domain"), meta.get("logger")
     if isinstance(domain, Mapping) and domain.get("control") == TARGET_CONTROL:
         return f"control {TARGET_CONTROL}"
-    if logger and (one := Logger(**logger)).target:
-        return f"a log of {one.bits} bit whose samples are held {one.hold} times"
+    if logger and (logger["bits"] <= TARGET_BITS or logger["hold"] >= TARGET_HOLD):
+        return f"a log of {logger['bits']} bit whose samples are held {logger['hold']} times"
     return ""
 
 
