@@ -78,12 +78,14 @@ def main() -> None:
     for name in options.models:
         profile, rate = MODELS[name]
         kind = name.rpartition("-")[2]
-        source, target = (logs(wide, build, kind, side) for side in ("source", "target"))
+        sides: tuple[domainset.Side, ...] = ("source", "target", "logger")
+        source, target, logger = (logs(wide, build, kind, side) for side in sides)
         path = HERE / "models" / f"{name}.npz"
         train([source, home.path], profile, rate, path, part=Part.TRAINING, overwrite=True)
         sections = {
             "Other seeds of the same robots, in wide domains": [source],
-            "Robots, control and sensing that were never learnt from": [target],
+            "Robots and control that were never learnt from": [target],
+            "Loggers that were never learnt from, other seeds of the same robots": [logger],
             f"The scenarios at home, seed {FIRST}": [test.path],
         }
         write_card(name, path, sections)

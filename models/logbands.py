@@ -30,6 +30,10 @@ class LogBands:
     """Name of the estimator."""
     alarm: float = 0.5
     """Alarm threshold: a probability of any failure."""
+    rounds: int = 100
+    """Rounds of boosting of trees."""
+    leaves: int = 16
+    """Leaves of a tree at most."""
     frame: float = 0.4
     """Duration of a frame, in [s]."""
     hop: float = 0.1
@@ -99,6 +103,8 @@ class LogBands:
             least_deviation=self.least_deviation,
             estimator=self.estimator,
             alarm=self.alarm,
+            rounds=self.rounds,
+            leaves=self.leaves,
             kernel="rbf",
             regularization=self.regularization,
             # Two frames' n standardised features differ by 2 n in squares, whatever the rate.
@@ -132,11 +138,11 @@ class LogBands:
 SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.85, quick=0.02)
 """For the noise alone. Failures are louder than 0.03 rad/s; amplitudes far below depend on encoders
 and simulators."""
-GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.7, speed=True)
+GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.85, leaves=4, speed=True)
 """For runs with measured and desired motion; with fewer false positives in good motion. The noise
 alone does not separate a fast motion without sensor noise from a failure. Trees find more failures
 that resemble the training set; networks more that do not, say a rattle on a motion without any
 other noise, which the noise alone does not show as an error."""
 
-EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.75)
+EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.8, rounds=40)
 """For runs that name their joints: the norm of all masks a single one."""

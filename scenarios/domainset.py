@@ -20,8 +20,9 @@ from scenarios.tasks import Task
 FAULTS = 2
 """Faulty runs of each robot and seed."""
 
-Side: TypeAlias = Literal["all", "source", "target"]
-"""All domains, those that are learnt from, or those that never are."""
+Side: TypeAlias = Literal["all", "source", "target", "logger"]
+"""All logs; those that are learnt from; those of robots and domains that never are; and of robots
+and domains that are, those of loggers that never are."""
 
 
 def tasks(
@@ -102,19 +103,20 @@ def logs(
         for copy in range(copies):
             draw = np.random.default_rng((task.seed, crc32(task.name.encode()), copy))
             logger = distribution.logger(draw, domain, most=run.rate, rate=rate)
-            if side != "all" and is_target(task.robot, domain, logger) != (side == "target"):
+            if side not in ("all", side_of(task.robot, domain, logger)):
                 continue
             noise = int(np.random.default_rng((task.seed, copy, 3)).integers(2**32))
             name = f"{task.scenario}.{copy}" if copy else task.scenario
-            yield (
-                f"{task.robot}/{name}-{task.seed:03d}",
-                logged(run, reference, logger, seed=noise),
-            )
+            found = logged(run, reference, logger, seed=noise)
+            if found.blocks or found.meta["events"]:  # else nothing of it can be measured
+                yield f"{task.robot}/{name}-{task.seed:03d}", found
 
 
-def is_target(robot: str, domain: Domain, logger: Logger) -> bool:
-    """Whether a robot, a domain or a logger is one of those that are never learnt from."""
-    return robot in TARGETS or domain.target or logger.target
+def side_of(robot: str, domain: Domain, logger: Logger) -> Side:
+    """What a log is for: to learn from, or to measure on only, by what of it is a target."""
+    if robot in TARGETS or domain.target:
+        return "target"
+    return "logger" if logger.target else "source"
 
 
 def write(logs: Iterator[tuple[str, Run]], output: Path) -> Iterator[tuple[str, Run]]:

@@ -11,7 +11,7 @@ from noisemodel import Run
 from scenarios.dataset import make
 from scenarios.domains import DISTRIBUTION, GOOD, faults_of, simulate, simulation
 from scenarios.domains.domain import Domain, Logger
-from scenarios.domainset import is_target, logs, tasks, write
+from scenarios.domainset import logs, side_of, tasks, write
 from scenarios.errors import DivergedError
 from scenarios.folder import Folder
 from scenarios.limits import Limits
@@ -170,11 +170,11 @@ def test_targets_are_robots_domains_and_loggers_apart():
         repeated=0.0, hold=1, ripple=0.0, roughness=0.0, gear=100.0, resonances=(),
         desired="planned",
     )  # fmt: skip
-    assert not is_target("ur5", domain, fine)
-    assert is_target("xarm7", domain, fine)
-    assert is_target("ur5", replace(domain, control="impedance"), fine)
-    assert is_target("ur5", domain, replace(fine, bits=12))
-    assert is_target("ur5", domain, replace(fine, hold=5))
+    assert side_of("ur5", domain, fine) == "source"
+    assert side_of("xarm7", domain, fine) == "target"
+    assert side_of("ur5", replace(domain, control="impedance"), fine) == "target"
+    assert side_of("ur5", domain, replace(fine, bits=12)) == "logger"
+    assert side_of("ur5", domain, replace(fine, hold=5)) == "logger"
 
 
 def test_domains_are_kept_as_they_were_drawn(good):

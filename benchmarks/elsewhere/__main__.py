@@ -4,7 +4,7 @@
 
 For measuring only: nothing is trained on these runs, and nothing of ours is tuned to them.
 
-Writes run files `OUT/<domain>/<robot>/<scenario>-<seed>.npz`: for each seed and domain a good run
+Writes run files `OUT/<domain>/<robot>/<scenario>-<90000 + seed>.npz`: for each seed and domain a good run
 and two with faults, of one kind each, at 1 kHz; for every other seed also a good run at the
 simulator's own rate, and for the first one a run with faults. Files that exist are kept. A run in
 which the robot falls or the simulation diverges is named, and leaves
@@ -25,6 +25,9 @@ from benchmarks.elsewhere.faults import KINDS
 from benchmarks.elsewhere.recorded import DroppedError
 from noisemodel import Run
 
+FIRST = 90_000
+"""Added to seeds in names: no run is taken for one of the same robot and seed that is ours."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -39,7 +42,7 @@ class Task:
     def name(self) -> str:
         """Name of its file, without a suffix."""
         rate = "" if self.rate == 1000 else f"-{self.rate:.0f}hz"
-        return f"{self.domain.folder}/{self.kind}{rate}-{self.seed:03d}"
+        return f"{self.domain.folder}/{self.kind}{rate}-{FIRST + self.seed}"
 
 
 def tasks(names: list[str], seeds: int) -> Iterator[Task]:

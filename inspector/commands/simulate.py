@@ -54,6 +54,7 @@ class Side(StrEnum):
     ALL = "all"
     SOURCE = "source"
     TARGET = "target"
+    LOGGER = "logger"
 
 
 @app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
@@ -193,7 +194,11 @@ def logs(
         float | None, typer.Option(help="Of all logs, in Hz; drawn by default.")
     ] = None,
     side: Annotated[
-        Side, typer.Option(help="All domains, those to learn from, or those never learnt from.")
+        Side,
+        typer.Option(
+            help="All logs; those to learn from; robots and domains to measure on only; loggers to"
+            " measure on only."
+        ),
     ] = Side.ALL,
 ) -> None:
     """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
