@@ -5,9 +5,9 @@
 For measuring only: nothing is trained on these runs, and nothing of ours is tuned to them.
 
 Writes run files `OUT/<domain>/<robot>/<scenario>-<90000 + seed>.npz`: for each seed and domain a
-good run and two with faults, of one kind each, at 1 kHz; for every other seed also a good run at the
-simulator's own rate, and for the first one a run with faults. Files that exist are kept. A run in
-which the robot falls or the simulation diverges is named, and leaves
+good run and two with faults, of one kind each, at 1 kHz; for every other seed also a good run at
+the simulator's own rate, and for the first one a run with faults. Files that exist are kept. A run
+in which the robot falls or the simulation diverges is named, and leaves
 `<scenario>-<seed>.dropped.json` instead. docs/elsewhere.md describes the domains.
 """
 
