@@ -47,7 +47,7 @@ MODELS = {
     "scalar-1khz": ("scalar", 1000.0),
 }
 """Profile and rate, in [Hz], by name."""
-DEMO = ("panda", "obstacle-full", 100, 4.0)
+DEMO = ("panda", "obstacle-full", 102, 4.0)
 CARD = """# {name}
 
 Classifies frames of noise at {rate:g} Hz: {classes}, or unknown.

@@ -135,14 +135,14 @@ class LogBands:
         return tuple(edges) if len(edges) > 1 else ()
 
 
-SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.85, quick=0.02)
+SCALAR = LogBands(relative=True, floor=1e-3, estimator="networks", alarm=0.5, quick=0.02)
 """For the noise alone. Failures are louder than 0.03 rad/s; amplitudes far below depend on encoders
 and simulators."""
-GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.85, leaves=4, speed=True)
+GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.6, leaves=4, speed=True)
 """For runs with measured and desired motion; with fewer false positives in good motion. The noise
 alone does not separate a fast motion without sensor noise from a failure. Trees find more failures
 that resemble the training set; networks more that do not, say a rattle on a motion without any
 other noise, which the noise alone does not show as an error."""
 
-EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.8, rounds=40)
+EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.6, rounds=40)
 """For runs that name their joints: the norm of all masks a single one."""

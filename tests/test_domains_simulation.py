@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import scenarios
-from noisemodel import Run
+from noisemodel import Block, Run
 from scenarios.dataset import make
 from scenarios.domains import DISTRIBUTION, GOOD, faults_of, simulate, simulation
 from scenarios.domains.domain import Domain, Logger
@@ -148,6 +148,7 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
             position=still,
             stages={"planned": still},
             robot="ur5",
+            blocks=(Block(0.0, 2.0, "ok"),),
             meta={"domain": drawn(control="pd").as_dict(), "events": []},
         )
 

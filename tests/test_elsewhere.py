@@ -119,10 +119,10 @@ def test_a_run_that_is_dropped_is_named_and_not_tried_again(domains, monkeypatch
     (task, *_) = script.tasks(["pybullet-a1"], 1)
     for _ in range(2):
         script.make(task, tmp_path, 3.0)
-    assert capsys.readouterr().out == "dropped pybullet-a1/a1/good-000: fell after 1.00 s\n"
+    assert capsys.readouterr().out == "dropped pybullet-a1/a1/good-90000: fell after 1.00 s\n"
     script.report([task], tmp_path)
     table = capsys.readouterr().out
-    assert table.endswith("dropped: pybullet-a1/a1/good-000 (fell after 1.00 s)\n")
+    assert table.endswith("dropped: pybullet-a1/a1/good-90000 (fell after 1.00 s)\n")
 
 
 def test_a_simulation_that_diverges_is_dropped(domains):

@@ -107,13 +107,13 @@ def test_a_run_without_the_signals_of_a_model_is_not_classified_and_the_error_ha
 def test_joints_are_classified_of_robots_in_the_training_set_and_norms_of_all_others():
     both = {name: LIBRARY[name] for name in ("general-1khz", "joints-1khz")}
     assert for_robot(both, "panda") == both
-    for robot in (None, "ur5", "my.urdf"):
+    for robot in (None, "xarm7", "my.urdf"):
         assert list(for_robot(both, robot)) == ["general-1khz"]
     alone = {"joints-1khz": LIBRARY["joints-1khz"]}
-    assert for_robot(alone, "ur5") == alone  # who names one model means it
+    assert for_robot(alone, "xarm7") == alone  # who names one model means it
 
 
 def test_a_model_whose_runs_name_no_robot_classifies_the_joints_of_any():
     own = replace(LIBRARY["joints-1khz"], runs={"monday": "", "tuesday": ""})
     library = {"general-1khz": LIBRARY["general-1khz"], "own": own}
-    assert for_robot(library, "ur5") == library
+    assert for_robot(library, "xarm7") == library

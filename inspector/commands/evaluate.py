@@ -33,7 +33,7 @@ def evaluate(
     ] = False,
     overwrite: Overwrite = False,
 ) -> None:
-    """Evaluate a model on annotated runs that it was not trained on (docs/evaluation.md)."""
+    """Evaluate a model on annotated runs that it was not trained on."""
     from inspector import assets
     from inspector.training.evaluation import Outputs
     from inspector.training.evaluation import as_json as json_of
