@@ -146,9 +146,11 @@ def test_a_noise_that_differs_in_its_last_bit_is_noticed(short, tmp_path):
 
 @pytest.mark.slow
 def test_noise_and_scores_are_those_of_the_first_version(first, short, tmp_path):
-    status, lines = compared(first, short, tmp_path)
-    assert status == 0, "\n".join(lines)
-    for item in ("scalar-1khz: signals", "simplified noise: velocity"):
+    _, lines = compared(first, short, tmp_path)
+    # The models that ship are others since 0.3; the file of before has to give what it gave.
+    different = [line for line in lines if line.startswith("different")]
+    assert [line.split(":")[0] for line in different] == ["different  short, scalar-1khz"], lines
+    for item in ("model file of before, scalar-1khz: signals", "simplified noise: velocity"):
         assert [line for line in lines if line.startswith(f"same       short, {item}")]
 
 
