@@ -81,13 +81,15 @@ def logs(
         distribution: What loggers are drawn from.
 
     Raises:
-        DatasetError: If the side is unknown.
+        DatasetError: If the side is unknown, or the folder holds no run.
         NoiseModelError: If a file is damaged.
     """
     if side not in get_args(Side):
         raise DatasetError(f"no side {side!r}; there are {', '.join(get_args(Side))}")
     twin: tuple[Task | None, Run | None] = (None, None)
     kept = set(folder.kept())
+    if not kept:
+        raise DatasetError(f"{folder.path}: holds no run; `inspector simulate domains` makes them")
     for task in sorted(kept, key=lambda task: (task.robot, task.seed, task.scenario)):
         good = Task(task.robot, GOOD, task.seed)
         if good not in kept:  # its twin fell

@@ -164,6 +164,12 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
     assert Run.load(tmp_path / "logs/ur5/tone-10000.npz").rate == pytest.approx(500.0)
 
 
+def test_a_folder_without_runs_has_no_logs(tmp_path):
+    folder = Folder.opened(tmp_path, format_name="domains")
+    with pytest.raises(scenarios.DatasetError, match="holds no run; `inspector simulate domains`"):
+        next(logs(folder))
+
+
 def test_targets_are_robots_domains_and_loggers_apart():
     domain = drawn(control="pd")
     fine = Logger(

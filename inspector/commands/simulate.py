@@ -208,6 +208,8 @@ def logs(
     from scenarios.domainset import write
     from scenarios.folder import Folder
 
+    if not data.is_dir():
+        raise typer.BadParameter(f"{data}: there is no such folder")
     folder = Folder.opened(data, format_name="domains")
     rates, labelled, lost = Counter[float](), 0, 0
     for _, run in write(logs_of(folder, copies=copies, rate=rate, side=side.value), output):
