@@ -107,7 +107,7 @@ def main() -> None:
     arguments.add_argument("--sound", type=Path, help="folder of WAV files to write")
     arguments.add_argument("--real", type=Path, default=PANDA, help="log of a real Panda")
     given = arguments.parse_args()
-    shown = examined(Folder.opened(given.data, format_name="domains"))
+    shown = examined(Folder.opened(given.data, format_name="domains", any_recipe=True))
     compared = {HOME: home()} | real(given.real)
     print("\n".join(table(shown.robots, compared)))
     if given.picture:

@@ -26,7 +26,12 @@ and domains that are, those of loggers that never are."""
 
 
 def tasks(
-    robots: Sequence[str] = (), *, first: int = FIRST, seeds: int = 8, faults: int = FAULTS
+    robots: Sequence[str] = (),
+    *,
+    first: int = FIRST,
+    seeds: int = 8,
+    faults: int = FAULTS,
+    always: Sequence[str] = (),
 ) -> list[Task]:
     """The runs of a data set, seed by seed.
 
@@ -35,9 +40,10 @@ def tasks(
         first: The first seed.
         seeds: How many seeds.
         faults: Faulty runs of each robot and seed, each of another fault, drawn by the seed.
+        always: Faults of each robot and seed besides, where they can act.
 
     Raises:
-        ScenarioError: If a robot is unknown, or a number is out of range.
+        ScenarioError: If a robot is unknown, a number is out of range, or no robot has a fault.
     """
     for robot in robots:
         if robot not in WIDE:
@@ -48,19 +54,24 @@ def tasks(
         raise DatasetError(
             f"{seeds} seeds with {faults} faults each, expected 1 or more, 0 or more"
         )
+    for name in always:
+        if not any(name in faults_of(robot) for robot in robots or WIDE):
+            raise DatasetError(f"no fault {name!r} of {', '.join(robots or ('any robot',))}")
     return [
         Task(robot, name, seed)
         for seed in range(first, first + seeds)
         for robot in robots or WIDE
-        for name in (GOOD, *_faults(robot, seed, faults))
+        for name in (GOOD, *_faults(robot, seed, faults, always))
     ]
 
 
-def _faults(robot: str, seed: int, count: int) -> list[str]:
-    names = faults_of(robot, seed)
+def _faults(robot: str, seed: int, count: int, always: Sequence[str]) -> list[str]:
+    suited = faults_of(robot, seed)
+    names = [name for name in suited if name not in always]
     rng = np.random.default_rng((seed, crc32(robot.encode()), 2))
     chosen = rng.choice(len(names), min(count, len(names)), replace=False)
-    return [names[index] for index in sorted(chosen.tolist())]
+    drawn = [names[index] for index in sorted(chosen.tolist())]
+    return drawn + [name for name in always if name in suited]
 
 
 def logs(

@@ -110,6 +110,10 @@ class Drives:
         demanded += self._damping * (rate - velocity)
         return self._delayed(demanded)
 
+    def measured(self, acting: Array) -> Array:
+        """Torques that the drives measure while some act, shape (joints,), in [N m]: the same."""
+        return acting
+
     def _delayed(self, demanded: Array) -> Array:
         """Torques demanded before the delay, within the limits."""
         acting = self._waiting.popleft()

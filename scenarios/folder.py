@@ -43,7 +43,12 @@ class Folder:
 
     @classmethod
     def opened(
-        cls, path: str | Path, *, format_name: str = "samples", duration: float | None = None
+        cls,
+        path: str | Path,
+        *,
+        format_name: str = "samples",
+        duration: float | None = None,
+        any_recipe: bool = False,
     ) -> Self:
         """Open a folder, or create it.
 
@@ -51,6 +56,8 @@ class Folder:
             path: An empty folder, a new one, or one with the same settings.
             format_name: A name in ``FORMATS``.
             duration: Duration of each run, in [s]; by default that of its motion.
+            any_recipe: Whether its runs may be of another version of the simulation: to be read,
+                not to be added to.
 
         Returns:
             The folder.
@@ -71,7 +78,8 @@ class Folder:
             if path.exists() and not path.is_dir():
                 raise DatasetError(f"{path}: is a file; name a folder")
             if (path / MANIFEST).exists():
-                _compare(path, _read_json(path / MANIFEST), settings)
+                compared = {k: v for k, v in settings.items() if k != "recipe" or not any_recipe}
+                _compare(path, _read_json(path / MANIFEST), compared)
             elif path.is_dir() and any(path.iterdir()):
                 raise DatasetError(
                     f"{path}: holds other files (it has no {MANIFEST}); name an empty folder"

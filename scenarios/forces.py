@@ -1,4 +1,4 @@
-"""Forces on a simulated robot from outside: payloads, obstacles in the air, end stops."""
+"""Forces on a simulated robot from outside: payloads, obstacles, end stops, pushes."""
 
 from collections.abc import Iterable
 from typing import Any
@@ -10,7 +10,7 @@ from noisemodel.types import Array
 from scenarios.clock import STEP
 from scenarios.contacts import APART, IMPACT
 from scenarios.events import Event
-from scenarios.loads import Collision, JointStop, Load, Payload
+from scenarios.loads import Collision, JointStop, Load, Payload, Push
 from scenarios.loop import Force
 from scenarios.paths import minimum_jerk
 
@@ -49,7 +49,7 @@ def _force(model: Any, load: Load) -> Force:
         return _Weight(model, load)
     if isinstance(load, Collision):
         return _Obstacle(model, load)
-    return _Stop(load)
+    return _Hand(model, load) if isinstance(load, Push) else _Stop(load)
 
 
 class _Point:
@@ -192,3 +192,33 @@ class _Stop:
         """An impact each time that the joint meets the stop, and its release if that is later."""
         facts = {"joint": self._load.joint, "stiffness": self._load.stiffness}
         return self._touches.events(**facts) + self._touches.releases(**facts)
+
+
+class _Hand:
+    """A hand on a link."""
+
+    def __init__(self, model: Any, load: Push) -> None:
+        self._model, self._load = model, load
+        self._body = 1 + round(load.along * (model.nbody - 2))  # after the world
+        self._force, self._no_torque = np.array(load.force), np.zeros(3)
+
+    def apply(self, data: Any, sample: int) -> None:
+        """Push."""
+        load, time = self._load, sample * STEP
+        if not load.start < time < load.stop:
+            return
+        since = np.array([time - load.start, time - load.stop + load.fall])
+        up, down = minimum_jerk(np.clip(since / np.array([load.rise, load.fall]), 0, 1))
+        mujoco.mj_applyFT(
+            self._model,
+            data,
+            (up - down) * self._force,
+            self._no_torque,
+            data.xipos[self._body],
+            self._body,
+            data.qfrc_applied,
+        )
+
+    def events(self) -> tuple[Event, ...]:
+        """None: a push is planned, and its event is known before."""
+        return ()

@@ -3,6 +3,9 @@
 from dataclasses import dataclass
 from typing import TypeAlias
 
+PUSH = "push of a hand"
+"""Cause of the events of pushes, which velocities may not show."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Payload:
@@ -61,5 +64,26 @@ class JointStop:
     stiffness: float
 
 
-Load: TypeAlias = Payload | Collision | JointStop
+@dataclass(frozen=True, kw_only=True)
+class Push:
+    """A hand that pushes at the centre of mass of a link.
+
+    Attributes:
+        along: Which link: 0 the first one, 1 the last one.
+        start: When its force begins to rise, in [s].
+        stop: When it has vanished, in [s].
+        rise: Time in which it rises, in [s].
+        fall: Time in which it falls, in [s].
+        force: Its largest value, in the world's axes, in [N].
+    """
+
+    along: float
+    start: float
+    stop: float
+    rise: float
+    fall: float
+    force: tuple[float, float, float]
+
+
+Load: TypeAlias = Payload | Collision | JointStop | Push
 """A force on a robot from outside."""

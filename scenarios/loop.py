@@ -120,7 +120,7 @@ class Motion:
         velocity_desired: Reference of the drives, shape (samples, joints), in [rad/s].
         planned: Velocities of the plan alone, shape (samples, joints), in [rad/s].
         commanded: Velocities that the controller demands, shape (samples, joints), in [rad/s].
-        torque: Of the drives, shape (samples, joints), in [N m].
+        torque: As the drives measure it, shape (samples, joints), in [N m].
         contact: True contact force of each effector, shape (samples, effectors), in [N].
         base_pose: True pose of a floating base, as MuJoCo has it (quaternion w, x, y, z),
             shape (samples, 7), or (samples, 0).
@@ -205,7 +205,7 @@ def record(
             acting = drives.torque(position, velocity, targets[step], rates[step], torque)
             data.ctrl[:] = acting
             motion.position[sample], motion.velocity[sample] = position, velocity
-            motion.torque[sample] = acting
+            motion.torque[sample] = drives.measured(acting)
             if base:
                 motion.base_pose[sample], motion.base_velocity[sample] = base_pose, base_velocity
             if scene.forces:

@@ -40,6 +40,7 @@ class Reach:
         acceleration: Largest acceleration of a joint, in [rad/s²].
         spread: Furthest distance of a joint from its position at rest, in [rad].
         pause: Time between two movements; some are longer, in [s].
+        stand: Time that it stands before its first movement, in [s].
         stops: Emergency stops per second, in [1/s]; the arm goes on after each.
         payload: Mass that it picks up and puts down, times the robot's unit of force, in [kg];
             (0, 0) for none.
@@ -53,6 +54,7 @@ class Reach:
     pause: Range = (0.05, 0.4)
     stops: float = 0.0
     payload: Range = (0.0, 0.0)
+    stand: float = 0.2
     duration: float = 6.0
 
 

@@ -158,6 +158,9 @@ def domains(
     seeds: Annotated[int, typer.Option(help="Seeds per robot; each draws a domain.")] = 8,
     first_seed: Annotated[int, typer.Option(help="The first random seed.")] = 10_000,
     faults: Annotated[int, typer.Option(help="Faulty runs per robot and seed.")] = 2,
+    always: Annotated[
+        str, typer.Option(help="Faults of each robot and seed besides, where they can act: push.")
+    ] = "",
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
     list_: Annotated[
         bool, typer.Option("--list", help="Print robots and distribution, simulate nothing.")
@@ -177,7 +180,9 @@ def domains(
         typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
         typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{DISTRIBUTION}")
         return
-    chosen = tasks(_listed(robots), first=first_seed, seeds=seeds, faults=faults)
+    chosen = tasks(
+        _listed(robots), first=first_seed, seeds=seeds, faults=faults, always=_listed(always)
+    )
     folder = Folder.opened(output, format_name="domains")
     missing = folder.missing(chosen)
     for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
@@ -210,7 +215,7 @@ def logs(
 
     if not data.is_dir():
         raise typer.BadParameter(f"{data}: there is no such folder")
-    folder = Folder.opened(data, format_name="domains")
+    folder = Folder.opened(data, format_name="domains", any_recipe=True)
     rates, labelled, lost = Counter[float](), 0, 0
     for _, run in write(logs_of(folder, copies=copies, rate=rate, side=side.value), output):
         rates[run.rate] += 1

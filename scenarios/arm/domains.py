@@ -16,6 +16,7 @@ from scenarios.defects import (
     JointStops,
     Multisine,
     Obstacles,
+    Pushes,
     ReferenceJumps,
     SensorJumps,
 )
@@ -28,6 +29,10 @@ SLOWEST = 0.05
 """Lowest peak speed of a joint in a movement, in [rad/s]."""
 FASTEST = (0.5, 2.5)
 """Highest peak speed, mild and wild, in [rad/s]."""
+STANDS = 0.3
+"""Share of motions in the air that begin with standing for a while."""
+STANDING = (1.5, 4.0)
+"""How long they stand, in [s]."""
 
 
 def motion(
@@ -46,6 +51,7 @@ def motion(
     """
     picks, kind, way = rng.uniform(size=3).tolist()
     fast, hard, wide, stops, carries, pace, force = rng.uniform(size=7).tolist()
+    stands, long = rng.uniform(size=2).tolist()
     if picks < PICKS and (arm is None or arm.reach is not None):
         ways = ("straight", "curve", "directions", "spot")
         low = 10.0 + 10.0 * force
@@ -63,6 +69,7 @@ def motion(
         pause=(0.0, 0.1 + 0.5 * pace),
         stops=0.3 * wildness if stops < 0.5 * wildness else 0.0,
         payload=(0.1, 0.5 + 1.5 * wildness) if carries < 0.2 + 0.4 * wildness else (0.0, 0.0),
+        stand=_mixed(STANDING, long) if stands < STANDS else 0.2,
     )
 
 
@@ -84,6 +91,7 @@ DEFECTS: Mapping[str, Defect] = {
     "force-jump": SensorJumps((80.0, 160.0)),
     "reference-jump": ReferenceJumps(distance=(0.0005, 0.006), speed=(0.05, 2.0)),
     "multisine": Multisine(BANDS, (0.00005, 0.002), fastest=1.0),
+    "push": Pushes(),
 }
 """Faults by name; `suited` has those that can act in a motion."""
 

@@ -179,7 +179,8 @@ def reach(
             f"motion of kind {motion.kind!r} is unknown; there are {', '.join(KINDS)}"
         )
     moving, stopping, loading = rng.spawn(3)
-    parts, ticks = [np.tile(ability.rest, (round(0.2 / TICK), 1))], round(duration / TICK)
+    parts = [np.tile(ability.rest, (round(motion.stand / TICK), 1))]
+    ticks = round(duration / TICK)
     while sum(map(len, parts)) < ticks:
         parts += [_movement(motion, moving, ability, parts[-1][-1])]
         pause = moving.uniform(*(LONG if moving.uniform() < STANDS else motion.pause))

@@ -4,7 +4,7 @@ A defect acts in one of six places: ground, encoder, planned motion, sensors, ga
 outside. It depends on the plan only by time, ground, contacts and motion, not on the robot.
 """
 
-from scenarios.defects.air import Collisions, JointStops
+from scenarios.defects.air import Collisions, JointStops, Pushes
 from scenarios.defects.edge import Overhang, StepDown
 from scenarios.defects.ground import GivingWay, Obstacles
 from scenarios.defects.plan import Defect, NoDefect, Plan, Range, Units
@@ -29,6 +29,7 @@ __all__ = [
     "Obstacles",
     "Overhang",
     "Plan",
+    "Pushes",
     "Range",
     "ReferenceJumps",
     "Scaled",

@@ -1,18 +1,24 @@
-"""Defects in the air: obstacles in the way of a tool, and end stops of joints."""
+"""Defects in the air: obstacles in the way of a tool, end stops of joints, hands that push."""
 
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from noisemodel.types import Array
 from scenarios.clock import TICK
 from scenarios.defects.plan import Plan, Range
+from scenarios.events import Event
 from scenarios.faults import Faults
-from scenarios.loads import Collision, JointStop
+from scenarios.loads import PUSH, Collision, JointStop, Push
 
 MOVING = 0.05
 """Least speed of an effector that is to collide, in [m/s]."""
+SLOW = 0.05
+"""Highest speed of an effector that moves slowly, in [m/s]."""
+ALONE = 0.6
+"""Time without pushes at the begin and at the end of a run, in [s]."""
 
 
 @runtime_checkable
@@ -105,6 +111,67 @@ class JointStops:
             stiffness=plan.units.torque * float(np.exp(_between(np.log(self.stiffness), hardness))),
         )
         return Faults(loads=(stop,), facts={"joint": joint, "angle": stop.angle})
+
+
+@dataclass(frozen=True)
+class Pushes:
+    """Hands that push links while the robot stands or moves slowly, each at another time.
+
+    Attributes:
+        every: Mean time between two pushes, in [s].
+        force: Largest force, in [N], times the robot's unit of force.
+        rise: Time in which it rises, and time in which it falls, in [s].
+        hold: Time in between, in [s].
+        along: Which link is pushed: 0 the first one, 1 the last one.
+    """
+
+    every: float = 2.5
+    force: Range = (3.0, 40.0)
+    rise: Range = (0.1, 1.0)
+    hold: Range = (0.0, 0.4)
+    along: Range = (0.3, 1.0)
+
+    def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
+        """Draw pushes where the tool is slow; at least one, where it is slowest."""
+        if not isinstance(plan, _Tool):
+            return Faults()
+        speed = np.linalg.norm(np.gradient(plan.position, TICK, axis=0), axis=1)
+        edge = round(min(ALONE, plan.duration / 4) / TICK)
+        count = max(1, round((plan.duration - 2 * ALONE) / self.every))
+        drawn = []
+        for span in np.array_split(np.arange(edge, len(speed) - edge), count):
+            times = np.append(_log_between(self.rise, rng.uniform(size=2)), rng.uniform(*self.hold))
+            times *= min(1.0, 0.9 * len(span) * TICK / times.sum())
+            size = plan.units.force * float(_log_between(self.force, rng.uniform()))
+            way, along, place = rng.normal(size=3), rng.uniform(*self.along), rng.uniform()
+            fastest = sliding_window_view(speed[span], round(times.sum() / TICK)).max(axis=1)
+            slow = np.flatnonzero(fastest <= max(SLOW, fastest.min()))
+            first = slow[int(place * len(slow))]
+            start, (x, y, z) = float(span[first] * TICK), size * way / np.linalg.norm(way)
+            push = Push(
+                along=float(along),
+                start=start,
+                stop=start + float(times.sum()),
+                rise=float(times[0]),
+                fall=float(times[1]),
+                force=(float(x), float(y), float(z)),
+            )
+            drawn.append((fastest[first], push))
+        slowest = min(one for one, _ in drawn)
+        pushes = [push for fastest, push in drawn if fastest <= max(SLOW, slowest)]
+        events = tuple(
+            Event("impact", PUSH, push.start, push.stop,
+                  {"force": float(np.linalg.norm(push.force)), "along": push.along})
+            for push in pushes
+        )  # fmt: skip
+        return Faults(
+            loads=tuple(pushes), events=events, facts={"starts": [push.start for push in pushes]}
+        )
+
+
+def _log_between(span: Range, share: Array | float) -> Array:
+    low, high = np.log(span)
+    return np.asarray(np.exp(low + share * (high - low)))
 
 
 def _between(span: Range | Array, share: float) -> float:

@@ -17,6 +17,8 @@ RESONANCES = 2
 """Most resonances of one robot."""
 PRESENT = 0.5
 """Share of the robots that have a given imperfection of gears at all."""
+CURRENTS = 0.5
+"""Share of the logs with efforts whose efforts are currents."""
 RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0)
 """Rates of loggers, in [Hz], each drawn as often as it is listed."""
 
@@ -257,6 +259,31 @@ class Distribution:
         ),
     )
 
+    effort_share: Ends = field(
+        default=(0.6, 0.6),
+        metadata=_about("", "share of the logs with efforts", _OWN, (0.0, 1.0)),
+    )
+    current: Ends = field(
+        default=(2.0, 40.0),
+        metadata=_about(
+            "A",
+            "motors' current at the torque limit, at any wildness",
+            "data sheets of servos, UR arms, legs' drives",
+            (0.1, 1000.0),
+            log=True,
+        ),
+    )
+    effort_noise: Ends = field(
+        default=(0.0003, 0.01),
+        metadata=_about("", "white noise of efforts by limit", _OWN, (0.0, 0.2), log=True),
+    )
+    effort_bits: Ends = field(
+        default=(16.0, 9.0),
+        metadata=_about(
+            "bit", "efforts from limit to limit", "converters of drives: 10 to 16 bit", (6.0, 30.0)
+        ),
+    )
+
     def __post_init__(self) -> None:
         """Check all ranges."""
         for each in fields(self):
@@ -335,6 +362,8 @@ class Distribution:
         drawn = float(rng.choice([each for each in RATES if each <= most * (1 + 1e-6)]))
         rate = rate or drawn
         held = rng.uniform() < 0.1
+        # Of another generator, so that it changes nothing else.
+        efforts = _Draw(self, rng.spawn(1)[0], domain.wildness)
         return Logger(
             rate=rate,
             velocity=str(rng.choice(get_args(Velocity))),  # type: ignore[arg-type]
@@ -352,6 +381,7 @@ class Distribution:
             desired=str(  # type: ignore[arg-type]
                 rng.choice(get_args(Desired), p=(0.5, 0.35, 0.08, 0.07))
             ),
+            **efforts.effort(),
         )
 
     def __str__(self) -> str:
@@ -395,6 +425,18 @@ class _Draw:
     def present(self) -> bool:
         """Whether the robot has an imperfection."""
         return bool(self._rng.uniform() < PRESENT)
+
+    def effort(self) -> dict[str, Any]:
+        """What of efforts a logger has."""
+        share, kind = self._rng.uniform(size=2).tolist()
+        current, noise, bits = (self.far("current"), self("effort_noise"), self("effort_bits"))
+        there, measured = share < self("effort_share"), kind >= CURRENTS
+        return {
+            "effort": ("torque" if measured else "current") if there else "missing",
+            "current": 0.0 if measured or not there else current,
+            "effort_noise": noise,
+            "effort_bits": round(bits),
+        }
 
     def _between(self, name: str, share: float) -> float:
         mild, wild = getattr(self._distribution, name)

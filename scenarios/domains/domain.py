@@ -6,6 +6,7 @@ from typing import Any, Literal, TypeAlias
 Control: TypeAlias = Literal["pd", "computed-torque", "impedance", "policy"]
 Velocity: TypeAlias = Literal["measured", "filtered", "differentiated"]
 Desired: TypeAlias = Literal["commanded", "planned", "zero", "missing"]
+Effort: TypeAlias = Literal["missing", "torque", "current"]
 
 TARGET_CONTROL: Control = "impedance"
 """Control that is never learnt from."""
@@ -108,6 +109,10 @@ class Logger:
         resonances: Frequencies that the ripple excites, in [Hz].
         desired: What the desired velocities are: those that the drives follow (with feedback),
             those of the plan (smooth), zeros, or none.
+        effort: What the efforts are: none, torques of the drives, or currents of their motors.
+        current: Current of a motor at the torque limit, in [A]; 0 unless it is logged.
+        effort_noise: Standard deviation of the white noise of efforts, as a share of the limit.
+        effort_bits: Steps from minus to plus the limit, as a power of two.
     """
 
     rate: float
@@ -124,6 +129,10 @@ class Logger:
     gear: float
     resonances: tuple[float, ...]
     desired: Desired
+    effort: Effort = "missing"
+    current: float = 0.0
+    effort_noise: float = 0.0
+    effort_bits: int = 16
 
     @property
     def target(self) -> bool:

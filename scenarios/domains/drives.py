@@ -70,6 +70,7 @@ class DomainDrives(Drives):
         self._sample = -round(settling * RATE)
         self._begin, self._end = _samples(fault)
         self._added = _torque(fault, self._begin, self._end, joints)
+        self._outside: Array | float = 0.0
         self._changed = bool(np.any(fault.offset))
         self._demands: deque[Array] = deque(
             [np.zeros(joints)] * (1 + imperfections.torque_delay + round(fault.delay * RATE)),
@@ -141,11 +142,16 @@ class DomainDrives(Drives):
         motor = motor + self._cogging * np.sin(self._teeth * self._angle + self._teeth_phase)
         motor -= self._stiction * np.exp(-np.square(speed / STRIBECK)) * np.tanh(speed / 5e-3)
         added = self._added[self._sample - self._begin] if inside and len(self._added) else 0.0
+        self._outside = added if self._fault.outside else 0.0
         self._sample += 1
         if not self._elastic:
             self._angle = position
             return np.asarray(motor + added)
         return np.asarray(self._through_gear(motor) + added)
+
+    def measured(self, acting: Array) -> Array:
+        """Torques that sensors between gears and joints measure, without what acts from outside."""
+        return acting - self._outside
 
     def _delayed(self, demanded: Array) -> Array:
         """Torques demanded before the delay, within limits of torque and of its rate."""

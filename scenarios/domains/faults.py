@@ -33,6 +33,7 @@ class DriveFault:
         offset: Error of the encoders from the start of the event on, shape (joints,), in [rad].
         torque: Torque added meanwhile: from times since the start, shape (samples,), in [s], to
             shape (samples, joints), in [N m].
+        outside: Whether that torque is not of the drives, which do not measure it.
         command: Changes targets and rates.
     """
 
@@ -43,6 +44,7 @@ class DriveFault:
     power: float = 1.0
     offset: Array | float = 0.0
     torque: Callable[[Array], Array] | None = None
+    outside: bool = False
     command: Command | None = None
 
     @property
@@ -206,7 +208,8 @@ def knock(rng: np.random.Generator, drives: Drivetrain, duration: float) -> Driv
     def torque(since: Array) -> Array:
         return np.outer(np.sin(np.pi * np.clip(since / length, 0, 1)), size)
 
-    return DriveFault(event=Event("impact", "blow", start, stop, facts), torque=torque)
+    event = Event("impact", "blow", start, stop, facts)
+    return DriveFault(event=event, torque=torque, outside=True)
 
 
 def dropout(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:

@@ -3,7 +3,11 @@
 This needs no simulation. Ripple of the gears, sensing and sampling are applied to a run and to its
 twin, the run of the same robot and seed without a fault. A fault keeps its label where it still can
 be seen: where the difference that it makes exceeds the twin's log (its motion, ripple and noise)
-by ``CONTRAST`` in at least one band of one joint, in the measured velocities or in their error.
+by ``CONTRAST`` in at least one band of one joint, in the measured velocities, in their error, or in
+the efforts, if the log has any. Bands of efforts begin at ``SLOWEST``, those of velocities at
+``LOWEST``: a push is slow. Of efforts, the mean of a frame is left out, since a window would spread
+weights into the lowest bands; so a force that does not change cannot be seen. A push of a hand
+has a label while it can be seen in the efforts, even if velocities do not show it.
 """
 
 from collections.abc import Sequence
@@ -16,6 +20,7 @@ from numpy.typing import NDArray
 from noisemodel import Block, Run
 from noisemodel.types import Array, Mask, Real
 from scenarios.domains.domain import Logger
+from scenarios.loads import PUSH
 
 CONTRAST = 10 ** (3 / 10)
 """Least ratio of the power of a fault to that of the twin's log in a band: 3 dB."""
@@ -23,6 +28,9 @@ FRAME, HOP = 0.4, 0.1
 """Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
 LOWEST = 10.0
 """Lowest frequency of the bands, in [Hz]; each is a third of an octave wide."""
+SLOWEST = 1.0
+"""That of efforts, in [Hz]: the lowest band of a frame has its first line, at 2.5 Hz, into which
+the window spreads what is slower."""
 HARMONICS = (1, 2, 4)
 """Orders of the ripple, as multiples of the gear ratio."""
 SHARPNESS, GAIN = 8.0, 3.0
@@ -39,8 +47,9 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
         seed: Of the random numbers; equal seeds give equal noise and equal phases.
 
     Returns:
-        Measured velocities and what is desired, at the logger's rate, with those of the failures'
-        labels that can still be seen; ``meta`` has the logger and the twin's level of noise.
+        Measured velocities, what is desired and efforts (torques in [N m], or currents in [A]), at
+        the logger's rate, with those of the failures' labels that can still be seen; ``meta`` has
+        the logger.
     """
     found, reference = _log(run, logger, seed), _log(twin, logger, seed)
     blocks = run.blocks
@@ -51,7 +60,17 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
             desired = found.velocity_desired - reference.velocity_desired
             floor = reference.velocity_desired - reference.velocity
             seen |= visible(desired - difference, floor, rate=logger.rate)
-        blocks = _kept(run.blocks, seen)
+        pushed: tuple[Block, ...] = ()
+        if found.effort is not None and reference.effort is not None:
+            felt = visible(
+                found.effort - reference.effort,  # their noise is equal
+                reference.effort,
+                rate=logger.rate,
+                lowest=SLOWEST,
+                centred=True,
+            )
+            seen, pushed = seen | felt, _kept(_pushes(run), felt)
+        blocks = _joined((*_kept(run.blocks, seen), *pushed))
     end = len(found.velocity) / logger.rate
     blocks = tuple(replace(b, stop=min(b.stop, end)) for b in blocks if b.start < end)
     events = [
@@ -62,13 +81,17 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
     )
 
 
-def visible(difference: Real, floor: Real, *, rate: float) -> Mask:
+def visible(
+    difference: Real, floor: Real, *, rate: float, lowest: float = LOWEST, centred: bool = False
+) -> Mask:
     """Frames in which a difference exceeds a floor by ``CONTRAST`` in a band of a joint.
 
     Args:
         difference: What a fault changes, shape (samples, joints).
         floor: The signal without the fault, shape (samples, joints).
         rate: Sample rate, in [Hz].
+        lowest: Lowest frequency of the bands, in [Hz].
+        centred: Whether each frame's mean is subtracted.
 
     Returns:
         Shape (frames,); frames begin every ``HOP``.
@@ -77,18 +100,19 @@ def visible(difference: Real, floor: Real, *, rate: float) -> Mask:
     starts = np.arange(0, max(len(difference) - length, 0) + 1, hop)
     window = np.hanning(length)[:, None]
     frequencies = np.fft.rfftfreq(length, 1 / rate)
-    edges = LOWEST * 2 ** (np.arange(0, 3 * np.log2(rate / 2 / LOWEST) + 1) / 3)
+    edges = lowest * 2 ** (np.arange(0, 3 * np.log2(rate / 2 / lowest) + 1) / 3)
     edges = edges[np.r_[True, np.diff(np.searchsorted(frequencies, edges)) > 0]]
     first = np.searchsorted(frequencies, edges)
     first = first[first < len(frequencies)]
     out = np.zeros(len(starts), dtype=bool)
     for number, start in enumerate(starts):
         frame = slice(start, start + length)
+        signals = difference[frame], floor[frame]
+        if centred:
+            signals = signals[0] - signals[0].mean(axis=0), signals[1] - signals[1].mean(axis=0)
         ours, theirs = (
-            np.add.reduceat(
-                np.square(np.abs(np.fft.rfft(window[: len(s[frame])] * s[frame], axis=0))), first
-            )
-            for s in (difference, floor)
+            np.add.reduceat(np.square(np.abs(np.fft.rfft(window[: len(s)] * s, axis=0))), first)
+            for s in signals
         )
         out[number] = bool(np.any((ours > CONTRAST * theirs) & (ours > 0)))
     return out
@@ -121,6 +145,27 @@ def _kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
 def _piece(block: Block, start: float, stop: float) -> list[Block]:
     first, last = max(block.start, start), min(block.stop, stop)
     return [replace(block, start=first, stop=last)] if last > first else []
+
+
+def _pushes(run: Run) -> tuple[Block, ...]:
+    """The times in which hands push, by their events."""
+    return tuple(
+        Block(event["start"], event["stop"], event["label"])
+        for event in run.meta.get("events", ())
+        if event.get("cause") == PUSH
+    )
+
+
+def _joined(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """Blocks in order, those of one label that overlap as one."""
+    joined: list[Block] = []
+    for block in sorted(blocks):
+        last = joined[-1] if joined else None
+        if last and last.label == block.label and block.start < last.stop:
+            joined[-1] = replace(last, stop=max(last.stop, block.stop))
+        else:
+            joined.append(block)
+    return tuple(joined)
 
 
 def _overlap(event: dict[str, Any], blocks: Sequence[Block]) -> float:
@@ -164,21 +209,44 @@ def _log(run: Run, logger: Logger, seed: int) -> Run:
             velocity = _low_pass(velocity, logger.cutoff, run.rate)
         velocity = _sampled(velocity, run.rate, stamps)
         velocity += noise + rough * velocity
-    velocity[_again(repeated < logger.repeated)] = velocity[_before(repeated < logger.repeated)]
-    gaps = lost < logger.lost
-    if gaps.any() and not gaps.all():
-        known = np.flatnonzero(~gaps)
-        for joint in range(joints):
-            velocity[gaps, joint] = np.interp(np.flatnonzero(gaps), known, velocity[known, joint])
-    desired = _desired(run, logger)
+    effort = _effort(run, logger, stamps, seed)
+    for signal in (velocity, effort):
+        if signal is not None:
+            _transmit(signal, repeated < logger.repeated, lost < logger.lost)
     return Run(
         time=np.arange(count) / logger.rate,
         joint_names=run.joint_names,
         velocity=_held(velocity, logger.hold).astype(np.float32),
-        velocity_desired=desired,
+        velocity_desired=_desired(run, logger),
+        effort=None if effort is None else _held(effort, logger.hold).astype(np.float32),
         robot=run.robot,
         meta=run.meta,
     )
+
+
+def _effort(run: Run, logger: Logger, stamps: Array, seed: int) -> Array | None:
+    """Efforts at stamps, shape (samples, joints), in [N m] or [A]; or None."""
+    if run.effort is None or logger.effort == "missing":
+        return None
+    effort, most = run.effort.astype(np.float64), np.array(run.meta["effort_limit"])
+    if logger.effort == "current":
+        effort, most = effort * (logger.current / most), np.full_like(most, logger.current)
+    if logger.velocity != "measured":
+        effort = _low_pass(effort, logger.cutoff, run.rate)
+    effort = _sampled(effort, run.rate, stamps)
+    rng = np.random.default_rng((seed, 1))  # not that of velocities, which stay what they are
+    effort += logger.effort_noise * most * rng.standard_normal(effort.shape)
+    counts = 2 * most / 2**logger.effort_bits
+    return np.asarray(np.rint(effort / counts) * counts)
+
+
+def _transmit(signal: Array, repeated: Mask, lost: Mask) -> None:
+    """Repeat samples of a signal, shape (samples, joints), and interpolate lost ones, in place."""
+    signal[_again(repeated)] = signal[_before(repeated)]
+    if lost.any() and not lost.all():
+        known = np.flatnonzero(~lost)
+        for joint in range(signal.shape[1]):
+            signal[lost, joint] = np.interp(np.flatnonzero(lost), known, signal[known, joint])
 
 
 def _desired(run: Run, logger: Logger) -> Any:

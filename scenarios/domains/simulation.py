@@ -35,7 +35,7 @@ from scenarios.simulation import recorded
 if TYPE_CHECKING:
     from scenarios.loop import Motion
 
-RECIPE = 1
+RECIPE = 2
 """Version of these simulations; it increases whenever a seed gives another run than before."""
 GOOD = "good"
 """Name of a run without a fault, the twin of those of its robot and seed."""
@@ -114,7 +114,9 @@ def simulate(
 
     Returns:
         The run, as the drives report it, at ``SLOW`` or at 10 kHz; stage ``planned`` is the
-        velocity of the plan. ``meta`` has the domain, the drawn fault and all events.
+        velocity of the plan. ``effort`` is the torque of the drives after gears, limits and
+        delays, before the friction of the joints; ``meta`` has its limit of each joint, in [N m],
+        the domain, the drawn fault and all events.
 
     Raises:
         ScenarioError: If the robot or the fault is unknown, or the seed is too low.
@@ -149,6 +151,7 @@ def simulate(
             "recipe": f"domains {RECIPE}",
             "domain": trial.domain.as_dict(),
             "motion": trial.description,
+            "effort_limit": [trial.domain.torque_limit * one for one in entry.drives.torque],
             "defect": dict(trial.facts),
             "events": [trace.record() for trace in traces],
             "labelling": asdict(RULE),
@@ -157,7 +160,7 @@ def simulate(
 
 
 def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
-    """What is kept of a recording: positions and velocities, single precision, at a rate."""
+    """What is kept of a recording: positions, velocities, torques, single precision, at a rate."""
 
     def single(signal: Any) -> Any:
         return signal.astype(np.float32)
@@ -170,6 +173,7 @@ def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
             "planned": single(motion.planned),
             "position": single(motion.position),
             "target": single(motion.position_desired),
+            "torque": single(motion.torque),
         },
         **facts,
     )
@@ -181,6 +185,7 @@ def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
         velocity_desired=single(run.velocity_desired),
         position=stages.pop("position"),
         position_desired=stages.pop("target"),
+        effort=stages.pop("torque"),
         stages=stages,
     )
 

@@ -1,0 +1,203 @@
+"""Efforts of wide domains: drives show the torques that physics asks for, and pushes of hands."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from noisemodel import Run
+from scenarios.arm.scene import bodies
+from scenarios.clock import RATE
+from scenarios.domains import GOOD, RECIPE, logged, simulate, simulation
+from scenarios.domains.domain import Logger
+from scenarios.domains.logs import visible
+from scenarios.errors import DatasetError
+from scenarios.folder import Folder
+from scenarios.imperfections import real_model
+from scenarios.loads import PUSH
+from scenarios.reduced import configuration, reduced_model
+from scenarios.robots import WIDE
+from scenarios.tasks import Task
+
+SECONDS = 1.5
+STANDS = 10_004
+"""A seed of which the Panda stands for so long, on elastic gears."""
+PLAIN = Logger(
+    rate=1000.0, velocity="measured", bits=23, cutoff=700.0, noise=0.001, jitter=0.0, lost=0.0,
+    repeated=0.0, hold=1, ripple=0.0, roughness=0.0, gear=100.0, resonances=(),
+    desired="commanded", effort="torque", effort_noise=0.0, effort_bits=24,
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def twin():
+    return simulate("panda", GOOD, STANDS, duration=SECONDS)
+
+
+@pytest.fixture(scope="module")
+def pushed():
+    return simulate("panda", "push", STANDS, duration=SECONDS)
+
+
+def real_panda():
+    """The Panda of the seed with its real masses, and the Coulomb friction of its joints."""
+    drawn = simulation._draw(WIDE["panda"], STANDS)
+    imperfections = simulation._imperfections(
+        drawn.robot, drawn.domain, drawn.streams[1], bodies=bodies(drawn.robot)
+    )
+    tool = drawn.robot.tool
+    model = real_model(reduced_model(drawn.robot), tool.frame, np.array(tool.point), imperfections)
+    friction = np.array(drawn.robot.drives.friction) * imperfections.friction
+    return model, friction * drawn.domain.stiction
+
+
+def test_the_effort_of_a_standing_arm_is_its_gravity_torque_within_friction(twin):
+    model, friction = real_panda()
+    late = twin.time > 1.0
+    assert np.abs(twin.velocity[late]).max() < 0.02
+    position = twin.position[late].astype(np.float64).mean(axis=0)
+    gravity = pin.computeGeneralizedGravity(
+        model, model.createData(), configuration(model, position)
+    )
+    off = np.abs(twin.effort[late].mean(axis=0) - gravity)
+    assert (off < friction + 0.01 * np.abs(gravity)).all()
+    assert np.abs(gravity).max() > 10 * friction.max()
+
+
+def test_a_push_shows_in_the_efforts_as_the_torque_that_holds_its_force(twin, pushed):
+    model, friction = real_panda()
+    (event,) = pushed.meta["events"]
+    (load,) = pushes(pushed)
+    middle = load.start + load.rise + (load.stop - load.fall - load.start - load.rise) / 2
+    now = np.abs(pushed.time - middle) < 0.01
+    body = 1 + round(load.along * (model.njoints - 2))
+    data, position = model.createData(), pushed.position[now].astype(np.float64).mean(axis=0)
+    pin.computeJointJacobians(model, data, configuration(model, position))
+    jacobian = pin.getJointJacobian(model, data, body, pin.LOCAL_WORLD_ALIGNED)
+    lever = data.oMi[body].rotation @ model.inertias[body].lever
+    torque = (jacobian[:3] - pin.skew(lever) @ jacobian[3:]).T @ np.array(load.force)
+    shown = (pushed.effort - twin.effort)[now].mean(axis=0)
+    assert (np.abs(shown + torque) < 2 * friction).all()
+    assert np.abs(torque).max() > 3 * friction.max()
+    assert event["cause"] == PUSH
+    assert event["label"] == "impact"
+    assert np.linalg.norm(load.force) == pytest.approx(event["facts"]["force"])
+
+
+def pushes(run):
+    drawn = simulation._draw(WIDE["panda"], STANDS)
+    from scenarios.arm.domains import DEFECTS
+    from scenarios.arm.scene import plan
+
+    planned = plan(drawn.robot, drawn.motion, drawn.streams[0], SECONDS)
+    return DEFECTS["push"].draw(drawn.streams[4], planned).loads
+
+
+def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
+    assert twin.effort.dtype == np.float32
+    assert twin.effort.shape == twin.velocity.shape
+    drives, scale = WIDE["panda"].drives, twin.meta["domain"]["torque_limit"]
+    assert twin.meta["effort_limit"] == pytest.approx(np.array(drives.torque) * scale)
+    trial = simulation._twin("panda", STANDS, SECONDS, simulation.DISTRIBUTION)
+    step = round(RATE / twin.rate)
+    steady = slice(200, -200)
+    np.testing.assert_allclose(twin.effort[steady], trial.motion.torque[::step][steady], atol=0.5)
+
+
+def test_a_blow_from_outside_is_not_among_the_torques_of_the_drives():
+    blow = simulate("panda", "blow", STANDS, duration=3.0)
+    twin = simulate("panda", GOOD, STANDS, duration=3.0)
+    (event,) = blow.meta["events"]
+    size = event["facts"]["share"] * np.array(blow.meta["effort_limit"])
+    begun = (blow.time > event["start"]) & (blow.time < event["start"] + 1e-3)
+    hit = np.array(event["facts"]["joints"]) > 0
+    shown = np.abs(blow.effort - twin.effort)[begun][:, hit]
+    assert (shown.max(axis=0) < 0.2 * size[hit]).all()
+
+
+def test_a_push_that_velocities_do_not_show_has_a_label_where_efforts_show_it(twin, pushed):
+    (event,) = pushed.meta["events"]
+    found = logged(pushed, twin, PLAIN, seed=1)
+    labels = [block for block in found.blocks if block.label == "impact"]
+    assert sum(block.stop - block.start for block in labels) > 0.3 * (
+        event["stop"] - event["start"]
+    )
+    assert all(event["start"] <= b.start < b.stop <= event["stop"] for b in labels)
+    assert found.meta["events"][0]["labelled"] > 0
+    blind = logged(pushed, twin, replace(PLAIN, effort="missing"), seed=1)
+    assert blind.effort is None
+    assert {block.label for block in blind.blocks} == {"ok"}
+    assert blind.meta["events"][0]["labelled"] == 0
+    noisy = logged(pushed, twin, replace(PLAIN, effort_noise=2.0), seed=1)
+    assert noisy.blocks == blind.blocks
+
+
+def test_a_logger_of_efforts_leaves_velocities_as_they_are(twin):
+    rough = replace(PLAIN, jitter=0.1, lost=0.02, repeated=0.02, hold=3, velocity="filtered")
+    kinds = [
+        logged(twin, twin, replace(rough, effort=kind, current=8.0), seed=4)
+        for kind in ("missing", "torque", "current")
+    ]
+    for found in kinds[1:]:
+        assert np.array_equal(found.velocity, kinds[0].velocity)
+        assert np.array_equal(found.velocity_desired, kinds[0].velocity_desired)
+    again = logged(twin, twin, replace(rough, effort="current", current=8.0), seed=4)
+    assert np.array_equal(again.effort, kinds[2].effort)
+    noise = replace(rough, effort_noise=0.01)
+    other = [logged(twin, twin, noise, seed=seed).effort for seed in (4, 4, 5)]
+    assert np.array_equal(other[0], other[1])
+    assert not np.array_equal(other[0], other[2])
+
+
+def test_currents_are_torques_by_the_torque_constant_of_each_joint(twin):
+    limit = np.array(twin.meta["effort_limit"])
+    torque = logged(twin, twin, PLAIN, seed=1).effort
+    current = logged(twin, twin, replace(PLAIN, effort="current", current=10.0), seed=1).effort
+    np.testing.assert_allclose(current * limit / 10.0, torque, atol=1e-3)
+
+
+def test_efforts_have_steps_noise_and_are_held_as_velocities_are(twin):
+    limit = np.array(twin.meta["effort_limit"])
+    fine = logged(twin, twin, PLAIN, seed=1).effort
+    coarse = logged(twin, twin, replace(PLAIN, effort_bits=8), seed=1).effort
+    step = 2 * limit / 2**8
+    np.testing.assert_allclose(coarse / step, np.rint(coarse / step), atol=1e-3)
+    assert (np.abs(coarse - fine) <= 0.51 * step).all()
+    noisy = logged(twin, twin, replace(PLAIN, effort_noise=0.01), seed=1).effort
+    np.testing.assert_allclose((noisy - fine).std(axis=0), 0.01 * limit, rtol=0.1)
+    held = logged(twin, twin, replace(PLAIN, hold=10), seed=1).effort
+    assert np.array_equal(held[::10], held[9::10])
+
+
+def test_a_run_without_efforts_has_logs_without(twin):
+    old = replace(twin, effort=None, meta={**twin.meta, "recipe": "domains 1"})
+    assert logged(old, old, PLAIN, seed=1).effort is None
+
+
+def test_a_slow_change_is_visible_beside_a_weight_only_where_means_are_left_out():
+    time = np.arange(2000) / 1000
+    weight = 40.0 + 0.01 * np.random.default_rng(1).normal(size=(2000, 1))
+    push = 2.0 * np.clip(time - 0.5, 0, 1)[:, None]
+    assert not visible(push, weight, rate=1000.0).any()
+    assert not visible(push, weight, rate=1000.0, lowest=1.0).any()
+    seen = visible(push, weight, rate=1000.0, lowest=1.0, centred=True)
+    starts = 0.1 * np.arange(len(seen))
+    assert seen[(starts > 0.45) & (starts < 1.05)].all()
+    assert not seen[starts < 0.05].any()
+    assert not seen[starts > 1.55].any()  # a force that does not change
+
+
+def test_folders_of_older_recipes_are_read_and_not_added_to(tmp_path, twin):
+    folder = Folder.opened(tmp_path / "data", format_name="domains")
+    folder.save(Task("panda", GOOD, STANDS), replace(twin, effort=None))
+    manifest = folder.path / "dataset.json"
+    settings = json.loads(manifest.read_text())
+    assert settings["recipe"] == RECIPE
+    manifest.write_text(json.dumps({**settings, "recipe": RECIPE - 1}))
+    with pytest.raises(DatasetError, match=f"made with recipe {RECIPE - 1}, now it is {RECIPE}"):
+        Folder.opened(folder.path, format_name="domains")
+    old = Folder.opened(folder.path, format_name="domains", any_recipe=True)
+    (task,) = old.kept()
+    assert Run.load(old.file(task)).effort is None
