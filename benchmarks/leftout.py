@@ -35,7 +35,6 @@ from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.recordings import classified
 from inspector.training.training import LeftOut, lacking, profile_at
-from models.classifier import CHUNK, all_frames
 from models.estimators.calibration import identity
 from models.estimators.estimator import ESTIMATORS
 from models.estimators.probabilistic import NOVELTY_LIMIT, Probable
@@ -45,7 +44,8 @@ from models.evaluation.matching import OK, UNCLEAR, Matched
 from models.evaluation.outcomes import Outcome
 from models.evaluation.predictions import Predictions, within
 from models.evaluation.ranking import auc, harmonic_mean, partial_auc
-from models.features import features, standard
+from models.features import standard
+from models.framefeatures import frame_features
 from models.labels import Labels
 from models.splitting import folds, group_of
 from models.tuning.grid import Grid
@@ -351,9 +351,7 @@ def _known(path: Path, profile: models.Profile) -> Known | tuple[str, str]:
 
 def of_recording(recording: models.Recording, profile: models.Profile) -> Known:
     """Features of a recording."""
-    view, starts = all_frames(recording.signal, profile, recording.valid)
-    chunks = np.split(starts, range(CHUNK, len(starts), CHUNK))
-    whole = np.concatenate([features(view[chunk], profile) for chunk in chunks])
+    starts, whole = frame_features(recording.signal, profile, recording.valid)
     try:
         examples = models.Examples.of(models.Dataset.of([recording], profile), profile)
         cut, labels = examples.features, examples.labels

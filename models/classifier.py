@@ -12,14 +12,14 @@ import numpy as np
 from models import modelfile
 from models.confusion import Evaluation
 from models.dataset import Dataset
-from models.errors import DatasetError, RateError, SignalError
+from models.errors import DatasetError, RateError
 from models.estimators.estimator import ESTIMATORS, Estimator
 from models.examples import CHUNK, Examples
 from models.features import features, standard
-from models.framing import frame_starts
+from models.framefeatures import frame_features
 from models.labels import UNKNOWN, Labels
 from models.profile import TOLERANCE, Profile
-from models.signals import Signals, check, stacked
+from models.signals import Signals
 from models.types import Array, Index, Mask, Real, Words
 
 
@@ -126,7 +126,9 @@ class Classifier:
         Raises:
             SignalError: If the frames have another shape or values that are not finite.
         """
-        return self._decide(frames, np.arange(len(frames)))
+        chunks = range(0, max(len(frames), 1), CHUNK)
+        found = [features(frames[first : first + CHUNK], self.profile) for first in chunks]
+        return self.decide(np.concatenate(found))
 
     def scores(self, frames: Real) -> Array:
         """Score of each class, larger meaning more certain.
@@ -163,8 +165,8 @@ class Classifier:
         """
         if not abs(rate / self.rate - 1.0) <= TOLERANCE:
             raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
-        view, starts = all_frames(signal, self.profile, valid)
-        return self.labels(self._decide(view, starts), starts, rate, start=start)
+        starts, plain = frame_features(signal, self.profile, valid)
+        return self.labels(self.decide(plain), starts, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
         """Labels of frames from their decision values.
@@ -194,7 +196,9 @@ class Classifier:
         Returns:
             Decisions, shape (frames, decisions).
         """
-        return self.estimator.decision((plain - self.mean) / self.scale)
+        chunks = range(0, max(len(plain), 1), CHUNK)
+        parts = ((plain[first : first + CHUNK] - self.mean) / self.scale for first in chunks)
+        return np.concatenate([self.estimator.decision(part) for part in parts])
 
     def predict_features(self, plain: Array) -> Words:
         """Class of each frame, from its features.
@@ -205,8 +209,7 @@ class Classifier:
         Returns:
             Class names, shape (frames,).
         """
-        chunks = _chunks(np.arange(len(plain)))
-        return np.concatenate([self._choose(self.decide(plain[chunk])) for chunk in chunks])
+        return self._choose(self.decide(plain))
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a model file, whole or not at all; the same model gives the same bytes.
@@ -257,11 +260,6 @@ class Classifier:
     def _names(self) -> Words:
         return np.array((*self.classes, UNKNOWN))
 
-    def _decide(self, frames: Real, index: Index) -> Array:
-        return np.concatenate(
-            [self.decide(features(frames[chunk], self.profile)) for chunk in _chunks(index)]
-        )
-
     def _choose(self, decisions: Array) -> Words:
         return self._names[self.estimator.choose(decisions)]
 
@@ -269,44 +267,5 @@ class Classifier:
         return self.estimator.score(decisions)
 
 
-def all_frames(signal: Signals, profile: Profile, valid: Mask | None = None) -> tuple[Real, Index]:
-    """Frames of a whole signal, as `Classifier.classify` cuts them.
-
-    Args:
-        signal: The noise estimate, shape (samples,), or signals by name, each of that shape.
-        profile: How it is framed.
-        valid: False in gaps, shape (samples,); frames that touch a gap are left out.
-
-    Returns:
-        A view of the frames that begin at each sample, shape (samples - length + 1, length), or
-        (samples - length + 1, rows, length) if the profile has several signals; and the samples at
-        which the frames begin, shape (frames,).
-
-    Raises:
-        SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
-            profile needs another one.
-    """
-    samples = stacked(signal, profile.signals).astype(np.float64, copy=False)
-    count = samples.shape[-1]
-    valid = np.ones(count, dtype=bool) if valid is None else np.asarray(valid, bool)
-    first, length = int(profile.drop_first_sample), profile.length
-    check(samples, valid)
-    if count < first + length:
-        raise SignalError(
-            f"a signal of {count} samples is too short: a frame takes {first + length}"
-        )
-    starts = first + frame_starts(
-        count - first, length=length, hop=profile.hop, flush_end=profile.flush_end
-    )
-    gaps = np.concatenate(([0], np.cumsum(~valid)))
-    starts = starts[gaps[starts + length] == gaps[starts]]
-    windows = np.lib.stride_tricks.sliding_window_view(samples, length, axis=-1)
-    return np.moveaxis(windows, -2, 0), starts
-
-
 def _examples(dataset: Dataset | Examples, profile: Profile) -> Examples:
     return Examples.of(dataset, profile) if isinstance(dataset, Dataset) else dataset
-
-
-def _chunks(index: Index) -> list[Index]:
-    return np.split(index, range(CHUNK, len(index), CHUNK))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import SignalError
-from models.types import Index, Real
+from models.types import Real
 
 Scalar = TypeVar("Scalar", bound=np.generic)
 
@@ -37,23 +37,6 @@ def frame(signal: NDArray[Scalar], *, length: int = 4000, hop: int = 1000) -> ND
         )
     windows = np.lib.stride_tricks.sliding_window_view(signal, length, axis=-1)
     return np.moveaxis(windows[..., ::hop, :], -2, 0)
-
-
-def frame_starts(samples: int, *, length: int, hop: int, flush_end: bool) -> Index:
-    """Start of each frame of a signal.
-
-    Args:
-        samples: Samples of the signal, at least ``length``.
-        length: Samples of a frame.
-        hop: Samples from the start of one frame to the start of the next.
-        flush_end: Whether a last frame, flush with the end, covers the tail that the hops leave.
-
-    Returns:
-        Index of the first sample of each frame, shape (frames,).
-    """
-    last = samples - length
-    starts = np.arange(0, last + 1, hop)
-    return np.append(starts, last) if flush_end and starts[-1] < last else starts
 
 
 def pad_end(signal: Real, *, length: int) -> Real:

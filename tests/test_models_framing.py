@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 import models
-from models.framing import frame_starts, pad_end
+from models.framefeatures import frame_features
+from models.framing import pad_end
 
 
 @pytest.mark.parametrize(("samples", "frames"), [(400, 1), (499, 1), (500, 2), (1000, 7)])
@@ -25,7 +26,7 @@ def test_frames_are_a_view_that_cannot_be_written():
 
 def test_a_flush_frame_covers_the_tail_once():
     def starts(samples):
-        return frame_starts(samples, length=400, hop=100, flush_end=True).tolist()
+        return frame_features(np.ones(samples), models.LogBands().at(1000.0))[0].tolist()
 
     assert starts(500) == [0, 100]
     assert starts(501) == [0, 100, 101]

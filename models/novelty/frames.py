@@ -8,14 +8,12 @@ from typing import Self
 import numpy as np
 
 from models.errors import DatasetError, MissingSignalError, RateError, RecordingError
-from models.examples import CHUNK
-from models.features import feature_count, features
-from models.framing import frame_starts
+from models.features import feature_count
+from models.framefeatures import frame_features
 from models.profile import TOLERANCE, Profile
 from models.recording import Recording
-from models.signals import stacked
 from models.splitting import group_of
-from models.types import Array, Index, Mask, Words
+from models.types import Array, Mask, Words
 
 OK = "ok"
 
@@ -110,20 +108,14 @@ def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array
             [profile.rate],
             f"recording {recording.name!r} does not fit; lower its rate, or take another profile",
         )
+    if recording.samples < profile.length:
+        return np.empty((0, feature_count(profile))), np.empty(0), np.empty(0)
     try:
-        samples = stacked(recording.signal, profile.signals).astype(np.float64, copy=False)
+        starts, found = frame_features(recording.signal, profile, _good(recording))
     except MissingSignalError as error:
         raise RecordingError(recording.name, str(error)) from error
-    starts = _whole(_good(recording), profile)
-    windows = np.lib.stride_tricks.sliding_window_view(
-        samples, min(profile.length, samples.shape[-1]), axis=-1
-    )
-    view = np.moveaxis(windows, -2, 0)
-    chunks = np.split(starts, range(CHUNK, len(starts), CHUNK)) if len(starts) else []
-    found = [features(view[chunk], profile) for chunk in chunks]
     time = recording.start + starts / recording.rate
-    nothing = np.empty((0, feature_count(profile)))
-    return np.concatenate([nothing, *found]), time, time + profile.length / recording.rate
+    return found, time, time + profile.length / recording.rate
 
 
 def _good(recording: Recording) -> Mask:
@@ -139,15 +131,3 @@ def _good(recording: Recording) -> Mask:
         ]
         good = np.any([np.zeros_like(good), *inside], axis=0)
     return good if recording.valid is None else good & recording.valid
-
-
-def _whole(good: Mask, profile: Profile) -> Index:
-    """List where the frames start that are good throughout, as classifying would cut them."""
-    if len(good) < profile.length:
-        return np.empty(0, dtype=np.intp)
-    starts = frame_starts(
-        len(good), length=profile.length, hop=profile.hop, flush_end=profile.flush_end
-    )
-    bad = np.concatenate(([0], np.cumsum(~good)))
-    whole: Index = starts[bad[starts + profile.length] == bad[starts]]
-    return whole
