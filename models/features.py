@@ -8,7 +8,6 @@ the second.
 
 from collections.abc import Sequence
 from functools import lru_cache
-from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,11 +33,9 @@ def features(frames: Real, profile: Profile) -> Array:
     """
     _check(frames, profile)
     rows = frames.shape[1] if frames.ndim > 2 else 1
-    exact = rounded(frames, profile).reshape(len(frames), rows, profile.length)
+    exact = rounded(frames, profile).reshape(len(frames), rows, profile.length).swapaxes(0, 1)
     energies = [
-        log_band_energies(
-            np.swapaxes(_windows(exact, each.window, each.stride), 1, 2), profile, each
-        )
+        log_band_energies(_windows(exact, each.window, each.stride), profile, each)
         for each in profile.resolutions
     ]
     return temporal_pooling(energies, profile)
@@ -60,7 +57,7 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     """Logarithm of the amplitude of each frequency band, in each window of a Fourier transform.
 
     Args:
-        windows: Samples of the windows, shape (..., rows, window).
+        windows: Samples of the windows, shape (rows, ..., window).
         profile: What to compute.
         resolution: The one of the profile's that the windows are of.
 
@@ -70,50 +67,30 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
         signal that goes joint by joint, and the difference of that joint from the mean of all
         joints.
     """
-    rows = windows.shape[:-2]
-    if profile.bands != "log":
-        amplitude = compress(_amplitude(windows), comb=profile.bands == "comb")
-        return np.log(amplitude + profile.floor).reshape(*rows, prod(amplitude.shape[-2:]))
     spectrum = _transform(windows)
-    squares = np.square(spectrum.real)
-    squares += np.square(spectrum.imag)
-    shares = _power_shares(profile.rate, resolution)
-    # Windows of all signals in one product of matrices.
-    power = squares.reshape(-1, len(shares)) @ shares
-    np.sqrt(power, out=power)
-    power += profile.floor
-    bands = shares.shape[1]
-    if profile.norms < len(profile.signals):
-        return _with_joints(np.log(power).reshape(*rows, -1, bands), profile)
-    own = windows.shape[-2] * bands
-    energies = np.empty((*rows, 2 * own - bands if profile.relative else own))
-    np.log(power.reshape(*rows, own), energies[..., :own])
+    if profile.bands == "log":
+        squares = np.square(spectrum.real)
+        squares += np.square(spectrum.imag)
+        shares = _power_shares(profile.rate, resolution)
+        # Windows of all signals in one product of matrices.
+        power = squares.reshape(-1, len(shares)) @ shares
+        amplitude = np.sqrt(power, out=power).reshape(*windows.shape[:-1], -1)
+    else:
+        amplitude = compress(np.abs(spectrum), comb=profile.bands == "comb")
+    amplitude += profile.floor
+    found = np.log(amplitude, out=amplitude)
+    norms, joints = found[: profile.norms], found[profile.norms :]
+    parts = [norms]
     if profile.relative:
-        np.subtract(energies[..., bands:own], energies[..., : own - bands], energies[..., own:])
-    return energies
-
-
-def _with_joints(found: Array, profile: Profile) -> Array:
-    """Log-band energies of norms and joints, in the order of `log_band_energies`.
-
-    Args:
-        found: Shape (..., rows, bands).
-        profile: Defines how many rows are norms, and how many signals have a row per joint.
-    """
-    rows, bands = found.shape[:-2], found.shape[-1]
-    norms, kinds = profile.norms, len(profile.signals) - profile.norms
-    joints = found[..., norms:, :].reshape(*rows, kinds, -1, bands)
-    energies = np.empty((*rows, 2 * norms - 1 + 3 * kinds - 1, bands))
-    own, loudest = energies[..., : 2 * norms - 1, :], energies[..., 2 * norms - 1 :, :]
-    own[..., :norms, :] = found[..., :norms, :]
-    np.subtract(own[..., 1:norms, :], own[..., : norms - 1, :], own[..., norms:, :])
-    most, above = loudest[..., :kinds, :], loudest[..., -kinds:, :]
-    np.maximum.reduce(joints, -2, out=most)
-    np.subtract(most[..., 1:, :], most[..., :-1, :], loudest[..., kinds:-kinds, :])
-    np.add.reduce(joints, -2, out=above)
-    above /= joints.shape[-2]
-    np.subtract(most, above, above)
-    return energies.reshape(*rows, -1)
+        parts.append(norms[1:] - norms[:-1])
+    if len(joints):
+        joints = joints.reshape(len(profile.signals) - len(norms), -1, *found.shape[1:])
+        loudest = np.maximum.reduce(joints, 1)
+        mean = np.add.reduce(joints, 1) / joints.shape[1]
+        parts += [loudest, loudest[1:] - loudest[:-1], loudest - mean]
+    energies = np.concatenate(parts)
+    *leading, last = range(1, energies.ndim)
+    return energies.transpose(*leading, 0, last).reshape(*found.shape[1:-1], -1)
 
 
 def temporal_pooling(energies: Sequence[Array], profile: Profile) -> Array:
@@ -167,7 +144,7 @@ def spectrogram(frames: Array, *, window: int, stride: int) -> Array:
     Returns:
         Amplitudes, shape (frames, time, frequency).
     """
-    return _amplitude(_windows(frames, window, stride))
+    return np.abs(_transform(_windows(frames, window, stride)))
 
 
 def compress(spectrum: Array, *, comb: bool = False) -> Array:
@@ -235,11 +212,6 @@ def _power_shares(rate: float, resolution: Resolution) -> Array:
 
 def _transform(windows: Array) -> NDArray[np.complex128]:
     return np.fft.rfft(windows * _hann(windows.shape[-1]), axis=-1)
-
-
-def _amplitude(windows: Array) -> Array:
-    amplitude: Array = np.abs(_transform(windows))
-    return amplitude
 
 
 @lru_cache

@@ -11,6 +11,9 @@ from models.signals import Signals, check, stacked
 from models.types import Array, Index, Mask, Real
 from models.windows import Windows
 
+AT_ONCE = 2
+"""Frames' lengths of samples that are taken at once: more do not fit into the cache."""
+
 Frames: TypeAlias = tuple[Index, Array]
 """First sample of each frame, shape (frames,), and its features, not yet standardised, shape
 (frames, features)."""
@@ -43,10 +46,9 @@ def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None)
 class FrameFeatures:
     """Features of the frames of a signal that comes in chunks of any size.
 
-    The features of a frame come with its last sample, and do not depend on the chunks, bit for
-    bit. Each Fourier transform is computed once, for all frames that share it: many at a time,
-    since they take little longer than one, and all but the last few before the chunk that
-    completes a frame. Memory does not grow.
+    The features of a frame come with its last sample. Each Fourier transform is computed once, for
+    all frames that share it: many at a time, since they take little longer than one, and all but
+    the last few before the chunk that completes a frame. Memory does not grow.
 
     Args:
         profile: How the signal is framed, and what to compute.
@@ -56,8 +58,9 @@ class FrameFeatures:
     def __init__(self, profile: Profile, rows: int) -> None:
         self._profile = profile
         # Room for a frame, and for as much as is taken at once.
-        self._samples = np.zeros((rows, 3 * profile.length))
-        self._valid = np.zeros(3 * profile.length, dtype=bool)
+        self._at_once = AT_ONCE * profile.length
+        self._samples = np.zeros((rows, profile.length + self._at_once))
+        self._valid = np.zeros(self._samples.shape[1], dtype=bool)
         self._windows = [Windows(self._samples, profile, each) for each in profile.resolutions]
         self._nothing = np.empty(0, dtype=np.intp), np.empty((0, feature_count(profile)))
         # Longest latency of a window: its samples have to be in the buffer still.
@@ -131,8 +134,8 @@ class FrameFeatures:
 
     def _take(self, exact: Array, valid: Mask | None) -> Frames:
         found: list[Frames] = []
-        for first in range(0, exact.shape[-1], self._profile.length):
-            piece = slice(first, first + self._profile.length)
+        for first in range(0, exact.shape[-1], self._at_once):
+            piece = slice(first, first + self._at_once)
             self._keep(exact[..., piece], True if valid is None else valid[piece])
             if self._count >= self._due:
                 found += self._advance(exact.shape[-1])
@@ -142,7 +145,7 @@ class FrameFeatures:
         self._take(np.zeros((len(self._samples), samples)), np.zeros(samples, dtype=bool))
 
     def _keep(self, samples: Array, valid: Mask | bool) -> None:
-        """Append at most a frame's length of samples to the buffer."""
+        """Append samples to the buffer, at most as many as are taken at once."""
         length = self._profile.length
         count = samples.shape[-1]
         if self._held + count > len(self._valid):

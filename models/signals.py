@@ -55,7 +55,7 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
 
     Args:
         signals: The noise, or signals by name.
-        names: Those to stack, in order. ``noise`` is computed from ``measured`` and ``desired``
+        names: Those to stack, norms first. ``noise`` is computed from ``measured`` and ``desired``
             where it is missing.
 
     Returns:
@@ -76,24 +76,17 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
         found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
         joints = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
         raise SignalError(f"a signal has another shape, {found}, expected (samples,){joints}")
-    if any(map(by_joint, names)):
-        return np.vstack(chosen)
-    return chosen[0] if len(chosen) == 1 else np.array(chosen)
+    if len(chosen) == 1:
+        return chosen[0]
+    return np.vstack(chosen) if chosen[-1].ndim > 1 else np.array(chosen)
 
 
 def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
     """Whether all norms have one shape, and all that goes joint by joint has another one."""
-    shapes: dict[bool, set[tuple[int, ...]]] = {False: set(), True: set()}
-    for name, each in zip(names, chosen, strict=True):
-        shapes[by_joint(name)].add(each.shape)
-    if any(
-        len(shape) != 1 + joints or 0 in shape[:joints]
-        for joints in shapes
-        for shape in shapes[joints]
-    ):
-        return False
-    alike = all(len(each) <= 1 for each in shapes.values())
-    return alike and len({shape[-1] for each in shapes.values() for shape in each}) == 1
+    count, joints = chosen[0].shape[-1:], chosen[-1].shape[:-1]
+    wanted = [joints + count if name in JOINTS else count for name in names]
+    alike = [each.shape for each in chosen] == wanted
+    return alike and len(count) == 1 and len(joints) == (names[-1] in JOINTS) and 0 not in joints
 
 
 def check(samples: Real, valid: Mask | None = None, *, first: int = 0) -> None:

@@ -29,15 +29,14 @@ class Windows:
         self._of_frame = hops * len(phases) + rank  # those of the first frame
         self._in_frame = steps
         self._phases: list[int] = phases.tolist()
-        view = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, axis=-1)
-        self._windows = np.swapaxes(view, 0, 1)
-        cycle = 2 * profile.length // profile.hop + 2
+        self._windows = np.lib.stride_tricks.sliding_window_view(samples, resolution.window, -1)
+        cycle = samples.shape[1] // profile.hop + 2
         self._rows, self._cycle = len(phases) * cycle, cycle * profile.hop
         # Window i is in row i modulo rows; two cycles, so that no slice ends at the last row.
         around = np.arange(2 * self._rows)
         self._row_of = around % self._rows
         self._start_of = around // len(phases) * profile.hop + phases[around % len(phases)]
-        one = log_band_energies(self._windows[0], profile, resolution)
+        one = log_band_energies(self._windows[:, 0], profile, resolution)
         self._energies = np.zeros((self._rows, *one.shape))
         self._done = 0  # transformed windows
 
@@ -62,7 +61,7 @@ class Windows:
             return
         cycles, first = divmod(self._done, self._rows)
         fresh = slice(first, first + complete - self._done)
-        windows = self._windows[self._start_of[fresh] + (cycles * self._cycle - base)]
+        windows = self._windows[:, self._start_of[fresh] + (cycles * self._cycle - base)]
         found = log_band_energies(windows, self._profile, self._resolution)
         self._energies[self._row_of[fresh]] = found
         self._done = complete
@@ -85,5 +84,5 @@ class Windows:
         Returns:
             As `of_frames`, for one frame.
         """
-        windows = self._windows[place + self._in_frame]
+        windows = self._windows[:, place + self._in_frame]
         return log_band_energies(windows, self._profile, self._resolution)[None]

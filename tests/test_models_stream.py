@@ -3,6 +3,7 @@ import sys
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,8 @@ from hypothesis import strategies as st
 
 import models
 from models import windows
+from models.framefeatures import FrameFeatures, frame_features
+from models.signals import by_joint, stacked
 
 RATE = 1000.0
 OURS = models.LogBands().at(RATE)
@@ -23,6 +26,13 @@ PROFILES = {
     "paper": replace(models.Profile.paper(), rate=RATE, length=400, hop=100, window=64, stride=48),
     "frames apart": replace(OURS, hop=650, stride=37),
     "two windows": models.LogBands(relative=True, quick=0.02, speed=True).at(RATE),
+}
+CORES = {name: (profile, 1) for name, profile in PROFILES.items()} | {
+    "norms": (models.GENERAL.at(RATE), 1),
+    "one joint": (models.EACH.at(RATE), 1),
+    "twelve joints": (models.EACH.at(RATE), 12),
+    # Its short windows have a single band.
+    "low rate": (models.EACH.at(250.0), 12),
 }
 
 
@@ -50,7 +60,7 @@ def test_the_chunk_that_completes_a_frame_finds_nearly_all_its_windows_done(chun
     transformed, original = [], windows.log_band_energies
 
     def counted(samples, *rest):
-        transformed.append(len(samples))
+        transformed.append(samples.shape[-2])
         return original(samples, *rest)
 
     monkeypatch.setattr(windows, "log_band_energies", counted)
@@ -114,6 +124,79 @@ def test_frames_that_touch_a_gap_are_left_out_as_in_the_whole_signal(name, data)
     assert_equal(streamed(models.Stream(classifier(name)), signal, cuts, valid), batch)
 
 
+def cut_features(samples, profile, cuts, valid):
+    """Features of the frames of a signal in pieces."""
+    frames = FrameFeatures(profile, len(samples))
+    pieces = [slice(a, b) for a, b in pairwise([0, *sorted(cuts), samples.shape[1]])]
+    found = [frames.push(samples[:, piece], valid[piece]) for piece in pieces]
+    return [np.concatenate(each) for each in zip(*found, frames.finish(), strict=True)]
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("name", CORES)
+def test_features_do_not_depend_on_the_chunks(name, data):
+    profile, joints = CORES[name]
+    count = data.draw(st.integers(profile.length + 1, 6 * profile.length))
+    cuts = data.draw(st.lists(st.integers(0, count), max_size=30))
+    valid = np.ones(count, dtype=bool)
+    for first in data.draw(st.lists(st.integers(0, count - 1), max_size=2)):
+        valid[first : first + data.draw(st.integers(1, 900))] = False
+    signals = random_signals(profile, joints, count)
+    starts, features = frame_features(signals, profile, valid)
+    samples = np.atleast_2d(stacked(signals, profile.signals))
+    ours_starts, ours = cut_features(samples, profile, cuts, valid)
+    assert np.array_equal(ours_starts, starts)
+    np.testing.assert_allclose(ours, features, rtol=1e-9, atol=1e-9)
+    frames = np.array([samples[:, start : start + profile.length] for start in starts])
+    if len(frames):
+        alone = models.features(frames if len(samples) > 1 else frames[:, 0], profile)
+        np.testing.assert_allclose(features, alone, rtol=1e-9, atol=1e-9)
+
+
+def random_signals(profile, joints, count):
+    """White noise about 1, shape (samples,) or (joints, samples), by name."""
+    random = np.random.default_rng(count)
+    return {
+        name: 1.0 + 0.1 * random.standard_normal((joints,) * by_joint(name) + (count,))
+        for name in profile.signals
+    }
+
+
+SHIPPED = sorted((Path(__file__).parents[1] / "assets" / "models").glob("*.npz"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=[path.stem for path in SHIPPED])
+def test_shipped_models_decide_the_same_whole_and_in_chunks(path, monkeypatch):
+    decided, original = [], models.Classifier.decide
+
+    def decide(self, features):
+        decided.append(original(self, features))
+        return decided[-1]
+
+    monkeypatch.setattr(models.Classifier, "decide", decide)
+    model = models.Classifier.load(path)
+    rate, hop = model.rate, model.profile.hop
+    count = round(3.037 * rate)
+    signals, valid = random_signals(model.profile, 12, count), np.ones(count, dtype=bool)
+    valid[round(1.2 * rate) : round(1.21 * rate)] = False
+    whole = model.classify(signals, rate, valid=valid)
+    expected = decided.pop()
+    for chunk in (max(round(rate / 1000), 7), round(rate / 50), hop, 3 * hop + 1):
+        stream = models.Stream(model, joints=12)
+        pieces = [slice(first, first + chunk) for first in range(0, count, chunk)]
+        parts = [
+            stream.push({name: each[..., piece] for name, each in signals.items()}, valid[piece])
+            for piece in pieces
+        ]
+        labels = joined([*parts, stream.finish()])
+        np.testing.assert_allclose(np.concatenate(decided), expected, atol=1e-5)
+        assert np.array_equal(labels.start, whole.start)
+        assert np.array_equal(labels.label, whole.label)
+        np.testing.assert_allclose(labels.scores, whole.scores, atol=1e-5)
+        decided.clear()
+
+
 @settings(max_examples=30, deadline=None)
 @given(before=st.integers(0, 900), lost=st.integers(0, 5000), after=st.integers(0, 1500))
 @pytest.mark.parametrize("name", PROFILES)
@@ -165,8 +248,10 @@ def test_memory_does_not_grow():
     sizes = []
     for _ in range(20):
         stream.push(signal)
-        arrays = [each for each in vars(stream).values() if isinstance(each, np.ndarray)]
-        sizes.append((len(vars(stream)), sum(each.nbytes for each in arrays)))
+        frames = stream._frames
+        state = [vars(each) for each in (stream, frames, *frames._windows)]
+        arrays = [v for each in state for v in each.values() if isinstance(v, np.ndarray)]
+        sizes.append((sum(map(len, state)), sum(each.nbytes for each in arrays)))
     assert len(set(sizes)) == 1
 
 
@@ -176,7 +261,7 @@ def test_every_transform_is_computed_once(monkeypatch):
     transformed = []
 
     def counted(windows, profile, resolution):
-        transformed.append(len(windows))
+        transformed.append(windows.shape[-2])
         return original(windows, profile, resolution)
 
     original = module.log_band_energies
@@ -185,6 +270,9 @@ def test_every_transform_is_computed_once(monkeypatch):
     for sample in np.split(noise(1000), 40):
         stream.push(sample)
     assert sum(transformed) == 1 + (1000 - OURS.window) // OURS.stride
+    transformed.clear()
+    classifier("ours").classify(noise(5000), RATE)
+    assert sum(transformed) == 1 + 1 + (5000 - OURS.window) // OURS.stride  # one for its shape
 
 
 @pytest.mark.parametrize("rate", [10_000.0, 990.0, 0.0, float("nan")])
