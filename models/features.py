@@ -65,16 +65,15 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
         Shape (..., energies), in [Np]: of each norm, and then, in a relative profile, the
         difference of each norm from the one before; then the same of the loudest joint of each
         signal that goes joint by joint, and the difference of that joint from the mean of all
-        joints.
+        joints. They do not depend on the windows beside, bit for bit.
     """
     spectrum = _transform(windows)
     if profile.bands == "log":
         squares = np.square(spectrum.real)
         squares += np.square(spectrum.imag)
-        shares = _power_shares(profile.rate, resolution)
-        # Windows of all signals in one product of matrices.
-        power = squares.reshape(-1, len(shares)) @ shares
-        amplitude = np.sqrt(power, out=power).reshape(*windows.shape[:-1], -1)
+        # A product for each window: the rounding of one for all depends on how many they are.
+        power = squares[..., None, :] @ _power_shares(profile.rate, resolution)
+        amplitude = np.sqrt(power[..., 0, :])
     else:
         amplitude = compress(np.abs(spectrum), comb=profile.bands == "comb")
     amplitude += profile.floor
@@ -86,7 +85,8 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     if len(joints):
         joints = joints.reshape(len(profile.signals) - len(norms), -1, *found.shape[1:])
         loudest = np.maximum.reduce(joints, 1)
-        mean = np.add.reduce(joints, 1) / joints.shape[1]
+        # The order in which `add.reduce` sums up depends on the shape; this one does not.
+        mean = np.add.reduceat(joints, [0], 1)[:, 0] / joints.shape[1]
         parts += [loudest, loudest[1:] - loudest[:-1], loudest - mean]
     energies = np.concatenate(parts)
     *leading, last = range(1, energies.ndim)

@@ -46,9 +46,10 @@ def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None)
 class FrameFeatures:
     """Features of the frames of a signal that comes in chunks of any size.
 
-    The features of a frame come with its last sample. Each Fourier transform is computed once, for
-    all frames that share it: many at a time, since they take little longer than one, and all but
-    the last few before the chunk that completes a frame. Memory does not grow.
+    The features of a frame come with its last sample, and do not depend on the chunks, bit for
+    bit. Each Fourier transform is computed once, for all frames that share it: many at a time,
+    since they take little longer than one, and all but the last few before the chunk that
+    completes a frame. Memory does not grow.
 
     Args:
         profile: How the signal is framed, and what to compute.

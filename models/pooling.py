@@ -7,7 +7,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from models.profile import Profile, Resolution
-from models.types import Array
+from models.types import Array, Index
 
 Spectrum: TypeAlias = Literal["norm", "loudest", "difference"]
 """What a spectrum is of: a norm, the loudest joint, or a difference."""
@@ -35,9 +35,10 @@ def pooled(energies: Sequence[Array], profile: Profile) -> Array:
     ]
     if not profile.relative:
         return np.concatenate(rows, axis=1)
-    share, above = _level(spectra(profile), profile.resolutions)
+    means, above = _level(spectra(profile), profile.resolutions)
     described = np.concatenate((*rows, np.zeros((len(rows[0]), 1))), axis=1)
-    described -= (described @ share)[:, None] * above
+    level = np.add.reduce(described.take(means, 1), 1, keepdims=True) / len(means)
+    described -= level * above
     return described
 
 
@@ -84,20 +85,19 @@ def spectra(profile: Profile) -> tuple[Spectrum, ...]:
 
 
 @lru_cache
-def _level(kinds: tuple[Spectrum, ...], resolutions: tuple[Resolution, ...]) -> tuple[Array, Array]:
+def _level(kinds: tuple[Spectrum, ...], resolutions: tuple[Resolution, ...]) -> tuple[Index, Array]:
     """Weights by which features become relative to the level of the frame.
 
     Returns:
-        The share of each feature in the level of the frame, which is the mean of all means of the
-        norms; and how often that level is subtracted from each: once from the means and maxima of
-        norms and loudest joints, minus once from the last feature, which thereby is the level
-        itself. Shape (features,) each.
+        Places of the means of the norms, of which the level of the frame is the mean, shape
+        (means,); and how often that level is subtracted from each feature: once from the means and
+        maxima of norms and loudest joints, minus once from the last feature, which thereby is the
+        level itself, shape (features,).
     """
-    share, above = [], []
+    means, above = [], []
     for each in resolutions:
         level = np.repeat((1.0, 1.0, 0.0), len(each.edges) - 1)  # mean, maximum, deviation
-        mean = np.repeat((1.0, 0.0, 0.0), len(each.edges) - 1)
-        share += [mean * (kind == "norm") for kind in kinds]
+        mean = np.repeat((True, False, False), len(each.edges) - 1)
+        means += [mean & (kind == "norm") for kind in kinds]
         above += [level * (kind != "difference") for kind in kinds]
-    shares = np.concatenate((*share, [0.0]))
-    return shares / shares.sum(), np.concatenate((*above, [-1.0]))
+    return np.flatnonzero(np.concatenate(means)), np.concatenate((*above, [-1.0]))

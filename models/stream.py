@@ -14,8 +14,10 @@ from models.types import Mask
 class Stream:
     """A classifier of samples one by one, or in chunks of any size.
 
-    Its labels are those of `Classifier.classify` for the whole signal, since both have the same
-    features of each frame (`FrameFeatures`); the label of a frame comes with its last sample.
+    Its labels are those of `Classifier.classify` for the whole signal: both have the same features
+    and decision values of each frame, bit for bit (of support vector machines, decision values up
+    to rounding: one product of matrices is faster for many frames, but its rounding depends on how
+    many they are). The label of a frame comes with its last sample.
 
     Args:
         classifier: The model.

@@ -1,4 +1,4 @@
-"""Buffered windows of a stream: each transform is computed once, for all frames that share it."""
+"""Buffered windows of a signal: each transform is computed once, for all frames that share it."""
 
 from bisect import bisect_right
 
@@ -10,13 +10,13 @@ from models.types import Array, Index
 
 
 class Windows:
-    """Log-band energies of a stream's windows at one resolution.
+    """Log-band energies of a signal's windows at one resolution.
 
     Frames start every hop, and their windows at the same phases of each hop. Windows are numbered
     in order of time. Samples are counted from the start of the first frame.
 
     Args:
-        samples: Buffer of the stream, shape (signals, samples).
+        samples: Buffer of the signal, shape (rows, samples).
         profile: What to compute.
         resolution: One of the profile's.
     """

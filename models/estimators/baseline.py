@@ -130,8 +130,9 @@ def distance(features: Array, good: Array) -> Array:
         Root mean square of the differences, shape (frames,), in deviations.
     """
     raised = np.maximum(features, good[0])
-    # |x - g|^2 = |x|^2 + |g|^2 - 2 x g
-    product = np.einsum("ij,ij->i", good, good) - 2.0 * raised @ good.T
+    # |x - g|^2 = |x|^2 + |g|^2 - 2 x g, with a product for each frame: the rounding of one for all
+    # depends on how many they are.
+    product = np.einsum("ij,ij->i", good, good) - 2.0 * (raised[:, None] @ good.T)[:, 0]
     nearest = product.min(axis=1) + np.einsum("ij,ij->i", raised, raised)
     root: Array = np.sqrt(np.maximum(nearest, 0.0) / features.shape[1])
     return root

@@ -141,7 +141,8 @@ class Networks(Probable):
     def average(self, features: Array) -> Array:
         """Logarithms of the mean probabilities of all networks, shape (frames, classes)."""
         weights, bias, output = self._single
-        hidden = features.astype(np.float32) @ weights
+        # A product for each frame: the rounding of one for all depends on how many they are.
+        hidden = features.astype(np.float32)[:, None] @ weights
         hidden += bias
         np.maximum(hidden, 0.0, out=hidden)
         logits = (hidden @ output).reshape(len(features), *self.output_bias.shape)
