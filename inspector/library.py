@@ -10,7 +10,7 @@ from inspector import assets
 from inspector.errors import InspectorError
 from noisemodel.types import Array, Real
 
-Library = Mapping[str, models.Classifier]
+Library = Mapping[str, models.Model]
 """Models by name."""
 
 
@@ -43,11 +43,11 @@ def load_library(paths: Sequence[str | Path] = ()) -> Library:
         ModelFileError: If a file is no model.
     """
     files = assets.model_files([Path(path) for path in paths])
-    return {path.stem: models.Classifier.load(path) for path in files}
+    return {path.stem: models.load(path) for path in files}
 
 
 def for_robot(library: Library, robot: str | None) -> Library:
-    """Models without those that classify joint by joint and were trained on other robots alone.
+    """Models without those of one rate that go joint by joint and know other robots alone.
 
     Signals of single joints generalise to new robots less than norms. A model whose runs name no
     robot stays, and so do all if none would be left.
@@ -60,8 +60,10 @@ def for_robot(library: Library, robot: str | None) -> Library:
     return kept or library
 
 
-def _fits(model: models.Classifier, robot: str | None) -> bool:
-    if not any(map(models.signals.by_joint, model.profile.signals)):
+def _fits(model: models.Model, robot: str | None) -> bool:
+    if isinstance(model, models.General) or not any(
+        map(models.signals.by_joint, model.profile.signals)
+    ):
         return True
     robots = {models.splitting.robot_of(name) for name in model.runs} - {""}
     return not robots or robot in robots
@@ -152,10 +154,9 @@ def _choose(
     library: Library, rate: float, signals: Collection[str]
 ) -> tuple[str, models.Classifier]:
     try:
-        chosen = models.nearest(tuple(library.values()), rate, signals)
+        return models.nearest(library, rate, signals)
     except models.ModelsError as error:
         raise CannotTellError(str(error)) from error
-    return next((name, model) for name, model in library.items() if model is chosen)
 
 
 def _close(rate: float, other: float) -> bool:

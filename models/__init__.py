@@ -12,7 +12,7 @@ This package needs no robot: its input is a signal and its rate. It needs NumPy,
 only to train.
 """
 
-from models.choice import nearest
+from models.choice import Model, load, nearest
 from models.classifier import Classifier
 from models.confusion import Evaluation
 from models.dataset import Dataset
@@ -39,8 +39,9 @@ from models.evaluation.predictions import Unanswered
 from models.examples import Examples
 from models.features import features
 from models.framing import frame
+from models.general import Frames, General, frames_of
 from models.labels import ANOMALY, UNKNOWN, Event, Labels
-from models.logbands import EACH, GENERAL, SCALAR, LogBands
+from models.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
 from models.novelty.frames import GoodMotion
 from models.novelty.limit import Limit
@@ -53,6 +54,7 @@ from models.stream import Stream
 
 __all__ = [
     "ANOMALY",
+    "ANY",
     "CLASSES",
     "EACH",
     "GENERAL",
@@ -71,12 +73,15 @@ __all__ = [
     "Examples",
     "Fault",
     "FileError",
+    "Frames",
+    "General",
     "GoodMotion",
     "Labels",
     "Learnt",
     "Limit",
     "LogBands",
     "MissingSignalError",
+    "Model",
     "ModelFileError",
     "ModelsError",
     "NoFrameError",
@@ -98,10 +103,12 @@ __all__ = [
     "features",
     "folds",
     "frame",
+    "frames_of",
     "group_of",
     "held_out",
     "learn_baseline",
     "leave_one_out",
+    "load",
     "nearest",
     "noisytest",
     "nominal_rate",

@@ -1,7 +1,6 @@
 """The classifier: a profile, its estimator, and the training set of it."""
 
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,14 +11,15 @@ import numpy as np
 from models import modelfile
 from models.confusion import Evaluation
 from models.dataset import Dataset
-from models.errors import DatasetError, RateError
+from models.errors import DatasetError, MissingSignalError, RateError
 from models.estimators.estimator import ESTIMATORS, Estimator
 from models.examples import CHUNK, Examples
 from models.features import features, standard
 from models.framefeatures import frame_features
 from models.labels import UNKNOWN, Labels
 from models.profile import TOLERANCE, Profile
-from models.signals import Signals
+from models.reference import Reference, reference_of
+from models.signals import Signals, feeds
 from models.types import Array, Index, Mask, Real, Words
 
 
@@ -37,6 +37,8 @@ class Classifier:
         metrics: Measures of the training set, and of a validation set if one was given.
         versions: Of the software that trained it.
         sha256: SHA-256 of the file that it was loaded from; empty if it was not.
+        reference: What features are relative to, in a profile with a reference; the signal itself
+            unless there is one.
     """
 
     profile: Profile
@@ -48,6 +50,7 @@ class Classifier:
     metrics: Mapping[str, Any] = field(default_factory=dict)
     versions: Mapping[str, str] = field(default_factory=dict)
     sha256: str = ""
+    reference: Reference | None = None
 
     @classmethod
     def train(
@@ -94,6 +97,24 @@ class Classifier:
             for name, each in sets.items()
         }
         return replace(classifier, metrics=metrics, versions=modelfile.versions())
+
+    def at(self, rate: float, signals: Collection[str]) -> "Classifier":
+        """The model itself, if it fits.
+
+        Args:
+            rate: Sample rate of a log, in [Hz], which must be the model's or above.
+            signals: Names of the signals that there are.
+
+        Raises:
+            MissingSignalError: If it needs another one.
+            RateError: If the rate is lower.
+        """
+        if not feeds(signals, self.profile.signals):
+            lacking = [name for name in self.profile.signals if name not in signals]
+            raise MissingSignalError(lacking, signals)
+        if self.rate > rate * (1.0 + TOLERANCE):
+            raise RateError(rate, [self.rate], "too low for any; log faster")
+        return self
 
     @property
     def rate(self) -> float:
@@ -165,7 +186,7 @@ class Classifier:
         """
         if not abs(rate / self.rate - 1.0) <= TOLERANCE:
             raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
-        starts, plain = frame_features(signal, self.profile, valid)
+        starts, plain = frame_features(signal, self.profile, valid, self.reference)
         return self.labels(self.decide(plain), starts, rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
@@ -230,6 +251,8 @@ class Classifier:
             "versions": dict(self.versions),
         }
         arrays = {**self.estimator.arrays(), "mean": self.mean, "scale": self.scale}
+        if self.reference is not None:
+            arrays |= {"location": self.reference.location, "spread": self.reference.spread}
         modelfile.write(path, manifest, arrays, overwrite=overwrite)
 
     @classmethod
@@ -242,7 +265,11 @@ class Classifier:
         Raises:
             ModelFileError: If the file is missing, damaged, no model file, or of another version.
         """
-        manifest, arrays = modelfile.read(path)
+        return cls.of(*modelfile.read(path), sha256=modelfile.digest(path))
+
+    @classmethod
+    def of(cls, manifest: Mapping[str, Any], arrays: Mapping[str, Array], sha256: str = "") -> Self:
+        """Make a classifier of what `modelfile.read` gave."""
         profile = Profile.of(manifest["profile"])
         return cls(
             profile,
@@ -250,10 +277,11 @@ class Classifier:
             ESTIMATORS[profile.estimator].of(arrays, profile),
             arrays["mean"],
             arrays["scale"],
+            reference=reference_of(arrays),
             runs=manifest["runs"],
             metrics=manifest["metrics"],
             versions=manifest["versions"],
-            sha256=hashlib.sha256(Path(path).read_bytes()).hexdigest(),
+            sha256=sha256,
         )
 
     @cached_property

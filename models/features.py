@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.errors import SignalError
-from models.pooling import POOLED, pooled, spectra
+from models.pooling import pooled, spectra, statistics
 from models.profile import Profile, Resolution
 from models.types import Array, Index, Real
 
@@ -26,7 +26,8 @@ def features(frames: Real, profile: Profile) -> Array:
         profile: What to compute, and the length that frames must have.
 
     Returns:
-        Features, not yet standardised, shape (frames, features).
+        Features, not yet standardised, shape (frames, features). Relative to a reference they are
+        0, as those of the first frame of a signal.
 
     Raises:
         SignalError: If the frames have another shape or values that are not finite.
@@ -38,7 +39,8 @@ def features(frames: Real, profile: Profile) -> Array:
         log_band_energies(_windows(exact, each.window, each.stride), profile, each)
         for each in profile.resolutions
     ]
-    return temporal_pooling(energies, profile)
+    found = temporal_pooling(energies, profile)
+    return np.concatenate((found, 0.0 * found), axis=1) if profile.reference else found
 
 
 def rounded(samples: Real, profile: Profile) -> Array:
@@ -80,14 +82,15 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     found = np.log(amplitude, out=amplitude)
     norms, joints = found[: profile.norms], found[profile.norms :]
     parts = [norms]
-    if profile.relative:
+    if profile.differences:
         parts.append(norms[1:] - norms[:-1])
     if len(joints):
         joints = joints.reshape(len(profile.signals) - len(norms), -1, *found.shape[1:])
         loudest = np.maximum.reduce(joints, 1)
-        # The order in which `add.reduce` sums up depends on the shape; this one does not.
-        mean = np.add.reduceat(joints, [0], 1)[:, 0] / joints.shape[1]
-        parts += [loudest, loudest[1:] - loudest[:-1], loudest - mean]
+        parts += [loudest, loudest[1:] - loudest[:-1]]
+        if profile.relative:
+            # The order in which `add.reduce` sums up depends on the shape; this one does not.
+            parts.append(loudest - np.add.reduceat(joints, [0], 1)[:, 0] / joints.shape[1])
     energies = np.concatenate(parts)
     *leading, last = range(1, energies.ndim)
     return energies.transpose(*leading, 0, last).reshape(*found.shape[1:-1], -1)
@@ -114,7 +117,8 @@ def feature_count(profile: Profile) -> int:
     """Number of features of a frame."""
     if profile.bands == "log":
         bands = sum(len(each.edges) - 1 for each in profile.resolutions)
-        return len(spectra(profile)) * POOLED * bands + profile.relative
+        plain = len(spectra(profile)) * statistics(profile) * bands + profile.relative
+        return (1 + profile.reference) * plain
     return profile.norms * (profile.bins // 3) * profile.transforms
 
 

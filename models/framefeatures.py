@@ -7,6 +7,7 @@ import numpy as np
 from models.errors import SignalError
 from models.features import feature_count, rounded, temporal_pooling
 from models.profile import Profile
+from models.reference import Reference, RunningReference
 from models.signals import Signals, check, stacked
 from models.types import Array, Index, Mask, Real
 from models.windows import Windows
@@ -19,13 +20,19 @@ Frames: TypeAlias = tuple[Index, Array]
 (frames, features)."""
 
 
-def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None) -> Frames:
+def frame_features(
+    signal: Signals,
+    profile: Profile,
+    valid: Mask | None = None,
+    reference: Reference | None = None,
+) -> Frames:
     """Features of all frames of a whole signal.
 
     Args:
         signal: The noise estimate, shape (samples,), or signals by name.
         profile: How it is framed, and what to compute.
         valid: False in gaps, shape (samples,); frames that touch a gap are left out.
+        reference: As `FrameFeatures` takes it.
 
     Returns:
         First sample of each frame, and its features.
@@ -35,7 +42,7 @@ def frame_features(signal: Signals, profile: Profile, valid: Mask | None = None)
             profile needs another one.
     """
     samples = stacked(signal, profile.signals)
-    frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1)
+    frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1, reference)
     parts = [frames.push(samples, None if valid is None else np.asarray(valid, bool))]
     least = profile.drop_first_sample + profile.length
     if frames.count < least:
@@ -54,10 +61,12 @@ class FrameFeatures:
     Args:
         profile: How the signal is framed, and what to compute.
         rows: Number of norms, and of joints of all signals that go joint by joint.
+        reference: What features are relative to, in a profile with a reference; the signal itself
+            as far as it has come, unless given.
     """
 
-    def __init__(self, profile: Profile, rows: int) -> None:
-        self._profile = profile
+    def __init__(self, profile: Profile, rows: int, reference: Reference | None = None) -> None:
+        self._profile, self._reference = profile, reference
         # Room for a frame, and for as much as is taken at once.
         self._at_once = AT_ONCE * profile.length
         self._samples = np.zeros((rows, profile.length + self._at_once))
@@ -120,7 +129,7 @@ class FrameFeatures:
         if flush and (last - self._first) % profile.hop and self._is_whole(last):
             place = last - self._base
             energies = [windows.of_place(place) for windows in self._windows]
-            found = np.array([last]), temporal_pooling(energies, profile)
+            found = np.array([last]), self._features(energies)
         self._begin()
         return found
 
@@ -129,6 +138,7 @@ class FrameFeatures:
         self._held = 0  # samples in the buffer
         self._first = int(self._profile.drop_first_sample)
         self._frame = self._first  # start of the next frame
+        self._relative = self._reference or RunningReference()
         for windows in self._windows:
             windows.begin()
         self._due = self._next_due(0)  # count with which there is work to do
@@ -175,7 +185,14 @@ class FrameFeatures:
             return []
         numbers = (whole - self._first) // profile.hop
         energies = [windows.of_frames(numbers) for windows in self._windows]
-        return [(whole, temporal_pooling(energies, profile))]
+        return [(whole, self._features(energies))]
+
+    def _features(self, energies: list[Array]) -> Array:
+        """Features of frames, in order, as they are, and relative to the reference."""
+        features = temporal_pooling(energies, self._profile)
+        if not self._profile.reference:
+            return features
+        return np.concatenate((features, self._relative.relative(features)), axis=1)
 
     def _next_due(self, chunk: int) -> int:
         """Count at which to go on: before the chunk that completes a frame, and after it."""

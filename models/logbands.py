@@ -1,16 +1,31 @@
 """Our own profiles, in seconds and hertz, for any sample rate."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any, Self
+
+import numpy as np
 
 from models.errors import ProfileError
-from models.pooling import POOLED
+from models.pooling import POOLED, columns
 from models.profile import CLASSES, EstimatorKind, Profile
 from models.signals import JOINTS, MOTION, NOISE
+from models.types import Index
+
+LOWEST, HIGHEST = 80.0, 10_000.0
+"""Rates that a general model takes, in [Hz]; faster logs are decimated."""
+INPUTS = ((*MOTION, *JOINTS), MOTION, ("measured", "measured_joints"), ("measured",), (NOISE,))
+"""Signals that a general model takes: the first of these that a log has."""
 
 SPEED = 1.5
 """Bins of a Hann window that the mean leaks into: up to here, a quick band is the speed itself."""
 WIDE = 2.0 ** (4 / 3)
 """From the lower to the upper edge of a quick window's other bands."""
+
+
+FEWEST = 2
+"""Fewest bands that a profile has."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +41,8 @@ class LogBands:
     """Input signals."""
     relative: bool = False
     """Whether energies are relative to the level of the frame, and to the signal before."""
+    reference: bool = False
+    """Whether features are taken relative to a reference, too (`models.reference`)."""
     estimator: EstimatorKind = "svm"
     """Name of the estimator."""
     alarm: float = 0.5
@@ -75,13 +92,14 @@ class LogBands:
             The profile: at 1 kHz a frame is 400 samples, every 100.
 
         Raises:
-            ProfileError: If fewer than three bands lie below half the rate.
+            ProfileError: If fewer than ``FEWEST`` bands lie below half the rate.
         """
         edges = self._edges(rate / 2)
-        if len(edges) < 4:
+        if len(edges) <= FEWEST:
             raise ProfileError(
-                f"a rate of {rate:g} Hz leaves {max(len(edges) - 1, 0)} bands up to"
-                f" {rate / 2:g} Hz, expected three or more: take a rate of 100 Hz at least"
+                f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {rate / 2:g} Hz,"
+                f" expected {FEWEST} or more: take a rate of"
+                f" {2 * (self.lowest + FEWEST / self.window):g} Hz at least"
             )
         quick = self._quick_edges(rate / 2)
         return Profile(
@@ -99,6 +117,7 @@ class LogBands:
             quick_stride=round(self.quick_stride * rate) if quick else 0,
             quick_edges=quick,
             relative=self.relative,
+            reference=self.reference,
             floor=self.floor,
             least_deviation=self.least_deviation,
             estimator=self.estimator,
@@ -115,6 +134,42 @@ class LogBands:
             spread_failures=True,
             flush_end=True,
         )
+
+    @classmethod
+    def of(cls, settings: Mapping[str, Any]) -> Self:
+        """Recipe with the settings of a model file.
+
+        Args:
+            settings: A value for each field.
+
+        Raises:
+            ProfileError: If a field is missing, unknown or wrong.
+        """
+        names = {field.name for field in fields(cls)}
+        if not isinstance(settings, Mapping) or names != settings.keys():
+            raise ProfileError(f"a recipe has {', '.join(sorted(names))}, and nothing else")
+        lists = {key: tuple(each) for key, each in settings.items() if isinstance(each, list)}
+        try:
+            recipe = cls(**{**settings, **lists})
+            recipe.bound(HIGHEST)
+        except (TypeError, ValueError, ArithmeticError) as error:
+            raise ProfileError(f"a setting of the recipe is wrong ({error})") from error
+        return recipe
+
+    def bound(self, rate: float, signals: Sequence[str] = INPUTS[0]) -> Profile:
+        """Profile for a sample rate and signals."""
+        return replace(self, signals=tuple(signals)).at(rate)
+
+    @cached_property
+    def columns(self) -> tuple[str, ...]:
+        """Names of all features of a general model, of all inputs at the highest rate."""
+        every = (columns(self.bound(HIGHEST, names)) for names in INPUTS)
+        return tuple(dict.fromkeys(name for names in every for name in names))
+
+    def places(self, profile: Profile) -> Index:
+        """Indices among all features of those that a profile has, ascending, shape (features,)."""
+        number = {name: place for place, name in enumerate(self.columns)}
+        return np.array([number[name] for name in columns(profile)])
 
     def _edges(self, nyquist: float) -> tuple[float, ...]:
         """Edges up to the Nyquist frequency, each band as wide as the window resolves or wider."""
@@ -143,6 +198,9 @@ GENERAL = replace(SCALAR, signals=MOTION, estimator="trees", alarm=0.6, leaves=4
 alone does not separate a fast motion without sensor noise from a failure. Trees find more failures
 that resemble the training set; networks more that do not, say a rattle on a motion without any
 other noise, which the noise alone does not show as an error."""
+
+ANY = LogBands(reference=True, floor=1e-3, estimator="trees", quick=0.02, speed=True, leaves=4)
+"""For any rate and whatever signals there are; features relative to a reference beside."""
 
 EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.6, rounds=40)
 """For runs that name their joints: the norm of all masks a single one."""

@@ -1,10 +1,13 @@
-"""The model file, version 5: one uncompressed `.npz` of plain arrays and a JSON manifest.
+"""The model file, version 6: one uncompressed `.npz` of plain arrays and a JSON manifest.
 
 Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
 its ``DIMENSIONS`` list them. Nothing in it is ever unpickled; sizes are checked before an array is
-made. The same model is the same bytes. Version 4 is read too: it differs in two names.
+made. The same model is the same bytes. Of a general model, ``recipe`` is in the manifest, and the
+profile is that of its highest rate. A model with a reference of its own has ``location`` and
+``spread``, too. Versions 4 and 5 are read too: they know no missing features and no reference.
 """
 
+import hashlib
 import io
 import json
 import os
@@ -24,17 +27,25 @@ from models.errors import ModelFileError, OutputError, ProfileError
 from models.estimators.estimator import ESTIMATORS
 from models.features import feature_count
 from models.labels import ANOMALY
+from models.logbands import HIGHEST, LogBands
 from models.profile import Profile
 from models.types import Array
 
-FORMAT = "noise-model/5"
-OLD_FORMAT = "noise-model/4"
+FORMAT = "noise-model/6"
+OLD_FORMATS = ("noise-model/4", "noise-model/5")
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times those of the shipped ones."""
+
+_REFERENCE = {"location": 1, "spread": 1}
 
 _KINDS = [
     {"manifest": 0, "mean": 1, "scale": 1, **estimator.DIMENSIONS}
     for estimator in ESTIMATORS.values()
+]
+_KINDS += [{**kind, **_REFERENCE} for kind in _KINDS] + [
+    {name: count for name, count in kind.items() if name != "missing"}
+    for kind in _KINDS
+    if "missing" in kind
 ]
 
 
@@ -123,6 +134,8 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
     except (zipfile.BadZipFile, EOFError, RuntimeError) as error:
         raise ModelFileError(path, f"is no model file, or a damaged one ({error})") from error
     manifest = _manifest(path, str(members.pop("manifest")))
+    if "threshold" in members:
+        members.setdefault("missing", np.zeros_like(members["threshold"]))
     for name, array in members.items():
         if not np.isfinite(array).all():
             raise ModelFileError(path, f"array {name!r} holds values that are not finite")
@@ -130,12 +143,17 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
     return manifest, members
 
 
+def digest(path: str | Path) -> str:
+    """SHA-256 of a model file."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
 def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]:
     """Check the table of contents; dimensions of each array, by name."""
     there = sorted(archive.namelist())
     kinds = [kind for kind in _KINDS if there == sorted(f"{name}.npy" for name in kind)]
     if not kinds:
-        wanted = " or ".join(", ".join(sorted(kind)) for kind in _KINDS)
+        wanted = " or ".join(", ".join(sorted(kind)) for kind in _KINDS[: len(ESTIMATORS)])
         raise ModelFileError(
             path, f"is no model file: holds {', '.join(there)[:200]}, expected {wanted}"
         )
@@ -177,17 +195,18 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
     except ValueError as error:
         raise ModelFileError(path, f"manifest is no JSON ({error})") from error
     given = manifest.get("format") if isinstance(manifest, dict) else manifest
-    if given not in (FORMAT, OLD_FORMAT):
+    known = (FORMAT, *OLD_FORMATS)
+    if given not in known:
         raise ModelFileError(
             path,
-            f"is of format {given!r}, this version reads {FORMAT!r} and {OLD_FORMAT!r}:"
+            f"is of format {given!r}, this version reads {', '.join(map(repr, known))}:"
             " train it again, or read it by the version that wrote it",
         )
-    return _renamed(manifest) if given == OLD_FORMAT else dict(manifest)
+    return dict(manifest) if given == FORMAT else _renamed(manifest)
 
 
 def _renamed(manifest: dict[str, Any]) -> dict[str, Any]:
-    """Give the entries of version 4 the names of version 5."""
+    """Give the entries of versions 4 and 5 the names of version 6."""
 
     def renamed(classes: Any) -> Any:
         old = isinstance(classes, list)
@@ -198,6 +217,7 @@ def _renamed(manifest: dict[str, Any]) -> dict[str, Any]:
         names = {"machine": "estimator"}
         profile = {names.get(name, name): value for name, value in profile.items()}
         profile["classes"] = renamed(profile.get("classes"))
+        profile.setdefault("reference", False)
     return {**manifest, "profile": profile, "classes": renamed(manifest.get("classes"))}
 
 
@@ -232,6 +252,10 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
             )
     try:
         profile = Profile.of(manifest["profile"])
+        count = feature_count(profile)
+        if "recipe" in manifest:
+            recipe = LogBands.of(manifest["recipe"])
+            count, profile = len(recipe.columns), recipe.bound(HIGHEST)
     except ProfileError as error:
         raise ModelFileError(path, f"manifest has a wrong profile: {error}") from error
     classes = manifest["classes"]
@@ -243,24 +267,29 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
         raise ModelFileError(
             path, f"rate is {manifest['rate']} Hz, but {profile.rate} Hz in its profile"
         )
-    _check_arrays(path, profile, len(classes), arrays)
+    _check_arrays(path, profile, count, len(classes), arrays)
 
 
 def _check_arrays(
-    path: str | Path, profile: Profile, classes: int, arrays: Mapping[str, Array]
+    path: str | Path, profile: Profile, count: int, classes: int, arrays: Mapping[str, Array]
 ) -> None:
     estimator = ESTIMATORS[profile.estimator]
     if lacking := sorted(estimator.DIMENSIONS.keys() - arrays.keys()):
         raise ModelFileError(
             path, f"its profile asks for {profile.estimator}, but it has no {', '.join(lacking)}"
         )
-    count = feature_count(profile)
     wanted = estimator.shapes(arrays, profile, features=count, classes=classes)
     for name, shape in {**wanted, "mean": (count,), "scale": (count,)}.items():
         if arrays[name].shape != shape:
             raise ModelFileError(
                 path, f"array {name!r} has shape {arrays[name].shape}, its profile asks for {shape}"
             )
+    if "location" in arrays and not (
+        arrays["location"].shape == arrays["spread"].shape == (count // 2,)
+        and profile.reference
+        and (arrays["spread"] >= 0).all()
+    ):
+        raise ModelFileError(path, "location and spread are no reference for its profile")
     if not (arrays["scale"] > 0).all():
         raise ModelFileError(path, "array 'scale' holds values that are not above 0")
     for name, most in estimator.highest(profile, features=count).items():

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -13,7 +14,8 @@ Spectrum: TypeAlias = Literal["norm", "loudest", "difference"]
 """What a spectrum is of: a norm, the loudest joint, or a difference."""
 
 POOLED = 3
-"""Statistics that `pool` computes of each log-band energy."""
+"""Statistics that `pool` computes of each log-band energy: mean, maximum and standard deviation.
+Beside a reference, the last one adds nothing on robots left out, and is not computed."""
 
 
 def pooled(energies: Sequence[Array], profile: Profile) -> Array:
@@ -25,12 +27,12 @@ def pooled(energies: Sequence[Array], profile: Profile) -> Array:
         profile: Whether energies are relative to the level of the frame.
 
     Returns:
-        Mean, maximum and standard deviation of each band, spectrum by spectrum; if the profile is
-        relative, the level of the frame comes last, and is subtracted from the energies of the
-        signals. Shape (frames, features).
+        Mean, maximum and standard deviation (for a profile with a reference, the first two) of each
+        band, spectrum by spectrum; if the profile is relative, the level of the frame comes last,
+        and is subtracted from the energies of the signals. Shape (frames, features).
     """
     rows = [
-        _by_spectrum(pool(each), len(resolution.edges) - 1)
+        _by_spectrum(pool(each, statistics(profile)), len(resolution.edges) - 1)
         for each, resolution in zip(energies, profile.resolutions, strict=True)
     ]
     if not profile.relative:
@@ -42,26 +44,57 @@ def pooled(energies: Sequence[Array], profile: Profile) -> Array:
     return described
 
 
-def pool(energies: Array) -> Array:
+def statistics(profile: Profile) -> int:
+    """Number of statistics of each log-band energy."""
+    return POOLED - profile.reference
+
+
+def columns(profile: Profile) -> tuple[str, ...]:
+    """Names of the features of a profile with a reference, in order.
+
+    A feature has one name at any rate: it consists of the signals, the window's kind, the statistic
+    and the lower edge of the band, in [Hz], after "relative" where it is relative to the reference.
+    """
+    norms, joints = profile.signals[: profile.norms], profile.signals[profile.norms :]
+    spectra = [
+        name
+        for signals in (norms, joints)
+        for name in (*signals, *(f"{b} less {a}" for a, b in pairwise(signals)))
+    ]
+    plain = [
+        f"{spectrum} {kind} {statistic} {edge:.4g}"
+        for kind, resolution in zip(("long", "short"), profile.resolutions, strict=False)
+        for spectrum in spectra
+        for statistic in ("mean", "maximum")
+        for edge in resolution.edges[:-1]
+    ]
+    return (*plain, *(f"relative {name}" for name in plain))
+
+
+def pool(energies: Array, count: int = POOLED) -> Array:
     """Mean, maximum and standard deviation over time of each log-band energy.
 
     Args:
         energies: Shape (frames, time, energies).
+        count: How many of these statistics, 2 or 3.
 
     Returns:
-        Statistics, which do not depend on the order in time, shape (frames, 3, energies).
+        Statistics, which do not depend on the order in time, shape (frames, count, energies).
     """
     # A frame at a time is too little for NumPy's methods, which take longer than their ufuncs.
-    frames, count, bands = energies.shape
-    found = np.empty((frames, POOLED, bands))
-    mean, most, deviation = found[:, 0], found[:, 1], found[:, 2]
+    frames, windows, bands = energies.shape
+    found = np.empty((frames, count, bands))
+    mean, most = found[:, 0], found[:, 1]
     np.add.reduce(energies, 1, out=mean)
-    mean /= count
+    mean /= windows
     np.maximum.reduce(energies, 1, out=most)
+    if count < POOLED:
+        return found
+    deviation = found[:, 2]
     squares = energies - mean[:, None]
     squares *= squares
     np.add.reduce(squares, 1, out=deviation)
-    deviation /= count
+    deviation /= windows
     np.sqrt(deviation, deviation)
     return found
 
@@ -77,10 +110,10 @@ def spectra(profile: Profile) -> tuple[Spectrum, ...]:
     """Kinds of the spectra of a window, in the order of `features.log_band_energies`."""
     norms, joints = profile.norms, len(profile.signals) - profile.norms
     found: list[Spectrum] = ["norm"] * norms
-    if profile.relative:
+    if profile.differences:
         found += ["difference"] * (norms - 1)
         found += ["loudest"] * joints
-        found += ["difference"] * max(2 * joints - 1, 0)
+        found += ["difference"] * max((1 + profile.relative) * joints - 1, 0)
     return tuple(found)
 
 

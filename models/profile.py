@@ -93,6 +93,9 @@ class Profile:
     """Whether log-band energies are relative to the level of the frame, and differences from the
     signal before are features, too: then the shape of a spectrum counts, and how much of a noise is
     neither desired nor tracked."""
+    reference: bool = False
+    """Whether log-band energies and their differences from the signal before are features as they
+    are, and once more relative to a reference (`models.reference`)."""
     floor: float = 1e-6
     """Added to an amplitude before its logarithm."""
     least_deviation: float = 0.0
@@ -211,6 +214,11 @@ class Profile:
         return sum(not by_joint(name) for name in self.signals)
 
     @property
+    def differences(self) -> bool:
+        """Whether differences of a signal from the one before are features."""
+        return self.relative or self.reference
+
+    @property
     def bins(self) -> int:
         """Bins of one Fourier transform, from 0 Hz up to half the rate."""
         return self.window // 2 + 1
@@ -288,10 +296,18 @@ def _check_ranges(profile: Profile) -> None:
             f"signals are {', '.join(profile.signals)}, expected norms, and after them those that"
             " go joint by joint"
         )
-    if profile.norms < len(profile.signals) and (profile.bands != "log" or not profile.relative):
+    if profile.norms < len(profile.signals) and not (
+        profile.bands == "log" and profile.differences
+    ):
         raise ProfileError(
-            f"signals are {', '.join(profile.signals)}, with bands {profile.bands!r} and relative"
-            f" {profile.relative}, expected 'log' and True for those that go joint by joint"
+            f"signals are {', '.join(profile.signals)}, with bands {profile.bands!r}, relative"
+            f" {profile.relative} and reference {profile.reference}, expected 'log' and one of both"
+            " for those that go joint by joint"
+        )
+    if profile.reference and (profile.bands != "log" or profile.relative):
+        raise ProfileError(
+            f"reference is True with bands {profile.bands!r} and relative {profile.relative},"
+            " expected 'log' and False"
         )
     repeated = len(set(profile.classes)) < len(profile.classes)
     if repeated or len(profile.classes) < 2 or profile.classes[0] != "ok":

@@ -41,10 +41,13 @@ def by_joint(run: Run) -> dict[str, Array]:
 
     Returns:
         ``desired_joints``, ``measured_joints`` and ``error_joints``, their difference, each of
-        shape (joints, samples), in [rad/s]; nothing if there are no such joints.
+        shape (joints, samples), in [rad/s]; without desired velocities, ``measured_joints`` of all
+        joints; nothing if no desired joint is measured.
     """
     names = [name for name in run.joint_names if name in run.desired_joint_names]
-    if run.velocity_desired is None or not names:
+    if run.velocity_desired is None:
+        return {"measured_joints": run.velocity.T.astype(np.float64, copy=False)}
+    if not names:
         return {}
     measured = run.velocity[:, [run.joint_names.index(name) for name in names]].T
     desired = run.velocity_desired[:, [run.desired_joint_names.index(name) for name in names]].T

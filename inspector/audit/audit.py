@@ -75,7 +75,7 @@ class Audit:
         return any(each.observability is not Observability.CANNOT_TELL for each in self.classes)
 
 
-def audit(run: Run, library: Mapping[str, models.Classifier]) -> Audit:
+def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
     """Audit a run.
 
     Gaps are counted in the whole run; signals are examined in an excerpt of it.

@@ -5,15 +5,16 @@ The limits:
 - *The bands of a class.* The paper puts oscillations at 20 to 1000 Hz (its table of scenarios:
   multi-sines of 20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations,
   which are short and broad: theirs is that of the model, from its first band to its last.
-- *The model.* A run is labelled by the model of the nearest rate at or below its own. Outside of
-  its bands nothing is observable; below all models the status is *cannot tell*.
+- *The model.* A run is labelled by the general model at the run's own rate, or by the model of the
+  nearest rate at or below. Outside of its bands nothing is observable; below all models the status
+  is *cannot tell*.
 - *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
   or a filter.
-- *Three bands.* Fewer than three of the model's bands are no spectrum; `models.LogBands` has the
-  same limit.
+- *Two bands.* Fewer than two of the model's bands are no spectrum; `models.LogBands` has the same
+  limit.
 - *The frame.* A model labels frames (the paper's 0.4 s) that touch no gap; there has to be one.
 
-A class is observable if all of its band is, partly if three bands of the model or more are, or if
+A class is observable if all of its band is, partly if two bands of the model or more are, or if
 some are at the quantisation floor: then a failure must exceed that.
 """
 
@@ -26,13 +27,11 @@ import numpy as np
 import models
 from inspector.audit.bandwidth import Bandwidth
 from models import Profile
+from models.logbands import FEWEST, LOWEST
 from noisemodel.types import Array, Mask
 
 OSCILLATIONS = (20.0, 1000.0)
 """The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz]."""
-
-FEWEST = 3
-"""Fewest bands of a model that are a spectrum."""
 
 
 class Observability(StrEnum):
@@ -75,7 +74,7 @@ class ClassObservability:
 def observable_classes(
     bandwidth: Bandwidth,
     valid: Mask,
-    library: Mapping[str, models.Classifier],
+    library: Mapping[str, models.Model],
     signals: Collection[str],
 ) -> tuple[ClassObservability, ...]:
     """Determine the observability of each failure class.
@@ -90,9 +89,12 @@ def observable_classes(
         One for each class of the model that would label the run, without `ok`.
     """
     rate = 2 * bandwidth.nyquist
-    profiles = [model.profile for model in library.values()]
+    profiles = [
+        model.recipe.bound(LOWEST) if isinstance(model, models.General) else model.profile
+        for model in library.values()
+    ]
     try:
-        chosen = models.nearest(tuple(library.values()), rate, signals)
+        _, chosen = models.nearest(library, rate, signals)
     except models.ModelsError as error:
         classes = dict.fromkeys(name for profile in profiles for name in profile.classes[1:])
         if isinstance(error, models.MissingSignalError):

@@ -14,13 +14,18 @@ def train(
     profile: Annotated[
         str,
         typer.Option(
-            help="joints, general, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
-            " paper-linear."
+            help="general, for any rate; or of one rate: joints, norms, scalar, logbands,"
+            " noisytest-rbf, noisytest-linear, paper-rbf or paper-linear."
         ),
     ] = "general",
     rate: Annotated[
-        float, typer.Option(min=1.0, help="Rate of the model in [Hz]; faster runs are decimated.")
-    ] = 10000.0,
+        float | None,
+        typer.Option(
+            min=1.0,
+            help="Rate of a model of one rate in [Hz], by default 10000; faster runs are"
+            " decimated.",
+        ),
+    ] = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
 ) -> None:

@@ -38,13 +38,13 @@ class NoiseSignals:
         self._ways: dict[str, Callable[[Array], Array]] = {
             NOISE: nm.simplified,  # of measured and desired velocities side by side
             of_measured: lambda motion: nm.simplified(motion[:, :moved]),
+            measured_joints: lambda motion: motion[:, base:moved].T,
         }
         if desired:
             self._ways |= {
                 of_desired: lambda motion: nm.simplified(motion[:, moved:]),
                 of_error: lambda motion: nm.simplified(motion[:, moved:] - motion[:, base:moved]),
                 desired_joints: lambda motion: motion[:, moved:].T,
-                measured_joints: lambda motion: motion[:, base:moved].T,
                 error_joints: lambda motion: (motion[:, moved:] - motion[:, base:moved]).T,
             }
         self.names = tuple(self._ways)
@@ -82,7 +82,7 @@ class Labeller:
         self._signals, self._names = NoiseSignals(widths), tuple[str, ...]()
         self._ratio, self._samples = 1, 0
         try:
-            chosen = models.nearest(tuple(library.values()), rate, self._signals.names)
+            self.model, chosen = models.nearest(library, rate, self._signals.names)
         except models.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
@@ -93,7 +93,6 @@ class Labeller:
                 " model, as is needed while samples come in."
             )
             return
-        self.model = next(name for name, model in library.items() if model is chosen)
         self._ratio, self._names = ratio, chosen.profile.signals
         self._stream = models.Stream(chosen, rate=rate / ratio, joints=self._signals.joints)
         if ratio > 1:

@@ -47,11 +47,12 @@ def evaluate(
     Raises:
         SeenError: If it was trained on a run, unless ``seen_too``.
     """
-    classifier = models.Classifier.load(model)
+    classifier = models.load(model)
+    rate = None if isinstance(classifier, models.General) else classifier.rate
     source: dict[str, nm.Run | None] = {}
 
     def read() -> Iterator[models.Recording | models.Unanswered]:
-        for recording, run in classified(inputs, classifier.rate, part):
+        for recording, run in classified(inputs, rate, part):
             source.clear()  # one run at a time stays in memory
             source[recording.name] = run
             yield recording

@@ -11,7 +11,8 @@ import noisemodel as nm
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.training.part import Part
-from scenarios.sample import Sample, is_sample
+from models.logbands import HIGHEST, LOWEST
+from scenarios.sample import DECIMATED, Sample, is_sample
 from scenarios.signals import WHOLE
 
 SLOWER = 1e-3
@@ -62,7 +63,7 @@ def in_part(recording: models.Recording | models.Unanswered, part: Part) -> bool
 
 
 def classified(
-    inputs: Sequence[Path], rate: float, part: Part = Part.ALL, *, bare_too: bool = False
+    inputs: Sequence[Path], rate: float | None, part: Part = Part.ALL, *, bare_too: bool = False
 ) -> Iterator[Read]:
     """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
 
@@ -71,7 +72,8 @@ def classified(
 
     Args:
         inputs: Files, and folders of them, however deep.
-        rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict.
+        rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict. None: each at its
+            own, as a general model takes it; samples at that of their joints.
         part: The part of these recordings to read.
         bare_too: Whether to yield run files without any annotation, in place of an error.
 
@@ -99,7 +101,9 @@ def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recordin
             yield recording
 
 
-def _read(inputs: Sequence[Path], read: Callable[[Path], Read], rate: float) -> Iterator[Read]:
+def _read(
+    inputs: Sequence[Path], read: Callable[[Path], Read], rate: float | None
+) -> Iterator[Read]:
     taken: set[str] = set()
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
@@ -111,14 +115,14 @@ def _read(inputs: Sequence[Path], read: Callable[[Path], Read], rate: float) -> 
             yield _apart(recording, file, taken), run
 
 
-def _as_classified(path: Path, rate: float, *, bare_too: bool) -> Read:
+def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
     try:
         if is_sample(path):
-            return of_sample(path, rate), None
+            return of_sample(path, DECIMATED if rate is None else rate), None
         run, _ = without_placeholder(nm.Run.load(path))
-        found = of_run(path, run, rate)
+        found = of_run(path, run, min(max(run.rate, LOWEST), HIGHEST) if rate is None else rate)
     except SlowRunError as error:
-        reason = f"rate {error.own:g} Hz < {rate:g} Hz"
+        reason = f"rate {error.own:g} Hz < {error.wanted:g} Hz"
         return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
     if not (found.blocks or found.events or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")

@@ -9,11 +9,19 @@ from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import classified, count
+from models.logbands import LOWEST
 from noisemodel.atomic import refuse_existing
+
+ANY_RATE = "general"
+"""The profile of a model for any rate."""
+RATE = 10_000.0
+"""Rate of a model of one rate unless another is given, in [Hz]."""
+THIN = 4
+"""A general model learns from every so many `ok` frames of a log."""
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
     "joints": lambda rate: models.EACH.at(rate),
-    "general": lambda rate: models.GENERAL.at(rate),
+    "norms": lambda rate: models.GENERAL.at(rate),
     "scalar": lambda rate: models.SCALAR.at(rate),
     "logbands": lambda rate: models.LogBands().at(rate),
     "noisytest-rbf": lambda _: models.Profile.noisytest("rbf"),
@@ -84,7 +92,7 @@ class Trained:
 def train(
     inputs: Sequence[Path],
     profile: str,
-    rate: float,
+    rate: float | None,
     output: Path,
     *,
     part: Part = Part.ALL,
@@ -97,8 +105,9 @@ def train(
 
     Args:
         inputs: Annotated run files, samples, folders of them, or NoisyTest folders.
-        profile: One of ``PROFILES``.
-        rate: Rate of the model, in [Hz], to which faster runs are decimated.
+        profile: ``ANY_RATE``, or one of ``PROFILES``.
+        rate: Rate of a model of one rate, in [Hz], to which faster runs are decimated; None for
+            ``RATE``. A general model takes each run at its own.
         output: The model file to write.
         part: The part of the recordings to train on.
         overwrite: Whether a file that exists may be replaced.
@@ -111,6 +120,11 @@ def train(
             are left out.
         OutputError: If the file exists or cannot be written.
     """
+    if profile == ANY_RATE:
+        if rate is not None:
+            raise InspectorError(f"profile {profile} is for any rate; leave out --rate {rate:g}")
+        return _train_general(inputs, output, part=part, overwrite=overwrite)
+    rate = RATE if rate is None else rate
     chosen = profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
     left_out = LeftOut()
@@ -131,6 +145,22 @@ def train(
     return Trained(evaluation, left_out)
 
 
+def _train_general(inputs: Sequence[Path], output: Path, *, part: Part, overwrite: bool) -> Trained:
+    """Train a general model and write it, see `train`."""
+    refuse_existing(output, overwrite=overwrite)
+    left_out = LeftOut()
+    read = progress(classified(inputs, None, part, bare_too=True), "read", total=count(inputs))
+    slowest = models.ANY.bound(LOWEST, (models.NOISE,))
+    usable = left_out.without((recording for recording, _ in read), slowest)
+    parts = list(models.frames_of(usable, models.ANY, thin=THIN))
+    if not parts:
+        raise InspectorError(f"no run to train {ANY_RATE} on; {left_out}")
+    frames = models.Frames.joined(parts)
+    model = models.General.train(frames, models.ANY, thin=THIN)
+    model.save(output, overwrite=overwrite)
+    return Trained(model.evaluate(frames), left_out)
+
+
 def profile_at(name: str, rate: float) -> models.Profile:
     """A profile by its name.
 
@@ -142,7 +172,7 @@ def profile_at(name: str, rate: float) -> models.Profile:
         InspectorError: If there is no such profile, or it does not exist at this rate.
     """
     if name not in PROFILES:
-        raise InspectorError(f"no profile {name!r}; there are {', '.join(PROFILES)}")
+        raise InspectorError(f"no profile {name!r}; there are {', '.join((ANY_RATE, *PROFILES))}")
     found = PROFILES[name](rate)
     if found.rate != rate:
         raise InspectorError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")

@@ -60,7 +60,7 @@ class Probable(ABC):
         """
         decisions = np.empty((len(features), self.width))
         decisions[:, :-1] = calibrated(self.logits(features), self.calibration)
-        np.maximum.reduce(features - self.maximum, 1, out=decisions[:, -1])
+        np.fmax.reduce(features - self.maximum, 1, out=decisions[:, -1])
         return decisions
 
     @cached_property

@@ -2,7 +2,9 @@
 
 In each round of boosting, a small tree for each class adds to the logit of that class; the sums
 are then calibrated. A feature below all of the training set leads to the same leaves as its
-minimum: a motion quieter than any other is no failure.
+minimum: a motion quieter than any other is no failure. A feature that is missing (NaN in training)
+leads to the side of a split that training chose for it; `at` decides all such splits once, for
+signals that lack the same features.
 
 All splits of all trees are evaluated together, in place of a walk down each: a split that a frame
 passes on the right rules out the leaves on its left, and of those that are left in the end, the
@@ -22,7 +24,7 @@ from models.estimators.calibration import calibrate, identity, of_seen_classes
 from models.estimators.probabilistic import Probable
 from models.profile import MOST_LEAVES, Profile
 from models.splitting import folds
-from models.types import Array, Index, Words
+from models.types import Array, Index, Mask, Words
 
 BATCH = 32
 """Frames that are evaluated together: fewer take longer, more take memory and no less time."""
@@ -49,6 +51,8 @@ class Trees(Probable):
             (trees, splits).
         left: The first leaf on the left of a split, and the first one that is not, shape
             (2, trees, splits).
+        missing: 1 where a frame without the feature is on the right of the split, else 0, shape
+            (trees, splits).
         leaf: What a leaf adds to its tree's class, shape (trees, leaves).
         prior: What classes start from, shape (classes,).
         known: Highest value of each feature in nearly all training frames, shape (features,).
@@ -58,6 +62,7 @@ class Trees(Probable):
         "feature": 2,
         "threshold": 2,
         "left": 3,
+        "missing": 2,
         "leaf": 2,
         "prior": 1,
         "calibration": 1,
@@ -68,6 +73,7 @@ class Trees(Probable):
     feature: Array
     threshold: Array
     left: Array
+    missing: Array
     leaf: Array
     prior: Array
     known: Array
@@ -131,8 +137,29 @@ class Trees(Probable):
     def first(self, rounds: int) -> "Trees":
         """Trees of the first rounds of boosting, with the same calibration."""
         count = rounds * len(self.prior)
-        own = {name: getattr(self, name)[:count] for name in ("feature", "threshold", "leaf")}
+        names = ("feature", "threshold", "missing", "leaf")
+        own = {name: getattr(self, name)[:count] for name in names}
         return replace(self, left=self.left[:, :count], **own)
+
+    def at(self, there: Index) -> "Trees":
+        """Trees of frames that lack some of the features.
+
+        Args:
+            there: Indices of the features that they have, ascending, shape (fewer,).
+
+        Returns:
+            Trees with the logits of these frames from their features, shape (frames, fewer).
+        """
+        number = self.feature.astype(np.intp)
+        place = np.searchsorted(there, number).clip(max=len(there) - 1)
+        known = there[place] == number
+        decided = np.where(self.missing > 0, -np.inf, np.inf)
+        return replace(
+            self,
+            feature=np.where(known, place, 0),
+            threshold=np.where(known, self.threshold, decided),
+            known=self.known[there],
+        )
 
     @classmethod
     def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
@@ -149,6 +176,7 @@ class Trees(Probable):
             "feature": (trees, leaves - 1),
             "threshold": (trees, leaves - 1),
             "left": (2, trees, leaves - 1),
+            "missing": (trees, leaves - 1),
             "leaf": (trees, leaves),
             "prior": (classes,),
             "calibration": (1 + classes,),
@@ -159,7 +187,7 @@ class Trees(Probable):
     @staticmethod
     def highest(profile: Profile, *, features: int) -> dict[str, int]:
         """Highest index of a feature, and of a leaf or the end of the leaves."""
-        return {"feature": features - 1, "left": profile.leaves}
+        return {"feature": features - 1, "left": profile.leaves, "missing": 1}
 
     @property
     def maximum(self) -> Array:
@@ -175,8 +203,11 @@ class Trees(Probable):
         return found
 
     def _sums(self, features: Array) -> Array:
-        number, threshold, left, leaf, first = self._side_by_side
-        right = features.take(number, axis=1) > threshold
+        number, threshold, missing, left, leaf, first = self._side_by_side
+        values = features.take(number, axis=1)
+        right = values > threshold
+        if np.isnan(features).any():
+            right |= np.isnan(values) & missing
         ruled_out = np.bitwise_or.reduce(right * left, 1)
         place = first + _FIRST.take(np.invert(ruled_out, out=ruled_out))
         added = leaf.take(place).reshape(len(features), -1, len(self.prior))
@@ -185,12 +216,13 @@ class Trees(Probable):
         return sums
 
     @cached_property
-    def _side_by_side(self) -> tuple[Index, Array, NDArray[np.uint16], Array, Index]:
+    def _side_by_side(self) -> tuple[Index, Array, Mask, NDArray[np.uint16], Array, Index]:
         """All first splits of the trees side by side, and then all second ones.
 
         Returns:
-            Features, thresholds and leaves on the left, as bits, shape (splits, trees); all
-            leaves in a row, and where those of each tree begin, shape (trees,).
+            Features, thresholds, whether missing features are on the right, and leaves on the
+            left, as bits, shape (splits, trees); all leaves in a row, and where those of each tree
+            begin, shape (trees,).
         """
         start, stop = self.left.astype(np.int64)
         bits = ((1 << stop) - (1 << start)).astype(np.uint16)
@@ -198,6 +230,7 @@ class Trees(Probable):
         return (
             np.ascontiguousarray(self.feature.T.astype(np.intp)),
             np.ascontiguousarray(self.threshold.T),
+            np.ascontiguousarray(self.missing.T > 0),
             np.ascontiguousarray(bits.T),
             self.leaf.ravel(),
             leaves * np.arange(trees),
@@ -250,20 +283,21 @@ def _fit(features: Array, targets: Index, train: Index, profile: Profile) -> Tre
     prior = np.where(counts > 0, 0.0, UNSEEN)
     prior[learnt] = boosting._baseline_prediction.ravel()
     shape = profile.rounds, classes, profile.leaves
-    splits, leaf = np.zeros((4, *shape[:2], shape[2] - 1)), np.zeros(shape)
+    splits, leaf = np.zeros((5, *shape[:2], shape[2] - 1)), np.zeros(shape)
     for number, trees in enumerate(boosting._predictors):
         for kind, tree in zip(learnt, trees, strict=True):
             rows, values = _lay_out(tree.nodes)
             splits[:, number, kind, : len(rows)] = np.transpose(rows)
             leaf[number, kind, : len(values)] = values
-    feature, threshold, *left = splits.reshape(4, -1, shape[2] - 1)
+    feature, threshold, missing, *left = splits.reshape(5, -1, shape[2] - 1)
     return Trees(
         feature=feature,
         threshold=threshold,
         left=np.array(left),
+        missing=missing,
         leaf=leaf.reshape(-1, shape[2]),
         prior=prior,
-        known=np.quantile(features[train], 1.0 - TAIL, axis=0),
+        known=np.nanquantile(features[train], 1.0 - TAIL, axis=0),
         calibration=identity(classes),
         frequency=counts / len(train),
         alarm=profile.alarm,
@@ -274,8 +308,9 @@ def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
     """Splits and leaves of a tree of scikit-learn.
 
     Returns:
-        Of each split the feature, the threshold, the first leaf on its left, and the first one
-        that is not; and the values of the leaves, from left to right.
+        Of each split the feature, the threshold, whether a missing feature is on its right, the
+        first leaf on its left, and the first one that is not; and the values of the leaves, from
+        left to right.
     """
     splits: list[list[float]] = []
     values: list[float] = []
@@ -285,7 +320,8 @@ def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
         if node["is_leaf"]:
             values.append(node["value"])
             return
-        split = [node["feature_idx"], node["num_threshold"], len(values)]
+        right = float(not node["missing_go_to_left"])
+        split = [node["feature_idx"], node["num_threshold"], right, len(values)]
         splits.append(split)
         visit(node["left"])
         split.append(len(values))

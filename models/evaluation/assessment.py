@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from models.classifier import Classifier
+from models.choice import Model
 from models.errors import DatasetError, SeenError, SignalError
 from models.evaluation import eventmeasures, eventscore, framescore, protocol
 from models.evaluation.calibration import Reliability, reliability
@@ -16,7 +16,7 @@ from models.evaluation.eventmeasures import EventMeasures
 from models.evaluation.eventscore import EventScore
 from models.evaluation.framescore import FrameScore
 from models.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
-from models.evaluation.matching import Matched
+from models.evaluation.matching import Matched, with_frames
 from models.evaluation.outcomes import FALSE
 from models.evaluation.predictions import UNNAMED, Localise, Predictions, Unanswered, predict
 from models.evaluation.protocol import Protocol
@@ -24,6 +24,7 @@ from models.evaluation.protocoltable import lines_of
 from models.evaluation.tradeoff import TradeOff, trade_off
 from models.labels import interval
 from models.recording import Recording
+from models.signals import named
 from models.splitting import seen
 from models.types import Array
 
@@ -134,7 +135,7 @@ class Assessment:
 
 
 def assess(
-    classifier: Classifier,
+    model: Model,
     recordings: Iterable[Recording | Unanswered],
     *,
     seen_too: bool = False,
@@ -143,9 +144,9 @@ def assess(
     """Assessment of a model on recordings, each of which is released once it is classified.
 
     Args:
-        classifier: The model.
-        recordings: Annotated noise at its rate, each of another name. Of recordings that are equal
-            bit for bit, the first counts. Those that have no verdict, because they came as such, do
+        model: The model.
+        recordings: Annotated noise at its rate, or at any for a general model, each of another
+            name. Of recordings that are equal bit for bit, the first counts. Those that have no verdict, because they came as such, do
             not fit the model, or have no frame without a gap, are listed.
         seen_too: Whether recordings count that the model was trained on, or that share their
             motion with such; the assessment lists them.
@@ -170,7 +171,7 @@ def assess(
             unanswered[name] = recording
             continue
         digest = recording.sha256
-        known |= seen(classifier.runs, {name: digest})
+        known |= seen(model.runs, {name: digest})
         if known and not seen_too:
             raise SeenError(known, 1, ADVICE)
         if digest in first:
@@ -178,7 +179,10 @@ def assess(
         else:
             first[digest] = name
             try:
-                found = predict(classifier, recording, localise)
+                bound = model.at(recording.rate, named(recording.signal))
+                found = predict(bound, recording, localise)
+                if bound.profile.reference:  # which frames that are cut out of blocks do not have
+                    found = with_frames(found)
                 reason = "" if len(found.labels) else NO_FRAME
             except SignalError as error:
                 reason = str(error)

@@ -7,7 +7,7 @@ annotations are written with few digits.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Self
 
 import numpy as np
@@ -135,6 +135,13 @@ class Matched:
     def by_run(self, run: Index) -> Array:
         """Count by recording, shape (runs,)."""
         return np.bincount(run, minlength=len(self.names)).astype(np.float64)
+
+
+def with_frames(one: Predictions) -> Predictions:
+    """Predictions on the frames of the whole recording whose true class is known, not on blocks."""
+    truth = Matched.of([one]).frames.truth
+    known = truth != UNCLEAR
+    return replace(one, truth=truth[known], predicted=one.labels.label[known])
 
 
 def _match(

@@ -13,7 +13,7 @@ from models.errors import DatasetError
 from models.labels import ANOMALY, Event, Labels
 from models.recording import Block, Fault, Recording
 from models.splitting import group_of, robot_of
-from models.types import Words
+from models.types import Index, Words
 
 UNNAMED = "unnamed"
 """Robot or domain of a recording that names none."""
@@ -146,6 +146,31 @@ def predict(
         recording.events,
         recording.facts,
         localise(recording, labels) if localise and len(labels) else None,
+    )
+
+
+def silent(recording: Recording, starts: Index, duration: float) -> Predictions:
+    """Predictions of nothing but `ok` on frames of a recording.
+
+    Args:
+        recording: The recording.
+        starts: First sample of each frame, shape (frames,).
+        duration: Of a frame, in [s].
+    """
+    begin = recording.start + starts / recording.rate
+    ok = np.full(len(starts), "ok")
+    labels = Labels(begin, begin + duration, ok, np.ones((len(starts), 1)), ("ok",))
+    nothing = np.array([], dtype=str)
+    return Predictions(
+        recording.name,
+        group_of(recording.name),
+        1.0 / recording.rate,
+        within(recording),
+        nothing,
+        nothing,
+        labels,
+        recording.events,
+        recording.facts,
     )
 
 
