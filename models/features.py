@@ -87,7 +87,8 @@ def log_band_energies(windows: Array, profile: Profile, resolution: Resolution) 
     if len(joints):
         joints = joints.reshape(len(profile.signals) - len(norms), -1, *found.shape[1:])
         loudest = np.maximum.reduce(joints, 1)
-        parts += [loudest, loudest[1:] - loudest[:-1]]
+        moving = loudest[: profile.moving]
+        parts += [loudest, moving[1:] - moving[:-1]]
         if profile.relative:
             # The order in which `add.reduce` sums up depends on the shape; this one does not.
             parts.append(loudest - np.add.reduceat(joints, [0], 1)[:, 0] / joints.shape[1])

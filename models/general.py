@@ -23,13 +23,14 @@ from models.evaluation.predictions import silent
 from models.framefeatures import frame_features
 from models.labels import UNKNOWN
 from models.logbands import HIGHEST, INPUTS, LOWEST, LogBands
+from models.pooling import RELATIVE
 from models.profile import TOLERANCE
 from models.recording import Recording
 from models.reference import Reference
 from models.signals import NOISE, feeds, named
 from models.types import Array, Real, Words
 
-LEARNT = (INPUTS[0], INPUTS[2], INPUTS[4])
+LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
 UNBOUNDED = 1e9
 """Highest value of features relative to a reference: they say nothing of novelty."""
@@ -113,19 +114,20 @@ class General:
                 f" the frames are {', '.join(sorted(there))}"
             )
         # A feature that no frame has tells nothing, wherever its frames would be.
-        features = np.where(np.isnan(frames.features).all(axis=0), 0.0, frames.features)
-        mean = np.nanmean(features, axis=0, dtype=np.float64)
+        unknown = np.isnan(frames.features).all(axis=0)
+        features = np.where(unknown, 0.0, frames.features)
+        mean = np.asarray(np.nanmean(features, axis=0, dtype=np.float64))
         scale = np.maximum(np.nanstd(features, axis=0, dtype=np.float64), recipe.least_deviation)
         targets = np.array([classes.index(label) for label in frames.labels.tolist()])
         scaled = (features - mean) / scale
         profile = recipe.bound(HIGHEST)
         trees = Trees.fit(scaled, targets, frames.groups, profile)
-        relative = np.array([name.startswith("relative") for name in recipe.columns])
+        relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
         shift = np.zeros(len(trees.calibration))
         shift[1] = np.log(thin)  # of the logits of `ok`
         trees = replace(
             trees,
-            known=np.where(relative, UNBOUNDED, trees.known),
+            known=np.where(relative | unknown, UNBOUNDED, trees.known),
             calibration=trees.calibration + shift,
         )
         model = cls(recipe, classes, trees, mean, scale, dict(frames.hashes))
@@ -248,5 +250,6 @@ def frames_of(
             known = (truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0))
             full = np.full((int(known.sum()), count), np.nan, dtype=np.float32)
             full[:, recipe.places(profile)] = features[known]
+            full[:, recipe.without_unit] = np.nan
             groups = np.full(len(full), frames.group)
             yield Frames(full, truth[known], groups, {recording.name: recording.sha256})

@@ -10,12 +10,20 @@ import numpy as np
 from models.errors import ProfileError
 from models.pooling import POOLED, columns
 from models.profile import CLASSES, EstimatorKind, Profile
-from models.signals import JOINTS, MOTION, NOISE
+from models.signals import EFFORT, JOINTS, MOTION, NOISE
 from models.types import Index
 
 LOWEST, HIGHEST = 80.0, 10_000.0
 """Rates that a general model takes, in [Hz]; faster logs are decimated."""
-INPUTS = ((*MOTION, *JOINTS), MOTION, ("measured", "measured_joints"), ("measured",), (NOISE,))
+INPUTS = (
+    (*MOTION, *JOINTS, EFFORT),
+    (*MOTION, *JOINTS),
+    MOTION,
+    ("measured", "measured_joints", EFFORT),
+    ("measured", "measured_joints"),
+    ("measured",),
+    (NOISE,),
+)
 """Signals that a general model takes: the first of these that a log has."""
 
 SPEED = 1.5
@@ -165,6 +173,11 @@ class LogBands:
         """Names of all features of a general model, of all inputs at the highest rate."""
         every = (columns(self.bound(HIGHEST, names)) for names in INPUTS)
         return tuple(dict.fromkeys(name for names in every for name in names))
+
+    @cached_property
+    def without_unit(self) -> Index:
+        """Indices of the features as they are of efforts, whose unit is not known."""
+        return np.array([n for n, name in enumerate(self.columns) if name.startswith(EFFORT)])
 
     def places(self, profile: Profile) -> Index:
         """Indices among all features of those that a profile has, ascending, shape (features,)."""

@@ -8,11 +8,14 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from models.profile import Profile, Resolution
+from models.signals import EFFORT
 from models.types import Array, Index
 
 Spectrum: TypeAlias = Literal["norm", "loudest", "difference"]
 """What a spectrum is of: a norm, the loudest joint, or a difference."""
 
+RELATIVE = "relative"
+"""What the names of features begin with that are relative to a reference."""
 POOLED = 3
 """Statistics that `pool` computes of each log-band energy: mean, maximum and standard deviation.
 Beside a reference, the last one adds nothing on robots left out, and is not computed."""
@@ -53,13 +56,13 @@ def columns(profile: Profile) -> tuple[str, ...]:
     """Names of the features of a profile with a reference, in order.
 
     A feature has one name at any rate: it consists of the signals, the window's kind, the statistic
-    and the lower edge of the band, in [Hz], after "relative" where it is relative to the reference.
+    and the lower edge of the band, in [Hz], after `RELATIVE` where it is relative to the reference.
     """
     norms, joints = profile.signals[: profile.norms], profile.signals[profile.norms :]
     spectra = [
         name
         for signals in (norms, joints)
-        for name in (*signals, *(f"{b} less {a}" for a, b in pairwise(signals)))
+        for name in (*signals, *(f"{b} less {a}" for a, b in pairwise(signals) if b != EFFORT))
     ]
     plain = [
         f"{spectrum} {kind} {statistic} {edge:.4g}"
@@ -68,7 +71,7 @@ def columns(profile: Profile) -> tuple[str, ...]:
         for statistic in ("mean", "maximum")
         for edge in resolution.edges[:-1]
     ]
-    return (*plain, *(f"relative {name}" for name in plain))
+    return (*plain, *(f"{RELATIVE} {name}" for name in plain))
 
 
 def pool(energies: Array, count: int = POOLED) -> Array:
@@ -113,7 +116,7 @@ def spectra(profile: Profile) -> tuple[Spectrum, ...]:
     if profile.differences:
         found += ["difference"] * (norms - 1)
         found += ["loudest"] * joints
-        found += ["difference"] * max((1 + profile.relative) * joints - 1, 0)
+        found += ["difference"] * max(profile.moving - 1 + profile.relative * joints, 0)
     return tuple(found)
 
 

@@ -8,7 +8,7 @@ from math import isfinite
 from typing import Any, Literal, Self, TypeAlias, get_args
 
 from models.errors import ProfileError
-from models.signals import by_joint
+from models.signals import EFFORT, JOINTS, by_joint
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 """NoisyTest's classes, in its order; `ok` is the first of every model."""
@@ -213,6 +213,11 @@ class Profile:
         """Number of signals that are norms."""
         return sum(not by_joint(name) for name in self.signals)
 
+    @cached_property
+    def moving(self) -> int:
+        """Number of velocities among the signals that go joint by joint."""
+        return sum(name in JOINTS for name in self.signals)
+
     @property
     def differences(self) -> bool:
         """Whether differences of a signal from the one before are features."""
@@ -303,6 +308,11 @@ def _check_ranges(profile: Profile) -> None:
             f"signals are {', '.join(profile.signals)}, with bands {profile.bands!r}, relative"
             f" {profile.relative} and reference {profile.reference}, expected 'log' and one of both"
             " for those that go joint by joint"
+        )
+    if EFFORT in profile.signals and (profile.signals[-1] != EFFORT or not profile.reference):
+        raise ProfileError(
+            f"signals are {', '.join(profile.signals)} with reference {profile.reference}, expected"
+            f" {EFFORT} last, and True"
         )
     if profile.reference and (profile.bands != "log" or profile.relative):
         raise ProfileError(

@@ -22,6 +22,9 @@ MOTION = ("desired", "measured", "error")
 JOINTS = tuple(f"{name}_joints" for name in MOTION)
 """The same, joint by joint."""
 
+EFFORT = "effort_joints"
+"""Joint torques, forces or motor currents, in any unit."""
+
 Signals: TypeAlias = Real | Mapping[str, Real]
 """The noise, shape (samples,), or signals by name: norms of that shape, and what goes joint by
 joint, shape (joints, samples)."""
@@ -34,7 +37,7 @@ def named(signals: Signals) -> Mapping[str, Real]:
 
 def by_joint(name: str) -> bool:
     """Whether a signal has a row for each joint, by its name."""
-    return name in JOINTS
+    return name in JOINTS or name == EFFORT
 
 
 def without_zero_error(signals: Mapping[str, Real]) -> dict[str, Real]:
@@ -84,9 +87,9 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
 def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
     """Whether all norms have one shape, and all that goes joint by joint has another one."""
     count, joints = chosen[0].shape[-1:], chosen[-1].shape[:-1]
-    wanted = [joints + count if name in JOINTS else count for name in names]
+    wanted = [joints + count if by_joint(name) else count for name in names]
     alike = [each.shape for each in chosen] == wanted
-    return alike and len(count) == 1 and len(joints) == (names[-1] in JOINTS) and 0 not in joints
+    return alike and len(count) == 1 and len(joints) == by_joint(names[-1]) and 0 not in joints
 
 
 def check(samples: Real, valid: Mask | None = None, *, first: int = 0) -> None:

@@ -42,20 +42,28 @@ def by_joint(run: Run) -> dict[str, Array]:
     Returns:
         ``desired_joints``, ``measured_joints`` and ``error_joints``, their difference, each of
         shape (joints, samples), in [rad/s]; without desired velocities, ``measured_joints`` of all
-        joints; nothing if no desired joint is measured.
+        joints; with efforts, also ``effort_joints``, in their unit; nothing if no desired joint is
+        measured.
     """
     names = [name for name in run.joint_names if name in run.desired_joint_names]
     if run.velocity_desired is None:
-        return {"measured_joints": run.velocity.T.astype(np.float64, copy=False)}
+        names = list(run.joint_names)
     if not names:
         return {}
-    measured = run.velocity[:, [run.joint_names.index(name) for name in names]].T
+    own = [run.joint_names.index(name) for name in names]
+    effort = (
+        {} if run.effort is None else {"effort_joints": run.effort[:, own].T.astype(np.float64)}
+    )
+    measured = run.velocity[:, own].T
+    if run.velocity_desired is None:
+        return {"measured_joints": measured.astype(np.float64, copy=False), **effort}
     desired = run.velocity_desired[:, [run.desired_joint_names.index(name) for name in names]].T
     measured, desired = (each.astype(np.float64, copy=False) for each in (measured, desired))
     return {
         "desired_joints": desired,
         "measured_joints": measured,
         "error_joints": desired - measured,
+        **effort,
     }
 
 

@@ -9,12 +9,12 @@ import noisemodel as nm
 from inspector.library import Library
 from inspector.live.decimator import Decimator
 from models.profile import TOLERANCE
-from models.signals import JOINTS, MOTION, NOISE
+from models.signals import EFFORT, JOINTS, MOTION, NOISE
 from noisemodel.decimation import EDGE
 from noisemodel.types import Array, Mask
 
-NOISY = ("base_velocity", "velocity", "velocity_desired")
-"""The signals that make noise: where one of them is unknown there is none."""
+NOISY = ("base_velocity", "velocity", "velocity_desired", "effort")
+"""The signals that models take: where one of them is unknown there is no label."""
 
 
 class NoiseSignals:
@@ -30,23 +30,28 @@ class NoiseSignals:
     """
 
     def __init__(self, widths: Mapping[str, int]) -> None:
-        base, joints, desired = (widths.get(name, 0) for name in NOISY)
-        self.columns, self.joints = base + joints + desired, joints
+        base, joints, desired, efforts = (widths.get(name, 0) for name in NOISY)
+        self.columns, self.joints = base + joints + desired + efforts, joints
         moved = base + joints
+        end = moved + desired
         of_desired, of_measured, of_error = MOTION
         desired_joints, measured_joints, error_joints = JOINTS
         self._ways: dict[str, Callable[[Array], Array]] = {
-            NOISE: nm.simplified,  # of measured and desired velocities side by side
+            NOISE: lambda motion: nm.simplified(motion[:, :end]),
             of_measured: lambda motion: nm.simplified(motion[:, :moved]),
             measured_joints: lambda motion: motion[:, base:moved].T,
         }
         if desired:
             self._ways |= {
-                of_desired: lambda motion: nm.simplified(motion[:, moved:]),
-                of_error: lambda motion: nm.simplified(motion[:, moved:] - motion[:, base:moved]),
-                desired_joints: lambda motion: motion[:, moved:].T,
-                error_joints: lambda motion: (motion[:, moved:] - motion[:, base:moved]).T,
+                of_desired: lambda motion: nm.simplified(motion[:, moved:end]),
+                of_error: lambda motion: nm.simplified(
+                    motion[:, moved:end] - motion[:, base:moved]
+                ),
+                desired_joints: lambda motion: motion[:, moved:end].T,
+                error_joints: lambda motion: (motion[:, moved:end] - motion[:, base:moved]).T,
             }
+        if efforts:
+            self._ways[EFFORT] = lambda motion: motion[:, end:].T
         self.names = tuple(self._ways)
 
     def of(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:

@@ -146,8 +146,9 @@ def assess(
     Args:
         model: The model.
         recordings: Annotated noise at its rate, or at any for a general model, each of another
-            name. Of recordings that are equal bit for bit, the first counts. Those that have no verdict, because they came as such, do
-            not fit the model, or have no frame without a gap, are listed.
+            name. Of recordings that are equal bit for bit, the first counts. Those that have no
+            verdict, because they came as such, do not fit the model, or have no frame without a
+            gap, are listed.
         seen_too: Whether recordings count that the model was trained on, or that share their
             motion with such; the assessment lists them.
         localise: Estimates onset and end of the findings; else they last as their frames do.
