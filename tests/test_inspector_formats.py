@@ -51,6 +51,7 @@ def test_json_is_noise_verdict_2():
     loud, slow = verdicts["runs"]
     assert loud["events"][1] == {
         "label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8, "novel": True,
+        "order": None,
     }  # fmt: skip
     assert loud["events"][0]["novel"] is False
     assert (loud["run"], loud["status"], loud["unknown"]) == ("loud.npz", "findings", "finding")

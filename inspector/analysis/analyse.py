@@ -34,6 +34,7 @@ from noisemodel.types import Array
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
+    from inspector.localisation.order import Order
     from noisemodel.links import LinkNoise
 
 
@@ -91,6 +92,16 @@ class Analysis:
         events = zip(self.spans, self.findings, strict=True)
         named: dict[Event | nm.Block, Event] = dict(events)
         return {named.get(failure, failure): each for failure, each in found.items()}
+
+    @cached_property
+    def orders(self) -> "dict[Event, Order]":
+        """Findings whose vibration goes with the speed of a joint; none of a scalar noise."""
+        from inspector.localisation.order import order
+
+        if self.audit is None:
+            return {}
+        found = ((event, order(self.run, event)) for event in self.findings)
+        return {event: known for event, known in found if known is not None}
 
     @cached_property
     def lane(self) -> tuple[tuple[float, float, str], ...]:

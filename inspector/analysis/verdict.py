@@ -17,6 +17,7 @@ from noisemodel.parallel import each
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
+    from inspector.localisation.order import Order
 
 EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
 """The errors that are printed in one line; all others are bugs."""
@@ -35,6 +36,7 @@ class Verdict:
         localisations: The localisation of each finding, if it was requested.
         unknown: What became of `unknown` frames.
         model_sha256: SHA-256 of the model's file, empty without.
+        orders: Of the findings whose vibration goes with the speed of a joint.
     """
 
     path: Path
@@ -45,6 +47,7 @@ class Verdict:
     localisations: Mapping[Event, "Localisation"] = field(default_factory=dict)
     unknown: Unknown = Unknown.FINDING
     model_sha256: str = ""
+    orders: Mapping[Event, "Order"] = field(default_factory=dict)
 
     @classmethod
     def of(cls, path: Path, analysis: Analysis, *, localise: bool = False) -> "Verdict":
@@ -65,6 +68,7 @@ class Verdict:
             {event: known[event] for event in analysis.findings if event in known},
             analysis.unknown,
             analysis.model_sha256,
+            analysis.orders,
         )
 
 

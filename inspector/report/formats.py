@@ -30,7 +30,7 @@ def text(verdicts: Sequence[Verdict]) -> str:
         model = f" [{verdict.model}]" if verdict.model else ""
         message = f": {verdict.message}" if verdict.message else ""
         lines.append(f"{verdict.path}: {verdict.status}{model}{message}")
-        lines += [f"  {_sentence(event)}" for event in verdict.events]
+        lines += [f"  {_sentence(verdict, event)}" for event in verdict.events]
     return "\n".join(lines)
 
 
@@ -54,6 +54,7 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
                     "stop": round(event.stop, 6),
                     "score": round(event.score, 6),
                     "novel": event.novel,
+                    "order": _order(verdict, event),
                     **_localised(verdict, event),
                 }
                 for event in verdict.events
@@ -84,7 +85,8 @@ def junit(verdicts: Sequence[Verdict]) -> str:
     for verdict in verdicts:
         case = ET.SubElement(suite, "testcase", classname="inspector", name=_plain(verdict.path))
         if verdict.status in tags:
-            sentences = [_sentence(event) for event in verdict.events] or [verdict.message]
+            sentences = [_sentence(verdict, event) for event in verdict.events]
+            sentences = sentences or [verdict.message]
             outcome = ET.SubElement(case, tags[verdict.status], message=_plain(sentences[0]))
             outcome.text = _plain("\n".join(sentences))
         if verdict.message and verdict.status in (Status.OK, Status.FINDINGS):
@@ -98,7 +100,11 @@ def junit(verdicts: Sequence[Verdict]) -> str:
 def github(verdicts: Sequence[Verdict]) -> str:
     """Write verdicts as GitHub workflow commands, at most ten of a kind."""
     errors = [
-        _annotation("error", verdict, "; ".join(map(_sentence, verdict.events)) or verdict.message)
+        _annotation(
+            "error",
+            verdict,
+            "; ".join(_sentence(verdict, event) for event in verdict.events) or verdict.message,
+        )
         for verdict in verdicts
         if verdict.status in (Status.BAD_INPUT, Status.FINDINGS)
     ]
@@ -136,8 +142,17 @@ def _localisation(known: "Localisation") -> dict[str, object]:
     }
 
 
-def _sentence(event: Event) -> str:
-    return f"{event.label} from {interval(event.start, event.stop)}{event.novelty}"
+def _order(verdict: Verdict, event: Event) -> dict[str, object] | None:
+    """Joint with whose speed a finding goes, and periods per turn of it; None if none."""
+    known = verdict.orders.get(event)
+    if known is None:
+        return None
+    return {"joint": known.joint, "periods_per_turn": round(known.periods_per_turn, 1)}
+
+
+def _sentence(verdict: Verdict, event: Event) -> str:
+    order = f", {verdict.orders[event]}" if event in verdict.orders else ""
+    return f"{event.label} from {interval(event.start, event.stop)}{event.novelty}{order}"
 
 
 def _plain(value: object) -> str:

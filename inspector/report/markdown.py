@@ -74,11 +74,13 @@ def sentence(analysis: Analysis, event: Event | Block) -> str:
 def localised(
     analysis: Analysis, failure: Event | Block, *, quote: str = ""
 ) -> tuple[str, str, str, str]:
-    """Localisation of a failure in words: stage of the control flow, joints, band, links."""
+    """Localisation of a failure in words: stage, joints, band (with its order), and links."""
     if failure.label == "ok":
         return "", "", "", ""
-    known = analysis.localisations[failure]
-    return *words(known, quote=quote), _links(analysis, failure)
+    stage, joints, band = words(analysis.localisations[failure], quote=quote)
+    order = analysis.orders.get(failure) if isinstance(failure, Event) else None
+    band = "; ".join(str(part) for part in (band, order) if part)
+    return stage, joints, band, _links(analysis, failure)
 
 
 def note(analysis: Analysis) -> str:

@@ -21,6 +21,8 @@ INK = "#24292f"
 POINTS = 4000
 TOP_HZ = 2000.0
 LINKS = 12
+ORDERS = 3
+"""Findings of which the order is written."""
 LINK_RANGE_DB = 50.0
 ROW = 0.24
 """Height of a class or a link, in [inch]."""
@@ -87,7 +89,10 @@ def _classes(axes: "Axes", analysis: Analysis) -> None:
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
     hatched = "; hatched: annotated" if analysis.run.blocks else ""
-    axes.set_title(f"filled: found{hatched}", fontsize=9, loc="left")
+    lines = [f"filled: found{hatched}"]
+    known = [f"{event.start:.2f} s: {order}" for event, order in analysis.orders.items()]
+    lines += [*known[:ORDERS], *(["…"] if known[ORDERS:] else [])]
+    axes.set_title("\n".join(lines), fontsize=9, loc="left", parse_math=False)
 
 
 def _noise(axes: "Axes", analysis: Analysis) -> None:

@@ -1,0 +1,300 @@
+"""Order of a finding: the periods per turn of a joint of a vibration that goes with its speed.
+
+Teeth, balls or poles that pass n times per turn of a joint shake it at n |w| / 2 pi: a frequency
+that goes with the joint's speed w, but one line at order n in the spectrum over the joint's angle.
+That is order tracking with angular resampling (Fyfe & Munck 1997, Analysis of computed order
+tracking, Mechanical Systems and Signal Processing 11(2); R. B. Randall, Vibration-based Condition
+Monitoring, Wiley 2011). A vibration of fixed frequency is a line over time, and smears over angle.
+
+Both are measured in the same way: by the share of the energy that one line explains. The vibration
+e is cut into pieces of at most `LONGEST`, and where the joint stops or turns back. In each piece,
+with Hann weights h, a line at order n is
+
+    a sqrt|w| cos(n theta + phi)
+
+with amplitude a and phase phi by least squares, for each piece its own; n is common to all. A line
+at frequency f is the same of a joint that turns at 1 rad/s throughout: a cos(2 pi f t + phi). The
+factor sqrt|w| lies between a ripple of constant amplitude and one that grows with the speed, and
+conserves energy from time to angle: sum h e sqrt|w| exp(-i n theta) over time is the integral of
+h e / sqrt|w| exp(-i n theta) over angle, thus a Fourier transform of samples at equal steps of it.
+
+An order is stated if its line explains `LEAST` of the energy, and `MARGIN` of it more than the best
+line of fixed frequency. While the speed hardly varies both explain the same, and none is stated.
+The resolution of an order is the inverse of the number of periods, of which `PERIODS` are needed.
+Neither share depends on the scale of the vibration or the direction of time. The limits were chosen
+on simulated findings (`benchmarks/ripple.py`).
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from models import Event
+from noisemodel import Block, Run
+from noisemodel.types import Array, Real
+
+LOWEST = 10.0
+"""Lowest frequency, in [Hz]; what is slower is motion."""
+HIGHEST = 0.4
+"""Highest frequency, by the sample rate: interpolation loses 3 % of its amplitude."""
+SMOOTH = 0.1
+"""Length of each of two moving means, in [s], of which the frequency response is 0 at 10 Hz."""
+SHORTEST, LONGEST = 0.8, 1.6
+"""Duration of a part, in [s]: as long as the finding, between these."""
+MOST = 16
+"""Most parts of a finding."""
+SLOWEST = 0.05
+"""A joint is at rest below this, in [rad/s]."""
+FINER = 4
+"""Steps of time and angle per sample, the latter where the joint is fastest. Where it has less than
+the inverse of its greatest speed, spectra over angle would alias: there it counts as at rest."""
+PADDED = 4
+"""Factor by which spectra are padded, so that peaks can be interpolated."""
+FEWEST, PERIODS = 4.0, 5.0
+"""Least number of periods of an order in a piece, else it explains nothing there, and in all of
+them, by Hann weights: 10 in a lone piece of steady motion."""
+LEAST = 0.25
+"""Least share of the energy that an order explains."""
+MARGIN = 0.15
+"""Least excess of that over the share that a fixed frequency explains."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """An order: what goes with a joint's speed.
+
+    Attributes:
+        joint: Name of the joint.
+        periods_per_turn: Periods of the vibration per turn of the joint.
+    """
+
+    joint: str
+    periods_per_turn: float
+
+    def __str__(self) -> str:
+        return f"goes with the speed of {self.joint}: {self.periods_per_turn:.0f} periods per turn"
+
+
+class Piece(NamedTuple):
+    """Motion of a joint in one direction, or its rest; arrays have shape (samples,).
+
+    Attributes:
+        wave: Vibration, in [rad/s].
+        angle: Since the start of the piece, increasing, in [rad].
+        speed: Its derivative, in [rad/s]; 0 at rest.
+    """
+
+    wave: Array
+    angle: Array
+    speed: Array
+
+
+def order(run: Run, failure: Event | Block) -> Order | None:
+    """Order of the vibration of the joint that vibrates most in a failure.
+
+    Args:
+        run: The run.
+        failure: A finding, or an annotated block.
+
+    Returns:
+        The order; None if a line at an order does not explain the vibration, or hardly better than
+        one at a frequency does.
+    """
+    best, over_angle, over_time = best_lines(run, failure)
+    return best if over_angle >= max(LEAST, over_time + MARGIN) else None
+
+
+def best_lines(run: Run, failure: Event | Block) -> tuple[Order | None, float, float]:
+    """The best order of the joint that vibrates most, and what it explains.
+
+    The vibration is the measured velocity less the desired one, or the measured one of a joint
+    without, above 10 Hz.
+
+    Args:
+        run: The run.
+        failure: A finding, or an annotated block.
+
+    Returns:
+        The order, its share of the joint's vibration, and that of the best line of a fixed
+        frequency, between 0 and 1; None, 0 and 0 without vibration or without motion.
+    """
+    parts = _parts(run, failure)
+    if not parts:
+        return None, 0.0, 0.0
+    waves = [_vibration(run, part) for part in parts]
+    weight = _hann(len(waves[0]))
+    joint = int(np.argmax(np.sum([weight @ np.square(wave) for wave in waves], axis=0)))
+    motions = [_motion(run, part, joint) for part in parts]
+    fastest = max(float(np.abs(speed).max()) for _, speed in motions)
+    pieces = [
+        piece
+        for wave, motion in zip(waves, motions, strict=True)
+        for piece in _pieces(wave[:, joint], *motion, max(SLOWEST, fastest / FINER))
+    ]
+    if fastest <= SLOWEST or not _energy(pieces) > 0.0:
+        return None, 0.0, 0.0
+    found, over_angle = _explained(pieces, fastest, run.rate, fewest=FEWEST, periods=PERIODS)
+    # Over time is over the angle of a joint that turns at 1 rad/s throughout; few periods count too,
+    # since a tone that is called ripple is worse than the reverse.
+    uniform = [
+        Piece(piece.wave, np.arange(len(piece.wave)) / run.rate, np.ones(len(piece.wave)))
+        for piece in pieces
+    ]
+    _, over_time = _explained(uniform, 1.0, run.rate)
+    return Order(run.joint_names[joint], found), over_angle, over_time
+
+
+def _parts(run: Run, failure: Event | Block) -> list[slice]:
+    """Parts of a failure without gaps, half of each in the next, spread evenly over it."""
+    length = min(max(failure.stop - failure.start, SHORTEST), LONGEST, run.duration)
+    size = round(length * run.rate)
+    first, last = np.searchsorted(run.time, (failure.start, failure.stop)).tolist()
+    if last - first < size:  # the part of a shorter failure extends beyond it
+        first = min(max(0, (first + last - size) // 2), len(run.time) - size)
+        last = first + size
+    count = min(MOST, 1 + math.ceil(2 * (last - first - size) / size))
+    starts = np.round(np.linspace(first, last - size, count)).astype(int)
+    parts = [slice(start, start + size) for start in starts.tolist()]
+    return [part for part in parts if run.mask[part].all()]
+
+
+def _around(run: Run, part: slice, margin: int, signal: Real) -> Array:
+    """A signal of a part and ``margin`` samples on each side, mirrored about gaps and ends."""
+    before = run.mask[max(0, part.start - margin) : part.start][::-1]
+    after = run.mask[part.stop : part.stop + margin]
+    sides = [int(np.append(side, False).argmin()) for side in (before, after)]
+    inside = signal[part.start - sides[0] : part.stop + sides[1]].astype(np.float64)
+    missing = [(margin - side, margin - side) for side in sides]
+    pad = ((missing[0][0], missing[1][0]), *[(0, 0)] * (inside.ndim - 1))
+    return np.pad(inside, pad, mode="reflect", reflect_type="odd")
+
+
+def _fast(signal: Array, half: int) -> Array:
+    """Signal above 10 Hz, shorter by ``4 half`` on each side.
+
+    Twice, a moving mean of a moving mean is subtracted: what the first time leaves of a steady
+    jerk is constant, and what is subtracted differs from slow motion in the fourth order only.
+    """
+    size, fast = 2 * half + 1, signal
+    for _ in range(2):
+        slow = fast
+        for _ in range(2):
+            sums = np.concatenate((np.zeros_like(slow[:1]), np.cumsum(slow, axis=0)))
+            slow = (sums[size:] - sums[:-size]) / size
+        fast = fast[2 * half : -2 * half] - slow
+    return fast
+
+
+def _half(run: Run) -> int:
+    """Samples on each side of the middle of a moving mean."""
+    return max(1, round(SMOOTH * run.rate / 2))
+
+
+def _vibration(run: Run, part: slice) -> Array:
+    """Tracking error above 10 Hz, else the motion, shape (samples, joints), in [rad/s]."""
+    half = _half(run)
+    wave = _around(run, part, 4 * half, run.velocity)
+    if run.velocity_desired is not None:
+        both = [name for name in run.joint_names if name in run.desired_joint_names]
+        measured = [run.joint_names.index(name) for name in both]
+        desired = [run.desired_joint_names.index(name) for name in both]
+        wave[:, measured] -= _around(run, part, 4 * half, run.velocity_desired)[:, desired]
+    return _fast(wave, half)
+
+
+def _motion(run: Run, part: slice, joint: int) -> tuple[Array, Array]:
+    """Angle, in [rad], and speed, in [rad/s], of a joint without its vibration."""
+    half = _half(run)
+    inner = slice(4 * half, -4 * half)
+    if run.position is None:
+        velocity = _around(run, part, 4 * half, run.velocity[:, joint])
+        speed = velocity[inner] - _fast(velocity, half)
+        steps = (speed[1:] + speed[:-1]) / 2.0 / run.rate
+        return np.concatenate(([0.0], np.cumsum(steps))), speed
+    wrapped = _around(run, part, 4 * half, run.position[:, joint])
+    angle = np.unwrap(wrapped)
+    angle = angle[inner] - _fast(angle, half)
+    return angle, np.gradient(angle) * run.rate
+
+
+def _pieces(wave: Array, angle: Array, speed: Array, slowest: float) -> Iterator[Piece]:
+    """Cut a part where the joint stops, starts or turns back; pieces of 4 samples or more."""
+    direction = np.where(np.abs(speed) > slowest, np.sign(speed), 0.0)
+    edges = [0, *(np.flatnonzero(np.diff(direction)) + 1).tolist(), len(speed)]
+    for first, last in pairwise(edges):
+        if last - first >= 4:
+            sign = direction[first]
+            turned = sign * (angle[first:last] - angle[first])
+            yield Piece(wave[first:last], turned, sign * speed[first:last])
+
+
+def _explained(
+    pieces: list[Piece], fastest: float, rate: float, *, fewest: float = 0.0, periods: float = 0.0
+) -> tuple[float, float]:
+    """The order that explains most, in periods per turn, and the share that it explains."""
+    best = _strongest(pieces, fastest, rate, fewest=fewest, periods=periods)
+    rest = _energy([_without(piece, best, fewest=fewest) for piece in pieces])
+    return best, 1.0 - rest / _energy(pieces)
+
+
+def _strongest(
+    pieces: list[Piece], fastest: float, rate: float, *, fewest: float, periods: float
+) -> float:
+    """The order that explains most, in periods per turn; 0 if none has periods enough."""
+    step = fastest / rate / FINER
+    longest = max(piece.angle[-1] for piece in pieces)
+    size = 1 << math.ceil(math.log2(PADDED * longest / step + 1.0))
+    orders = 2.0 * np.pi / (size * step) * np.arange(size // 2 + 1)
+    energy, counted = np.zeros(len(orders)), np.zeros(len(orders))
+    for wave, angle, speed in pieces:
+        if not speed.any():
+            continue
+        weight, sample = _hann(len(wave)), np.arange(len(wave))
+        at = np.interp(np.arange(0.0, angle[-1], step), angle, sample)
+        line = _finer(weight * wave, at) / np.sqrt(np.interp(at, sample, speed))
+        enough = orders * angle[-1] >= 2.0 * np.pi * fewest
+        energy += enough * np.square(np.abs(np.fft.rfft(line, size))) / (weight @ speed)
+        counted += enough * orders * (weight @ speed) / (2.0 * np.pi * rate)
+    frequency = orders * fastest / (2.0 * np.pi)
+    known = (frequency >= LOWEST) & (frequency <= HIGHEST * rate) & (counted >= periods)
+    return _peak(orders, energy * known)
+
+
+def _finer(signal: Array, at: Array) -> Array:
+    """Values between samples of a signal that begins and ends near 0."""
+    size = FINER * len(signal)
+    finer = FINER * np.fft.irfft(np.fft.rfft(signal), size)
+    return np.asarray(np.interp(FINER * at, np.arange(size), finer))
+
+
+def _without(piece: Piece, order: float, *, fewest: float) -> Piece:
+    """A piece less the least-squares fit of an order, unless it has too few periods of it."""
+    if not piece.speed.any() or order * piece.angle[-1] < 2.0 * np.pi * fewest:
+        return piece
+    weight = _hann(len(piece.wave))
+    line = np.sqrt(piece.speed) * np.exp(1j * order * piece.angle)
+    size = 2.0 * (weight * piece.wave) @ line.conj() / (weight @ piece.speed)
+    return piece._replace(wave=piece.wave - (size * line).real)
+
+
+def _energy(pieces: list[Piece]) -> float:
+    return sum(float(_hann(len(piece.wave)) @ np.square(piece.wave)) for piece in pieces)
+
+
+def _hann(samples: int) -> Array:
+    """Hann weights, of which none is 0."""
+    return np.hanning(samples + 2)[1:-1]
+
+
+def _peak(orders: Real, lines: Array) -> float:
+    """Top of the parabola through the highest value and its neighbours."""
+    best = int(np.argmax(lines))
+    if not 0 < best < len(lines) - 1:
+        return float(orders[best])
+    before, top, after = lines[best - 1 : best + 2].tolist()
+    offset = (before - after) / (before - 2.0 * top + after) / 2.0
+    return float(orders[best] + offset * (orders[1] - orders[0]))
