@@ -200,7 +200,7 @@ def test_the_picture_has_a_line_for_each_order(vibration, monkeypatch):
     titles = []
     monkeypatch.setattr(Axes, "set_title", lambda self, text, **_: titles.append(text))
     picture(analysed(vibration))
-    wanted = [f"0.30 s: {PHRASE}"] if analysed(vibration).orders else []
+    wanted = [f"at 0.30 s: {PHRASE}"] if analysed(vibration).orders else []
     assert titles == ["\n".join(["filled: found", *wanted])]
 
 

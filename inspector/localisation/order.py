@@ -138,8 +138,8 @@ def best_lines(run: Run, failure: Event | Block) -> tuple[Order | None, float, f
     if fastest <= SLOWEST or not _energy(pieces) > 0.0:
         return None, 0.0, 0.0
     found, over_angle = _explained(pieces, fastest, run.rate, fewest=FEWEST, periods=PERIODS)
-    # Over time is over the angle of a joint that turns at 1 rad/s throughout; few periods count too,
-    # since a tone that is called ripple is worse than the reverse.
+    # Time is the angle of a joint that turns at 1 rad/s throughout. Few periods count too: a tone
+    # that is called ripple is worse than the reverse.
     uniform = [
         Piece(piece.wave, np.arange(len(piece.wave)) / run.rate, np.ones(len(piece.wave)))
         for piece in pieces

@@ -1,6 +1,7 @@
 """A run over time as a picture on paper: classes, noise, spectrogram, loudest links."""
 
 import io
+from collections import defaultdict
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +22,8 @@ INK = "#24292f"
 POINTS = 4000
 TOP_HZ = 2000.0
 LINKS = 12
-ORDERS = 3
-"""Findings of which the order is written."""
+ORDERS, TIMES = 3, 6
+"""Most orders that are written, and most times of each."""
 LINK_RANGE_DB = 50.0
 ROW = 0.24
 """Height of a class or a link, in [inch]."""
@@ -89,10 +90,20 @@ def _classes(axes: "Axes", analysis: Analysis) -> None:
     axes.set_ylim(len(names) - 0.5, -0.5)
     axes.grid(axis="x", alpha=0.3)
     hatched = "; hatched: annotated" if analysis.run.blocks else ""
-    lines = [f"filled: found{hatched}"]
-    known = [f"{event.start:.2f} s: {order}" for event, order in analysis.orders.items()]
-    lines += [*known[:ORDERS], *(["…"] if known[ORDERS:] else [])]
+    lines = [f"filled: found{hatched}", *_orders(analysis)]
     axes.set_title("\n".join(lines), fontsize=9, loc="left", parse_math=False)
+
+
+def _orders(analysis: Analysis) -> list[str]:
+    """List what goes with the speed of a joint, and when: a line for each order."""
+    when: dict[str, list[str]] = defaultdict(list)
+    for event, order in analysis.orders.items():
+        when[str(order)].append(f"{event.start:.2f}")
+    lines = [
+        f"at {', '.join(times[:TIMES])}{', …' * (len(times) > TIMES)} s: {order}"
+        for order, times in when.items()
+    ]
+    return [*lines[:ORDERS], *["…"] * (len(lines) > ORDERS)]
 
 
 def _noise(axes: "Axes", analysis: Analysis) -> None:
