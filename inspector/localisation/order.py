@@ -50,8 +50,8 @@ MOST = 16
 SLOWEST = 0.05
 """A joint is at rest below this, in [rad/s]."""
 FINER = 4
-"""Steps of time and angle per sample, the latter where the joint is fastest. Where it has less than
-the inverse of its greatest speed, spectra over angle would alias: there it counts as at rest."""
+"""Steps of time and angle per sample, the latter where the joint is fastest. Where it is
+slower by more than this factor, spectra over angle would alias: there it counts as at rest."""
 PADDED = 4
 """Factor by which spectra are padded, so that peaks can be interpolated."""
 FEWEST, PERIODS = 4.0, 5.0
