@@ -17,7 +17,7 @@ from models import modelfile
 from models.classifier import Classifier
 from models.confusion import Evaluation
 from models.errors import DatasetError, MissingSignalError, RateError
-from models.estimators.trees import Trees
+from models.estimators.trees import Detector, Trees
 from models.evaluation.matching import UNCLEAR, Matched
 from models.evaluation.predictions import silent
 from models.framefeatures import frame_features
@@ -121,7 +121,7 @@ class General:
         targets = np.array([classes.index(label) for label in frames.labels.tolist()])
         scaled = (features - mean) / scale
         profile = recipe.bound(HIGHEST)
-        trees = Trees.fit(scaled, targets, frames.groups, profile)
+        trees = Detector.fit(scaled, targets, frames.groups, profile)
         relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
         shift = np.zeros(len(trees.calibration))
         shift[1] = np.log(thin)  # of the logits of `ok`
@@ -188,7 +188,7 @@ class General:
         return cls(
             recipe,
             tuple(manifest["classes"]),
-            Trees.of(arrays, recipe.bound(HIGHEST)),
+            Detector.of(arrays, recipe.bound(HIGHEST)),
             arrays["mean"],
             arrays["scale"],
             runs=manifest["runs"],

@@ -212,7 +212,15 @@ alone does not separate a fast motion without sensor noise from a failure. Trees
 that resemble the training set; networks more that do not, say a rattle on a motion without any
 other noise, which the noise alone does not show as an error."""
 
-ANY = LogBands(reference=True, floor=1e-3, estimator="trees", quick=0.02, speed=True, leaves=4)
+ANY = LogBands(
+    reference=True,
+    floor=1e-3,
+    estimator="detector",
+    quick=0.02,
+    speed=True,
+    rounds=200,
+    leaves=8,
+)
 """For any rate and whatever signals there are; features relative to a reference beside."""
 
 EACH = replace(GENERAL, signals=(*MOTION, *JOINTS), alarm=0.6, rounds=40)

@@ -21,7 +21,7 @@ TOLERANCE = 1e-3
 
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
-EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "baseline"]
+EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "detector", "baseline"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
 _CHOICES = {"bands": Bands, "kernel": Kernel, "estimator": EstimatorKind, "multiclass": Multiclass}
@@ -102,7 +102,8 @@ class Profile:
     """Least standard deviation in the standardisation of features by the training set; 0 leaves
     them as they are."""
     estimator: EstimatorKind = "svm"
-    """Support vector machines, small networks, boosted trees, or a baseline of good runs."""
+    """Support vector machines, small networks, boosted trees, trees that first tell failures from
+    `ok` and then name them, or a baseline of good runs."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1

@@ -6,7 +6,7 @@ from typing import ClassVar, Protocol
 from models.estimators.baseline import Baseline
 from models.estimators.mlp import Networks
 from models.estimators.svm import SupportVectorMachines
-from models.estimators.trees import Trees
+from models.estimators.trees import Detector, Trees
 from models.profile import EstimatorKind, Profile
 from models.types import Array, Index, Mask, Words
 
@@ -85,6 +85,7 @@ ESTIMATORS: Mapping[EstimatorKind, type[Estimator]] = {
     "svm": SupportVectorMachines,
     "networks": Networks,
     "trees": Trees,
+    "detector": Detector,
     "baseline": Baseline,
 }
 """Class of each estimator, by the name that profiles have for it."""

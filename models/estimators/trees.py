@@ -120,7 +120,7 @@ class Trees(Probable):
         everything = np.arange(len(targets))
         parallel = Parallel(n_jobs=-1 if len(targets) > MANY else 1)
         fitted: list[Trees] = parallel(
-            delayed(_fit)(features, targets, train, profile)
+            delayed(cls.uncalibrated)(features, targets, train, profile)
             for train in (everything, *(train for train, _ in parts))
         )
         seen = [of_seen_classes(targets, train, test) for train, test in parts]
@@ -133,6 +133,34 @@ class Trees(Probable):
                 trees = replace(trees, calibration=calibrate(np.concatenate(logits), truth))
             found.append(trees)
         return found
+
+    @classmethod
+    def uncalibrated(
+        cls, features: Array, targets: Index, train: Index, profile: Profile
+    ) -> "Trees":
+        """Train trees on some of the frames, without calibration."""
+        classes = int(targets.max()) + 1
+        splits, leaf, prior = cls._learnt(features, targets, train, classes, profile)
+        feature, threshold, missing, *left = splits.reshape(5, -1, profile.leaves - 1)
+        return cls(
+            feature=feature,
+            threshold=threshold,
+            left=np.array(left),
+            missing=missing,
+            leaf=leaf.reshape(-1, profile.leaves),
+            prior=prior,
+            known=np.nanquantile(features[train], 1.0 - TAIL, axis=0),
+            calibration=identity(classes),
+            frequency=np.bincount(targets[train], minlength=classes) / len(train),
+            alarm=profile.alarm,
+        )
+
+    @staticmethod
+    def _learnt(
+        features: Array, targets: Index, train: Index, classes: int, profile: Profile
+    ) -> tuple[Array, Array, Array]:
+        """Splits, leaves and prior, as `_boosted` gives them."""
+        return _boosted(features, targets, train, classes, profile)
 
     def first(self, rounds: int) -> "Trees":
         """Trees of the first rounds of boosting, with the same calibration."""
@@ -241,6 +269,37 @@ class Trees(Probable):
         return {name: getattr(self, name) for name in self.DIMENSIONS}
 
 
+class Detector(Trees):
+    """Trees that tell failures from `ok`, and others that name a failure.
+
+    The first class has the trees that tell it from all failures; those of the other classes are
+    trained on failures alone. In each round of boosting there are as many trees as of `Trees`, but
+    only one sees all frames.
+    """
+
+    @staticmethod
+    def _learnt(
+        features: Array, targets: Index, train: Index, classes: int, profile: Profile
+    ) -> tuple[Array, Array, Array]:
+        failing = train[targets[train] > 0]
+        splits, leaf, prior = _boosted(features, targets, failing, classes, profile)
+        ours = _boosted(features, (targets == 0).astype(np.intp), train, 2, profile)
+        for whole, part in zip((splits, leaf), ours[:2], strict=True):
+            whole[..., 0, :] = part[..., 1, :]
+        prior[0] = ours[2][1]
+        return splits, leaf, prior
+
+    def logits(self, features: Array) -> Array:
+        """Logits of the classes, shape (frames, classes).
+
+        With the log odds d of `ok` and the logits n of failures, they are d and
+        n - log(sum exp n): then the softmax of all has the odds d of `ok`.
+        """
+        found = super().logits(features)
+        found[:, 1:] -= np.logaddexp.reduce(found[:, 1:], 1, keepdims=True)
+        return found
+
+
 def _first_bits() -> NDArray[np.uint8]:
     """Lowest set bit of each number of 16 bits, shape (65536,); 0 if none is set."""
     numbers = np.arange(1 << MOST_LEAVES)
@@ -259,11 +318,26 @@ def _parts(targets: Index, groups: Words) -> list[tuple[Index, Index]]:
     return [part for part in parts if len(set(targets[part[0]].tolist())) > 1]
 
 
-def _fit(features: Array, targets: Index, train: Index, profile: Profile) -> Trees:
-    """Train trees on some of the frames, without calibration."""
+def _boosted(
+    features: Array, targets: Index, train: Index, classes: int, profile: Profile
+) -> tuple[Array, Array, Array]:
+    """Boosted trees of some of the frames.
+
+    Returns:
+        Of each split the feature, the threshold, whether a missing feature is on its right, and its
+        leaves on the left, shape (5, rounds, classes, splits); leaves, shape (rounds, classes,
+        leaves); and what classes start from, shape (classes,).
+    """
     from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits
 
+    shape = profile.rounds, classes, profile.leaves
+    splits, leaf = np.zeros((5, *shape[:2], shape[2] - 1)), np.zeros(shape)
+    there = np.unique(targets[train])
+    prior = np.full(classes, UNSEEN)
+    prior[there] = 0.0
+    if len(there) < 2:
+        return splits, leaf, prior
     boosting = HistGradientBoostingClassifier(
         max_iter=profile.rounds,
         learning_rate=profile.learning_rate,
@@ -274,34 +348,16 @@ def _fit(features: Array, targets: Index, train: Index, profile: Profile) -> Tre
     )
     with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
         boosting.fit(features[train], targets[train])
-    classes = int(targets.max()) + 1
-    counts = np.bincount(targets[train], minlength=classes)
-    there = np.flatnonzero(counts)
     # Its trees are private attributes; a test compares ours with them. It has none for a class
     # without frames, and of two classes for the second alone.
     learnt = there if len(there) > 2 else there[1:]
-    prior = np.where(counts > 0, 0.0, UNSEEN)
     prior[learnt] = boosting._baseline_prediction.ravel()
-    shape = profile.rounds, classes, profile.leaves
-    splits, leaf = np.zeros((5, *shape[:2], shape[2] - 1)), np.zeros(shape)
     for number, trees in enumerate(boosting._predictors):
         for kind, tree in zip(learnt, trees, strict=True):
             rows, values = _lay_out(tree.nodes)
             splits[:, number, kind, : len(rows)] = np.transpose(rows)
             leaf[number, kind, : len(values)] = values
-    feature, threshold, missing, *left = splits.reshape(5, -1, shape[2] - 1)
-    return Trees(
-        feature=feature,
-        threshold=threshold,
-        left=np.array(left),
-        missing=missing,
-        leaf=leaf.reshape(-1, shape[2]),
-        prior=prior,
-        known=np.nanquantile(features[train], 1.0 - TAIL, axis=0),
-        calibration=identity(classes),
-        frequency=counts / len(train),
-        alarm=profile.alarm,
-    )
+    return splits, leaf, prior
 
 
 def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:

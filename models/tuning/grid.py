@@ -22,6 +22,7 @@ FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
 OWN = {
     "networks": ("networks", "units", "epochs", "decay", "alarm"),
     "trees": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
+    "detector": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
     "support vector machines": ("multiclass", "gamma", "regularization"),
 }
 ESTIMATOR_SETTINGS = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
