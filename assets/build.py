@@ -1,11 +1,11 @@
-"""Make the files that ship: simulate, train the models, measure them, cut the demo run.
+"""Make the files that ship: simulate, train the model, measure it, cut the demo run.
 
     python assets/build.py [--folder build] [--jobs 2]
 
-Models learn from logs of wide domains and from a few seeds of the scenarios at home: the training
-part of the sources, none of the targets (robots, control and sensing that are never learnt from).
-They are measured on the held-out part of the sources, on the targets, and at home, each with a
-section of its card. Killed and started again, this simulates only what is missing.
+The model learns from logs of wide domains at many rates and from a few seeds of the scenarios at
+home: the training part of the sources, none of the targets (robots, control and sensing that are
+never learnt from). It is measured on the held-out part of the sources, on the targets, and at home,
+each with a section of its card. Killed and started again, this simulates only what is missing.
 """
 
 import argparse
@@ -16,7 +16,7 @@ import scenarios
 from inspector.progress import progress
 from inspector.training.evaluation import evaluate
 from inspector.training.part import Part
-from inspector.training.training import train
+from inspector.training.training import ANY_RATE, train
 from noisemodel import Run
 from scenarios import domainset
 from scenarios.dataset import make
@@ -36,27 +36,24 @@ SEEDS = 2
 """Their seeds in every scenario, from 0."""
 TEST, FIRST, LAST = ("panda", "go2", "talos"), 55, 56
 """Robots whose scenarios at home are measured on, their first seed, and the one after the last."""
-RATES = {"1khz": 1000.0, "10khz": 10_000.0}
-COPIES = {"1khz": 2, "10khz": 2}
-"""Logs of each run, each of another logger."""
-MODELS = {
-    "joints-1khz": ("joints", 1000.0),
-    "general-10khz": ("general", 10_000.0),
-    "general-1khz": ("general", 1000.0),
-    "scalar-10khz": ("scalar", 10_000.0),
-    "scalar-1khz": ("scalar", 1000.0),
-}
-"""Profile and rate, in [Hz], by name."""
+RATES = (10_000.0, 2000.0, 1000.0, 500.0, 250.0, 125.0, 100.0, 80.0)
+"""Rates of the logs that are learnt from, in [Hz]."""
+SHOWN = (1000.0, 500.0, 250.0, 125.0)
+"""Rates of the logs of targets, in [Hz]."""
+COPIES = 2
+"""Logs of each run at 1 kHz and above, each of another logger; below, one."""
+NAME = "general"
 DEMO = ("panda", "obstacle-full", 102, 4.0)
 CARD = """# {name}
 
-Classifies frames of noise at {rate:g} Hz: {classes}, or unknown.
-Input signals: {signals}.
+Classifies frames of noise at any rate from 80 Hz to 10 kHz, by whatever signals a log has (desired
+and measured velocities, joint by joint or as norms, efforts; the noise alone): {classes}, or
+unknown.
 
-Made by `make models`: profile `{profile}`, trained on {runs} runs of {robots} robots: logs of wide
-domains (docs/domains.md, {domains} seeds of every source robot) and {seeds} seeds of every scenario
-at home (recipe {recipe}) of {home}, each without the part that is held out by hash. The model file
-has the hashes of all of them. Their licences allow anyone anything (docs/robots.md).
+Made by `make models`: profile `general`, trained on {runs} logs of {robots} robots: logs of wide
+domains (docs/domains.md, {domains} seeds of every source robot) at {rates} Hz, and {seeds} seeds of
+every scenario at home (recipe {recipe}) of {home}, each without the part that is held out by hash.
+The model file has the hashes of all of them. Their licences allow anyone anything (docs/robots.md).
 
 Never learnt from: {targets}; impedance control, encoders of 13 bit or fewer, samples held four
 times or more; any real robot; any other simulator. Measures are defined in docs/evaluation.md.
@@ -69,26 +66,23 @@ def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--folder", type=Path, default=HERE.parent / "build")
     arguments.add_argument("--jobs", type=int, default=2)
-    arguments.add_argument("--models", nargs="*", default=list(MODELS), choices=list(MODELS))
     options = arguments.parse_args()
     build: Path = options.folder
     wide = simulate(build / "domains", wide_tasks(), options.jobs, "domains")
     home = simulate(build / "home", home_tasks(), options.jobs)
     test = simulate(build / "home-test", test_tasks(), options.jobs)
-    for name in options.models:
-        profile, rate = MODELS[name]
-        kind = name.rpartition("-")[2]
-        sides: tuple[domainset.Side, ...] = ("source", "target", "logger")
-        source, target, logger = (logs(wide, build, kind, side) for side in sides)
-        path = HERE / "models" / f"{name}.npz"
-        train([source, home.path], profile, rate, path, part=Part.TRAINING, overwrite=True)
-        sections = {
-            "Other seeds of the same robots, in wide domains": [source],
-            "Robots and control that were never learnt from": [target],
-            "Loggers that were never learnt from, other seeds of the same robots": [logger],
-            f"The scenarios at home, seed {FIRST}": [test.path],
-        }
-        write_card(name, path, sections)
+    sources = [logs(wide, build, rate, "source") for rate in RATES]
+    path = HERE / "models" / f"{NAME}.npz"
+    train([*sources, home.path], ANY_RATE, None, path, part=Part.TRAINING, overwrite=True)
+    sections = {"Other seeds of the same robots, in wide domains, at 1 kHz": [sources[2]]}
+    for rate in SHOWN:
+        title = f"Robots and control that were never learnt from, at {rate:g} Hz"
+        sections[title] = [logs(wide, build, rate, "target")]
+    sections["Loggers that were never learnt from, other seeds of the same robots"] = [
+        logs(wide, build, 1000.0, "logger")
+    ]
+    sections[f"The scenarios at home, seed {FIRST}"] = [test.path]
+    write_card(path, sections)
     demo().save(HERE / "runs" / "demo.npz", overwrite=True)
 
 
@@ -117,34 +111,33 @@ def simulate(path: Path, tasks: list[Task], jobs: int, form: str = "samples") ->
     return folder
 
 
-def logs(wide: Folder, build: Path, kind: str, side: domainset.Side) -> Path:
+def logs(wide: Folder, build: Path, rate: float, side: domainset.Side) -> Path:
     """Logs of one rate of sources or of targets, written unless they are there."""
-    path = build / f"{side}-{kind}"
+    path = build / f"{side}-{rate:g}"
     if not path.exists():
         part = path.with_suffix(".part")
-        found = domainset.logs(wide, copies=COPIES[kind], rate=RATES[kind], side=side)
+        copies = COPIES if rate >= 1000.0 else 1
+        found = domainset.logs(wide, copies=copies, rate=rate, side=side)
         for _ in domainset.write(found, part):
             pass
         part.rename(path)
     return path
 
 
-def write_card(name: str, path: Path, sections: dict[str, list[Path]]) -> None:
+def write_card(path: Path, sections: dict[str, list[Path]]) -> None:
     """Measure a model, and write its card: what it was trained on, its figures, its limits."""
-    model = models.Classifier.load(path)
+    model = models.load(path)
     texts = []
     for title, inputs in sections.items():
         part = Part.TEST if "same robots" in title else Part.ALL
         report = evaluate(path, inputs, part=part)
         texts.append(f"## {title}\n\n```\n{report}\n```\n")
-        print(f"\n{name}: {title}\n{report}", flush=True)
+        print(f"\n{path.stem}: {title}\n{report}", flush=True)
     robots = {models.splitting.robot_of(run) for run in model.runs}
     card = CARD.format(
-        name=name,
-        signals=", ".join(model.profile.signals),
-        rate=model.rate,
+        name=path.stem,
+        rates=", ".join(f"{rate:g}" for rate in RATES),
         classes=", ".join(model.classes),
-        profile=MODELS[name][0],
         runs=len(model.runs),
         robots=len(robots & set(WIDE)),
         domains=DOMAINS,

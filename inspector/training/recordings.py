@@ -287,6 +287,13 @@ def faults(
     return tuple(found)
 
 
+def samples(inputs: Sequence[Path]) -> Iterator[Path]:
+    """Samples among files, and in folders of them."""
+    for path in inputs:
+        files = sorted(path.rglob("*.npz")) if path.is_dir() else [path]
+        yield from (file for file in files if is_sample(file))
+
+
 def count(inputs: Sequence[Path]) -> int:
     """Number of recordings in files and folders, or a few more: the length of a progress bar."""
     return sum(

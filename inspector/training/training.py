@@ -8,15 +8,15 @@ import models
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.recordings import classified, count
-from models.logbands import LOWEST
+from inspector.training.recordings import classified, count, samples
+from models.logbands import HIGHEST, LOWEST
 from noisemodel.atomic import refuse_existing
 
 ANY_RATE = "general"
 """The profile of a model for any rate."""
 RATE = 10_000.0
 """Rate of a model of one rate unless another is given, in [Hz]."""
-THIN = 4
+THIN = 8
 """A general model learns from every so many `ok` frames of a log."""
 
 PROFILES: dict[str, Callable[[float], models.Profile]] = {
@@ -149,10 +149,13 @@ def _train_general(inputs: Sequence[Path], output: Path, *, part: Part, overwrit
     """Train a general model and write it, see `train`."""
     refuse_existing(output, overwrite=overwrite)
     left_out = LeftOut()
-    read = progress(classified(inputs, None, part, bare_too=True), "read", total=count(inputs))
     slowest = models.ANY.bound(LOWEST, (models.NOISE,))
-    usable = left_out.without((recording for recording, _ in read), slowest)
-    parts = list(models.frames_of(usable, models.ANY, thin=THIN))
+    fast = list(samples(inputs))  # have noise of two rates
+    parts: list[models.Frames] = []
+    for paths, rate in ((inputs, None), (fast, HIGHEST)):
+        read = progress(classified(paths, rate, part, bare_too=True), "read", total=count(paths))
+        usable = left_out.without((recording for recording, _ in read), slowest)
+        parts += models.frames_of(usable, models.ANY, thin=THIN)
     if not parts:
         raise InspectorError(f"no run to train {ANY_RATE} on; {left_out}")
     frames = models.Frames.joined(parts)
