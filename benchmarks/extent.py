@@ -21,21 +21,24 @@ import numpy as np
 
 import noisemodel as nm
 from inspector.analysis.analyse import extents
-from inspector.assets import model_files
 from inspector.library import load_library
+from models.signals import JOINTS, MOTION, NOISE
 from scenarios.sample import DECIMATED, Sample
 
 WITHIN = (0.05, 0.1, 0.2)
 """Errors that are counted, in [s]."""
 CLASSES = ("impact", "highaccelerations", "oscillations", "all")
-MODELS = ("joints-1khz", "scalar-10khz")
-"""Models whose findings are measured."""
-LIBRARY = load_library([path for path in model_files() if path.stem in MODELS])
+GENERAL = load_library()["general"]
+LIBRARY = {
+    "joints at 1 kHz": GENERAL.at(DECIMATED, (*MOTION, *JOINTS)),
+    "noise at 10 kHz": GENERAL.at(10_000.0, (NOISE,)),
+}
+"""The shipped model, bound to what is measured."""
 
 
 def run_of(sample: Sample, model: str) -> nm.Run:
-    """Make a run of what a sample keeps: joints at 1 kHz, or the scalar noise."""
-    if model.startswith("scalar"):
+    """Make a run of what a sample keeps: joints at 1 kHz, or the noise."""
+    if model.startswith("noise"):
         time = np.arange(len(sample.noise)) / sample.rate
         return nm.Run(time=time, velocity=sample.noise[:, None], joint_names=("noise",))
     measured, desired = (sample.joints[f"{name}_joints"].T for name in ("measured", "desired"))
@@ -75,7 +78,7 @@ def main() -> None:
     options = arguments.parse_args()
     paths = sorted(options.folder.glob("*/*.npz"))
     chosen = [path for path in paths if int(path.stem.rpartition("-")[2]) % 2 == options.odd]
-    for model in MODELS:
+    for model in LIBRARY:
         found: dict[tuple[str, str], list[tuple[float, float]]] = defaultdict(list)
         for path in chosen:
             for label, which, error in errors(Sample.load(path), model):

@@ -1,7 +1,7 @@
 """The three tables of the paper, with the measures of models on simulated runs.
 
     python benchmarks/paper.py --training DATA --test DATA … --output build/paper
-        [--part test] [--from 10] [--good DATA …] [--seeds 8] [--profiles general …]
+        [--part test] [--from 10] [--good DATA …] [--seeds 8] [--profiles norms …]
         [--models FILE …] [--limit RUNS] [--jobs 2]
 
 Profiles are trained on the training part of a data set; since the time of libsvm grows with the
@@ -43,7 +43,7 @@ SHIPPED = Path(__file__).parents[1] / "assets" / "models"
 RATE = 10_000.0
 PROFILES = (
     *("noisytest-linear", "noisytest-rbf", "paper-linear", "paper-rbf"),
-    *("scalar", "general"),
+    *("scalar", "norms"),
 )
 HALF = {"talos": ("left_sole_link",), "go2": ("FL_foot", "RR_foot")}
 """Limbs of the third table; an arm has only one."""

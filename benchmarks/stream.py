@@ -2,11 +2,11 @@
 
     python benchmarks/stream.py [--seconds 20] [--turns 9]
 
-For each shipped model (with 12 joints, if it takes joints), in chunks of a sample, 1 ms, 20 ms and
-a hop, and whole: the ratio to real time, and the latency from the sample that completes a frame to
-its label; of a whole signal, the time that each label takes. Rows take turns,
-since a busy machine is half as fast for seconds at a time: printed are the medians over all turns
-and, after a slash, those of the best turn.
+For the shipped model at three rates, joint by joint with 12 joints, by norms and by the noise
+alone, in chunks of a sample, 1 ms, 20 ms and a hop, and whole: the ratio to real time, and the
+latency from the sample that completes a frame to its label; of a whole signal, the time that each
+label takes. Rows take turns, since a busy machine is half as fast for seconds at a time: printed
+are the medians over all turns and, after a slash, those of the best turn.
 """
 
 import argparse
@@ -20,10 +20,13 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import models
-from models.signals import by_joint
+from models.signals import JOINTS, MOTION, NOISE, by_joint
 
-MODELS = Path(__file__).parents[1] / "assets" / "models"
-JOINTS = 12
+MODEL = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
+RATES = (125.0, 1000.0, 10_000.0)
+"""Rates of the signals, in [Hz]."""
+INPUTS = {"joints": (*MOTION, *JOINTS), "norms": MOTION, "noise": (NOISE,)}
+MANY = 12
 """Number of joints, that of a quadruped."""
 
 
@@ -35,7 +38,7 @@ def measure(
     Returns:
         Total CPU time, then the median and the 99th percentile of the latency, in [s].
     """
-    stream, wall = models.Stream(classifier, joints=JOINTS), []
+    stream, wall = models.Stream(classifier, joints=MANY), []
     count = next(iter(signals.values())).shape[-1]
     start_cpu = time.process_time()
     for first in range(0, count, chunk):
@@ -53,16 +56,22 @@ def main() -> None:
     arguments.add_argument("--seconds", type=float, default=20.0)
     arguments.add_argument("--turns", type=int, default=9)
     options = arguments.parse_args()
-    classifiers = {path.stem: models.Classifier.load(path) for path in sorted(MODELS.glob("*.npz"))}
+    general = models.load(MODEL)
+    assert isinstance(general, models.General)
+    classifiers = {
+        f"{name}, {rate:g} Hz": general.at(rate, signals)
+        for name, signals in INPUTS.items()
+        for rate in RATES
+    }
     random, found = np.random.default_rng(0), defaultdict(list)
     for _ in range(options.turns):
         for name, classifier in classifiers.items():
             rate, count = classifier.rate, round(options.seconds * classifier.rate)
             signals = {
-                signal: 1.0 + 0.1 * random.standard_normal((JOINTS,) * by_joint(signal) + (count,))
+                signal: 1.0 + 0.1 * random.standard_normal((MANY,) * by_joint(signal) + (count,))
                 for signal in classifier.profile.signals
             }
-            for chunk in sorted({1, round(rate / 1000), round(rate / 50), classifier.profile.hop}):
+            for chunk in sorted({max(1, round(rate * each)) for each in (0.0, 0.001, 0.02, 0.1)}):
                 part = count if chunk > rate / 500 else count // 10
                 some = {signal: each[..., :part] for signal, each in signals.items()}
                 whole, *times = measure(classifier, some, chunk)
@@ -71,11 +80,11 @@ def main() -> None:
             labels = classifier.classify(signals, rate)
             taken = time.process_time() - start_cpu
             found[name, "whole"].append((options.seconds / taken, 1e3 * taken / len(labels)))
-    print(f"{'model':14} {'chunk':>6} {'x real time':>12} {'label: median, 99 % [ms]':>30}")
+    print(f"{'input':16} {'chunk':>6} {'x real time':>12} {'label: median, 99 % [ms]':>30}")
     for (name, chunk), turns in found.items():
         ratio, *times = np.median(turns, axis=0)
         most, *least = np.max(turns, axis=0)[0], *np.min(turns, axis=0)[1:]
-        print(f"{name:14} {chunk:>6} {ratio:5.0f} / {most:4.0f}", end="")
+        print(f"{name:16} {chunk:>6} {ratio:5.0f} / {most:4.0f}", end="")
         for typical, best in zip(times, least, strict=True):
             print(f" {typical:7.3f} / {best:5.3f}", end="")
         print()

@@ -1,7 +1,7 @@
 """Leave one robot out: the measures of models on an unseen robot.
 
     python -m benchmarks.unseen DATA … --output build/unseen
-        [--profiles general noisytest-rbf] [--robots go2] [--seeds 10] [--rate 1000]
+        [--profiles norms noisytest-rbf] [--robots go2] [--seeds 10] [--rate 1000]
 
 Each profile is trained on the training part of all robots but one, and measured on the test part of
 that one. Profiles of NoisyTest and of the paper exist at 10 kHz only; since the time of libsvm
@@ -38,7 +38,7 @@ def main() -> None:
     )
     arguments.add_argument("data", type=Path, nargs="+")
     arguments.add_argument("--output", type=Path, required=True, help="folder of the models")
-    arguments.add_argument("--profiles", nargs="*", default=["general"])
+    arguments.add_argument("--profiles", nargs="*", default=["norms"])
     arguments.add_argument("--robots", nargs="*", help="to leave out, in turn; by default all")
     arguments.add_argument("--seeds", type=int, help="of each robot, to train on; by default all")
     arguments.add_argument("--rate", type=float, default=10_000.0)
