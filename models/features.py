@@ -123,11 +123,11 @@ def feature_count(profile: Profile) -> int:
     return profile.norms * (profile.bins // 3) * profile.transforms
 
 
-def standard(plain: Array, profile: Profile) -> tuple[Array, Array]:
+def standard(plain: Real, profile: Profile) -> tuple[Array, Array]:
     """Mean and scale for the standardisation of features; 0 and 1 if they stay as they are.
 
     Args:
-        plain: Features of the training set, shape (frames, features).
+        plain: Features of the training set, NaN where they are missing, shape (frames, features).
         profile: Least standard deviation.
 
     Returns:
@@ -135,7 +135,9 @@ def standard(plain: Array, profile: Profile) -> tuple[Array, Array]:
     """
     if not profile.least_deviation:
         return np.zeros(plain.shape[1]), np.ones(plain.shape[1])
-    return plain.mean(axis=0), np.maximum(plain.std(axis=0), profile.least_deviation)
+    deviation: Array = np.nanstd(plain, axis=0, dtype=np.float64)
+    mean: Array = np.nanmean(plain, axis=0, dtype=np.float64)
+    return mean, np.maximum(deviation, profile.least_deviation)
 
 
 def spectrogram(frames: Array, *, window: int, stride: int) -> Array:

@@ -17,9 +17,11 @@ from models import modelfile
 from models.classifier import Classifier
 from models.confusion import Evaluation
 from models.errors import DatasetError, MissingSignalError, RateError
+from models.estimators.calibration import unthinned
 from models.estimators.trees import Detector, Trees
-from models.evaluation.matching import UNCLEAR, Matched
+from models.evaluation.matching import OK, UNCLEAR, Matched
 from models.evaluation.predictions import silent
+from models.features import standard
 from models.framefeatures import frame_features
 from models.labels import UNKNOWN
 from models.logbands import HIGHEST, INPUTS, LOWEST, LogBands
@@ -28,7 +30,7 @@ from models.profile import TOLERANCE
 from models.recording import Recording
 from models.reference import Reference
 from models.signals import NOISE, feeds, named
-from models.types import Array, Real, Words
+from models.types import Array, Mask, Real, Words
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
@@ -116,19 +118,16 @@ class General:
         # A feature that no frame has tells nothing, wherever its frames would be.
         unknown = np.isnan(frames.features).all(axis=0)
         features = np.where(unknown, 0.0, frames.features)
-        mean = np.asarray(np.nanmean(features, axis=0, dtype=np.float64))
-        scale = np.maximum(np.nanstd(features, axis=0, dtype=np.float64), recipe.least_deviation)
+        profile = recipe.bound(HIGHEST)
+        mean, scale = standard(features, profile)
         targets = np.array([classes.index(label) for label in frames.labels.tolist()])
         scaled = (features - mean) / scale
-        profile = recipe.bound(HIGHEST)
         trees = Detector.fit(scaled, targets, frames.groups, profile)
         relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
-        shift = np.zeros(len(trees.calibration))
-        shift[1] = np.log(thin)  # of the logits of `ok`
         trees = replace(
             trees,
             known=np.where(relative | unknown, UNBOUNDED, trees.known),
-            calibration=trees.calibration + shift,
+            calibration=unthinned(trees.calibration, thin),
         )
         model = cls(recipe, classes, trees, mean, scale, dict(frames.hashes))
         metrics = {"training": model.evaluate(frames).as_dict()}
@@ -246,10 +245,21 @@ def frames_of(
             starts, features = frame_features(recording.signal, profile, recording.valid)
             frames = silent(recording, starts, profile.duration)
             truth = Matched.of([frames]).frames.truth
-            ok = truth == "ok"
-            known = (truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0))
+            known = kept(truth, thin)
             full = np.full((int(known.sum()), count), np.nan, dtype=np.float32)
             full[:, recipe.places(profile)] = features[known]
             full[:, recipe.without_unit] = np.nan
             groups = np.full(len(full), frames.group)
             yield Frames(full, truth[known], groups, {recording.name: recording.sha256})
+
+
+def kept(truth: Words, thin: int) -> Mask:
+    """Which frames to train on: all of a known class, but only every ``thin``-th `ok` one.
+
+    Args:
+        truth: True class of each frame, `UNCLEAR` where that is not known, shape (frames,).
+        thin: Of `ok` frames.
+    """
+    ok = truth == OK
+    known: Mask = (truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0))
+    return known

@@ -68,6 +68,18 @@ def of_seen_classes(targets: Index, train: Index, test: Index) -> Index:
     return test[np.isin(targets[test], targets[train])]
 
 
+def unthinned(calibration: Array, thin: int) -> Array:
+    """Calibration for all frames, of one for every ``thin``-th `ok` frame and all failures.
+
+    Args:
+        calibration: Scale and offsets, as `calibrated` takes them, shape (1 + classes,).
+        thin: The odds of `ok`, the first class, are multiplied by it.
+    """
+    shift = np.zeros(len(calibration))
+    shift[1] = np.log(thin)
+    return calibration + shift
+
+
 def identity(classes: int) -> Array:
     """The calibration that changes nothing, shape (1 + classes,)."""
     return np.append(1.0, np.zeros(classes))
