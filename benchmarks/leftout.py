@@ -1,13 +1,18 @@
 """Leave robots out in turn: choose estimator, size and alarm threshold on source domains alone.
 
-    python -m benchmarks.leftout LOGS... [--profile joints] [--rate 1000] [--thin 4]
-        [--grid rounds=40,100 leaves=4,16] [--alarms 0.5 0.7 0.9] [--novelty 2 4 inf] [--budget 30]
+    python -m benchmarks.leftout LOGS... [--profile general] [--rate 1000] [--thin 8]
+        [--grid rounds=100,200 leaves=4,8 learning_rate=0.05,0.15] [--without relative joints]
+        [--alarms 0.5 0.7 0.9] [--novelty 2 4 inf] [--budget 30]
 
 LOGS are annotated run files of source domains, and folders of them; a run of a target domain is
 refused. Robots are dealt into folds, those of one line (anymal, anymal_c) together and each family
 evenly. Each candidate is trained on all folds but one and predicts the runs of that one as
 `inspector classify` does, but for the estimated onset and end of findings. Candidates are the
-points of the grid, and logistic regression on the same features.
+points of the grid, and logistic regression on the same features, missing ones at their mean.
+
+The general profile takes logs of any rates, each once with each of the inputs that training takes
+of it (`models.general.LEARNT`): what is said of runs below holds for each pair of a run and an
+input. Features can be left out by name, for ablations. Other profiles are of one rate.
 
 All measures are computed for each robot while it is left out, and averaged over robots: AUC and
 pAUC of runs by the harmonic mean, shares and rates by the mean. The thresholds of a candidate, of
@@ -34,20 +39,23 @@ import models
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.recordings import classified
-from inspector.training.training import LeftOut, lacking, profile_at
-from models.estimators.calibration import identity
+from inspector.training.training import ANY_RATE, THIN, LeftOut, lacking, profile_at
+from models.estimators.calibration import identity, unthinned
 from models.estimators.estimator import ESTIMATORS
 from models.estimators.probabilistic import NOVELTY_LIMIT, Probable
 from models.estimators.trees import TAIL, Trees
 from models.evaluation.intervals import ratio
 from models.evaluation.matching import OK, UNCLEAR, Matched
 from models.evaluation.outcomes import Outcome
-from models.evaluation.predictions import Predictions, within
+from models.evaluation.predictions import Predictions, silent
 from models.evaluation.ranking import auc, harmonic_mean, partial_auc
 from models.features import standard
 from models.framefeatures import frame_features
-from models.labels import Labels
-from models.splitting import folds, group_of
+from models.general import LEARNT, UNBOUNDED, kept
+from models.logbands import ANY, HIGHEST, LOWEST
+from models.pooling import RELATIVE, columns
+from models.signals import EFFORT, JOINTS, NOISE, feeds, named
+from models.splitting import folds
 from models.tuning.grid import Grid
 from noisemodel import NoiseModelError
 from scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
@@ -57,6 +65,17 @@ ALARMS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 
 """Alarm thresholds."""
 PENALTY = 0.01
 """C of logistic regression."""
+RATE = 1000.0
+"""Rate of a profile of one rate unless another is given, in [Hz]."""
+INPUTS = dict(zip(LEARNT, ("motion with efforts", "motion", "measured", "noise"), strict=True))
+"""Names of the inputs of the general profile, by their signals."""
+WITHOUT = {
+    "relative": f"{RELATIVE} ",
+    "plain": f"(?!{RELATIVE} )",
+    "efforts": f".*{EFFORT}",
+    "joints": f".*({'|'.join(JOINTS)})",
+}
+"""Features of the general profile that can be left out: what their names match."""
 COUNTS = (
     *("false_alarms", "ok_hours", "found_felt", "felt", "found", "faults"),
     *("recalled", "failing"),
@@ -99,15 +118,18 @@ class Known:
     """What is kept of a run.
 
     Attributes:
+        profile: How it is framed.
         base: The run, without predictions.
         failing: Whether each frame of the whole run is a failure, shape (frames,).
         starts: First sample of each, shape (frames,).
         start: Time of the first sample, in [s].
-        whole: Features of these frames, shape (frames, features).
-        cut: Features of the frames to train on, shape (cut, features).
+        whole: Features of these frames that there are, shape (frames, there).
+        cut: Those of the frames to train on, shape (cut, there).
         labels: Class of each, shape (cut,).
+        places: Which of all features they are, shape (there,).
     """
 
+    profile: models.Profile
     base: Predictions
     failing: np.ndarray
     starts: np.ndarray
@@ -115,22 +137,30 @@ class Known:
     whole: np.ndarray
     cut: np.ndarray
     labels: np.ndarray
+    places: np.ndarray
 
     @property
     def robot(self) -> str:
         """Its robot."""
         return self.base.origin.robot
 
-    def thinned(self, thin: int) -> tuple[np.ndarray, np.ndarray]:
-        """Features and classes of the frames to train on, with every ``thin``-th `ok` frame."""
-        ok = self.labels == OK
-        kept = ~ok | (np.cumsum(ok) % thin == 1 % thin)
-        return self.cut[kept], self.labels[kept]
+    @property
+    def part(self) -> tuple[int, str]:
+        """Its rate, in [Hz], and its input."""
+        return round(self.profile.rate), INPUTS.get(self.profile.signals, self.profile.name)
+
+    def wide(self, features: np.ndarray, count: int) -> np.ndarray:
+        """All features, NaN where they are missing, of those that there are."""
+        found = np.full((len(features), count), np.nan, dtype=np.float32)
+        found[:, self.places] = features
+        return found
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Linear(Probable):
     """Multinomial logistic regression with the decisions of our estimators, not calibrated.
+
+    Features that are missing are at the mean of those that are not.
 
     Attributes:
         weights: Shape (features, classes).
@@ -147,14 +177,15 @@ class Linear(Probable):
         """Train it with scikit-learn."""
         from sklearn.linear_model import LogisticRegression
 
-        fitted = LogisticRegression(C=PENALTY, max_iter=300).fit(scaled.astype(np.float32), targets)
+        known = np.nan_to_num(scaled.astype(np.float32), copy=False)
+        fitted = LogisticRegression(C=PENALTY, max_iter=300).fit(known, targets)
         weights, offset = fitted.coef_.T, fitted.intercept_
         if len(offset) == 1:  # of two classes, it has the second alone
             weights, offset = (np.concatenate((0 * each, each), -1) for each in (weights, offset))
         return cls(
             weights=weights.astype(np.float64),
             offset=offset.astype(np.float64),
-            known=np.quantile(scaled, 1.0 - TAIL, axis=0),
+            known=np.nanquantile(scaled, 1.0 - TAIL, axis=0),
             calibration=identity(len(offset)),
             frequency=np.bincount(targets) / len(targets),
             alarm=alarm,
@@ -167,7 +198,7 @@ class Linear(Probable):
 
     def logits(self, features: np.ndarray) -> np.ndarray:
         """Logits of the classes, shape (frames, classes)."""
-        return features @ self.weights + self.offset
+        return np.nan_to_num(features) @ self.weights + self.offset
 
 
 Fit = Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[Any]]
@@ -189,6 +220,7 @@ class Measured:
     Attributes:
         name: Of the candidate.
         robots: Of the runs, shape (runs,).
+        parts: Rates and inputs of the runs.
         score: Of the runs, shape (runs,).
         thresholds: All thresholds.
         counts: Counts of each run at each threshold, by name, shape (thresholds, runs).
@@ -197,6 +229,7 @@ class Measured:
 
     name: str
     robots: np.ndarray
+    parts: Sequence[tuple[int, str]]
     score: np.ndarray
     thresholds: Sequence[Threshold]
     counts: Mapping[str, np.ndarray]
@@ -223,6 +256,15 @@ class Measured:
         known = ~np.isnan(values)
         return np.asarray(ratio(np.where(known, values, 0.0).sum(axis=1), known.sum(axis=1)))
 
+    def of(self, part: tuple[int, str]) -> "Measured":
+        """The same on runs of one rate and input alone."""
+        mine = np.array([each == part for each in self.parts])
+        counts = {name: each[:, mine] for name, each in self.counts.items()}
+        parts = [part] * int(mine.sum())
+        return replace(
+            self, robots=self.robots[mine], parts=parts, score=self.score[mine], counts=counts
+        )
+
     def chosen(self, budget: float) -> int | None:
         """Number of the threshold that finds most felt faults within a budget, None without one.
 
@@ -234,6 +276,12 @@ class Measured:
         if not len(allowed):
             return None
         return int(allowed[np.lexsort((false[allowed], -found[allowed]))[0]])
+
+    def ranked(self, number: int | None) -> tuple[str, ...]:
+        """Measures of the ranking of runs, and those at a threshold if there is one."""
+        ranks = (f"{self.ranking(each):.3f}" for each in (partial_auc, auc))
+        at = ("none",) + ("-",) * 6 if number is None else self.cells(number)
+        return (*ranks, *at)
 
     def cells(self, number: int) -> tuple[str, ...]:
         """Measures at a threshold, as the table has them."""
@@ -254,37 +302,48 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     arguments.add_argument("logs", type=Path, nargs="+")
-    arguments.add_argument("--profile", default="joints")
-    arguments.add_argument("--rate", type=float, default=1000.0)
+    arguments.add_argument("--profile", default=ANY_RATE)
+    arguments.add_argument("--rate", type=float, help=f"of other profiles, by default {RATE:g} Hz")
+    arguments.add_argument("--without", nargs="+", choices=WITHOUT, default=[], help="features")
     arguments.add_argument("--grid", nargs="*", default=[], help="settings and their values")
     arguments.add_argument("--alarms", type=float, nargs="+", default=ALARMS)
     arguments.add_argument("--novelty", type=float, nargs="+", default=(NOVELTY_LIMIT,))
     arguments.add_argument("--budget", type=float, default=30.0, help="false alarms per hour")
     arguments.add_argument("--folds", type=int, default=6)
-    arguments.add_argument("--thin", type=int, default=1, help="train on every k-th ok frame")
+    arguments.add_argument(
+        "--thin", type=int, help=f"train on every k-th ok frame; {THIN} or, of one rate, 1"
+    )
     arguments.add_argument("--quick", action="store_true", help="trees without calibration")
     arguments.add_argument("--limit", type=int, help="runs of each robot, by default all")
     arguments.add_argument("--jobs", type=int, default=2, help="processes that read")
     arguments.add_argument("--no-logistic", action="store_true", help="without that candidate")
     given = arguments.parse_args()
     try:
-        profile = profile_at(given.profile, given.rate)
+        profile, names = wanted(given.profile, given.rate, given.without)
+        thin = given.thin or (THIN if names else 1)
         several = [*candidates(profile, given.grid)]
         if not given.no_logistic:
             several.append(logistic(profile))
         began = perf_counter()
-        runs, left_out = read(files(given.logs, given.limit), profile, jobs=given.jobs)
-        print(f"{len(runs)} runs, read in {perf_counter() - began:.0f} s; {left_out}")
+        paths = files(given.logs, given.limit)
+        runs, left_out = read(paths, profile, thin=thin, names=names, jobs=given.jobs)
+        print(
+            f"{len(runs)} pairs of run and input of {len(paths)} runs, read in"
+            f" {perf_counter() - began:.0f} s; {left_out}"
+        )
         split = robot_folds([run.robot for run in runs], given.folds)
         for number, (_, test) in enumerate(split, start=1):
             robots = sorted({runs[index].robot for index in test})
-            print(f"fold {number} leaves out {len(test)} runs of {', '.join(robots)}", flush=True)
+            print(f"fold {number} leaves out {len(test)} of {', '.join(robots)}", flush=True)
         began = perf_counter()
         thresholds = [Threshold(*each) for each in product(given.alarms, given.novelty)]
         shown = progress(split, "fold", total=len(split))
         with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
             measured = measure(
-                runs, shown, several, profile, thresholds, thin=given.thin, quick=given.quick
+                *(runs, shown, several, profile, thresholds),
+                names=names,
+                thin=thin,
+                quick=given.quick,
             )
     except (InspectorError, models.ModelsError) as error:
         sys.exit(str(error))
@@ -304,88 +363,143 @@ def files(logs: Sequence[Path], limit: int | None = None) -> list[Path]:
     return found
 
 
+def wanted(
+    name: str, rate: float | None = None, without: Sequence[str] = ()
+) -> tuple[models.Profile, tuple[str, ...]]:
+    """A profile by its name, and the names of its features if it is the general one.
+
+    Args:
+        name: ``ANY_RATE``, or one of `inspector.training.training.PROFILES`.
+        rate: Of a profile of one rate, in [Hz].
+        without: Features of the general profile to leave out, of ``WITHOUT``.
+
+    Raises:
+        InspectorError: If there is no such profile, a setting is another profile's, or no feature
+            is left.
+    """
+    if name != ANY_RATE:
+        if without:
+            raise InspectorError(f"profile {name} is of one rate; leave out --without")
+        return profile_at(name, RATE if rate is None else rate), ()
+    if rate is not None:
+        raise InspectorError(f"profile {name} is for any rate; leave out --rate {rate:g}")
+    unused = [re.compile(WITHOUT[each]) for each in without]
+    names = tuple(
+        name
+        for number, name in enumerate(ANY.columns)
+        if number not in ANY.without_unit and not any(each.match(name) for each in unused)
+    )
+    if not names:
+        raise InspectorError(f"no feature is left without {', '.join(without)}")
+    return ANY.bound(HIGHEST), names
+
+
 def read(
-    paths: Sequence[Path], profile: models.Profile, *, jobs: int = 1
+    paths: Sequence[Path],
+    profile: models.Profile,
+    *,
+    thin: int = 1,
+    names: Sequence[str] = (),
+    jobs: int = 1,
 ) -> tuple[list[Known], LeftOut]:
     """Features of runs; only they are kept, and runs that lack a signal are left out.
+
+    Args:
+        paths: Run files.
+        profile: What to compute, at one rate or, with ``names``, at that of each run.
+        thin: Train on every ``thin``-th `ok` frame of a run.
+        names: Of the features of the general profile.
+        jobs: Processes.
 
     Raises:
         TargetError: If a run is of a target domain.
         InspectorError: If a run names no robot, or none is left.
     """
-    runs, left_out = [], LeftOut()
-    for one in Parallel(n_jobs=jobs)(delayed(known)(path, profile) for path in paths):
-        if isinstance(one, Known):
-            runs.append(one)
+    runs: list[Known] = []
+    left_out = LeftOut()
+    each = (delayed(known)(path, profile, thin, names) for path in paths)
+    for found in Parallel(n_jobs=jobs)(each):
+        if isinstance(found, list):
+            runs += found
         else:
-            left_out.runs.setdefault(one[1], []).append(one[0])
+            left_out.runs.setdefault(found[1], []).append(found[0])
     if not runs:
         raise InspectorError(f"no run to train on; {left_out}")
     return runs, left_out
 
 
-def known(path: Path, profile: models.Profile) -> Known | tuple[str, str]:
-    """Features of a run; its name and a reason if it cannot be used."""
+def known(
+    path: Path, profile: models.Profile, thin: int, names: Sequence[str]
+) -> list[Known] | tuple[str, str]:
+    """Features of a run, of each of its inputs; its name and a reason if it cannot be used."""
     try:
-        return _known(path, profile)
+        return _known(path, profile, thin, names)
     except TargetError:
         raise
     except (InspectorError, models.ModelsError, NoiseModelError) as error:
         raise InspectorError(str(error)) from None  # not all errors can come from a process
 
 
-def _known(path: Path, profile: models.Profile) -> Known | tuple[str, str]:
-    ((recording, run),) = classified([path], profile.rate, bare_too=True)
+def _known(
+    path: Path, profile: models.Profile, thin: int, names: Sequence[str]
+) -> list[Known] | tuple[str, str]:
+    ((recording, run),) = classified([path], None if names else profile.rate, bare_too=True)
     robot = recording.facts.get("robot", "")
     if what := target(robot, run.meta if run else {}):
         raise TargetError(recording.name, what)
     if not robot:
         raise InspectorError(f"{path}: names no robot, of which each is left out in turn")
-    if reason := lacking(recording, profile):
+    if reason := lacking(recording, ANY.bound(LOWEST, (NOISE,)) if names else profile):
         return recording.name, reason
+    profiles = [profile]
+    if names:
+        inputs = [each for each in LEARNT if feeds(named(recording.signal), each)]
+        profiles = [ANY.bound(recording.rate, each) for each in inputs]
     try:
-        return of_recording(recording, profile)
+        return [of_recording(recording, each, thin=thin, names=names) for each in profiles]
     except models.SignalError:  # too short
         return recording.name, f"shorter than {profile.duration:g} s"
 
 
-def of_recording(recording: models.Recording, profile: models.Profile) -> Known:
-    """Features of a recording."""
+def of_recording(
+    recording: models.Recording,
+    profile: models.Profile,
+    *,
+    thin: int = 1,
+    names: Sequence[str] = (),
+) -> Known:
+    """Features of a recording.
+
+    Frames to train on are cut as training cuts them: of the general profile, those that
+    classifying cuts, for their features are relative to the recording so far.
+    """
     starts, whole = frame_features(recording.signal, profile, recording.valid)
-    try:
-        examples = models.Examples.of(models.Dataset.of([recording], profile), profile)
-        cut, labels = examples.features, examples.labels
-    except models.NoFrameError:
-        cut, labels = whole[:0], np.array([], dtype=str)
-    begin = recording.start + starts / profile.rate
-    silent = Labels(
-        begin,
-        begin + profile.duration,
-        np.full(len(starts), OK),
-        np.ones((len(starts), 1)),
-        (OK,),
-    )
-    nothing = np.array([], dtype=str)
-    base = Predictions(
-        recording.name,
-        group_of(recording.name),
-        1.0 / recording.rate,
-        within(recording),
-        nothing,
-        nothing,
-        silent,
-        recording.events,
-        recording.facts,
-    )
+    whole = whole.astype(np.float32)
+    base = silent(recording, starts, profile.duration)
     truth = Matched.of([base]).frames.truth
+    places = np.arange(whole.shape[1])
+    if names:
+        number = {name: place for place, name in enumerate(names)}
+        own = np.array([number.get(name, -1) for name in columns(profile)])
+        whole, places = whole[:, own >= 0], own[own >= 0]
+        cut, labels = whole, truth
+    else:
+        try:
+            examples = models.Examples.of(models.Dataset.of([recording], profile), profile)
+            cut, labels = examples.features.astype(np.float32), examples.labels
+        except models.NoFrameError:
+            cut, labels = whole[:0], truth[:0]
+    learnt = kept(labels, thin)
     return Known(
+        profile,
         base,
         (truth != OK) & (truth != UNCLEAR),
         starts,
         recording.start,
-        whole.astype(np.float32),
-        cut.astype(np.float32),
-        labels,
+        whole,
+        cut[learnt],
+        labels[learnt],
+        places,
     )
 
 
@@ -441,7 +555,7 @@ def candidates(profile: models.Profile, grid: Sequence[str]) -> Iterator[Candida
         points = [", ".join(f"{k} {v:g}" for k, v in point.items()) for point in axes.points()]
     together: dict[models.Profile, list[tuple[str, models.Profile]]] = {}
     for name, one in zip(points, profiles, strict=True):
-        key = replace(one, rounds=1) if profile.estimator == "trees" else one
+        key = replace(one, rounds=1) if issubclass(ESTIMATORS[one.estimator], Trees) else one
         together.setdefault(key, []).append((name, one))
     for group in together.values():
         names, mine = zip(*group, strict=True)
@@ -451,9 +565,10 @@ def candidates(profile: models.Profile, grid: Sequence[str]) -> Iterator[Candida
 def _trained(profiles: Sequence[models.Profile]) -> Fit:
     def fit(scaled: np.ndarray, targets: np.ndarray, groups: np.ndarray) -> Sequence[Any]:
         most = max(profiles, key=lambda profile: profile.rounds)
-        if most.estimator != "trees":
-            return [ESTIMATORS[most.estimator].fit(scaled, targets, groups, most)]
-        return Trees.staged(scaled, targets, groups, most, [each.rounds for each in profiles])
+        kind = ESTIMATORS[most.estimator]
+        if not issubclass(kind, Trees):
+            return [kind.fit(scaled, targets, groups, most)]
+        return kind.staged(scaled, targets, groups, most, [each.rounds for each in profiles])
 
     return fit
 
@@ -474,6 +589,7 @@ def measure(
     profile: models.Profile,
     thresholds: Sequence[Threshold],
     *,
+    names: Sequence[str] = (),
     thin: int = 1,
     quick: bool = False,
 ) -> list[Measured]:
@@ -485,60 +601,76 @@ def measure(
         several: The candidates.
         profile: What the features are of.
         thresholds: All thresholds.
-        thin: Every ``thin``-th `ok` frame is trained on; the prior of `ok` is corrected for it.
+        names: Of the features of the general profile.
+        thin: The runs have every ``thin``-th `ok` frame to train on; the prior of `ok` is corrected
+            for it.
         quick: Whether trees are not calibrated, in a third of the time: to rank candidates, as
             their thresholds are others then.
 
     Raises:
         DatasetError: If there is one class alone.
     """
-    names = [name for each in several for name in each.names]
-    counts = np.zeros((len(names), len(COUNTS), len(thresholds), len(runs)))
-    score, seconds = np.full((len(names), len(runs)), np.nan), np.zeros(len(names))
+    candidates = [name for each in several for name in each.names]
+    counts = np.zeros((len(candidates), len(COUNTS), len(thresholds), len(runs)))
+    score, seconds = np.full((len(candidates), len(runs)), np.nan), np.zeros(len(candidates))
+    count = len(names) or runs[0].whole.shape[1]
     for learn, test in split:
-        mean, scale = standard(np.concatenate([runs[each].cut for each in learn]), profile)
-        parts = [runs[each].thinned(thin) for each in learn]
-        scaled = (np.concatenate([part for part, _ in parts]) - mean) / scale
-        labels = np.concatenate([part for _, part in parts])
-        groups = np.repeat([runs[each].base.group for each in learn], [len(x) for x, _ in parts])
+        features = np.concatenate([runs[each].wide(runs[each].cut, count) for each in learn])
+        labels = np.concatenate([runs[each].labels for each in learn])
+        groups = np.repeat(
+            [runs[each].base.group for each in learn], [len(runs[each].cut) for each in learn]
+        )
         if quick:
             groups = np.full(len(labels), "one")  # trees of one group are not calibrated
         classes = tuple(name for name in profile.classes if name in set(labels.tolist()))
         if len(classes) < 2:
             raise models.DatasetError(f"training takes two classes or more, not {len(classes)}")
         targets = np.array([classes.index(label) for label in labels.tolist()])
-        whole = (np.concatenate([runs[each].whole for each in test]) - mean) / scale
-        stops = np.cumsum([len(runs[each].whole) for each in test])[:-1]
+        unknown = np.isnan(features).all(axis=0)  # as `General.train` takes them
+        features[:, unknown] = 0.0
+        mean, scale = (each.astype(np.float32) for each in standard(features, profile))
+        features = (features - mean) / scale
+        unbounded = unknown | [name.startswith(RELATIVE) for name in names] if names else unknown
         number = 0
         for each in several:
             began = perf_counter()
-            fitted = each.fit(scaled, targets, groups)
+            fitted = each.fit(features, targets, groups)
             seconds[number : number + len(fitted)] += perf_counter() - began
             for estimator in fitted:
-                own = unthinned(estimator, thin)
-                classifier = models.Classifier(profile, classes, own, mean, scale)
-                decisions = np.split(own.decision(whole), stops)
-                for index, values in zip(test.tolist(), decisions, strict=True):
-                    found = counted(runs[index], classifier, values, thresholds)
+                own = corrected(estimator, thin, unbounded)
+                for index in test.tolist():
+                    run = runs[index]
+                    classifier = models.Classifier(run.profile, classes, own, mean, scale)
+                    decisions = classifier.decide(run.wide(run.whole, count))
+                    found = counted(run, classifier, decisions, thresholds)
                     score[number, index], counts[number, :, :, index] = found
                 number += 1
-    robots = np.array([run.robot for run in runs])
+    robots, parts = np.array([run.robot for run in runs]), [run.part for run in runs]
     return [
-        Measured(name, robots, mine, thresholds, dict(zip(COUNTS, numbers, strict=True)), spent)
-        for name, mine, numbers, spent in zip(names, score, counts, seconds.tolist(), strict=True)
+        Measured(
+            *(name, robots, parts, mine, thresholds),
+            dict(zip(COUNTS, numbers, strict=True)),
+            spent,
+        )
+        for name, mine, numbers, spent in zip(
+            candidates, score, counts, seconds.tolist(), strict=True
+        )
     ]
 
 
-def unthinned(estimator: Any, thin: int) -> Any:
+def corrected(estimator: Any, thin: int, unbounded: np.ndarray) -> Any:
     """An estimator for all frames, of one trained on every ``thin``-th `ok` frame.
 
-    The odds of `ok` are multiplied by ``thin``.
+    Args:
+        estimator: Any.
+        thin: The odds of `ok` are multiplied by it.
+        unbounded: Whether a feature says nothing of novelty, shape (features,).
     """
+    if unbounded.any():
+        estimator = replace(estimator, known=np.where(unbounded, UNBOUNDED, estimator.known))
     if thin == 1:
         return estimator
-    shift = np.zeros(len(estimator.calibration))
-    shift[1] = np.log(thin)
-    return replace(estimator, calibration=estimator.calibration + shift)
+    return replace(estimator, calibration=unthinned(estimator.calibration, thin))
 
 
 def counted(
@@ -566,22 +698,28 @@ def counted(
 
 
 def report(measured: Sequence[Measured], budget: float) -> Iterator[str]:
-    """Lines of a table of the candidates at their thresholds, and of one of all thresholds."""
+    """Lines of tables: of candidates at their thresholds, of all thresholds, and of each input."""
     yield (
         f"At the thresholds that find most felt faults with {budget:g} false alarms per hour or"
         " fewer, unweighted mean of robots:\n"
     )
     yield from _rows(HEAD)
     for one in measured:
-        number = one.chosen(budget)
-        at = ("none",) + ("-",) * 6 if number is None else one.cells(number)
-        ranks = (f"{one.ranking(each):.3f}" for each in (partial_auc, auc))
-        yield _row((one.name, *ranks, *at, f"{one.seconds:.0f} s"))
+        yield _row((one.name, *one.ranked(one.chosen(budget)), f"{one.seconds:.0f} s"))
     yield ""
     yield from _rows(("candidate", *HEAD[3:-1]))
     for one in measured:
         for number in range(len(one.thresholds)):
             yield _row((one.name, *one.cells(number)))
+    parts = sorted(set(measured[0].parts))
+    if len(parts) < 2:
+        return
+    yield "\nAt the same thresholds, by rate and input:\n"
+    yield from _rows((HEAD[0], "rate", "input", *HEAD[1:-1]))
+    for one in measured:
+        number = one.chosen(budget)
+        for rate, signals in parts:
+            yield _row((one.name, f"{rate} Hz", signals, *one.of((rate, signals)).ranked(number)))
 
 
 def _rows(head: Sequence[str]) -> Iterator[str]:

@@ -9,12 +9,15 @@ import pytest
 
 import models
 from inspector.errors import InspectorError
+from inspector.training.recordings import classified
 from models.estimators.calibration import identity
 from models.estimators.probabilistic import NOVELTY_LIMIT
 from models.estimators.trees import Trees
 from models.evaluation.outcomes import Outcome
 from models.evaluation.predictions import predict
-from noisemodel import Run
+from models.logbands import ANY
+from models.pooling import columns
+from noisemodel import Block, Run
 from scenarios.robots import TARGETS, WIDE
 
 with pytest.MonkeyPatch.context() as patch:
@@ -34,14 +37,15 @@ LOGGER = {
 }
 
 
-def recording(robot, seed, *, faulty):
+def recording(robot, seed, *, faulty, rate=1000.0):
     """Two joints that follow a sine, one of which vibrates for a second if it is faulty."""
-    time = np.arange(4000) / 1000
+    time = np.arange(int(4 * rate)) / rate
     desired = np.stack([np.sin(np.pi * time + seed), np.cos(np.pi * time)])
     error = 1e-3 * np.random.default_rng([seed, faulty]).normal(size=desired.shape)
     blocks, events = [models.Block(0.0, 4.0, "ok")], ()
     if faulty:
-        error[0, 2000:3000] += np.sin(2 * np.pi * 60 * time[:1000])
+        vibrates = (time >= 2.0) & (time < 3.0)
+        error[0, vibrates] += np.sin(2 * np.pi * 60 * time[: vibrates.sum()])
         ends = (0.0, 1.9, "ok"), (2.0, 3.0, "oscillations"), (3.2, 4.0, "ok")
         blocks, events = [models.Block(*each) for each in ends], (models.Fault(*ends[1]),)
     joints = {"desired": desired, "measured": desired - error, "error": error}
@@ -50,7 +54,7 @@ def recording(robot, seed, *, faulty):
     return models.Recording(
         f"{robot}/{'fault' if faulty else 'good'}-{seed}",
         signal,
-        1000.0,
+        rate,
         tuple(blocks),
         events=events,
         facts={"robot": robot},
@@ -189,12 +193,16 @@ def test_counts_at_the_shipped_thresholds_are_those_of_the_protocol():
         assert {name: expected.counts.get(name, found[name]) for name in found} == found
 
 
-def test_fewer_ok_frames_give_the_same_odds(runs):
-    run = runs[0]
-    cut, labels = run.thinned(3)
-    assert len(cut) == len(labels) == -(-len(run.labels) // 3)
+def test_fewer_ok_frames_give_the_same_odds():
+    one = recording("ur5", 0, faulty=True)
+    every, run = (leftout.of_recording(one, PROFILE, thin=thin) for thin in (1, 3))
+    ok, left = every.labels == "ok", run.labels == "ok"
+    assert left.sum() == ok.sum() // 3
+    assert (~left).sum() == (~ok).sum() > 0
+    np.testing.assert_array_equal(run.cut[left], every.cut[ok][2::3])
+    assert len(run.whole) == len(every.whole)
     (estimator,) = perfect().fit(np.eye(4), np.array([0, 0, 0, 1]), np.array(["a"] * 4))
-    thinned = leftout.unthinned(estimator, 3)
+    thinned = leftout.corrected(estimator, 3, np.zeros(4, dtype=bool))
     odds = [np.subtract(*each.decision(np.eye(4)[:1])[0, :2]) for each in (estimator, thinned)]
     assert odds[1] - odds[0] == pytest.approx(np.log(3))
 
@@ -205,7 +213,8 @@ def measured(false, found):
     counts |= {"false_alarms": np.array(false), "found_felt": np.array(found)}
     counts["ok_hours"][:] = 1.0
     thresholds = [Threshold(each, 2.0) for each in np.linspace(0.2, 0.8, len(false))]
-    return Measured("one", np.array(["a", "b"]), np.zeros(2), thresholds, counts, 0.0)
+    parts = [(1000, "joints")] * 2
+    return Measured("one", np.array(["a", "b"]), parts, np.zeros(2), thresholds, counts, 0.0)
 
 
 def test_the_threshold_finds_most_within_the_budget():
@@ -239,3 +248,155 @@ def test_trees_of_fewer_rounds_are_trained_with_those_of_more():
     expected = Trees.fit(features, targets, groups, alone)
     for name, array in few.arrays().items():
         np.testing.assert_array_equal(array, expected.arrays()[name])
+
+
+def files(folder, robots, *, rate, desired=True):
+    """Runs of robots at a rate: a good one and a faulty one of each."""
+    for robot in robots:
+        for seed, faulty in enumerate((False, True)):
+            one = recording(robot, seed, faulty=faulty, rate=rate)
+            path = folder / f"{rate:g}" / robot / f"{one.name.partition('/')[2]}.npz"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            Run(
+                time=one.time,
+                joint_names=("a", "b"),
+                velocity=one.signal["measured_joints"].T,
+                velocity_desired=one.signal["desired_joints"].T if desired else None,
+                robot=robot,
+                blocks=tuple(Block(*block) for block in one.blocks),
+            ).save(path)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Logs of three robots at 250 Hz, and of two of them at 1 kHz, of which one is measured."""
+    folder = tmp_path_factory.mktemp("logs")
+    files(folder, ["ur5", "anymal", "g1"], rate=250.0)
+    files(folder, ["ur5"], rate=1000.0)
+    files(folder, ["anymal"], rate=1000.0, desired=False)
+    return [folder / "250", folder / "1000"]
+
+
+def read_general(logs, *without, thin=8):
+    profile, names = leftout.wanted("general", without=without)
+    runs, _ = leftout.read(leftout.files(logs), profile, thin=thin, names=names)
+    return runs, profile, names
+
+
+def test_the_general_profile_takes_each_log_at_its_rate_with_each_of_its_inputs(logs):
+    runs, _, names = read_general(logs)
+    slow, fast = ([run.part for run in runs if run.part[0] == rate] for rate in (250, 1000))
+    assert sorted(slow) == sorted([(250, each) for each in ("motion", "measured", "noise")] * 6)
+    assert sorted(set(fast)) == [(1000, each) for each in ("measured", "motion", "noise")]
+    assert fast.count((1000, "motion")) == 2
+    assert not any(name.startswith("effort") for name in names)
+    assert any(name.startswith("relative effort") for name in names)
+
+
+def test_frames_of_the_general_profile_are_those_that_training_takes(logs):
+    runs, _, names = read_general(logs, thin=3)
+    own = np.array([name in names for name in ANY.columns])
+    read = [each for each, _ in classified(leftout.files(logs), None, bare_too=True)]
+    expected = models.Frames.joined(models.frames_of(read, ANY, thin=3))
+    found = np.concatenate([run.wide(run.cut, len(names)) for run in runs])
+    np.testing.assert_array_equal(found, expected.features[:, own])
+    assert np.isnan(expected.features[:, ~own]).all()
+    labels = np.concatenate([run.labels for run in runs])
+    np.testing.assert_array_equal(labels, expected.labels)
+
+
+def test_a_general_candidate_decides_as_the_model_that_training_makes(logs, monkeypatch):
+    runs, profile, names = read_general(logs)
+    small = replace(ANY, rounds=3, leaves=4)
+    read = [each for each, _ in classified(leftout.files(logs), None, bare_too=True)]
+    model = models.General.train(
+        models.Frames.joined(models.frames_of(read, small, thin=8)), small, thin=8
+    )
+    decided = []
+
+    def counted(run, classifier, decisions, thresholds):
+        decided.append(decisions)
+        return 0.0, np.zeros((len(leftout.COUNTS), len(thresholds)))
+
+    monkeypatch.setattr(leftout, "counted", counted)
+    every = np.arange(len(runs))  # none is left out
+    candidates = [*leftout.candidates(profile, ["rounds=3", "leaves=4"])]
+    threshold = [Threshold(0.5, NOVELTY_LIMIT)]
+    leftout.measure(runs, [(every, every)], candidates, profile, threshold, names=names, thin=8)
+    for run, decisions in zip(runs, decided, strict=True):
+        classifier = model.at(run.profile.rate, run.profile.signals)
+        expected = classifier.decide(run.whole[:, np.isin(columns(run.profile), names)])
+        np.testing.assert_allclose(decisions, expected, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("without", "left"),
+    [
+        ("relative", "measured long mean 15"),
+        ("plain", "relative effort_joints long mean 15"),
+        ("efforts", "relative error_joints long mean 15"),
+        ("joints", "relative effort_joints long mean 15"),
+    ],
+)
+def test_features_can_be_left_out_by_name(logs, without, left):
+    runs, _, names = read_general(logs[:1], without)
+    parts = {
+        "relative": lambda name: name.startswith("relative "),
+        "plain": lambda name: not name.startswith("relative "),
+        "efforts": lambda name: "effort_joints" in name,
+        "joints": lambda name: "_joints" in name and "effort" not in name,
+    }
+    assert left in names
+    assert not any(parts[without](name) for name in names)
+    _, every = leftout.wanted("general")
+    assert [name for name in every if not parts[without](name)] == list(names)
+    assert len(runs) == 18
+    widths = {run.part[1]: len(run.places) for run in runs}
+    assert all(np.ptp(run.places) < len(names) for run in runs)
+    assert 0 < widths["noise"] <= widths["measured"] <= widths["motion"]
+
+
+def test_settings_of_the_other_kind_of_profile_are_refused():
+    with pytest.raises(InspectorError, match=r"general is for any rate; leave out --rate 500"):
+        leftout.wanted("general", 500.0)
+    with pytest.raises(InspectorError, match=r"joints is of one rate; leave out --without"):
+        leftout.wanted("joints", None, ["efforts"])
+    with pytest.raises(InspectorError, match=r"no feature is left without plain, relative"):
+        leftout.wanted("general", None, ["plain", "relative"])
+
+
+def test_logistic_regression_takes_missing_features_at_their_mean():
+    generator = np.random.default_rng(0)
+    scaled, targets = generator.normal(size=(300, 3)).astype(np.float32), np.arange(300) % 2
+    scaled[:, 1] += targets
+    missing = scaled.copy()
+    missing[::3, 2] = np.nan
+    fitted = Linear.fit(missing, targets, 0.5)
+    alike = Linear.fit(np.nan_to_num(missing), targets, 0.5)
+    np.testing.assert_array_equal(fitted.logits(missing), alike.logits(np.nan_to_num(missing)))
+    assert np.isfinite(fitted.decision(missing)).all()
+
+
+def test_a_run_below_the_lowest_rate_is_left_out(tmp_path):
+    files(tmp_path, ["ur5"], rate=250.0)
+    files(tmp_path, ["ur5"], rate=50.0)
+    profile, names = leftout.wanted("general")
+    runs, left_out = leftout.read(leftout.files([tmp_path]), profile, names=names)
+    assert {run.part[0] for run in runs} == {250}
+    assert str(left_out) == "left out: 2 runs below 80 Hz, e.g. ur5/fault-1"
+
+
+@pytest.mark.parametrize("options", [[], ["--profile", "norms", "--rate", "250"]])
+def test_the_benchmark_prints_its_tables(logs, monkeypatch, capsys, options):
+    paths = [str(path) for path in logs[: 1 if options else 2]]
+    grid = ["--grid", "rounds=2,4", "leaves=4", "--alarms", "0.5", "0.9", "--budget", "1e6"]
+    monkeypatch.setattr(
+        "sys.argv", ["leftout", *paths, *options, *grid, "--folds", "3", "--jobs", "1"]
+    )
+    leftout.main()
+    tables = capsys.readouterr().out.split("\n\n")
+    rows = [[line for line in each.split("\n") if line.startswith("| ")] for each in tables]
+    counts = [len(each) for each in rows if each]
+    names = [line.split(" | ")[0] for line in max(rows, key=len)[1:]]
+    assert {"| rounds 2, leaves 4", "| logistic regression"} <= set(names)
+    assert counts == ([4, 7] if options else [4, 7, 1 + 3 * 6])
