@@ -44,7 +44,8 @@ class Run:
         position_desired: Desired joint positions, shape (samples, desired).
         desired_joint_names: Names of the desired joints; ``joint_names`` unless given.
         stages: Velocities at named stages of the control flow, each (samples, joints).
-        effort: Joint torques or forces, shape (samples, joints), in [N m] or [N].
+        effort: Joint torques or forces, shape (samples, joints), in [N m] or [N]; of some logs
+            motor currents, in [A].
         valid: False in gaps, where all values are 0, shape (samples,); all true unless given.
         base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
         base_velocity: Linear, then angular velocity of the base in its own axes,

@@ -54,6 +54,31 @@ def test_every_kind_of_control_and_of_log_is_drawn():
     assert {log.hold > 1 for log in loggers()} == {True, False}
 
 
+def test_some_logs_have_efforts_and_of_these_half_are_currents():
+    drawn = loggers(500)
+    kinds = [log.effort for log in drawn]
+    assert kinds.count("missing") / 500 == pytest.approx(0.4, abs=0.06)
+    assert kinds.count("current") / 500 == pytest.approx(0.3, abs=0.06)
+    for log in drawn:
+        assert (log.current > 0) == (log.effort == "current")
+        assert 9 <= log.effort_bits <= 16
+        assert 0.0003 <= log.effort_noise <= 0.01
+
+
+def test_what_is_drawn_of_efforts_changes_nothing_else():
+    other = replace(
+        DISTRIBUTION, effort_share=(1.0, 1.0), current=(5.0, 6.0), effort_bits=(12.0, 11.0)
+    )
+    ours = {"effort": "missing", "current": 0.0, "effort_noise": 0.0, "effort_bits": 16}
+    for seed, domain in enumerate(domains(50)):
+        first, second = np.random.default_rng(seed), np.random.default_rng(seed)
+        drawn = DISTRIBUTION.logger(first, domain, most=10_000.0)
+        again = other.logger(second, domain, most=10_000.0)
+        assert again.effort != "missing"
+        assert replace(drawn, **ours) == replace(again, **ours)
+        assert first.uniform() == second.uniform()
+
+
 def test_what_a_family_does_not_bear_is_not_drawn():
     limits = Limits(stiffness=(0.5, 1.0), damping=(0.6, 1.1), delay=2e-3, hold=0.01)
     for domain in domains(limits=limits):

@@ -13,11 +13,12 @@ from scenarios.arm.robots import ARMS, PANDA, SO101, Arm
 from scenarios.arm.scene import plan
 from scenarios.case import Case
 from scenarios.clock import TICK
-from scenarios.defects import Collisions, Defect, JointStops, NoDefect, Obstacles
+from scenarios.defects import Collisions, Defect, JointStops, NoDefect, Obstacles, Pushes
+from scenarios.defects.air import SLOW
 from scenarios.errors import UnsupportedModelError
 from scenarios.faults import Faults
 from scenarios.labels import deviation
-from scenarios.loads import Collision, JointStop, Payload
+from scenarios.loads import Collision, JointStop, Payload, Push
 from scenarios.motions import Picks, Reach
 from scenarios.reduced import reduced_model
 from scenarios.simulation import Trial
@@ -225,6 +226,42 @@ def test_a_collision_is_drawn_while_the_tool_moves():
     for seed in range(10):
         for load in Collisions().draw(RNG(seed), one).loads:
             assert speed[round(load.start / TICK)] > 0.05
+
+
+def test_pushes_are_drawn_while_the_tool_stands_or_is_slow():
+    for seed in range(10):
+        one = reach(seed=seed, duration=6.0, stand=3.0)
+        speed = np.linalg.norm(np.gradient(one.position, TICK, axis=0), axis=1)
+        faults = Pushes().draw(RNG(seed), one)
+        for load in faults.loads:
+            now = slice(round(load.start / TICK), round(load.stop / TICK))
+            assert speed[now].max() <= SLOW
+            assert 3.0 <= np.linalg.norm(load.force) <= 40.0
+            assert 0.6 <= load.start < load.start + load.rise + load.fall <= load.stop <= 5.4
+        assert [(event.start, event.stop) for event in faults.events] == [
+            (load.start, load.stop) for load in faults.loads
+        ]
+
+
+def test_a_push_begins_and_ends_when_it_says():
+    still = Reach(speed=(0.001, 0.001), spread=0.001)
+    push = Push(along=1.0, start=0.4, stop=1.2, rise=0.2, fall=0.3, force=(0.0, 20.0, 0.0))
+    bare = trial("panda", still).motion.torque
+    held = trial("panda", still, Given(Faults(loads=(push,)))).motion.torque
+    first, last = round(push.start * 10_000), round(push.stop * 10_000)
+    np.testing.assert_array_equal(held[:first], bare[:first])
+    change = np.abs(held - bare).max(axis=1)
+    assert change[first + 2000 : last - 3000].min() > 3.0
+    assert change[-3000:].max() < 2 * 1.5 * max(PANDA.drives.friction)
+
+
+def test_an_arm_stands_for_as_long_as_it_says():
+    one = reach(stand=2.0, duration=4.0)
+    moves = np.flatnonzero(np.abs(one.joints - one.joints[0]).max(axis=1) > 1e-9)
+    assert moves[0] * TICK == pytest.approx(2.0, abs=0.05)
+    drawn = [motion(RNG(seed), 0.5) for seed in range(300)]
+    stands = [one.stand > 1.0 for one in drawn if isinstance(one, Reach)]
+    assert np.mean(stands) == pytest.approx(0.3, abs=0.08)
 
 
 def test_nothing_is_drawn_for_an_arm_that_stands():
