@@ -52,9 +52,10 @@ def run_of(sample: Sample, model: str) -> nm.Run:
 
 def errors(sample: Sample, model: str) -> Iterator[tuple[str, str, tuple[float, float]]]:
     """Class of each finding, "onset" or "end", and errors of the frames and of the estimate."""
-    classifier = LIBRARY[model]
     signals = {"noise": sample.noise, **sample.decimated, **sample.joints}
-    profile, run = classifier.profile, run_of(sample, model)
+    run = run_of(sample, model)
+    classifier = LIBRARY[model].at(run.rate, signals)
+    profile = classifier.profile
     labels = classifier.classify(
         {name: signals[name] for name in profile.signals}, classifier.rate, start=0.0
     )

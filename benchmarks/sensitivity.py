@@ -19,7 +19,7 @@ import noisemodel as nm
 import scenarios
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import EXIT
-from inspector.library import load_library
+from inspector.library import load_library, signals_of
 
 JOINTS = {"panda": "panda_joint3", "talos": "leg_left_4_joint"}
 TONES, AMPLITUDES = (35.0, 90.0, 180.0), (0.1, 0.3, 1.0, 3.0, 10.0, 100.0)
@@ -73,7 +73,8 @@ def level_of(run: nm.Run, low: float, high: float) -> float:
 def found(run: nm.Run, trials: int, random: np.random.Generator) -> dict[str, np.ndarray]:
     """Whether each fault is found, by kind, shape (faults, factors)."""
     good = analyse(run, LIBRARY)
-    low, high = (LIBRARY[good.model].profile.edges[place] for place in (0, -1))
+    profile = LIBRARY[good.model].at(run.rate, signals_of(run)).profile
+    low, high = (profile.edges[place] for place in (0, -1))
     level = max(level_of(run, low, high), FELT)
     rows: dict[str, list[list[bool]]] = {kind: [] for kind in KINDS}
     for kind in KINDS:

@@ -59,7 +59,7 @@ def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason
     for each in found.classes:
         assert (each.needed, each.reason) == (
             None,
-            "no signal desired, error; there is noise, measured",
+            "no signal desired, error; there is noise, measured, measured_joints",
         )
 
 

@@ -213,10 +213,11 @@ def test_a_model_is_trained_on_a_folder_of_samples(inspector, simulated, tmp_pat
     status, out, _ = inspector("evaluate", model, data / "panda", "--json", "--seen-too")
     assert status == 0
     confusion = np.array(json.loads(out)["confusion"])
-    assert confusion.sum() == 3 * 2 * 7
+    # Frames within an ok second, and those that the failing second fills by half or more.
+    assert confusion.sum(axis=1).tolist() == [3 * 7, 3 * 9]
     one = data / "panda/straight-002.npz"
     status, out, _ = inspector("evaluate", model, one, "--json", "--seen-too")
-    assert np.array(json.loads(out)["confusion"]).sum() == 2 * 7
+    assert np.array(json.loads(out)["confusion"]).sum() == 7 + 9
 
 
 def test_a_sample_without_a_block_is_skipped(simulated, inspector, tmp_path):
@@ -228,7 +229,7 @@ def test_a_sample_without_a_block_is_skipped(simulated, inspector, tmp_path):
     assert (status, "Subset accuracy" in out) == (0, True)
     status, out, _ = inspector("evaluate", model, data / "panda", "--json", "--seen-too")
     found = json.loads(out)
-    assert (status, found["runs"], np.array(found["confusion"]).sum()) == (0, 3, 2 * 2 * 7)
+    assert (status, found["runs"], np.array(found["confusion"]).sum()) == (0, 3, 2 * (7 + 9))
 
 
 def test_samples_and_their_runs_have_equal_signals(simulated, inspector, tmp_path):
@@ -244,7 +245,8 @@ def test_samples_and_their_runs_have_equal_signals(simulated, inspector, tmp_pat
 
 def test_samples_cannot_be_decimated_to_another_rate(simulated, inspector, tmp_path):
     inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
-    status, _, err = inspector("train", tmp_path / "data", "--rate", 500, "-o", tmp_path / "m.npz")
+    call = ("train", tmp_path / "data", "--rate", 500, "-o", tmp_path / "m.npz")
+    status, _, err = inspector(*call, "--profile", "norms")
     assert (status, err.count("\n")) == (3, 1)
     assert "keeps its noise at 10000 Hz and 1000 Hz and no velocities" in err
 

@@ -313,7 +313,7 @@ def test_a_grid_that_cannot_be_searched_is_named(data, tmp_path, grid, reason):
 @pytest.mark.parametrize(
     ("more", "reason"),
     [
-        (("--profile", "mfcc"), "no profile 'mfcc'; there are joints, general, scalar, logbands"),
+        (("--profile", "mfcc"), "no profile 'mfcc' of one rate; there are joints, norms, scalar"),
         (("--profile", "paper-rbf"), "profile paper-rbf exists at 10000 Hz only, not 1000"),
     ],
 )

@@ -203,15 +203,15 @@ def test_failures_are_classified_without_ok():
 
 def test_the_nearest_model_is_the_one_below(ours):
     fast = replace(ours, profile=models.LogBands().at(10_000.0))
-    library = [fast, ours]
-    assert models.nearest(library, 10_000.0) is fast
-    assert models.nearest(library, 9_995.0) is fast  # within 0.1 %
-    assert models.nearest(library, 9_000.0) is ours
-    assert models.nearest(library, 48_000.0) is fast
+    library = {"fast": fast, "ours": ours}
+    assert models.nearest(library, 10_000.0) == ("fast", fast)
+    assert models.nearest(library, 9_995.0) == ("fast", fast)  # within 0.1 %
+    assert models.nearest(library, 9_000.0) == ("ours", ours)
+    assert models.nearest(library, 48_000.0) == ("fast", fast)
     with pytest.raises(models.RateError, match="rate of 500 Hz; the models' rates are 1000, 10000"):
         models.nearest(library, 500.0)
     with pytest.raises(models.RateError, match="the models' rates are none Hz"):
-        models.nearest([], 500.0)
+        models.nearest({}, 500.0)
 
 
 def test_classifying_needs_neither_scikit_learn_nor_scipy(ours, tmp_path):

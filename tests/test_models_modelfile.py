@@ -90,7 +90,7 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
 def test_numpy_alone_reads_it_too(path):
     with np.load(path, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))
-    assert manifest["format"] == "noise-model/5"
+    assert manifest["format"] == "noise-model/6"
     assert manifest["rate"] == 500.0
     assert manifest["metrics"]["training"]["subset_accuracy"] == 1.0
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
@@ -227,7 +227,8 @@ def test_a_header_that_states_more_than_there_is_is_refused(path):
         ({"manifest": np.array("{")}, "manifest is no JSON"),
         (
             {"manifest": np.array("[]")},
-            r"is of format \[\], this version reads 'noise-model/5' and 'noise-model/4'",
+            r"is of format \[\], this version reads 'noise-model/6', 'noise-model/4',"
+            " 'noise-model/5'",
         ),
     ],
 )

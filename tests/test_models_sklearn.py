@@ -120,7 +120,7 @@ def test_groups_calibrate():
             "no profile 'loud'; there are scalar",
         ),
         (NoiseFeatures("general"), 400, models.SignalError, "rows of 400 numbers, expected frames"),
-        (NoiseFeatures(rate=50.0), 400, models.ProfileError, "take a rate of 100 Hz at least"),
+        (NoiseFeatures(rate=50.0), 400, models.ProfileError, "take a rate of 70 Hz at least"),
         (
             NoiseFeatures(settings={"colour": 1}),
             400,

@@ -36,6 +36,7 @@ def test_two_trees_by_hand_add_up():
         threshold=np.array([[0.5, 2.0], [-1.0, 0.0]]),
         # 0: leaf 0 where x0 <= 0.5, else leaf 1 where x1 <= 2, else leaf 2. 1: one split alone.
         left=np.array([[[0.0, 1.0], [0.0, 0.0]], [[1.0, 2.0], [1.0, 0.0]]]),
+        missing=np.array([[0.0, 1.0], [1.0, 0.0]]),
         leaf=np.array([[1.0, 2.0, 3.0], [10.0, 20.0, 0.0]]),
         prior=np.array([0.25, -0.25]),
         calibration=np.array([1.0, 0.0, 0.0]),

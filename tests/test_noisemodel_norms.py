@@ -60,11 +60,15 @@ def test_joints_are_those_that_are_desired_as_well_as_measured():
     )
 
 
-@pytest.mark.parametrize(
-    "signals", [{}, {"velocity_desired": desired[:, :1], "desired_joint_names": ("tool",)}]
-)
-def test_a_run_without_desired_joints_has_nothing_joint_by_joint(signals):
-    assert nm.by_joint(run(**signals)) == {}
+def test_a_run_without_desired_velocities_has_all_measured_joints():
+    alone = nm.by_joint(run())
+    assert alone.keys() == {"measured_joints"}
+    np.testing.assert_array_equal(alone["measured_joints"], velocity.T)
+
+
+def test_a_run_of_which_no_desired_joint_is_measured_has_nothing_joint_by_joint():
+    others = run(velocity_desired=desired[:, :1], desired_joint_names=("tool",))
+    assert nm.by_joint(others) == {}
 
 
 def test_joints_have_the_norms_of_their_run():

@@ -39,7 +39,7 @@ def tune(
     profile: Annotated[
         str,
         typer.Option(
-            help="joints, general, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
+            help="joints, norms, scalar, logbands, noisytest-rbf, noisytest-linear, paper-rbf or"
             " paper-linear."
         ),
     ] = "noisytest-rbf",

@@ -175,7 +175,10 @@ def profile_at(name: str, rate: float) -> models.Profile:
         InspectorError: If there is no such profile, or it does not exist at this rate.
     """
     if name not in PROFILES:
-        raise InspectorError(f"no profile {name!r}; there are {', '.join((ANY_RATE, *PROFILES))}")
+        raise InspectorError(
+            f"no profile {name!r} of one rate; there are {', '.join(PROFILES)}, and {ANY_RATE} for"
+            " any rate"
+        )
     found = PROFILES[name](rate)
     if found.rate != rate:
         raise InspectorError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")

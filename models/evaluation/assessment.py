@@ -1,6 +1,7 @@
 """The assessment: all measures of a model on recordings, with confidence intervals."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+import typing
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from math import isnan
@@ -8,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from models.choice import Model
+from models.classifier import Classifier
 from models.errors import DatasetError, SeenError, SignalError
 from models.evaluation import eventmeasures, eventscore, framescore, protocol
 from models.evaluation.calibration import Reliability, reliability
@@ -34,6 +35,17 @@ WORDS = ("of", "measure", "class", "robot", "domain", "scenario")
 """Columns of the table of Arrow that name a row."""
 BUDGETS = (5.0, 20.0, 100.0)
 """False-alarm budgets, per hour, at which recall is read from the trade-off."""
+
+
+class Model(typing.Protocol):
+    """What is assessed: a model of one rate, or of any."""
+
+    @property
+    def runs(self) -> Mapping[str, str]:
+        """SHA-256 of each training recording, by name."""
+
+    def at(self, rate: float, signals: Collection[str], /) -> Classifier:
+        """The model for a sample rate, in [Hz], and for signals by name."""
 
 
 @dataclass(frozen=True, eq=False)
