@@ -11,7 +11,7 @@ import numpy as np
 from models import modelfile
 from models.confusion import Evaluation
 from models.dataset import Dataset
-from models.errors import DatasetError, MissingSignalError, RateError
+from models.errors import DatasetError, MissingSignalError, ModelFileError, RateError
 from models.estimators.estimator import ESTIMATORS, Estimator
 from models.examples import CHUNK, Examples
 from models.features import features, standard
@@ -263,9 +263,13 @@ class Classifier:
             path: The file.
 
         Raises:
-            ModelFileError: If the file is missing, damaged, no model file, or of another version.
+            ModelFileError: If the file is missing, damaged, no model file, of another version, or
+                a model for any rate.
         """
-        return cls.of(*modelfile.read(path), sha256=modelfile.digest(path))
+        manifest, arrays = modelfile.read(path)
+        if "recipe" in manifest:
+            raise ModelFileError(path, "is a model for any rate; read it by models.load")
+        return cls.of(manifest, arrays, modelfile.digest(path))
 
     @classmethod
     def of(cls, manifest: Mapping[str, Any], arrays: Mapping[str, Array], sha256: str = "") -> Self:

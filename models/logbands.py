@@ -156,10 +156,18 @@ class LogBands:
         names = {field.name for field in fields(cls)}
         if not isinstance(settings, Mapping) or names != settings.keys():
             raise ProfileError(f"a recipe has {', '.join(sorted(names))}, and nothing else")
+        for field in fields(cls):
+            value = settings[field.name]
+            # Bands of no width, or from minus infinity, would be without end.
+            if field.type is float and not (type(value) in (int, float) and 0 <= value <= HIGHEST):
+                raise ProfileError(
+                    f"{field.name} is {value!r}, expected a number from 0 to {HIGHEST:g}"
+                )
         lists = {key: tuple(each) for key, each in settings.items() if isinstance(each, list)}
         try:
             recipe = cls(**{**settings, **lists})
-            recipe.bound(HIGHEST)
+            for rate in (LOWEST, HIGHEST):
+                recipe.bound(rate)
         except (TypeError, ValueError, ArithmeticError) as error:
             raise ProfileError(f"a setting of the recipe is wrong ({error})") from error
         return recipe

@@ -255,6 +255,11 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
         count = feature_count(profile)
         if "recipe" in manifest:
             recipe = LogBands.of(manifest["recipe"])
+            if recipe.estimator != "trees" or not recipe.reference:
+                raise ProfileError(
+                    f"a recipe for any rate has trees and a reference, not {recipe.estimator} and"
+                    f" reference {recipe.reference}"
+                )
             count, profile = len(recipe.columns), recipe.bound(HIGHEST)
     except ProfileError as error:
         raise ModelFileError(path, f"manifest has a wrong profile: {error}") from error

@@ -270,7 +270,7 @@ def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(t
         session.push(velocity=np.ones((500, 2)))
     assert warned == [
         "No labels: rate of 250 Hz; the models' rates are 1000, 10000 Hz: too low for any; log"
-        " faster."
+        " at 1000 Hz or above."
     ]
     assert "no labels" in str(session.summary)
     found = entities(tmp_path / "live.rrd")

@@ -181,10 +181,11 @@ class Trees(Probable):
         number = self.feature.astype(np.intp)
         place = np.searchsorted(there, number).clip(max=len(there) - 1)
         known = there[place] == number
-        decided = np.where(self.missing > 0, -np.inf, np.inf)
+        # Each feature exceeds the least number, and none the greatest.
+        decided = np.finfo(np.float64).max * np.where(self.missing > 0, -1.0, 1.0)
         return replace(
             self,
-            feature=np.where(known, place, 0),
+            feature=np.where(known, place, 0.0),
             threshold=np.where(known, self.threshold, decided),
             known=self.known[there],
         )

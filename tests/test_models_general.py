@@ -1,0 +1,463 @@
+"""The general model: one for any rate, and for whatever signals a log has."""
+
+import json
+from dataclasses import asdict, replace
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import models
+from models.estimators.trees import Trees
+from models.framefeatures import frame_features
+from models.general import LEARNT
+from models.logbands import HIGHEST, INPUTS, LOWEST
+from models.pooling import columns
+from models.reference import Reference
+from models.signals import JOINTS, MOTION, NOISE
+
+RECIPE = replace(models.ANY, rounds=8)
+RATES = (80.0, 125.0, 500.0, 1000.0)
+SECONDS = 5.0
+GIVEN = {
+    "motion and joints": (*MOTION, *JOINTS),
+    "motion": MOTION,
+    "measured and joints": ("measured", "measured_joints"),
+    "measured": ("measured",),
+    "noise": (NOISE,),
+}
+"""Signals of logs, by what they have."""
+
+
+def signals(rate, label="ok", seed=0, names=(*MOTION, *JOINTS), seconds=SECONDS):
+    """Three joints that follow a motion; a failure shakes the second one."""
+    random = np.random.default_rng([seed, len(label)])
+    time = np.arange(round(seconds * rate)) / rate
+    phase = random.uniform(0, 6, (3, 1))
+    desired = np.array([[0.9], [0.3], [0.1]]) * np.sin(2 * np.pi * 0.5 * time + phase)
+    error = 0.01 * random.normal(size=desired.shape)
+    if label == "oscillations":
+        error[1] += 0.3 * np.sin(2 * np.pi * 27 * time)
+    if label == "impact":
+        error[1] += np.exp(-np.mod(time, 0.4) / 0.02) * random.normal(size=len(time))
+    joints = dict(zip(JOINTS, (desired, desired + error, error), strict=True))
+    norms = {name: np.linalg.norm(joints[f"{name}_joints"], axis=0) for name in MOTION}
+    every = {**norms, **joints, NOISE: np.hypot(norms["measured"], norms["desired"])}
+    return {name: every[name] for name in names}
+
+
+def recording(rate, label, seed, names=(*MOTION, *JOINTS)):
+    blocks = (models.Block(0.0, SECONDS, label),)
+    found = signals(rate, label, seed, names)
+    return models.Recording(f"panda/{label}-{rate:g}-{seed:03d}", found, rate, blocks)
+
+
+@cache
+def frames(recipe=RECIPE):
+    recordings = [
+        recording(rate, label, seed)
+        for rate in RATES
+        for seed in range(2)
+        for label in ("ok", "impact", "oscillations")
+    ]
+    return models.Frames.joined(models.frames_of(recordings, recipe))
+
+
+@cache
+def trained():
+    return models.General.train(frames(), RECIPE)
+
+
+@pytest.fixture
+def path(tmp_path):
+    trained().save(tmp_path / "model.npz")
+    return tmp_path / "model.npz"
+
+
+def rewrite(path, manifest=(), **changes):
+    """Write a model file anew, with changes of its manifest and arrays; None leaves one out."""
+    with np.load(path, allow_pickle=False) as members:
+        arrays = dict(members) | changes
+    whole = json.loads(str(arrays["manifest"])) | dict(manifest)
+    arrays["manifest"] = np.array(json.dumps(whole))
+    np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
+
+
+def streamed(classifier, signals, cuts):
+    """Labels of a signal in pieces, as those of the whole."""
+    count = next(iter(signals.values())).shape[-1]
+    joints = next((each.shape[0] for each in signals.values() if each.ndim > 1), 1)
+    stream = models.Stream(classifier, joints=joints)
+    parts = [
+        stream.push({name: each[..., a:b] for name, each in signals.items()})
+        for a, b in pairwise([0, *sorted(cuts), count])
+    ]
+    parts.append(stream.finish())
+    return {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("start", "stop", "label", "scores", "novel")
+    }
+
+
+@pytest.mark.parametrize("given_", GIVEN)
+@pytest.mark.parametrize("rate", RATES)
+def test_a_bound_model_decides_as_the_full_one_without_the_missing_features(rate, given_):
+    model = trained()
+    there = signals(rate, "oscillations", seed=7, names=GIVEN[given_])
+    bound = model.at(rate, there)
+    assert bound.profile.signals == GIVEN[given_]
+    _, features = frame_features(there, bound.profile)
+    full = np.full((len(features), len(RECIPE.columns)), np.nan)
+    full[:, RECIPE.places(bound.profile)] = features
+    expected = model.estimator.decision((full - model.mean) / model.scale)
+    np.testing.assert_array_equal(bound.decide(features), expected)
+
+
+@settings(max_examples=6, deadline=None)
+@given(data=st.data())
+@pytest.mark.parametrize("given_", GIVEN)
+@pytest.mark.parametrize("rate", RATES)
+def test_a_stream_in_any_chunks_has_the_labels_of_the_whole_run(rate, given_, data):
+    there = signals(rate, "oscillations", seed=8, names=GIVEN[given_], seconds=3.0)
+    bound = trained().at(rate, there)
+    cuts = data.draw(st.lists(st.integers(0, round(3.0 * rate)), max_size=20))
+    whole = bound.classify(there, rate)
+    for name, each in streamed(bound, there, cuts).items():
+        np.testing.assert_array_equal(each, getattr(whole, name), err_msg=name)
+
+
+@pytest.mark.parametrize("names", INPUTS, ids=", ".join)
+def test_a_feature_has_one_name_at_any_rate(names):
+    fewer = ()
+    for rate in (LOWEST, 99.7, 125.0, 149.0, 160.0, 250.0, 512.0, 1000.0, 4000.0, HIGHEST):
+        profile = RECIPE.bound(rate, names)
+        found = columns(profile)
+        assert (
+            len(found)
+            == len(set(found))
+            == models.features(np.zeros((1, *frame_shape(profile))), profile).shape[1]
+        )
+        assert set(fewer) <= set(found)
+        places = RECIPE.places(profile)
+        assert (np.diff(places) > 0).all()
+        assert tuple(np.array(RECIPE.columns)[places]) == found
+        fewer = found
+
+
+def frame_shape(profile):
+    rows = profile.norms + 2 * (len(profile.signals) - profile.norms)
+    return (profile.length,) if rows == 1 else (rows, profile.length)
+
+
+@pytest.mark.parametrize("frequency", [22.0, 30.0])
+def test_a_tone_is_in_features_of_one_name_at_any_rate(frequency):
+    loudest = set()
+    for rate in RATES:
+        tone = 0.1 * np.sin(2 * np.pi * frequency * np.arange(round(2 * rate)) / rate)
+        profile = RECIPE.bound(rate, ("measured",))
+        names = columns(profile)
+        _, features = frame_features({"measured": tone}, profile)
+        means = [n for n, name in enumerate(names) if name.startswith("measured long mean")]
+        loudest.add(names[means[features[0, means].argmax()]])
+    assert loudest == {f"measured long mean {15 if frequency < 25 else 25}"}
+
+
+@pytest.mark.parametrize("rate", RATES)
+def test_failures_are_found_at_any_rate(rate):
+    bound = trained().at(rate, (*MOTION, *JOINTS))
+    ok = bound.classify(signals(rate, "ok", seed=11), rate)
+    assert ok.events() == ()
+    shaken = bound.classify(signals(rate, "oscillations", seed=11), rate)
+    assert "oscillations" in {event.label for event in shaken.events()}
+
+
+def test_a_model_takes_the_most_signals_that_a_log_has():
+    model = trained()
+    for names in GIVEN.values():
+        assert model.at(200.0, names).profile.signals == names
+    assert model.at(200.0, (*MOTION, "measured_joints")).profile.signals == MOTION
+    assert model.at(200.0, ("measured", "desired")).profile.signals == ("measured",)
+    assert model.at(200.0).profile.signals == (NOISE,)
+    with pytest.raises(models.MissingSignalError, match="no signal noise; there is desired"):
+        model.at(200.0, ("desired",))
+
+
+def test_a_model_takes_rates_from_the_lowest_to_the_highest():
+    model = trained()
+    assert model.at(LOWEST).rate == LOWEST
+    assert model.at(LOWEST * (1 - 1e-4)).rate == pytest.approx(LOWEST, rel=1e-3)
+    assert model.at(333.3).rate == 333.3
+    assert model.at(48_000.0).rate == HIGHEST
+    with pytest.raises(models.RateError, match="rate of 79 Hz; the models' rates are 80 Hz: too"):
+        model.at(79.0)
+
+
+def test_a_general_model_is_nearer_than_one_of_a_lower_rate_and_yields_to_more_signals():
+    general = trained()
+    slow = replace(general.at(125.0), sha256="slow")
+    library = {"general": general, "slow": slow}
+    assert models.nearest(library, 500.0)[0] == "general"
+    name, chosen = models.nearest(library, 125.0, ("measured",))
+    assert (name, chosen.profile.signals) == ("general", ("measured",))
+    with pytest.raises(models.RateError, match="rate of 50 Hz; .* log at 80 Hz or above"):
+        models.nearest(library, 50.0)
+
+
+def test_a_reference_of_good_motion_takes_the_place_of_the_run_itself():
+    names, rate = (*MOTION, *JOINTS), 500.0
+    model = trained()
+    _, good = frame_features(signals(rate, "ok", seed=20), model.at(rate, names).profile)
+    reference = Reference.of(good[:, : good.shape[1] // 2])
+    bound = model.at(rate, names, reference=reference)
+    shaken = signals(rate, "oscillations", seed=21)
+    starts, features = frame_features(shaken, bound.profile, None, reference)
+    half = features.shape[1] // 2
+    np.testing.assert_array_equal(features[:, half:], reference.relative(features[:, :half]))
+    whole = bound.classify(shaken, rate)
+    np.testing.assert_array_equal(
+        whole.scores, bound.labels(bound.decide(features), starts, rate, start=0.0).scores
+    )
+    for name, each in streamed(bound, shaken, (13, 700, 701)).items():
+        np.testing.assert_array_equal(each, getattr(whole, name), err_msg=name)
+
+
+# --- training
+
+
+def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_feed():
+    one = recording(500.0, "oscillations", 0)
+    parts = list(models.frames_of([one], RECIPE))
+    feeding = [names for names in LEARNT if set(names) <= {*one.signal, NOISE}]
+    assert len(parts) == len(feeding)
+    for names, part in zip(feeding, parts, strict=True):
+        profile = RECIPE.bound(500.0, names)
+        _, features = frame_features(one.signal, profile)
+        assert part.features.shape == (len(features), len(RECIPE.columns))
+        places = RECIPE.places(profile)
+        there = ~np.isnan(part.features[:, places])
+        np.testing.assert_array_equal(
+            part.features[:, places][there], features.astype(np.float32)[there]
+        )
+        assert np.isnan(np.delete(part.features, places, axis=1)).all()
+        assert set(part.labels) == {"oscillations"}
+        assert part.hashes == {one.name: one.sha256}
+
+
+def test_every_so_many_ok_frames_are_kept_and_all_others():
+    ok, bad = recording(500.0, "ok", 0), recording(500.0, "impact", 0)
+    for one, share in ((ok, 4), (bad, 1)):
+        (whole, *_), (thin, *_) = (
+            list(models.frames_of([one], RECIPE, thin=count)) for count in (1, 4)
+        )
+        assert len(thin.labels) == len(whole.labels) // share
+    bare = next(models.frames_of([replace(ok, blocks=())], RECIPE))
+    assert bare.features.shape == (0, len(RECIPE.columns))
+
+
+def test_odds_are_corrected_for_frames_of_good_motion_that_were_left_out():
+    plain, thin = trained(), models.General.train(frames(), RECIPE, thin=4)
+    shift = thin.estimator.calibration - plain.estimator.calibration
+    np.testing.assert_allclose(shift, [0.0, np.log(4), 0.0, 0.0], atol=1e-12)
+
+
+def test_features_relative_to_a_reference_are_never_novel():
+    relative = np.array([name.startswith("relative") for name in RECIPE.columns])
+    known = trained().estimator.known
+    assert (known[relative] > 1e6).all()
+    assert (known[~relative] < 1e6).any()
+
+
+def test_training_takes_two_classes():
+    alone = models.Frames.joined(models.frames_of([recording(500.0, "ok", 0)], RECIPE))
+    with pytest.raises(models.DatasetError, match="two classes or more of ok, impact, .* are ok"):
+        models.General.train(alone, RECIPE)
+
+
+def test_a_split_sends_a_missing_feature_where_training_chose():
+    trees = Trees(
+        feature=np.array([[0.0], [1.0]]),
+        threshold=np.zeros((2, 1)),
+        left=np.array([[[0.0], [0.0]], [[1.0], [1.0]]]),
+        missing=np.array([[1.0], [0.0]]),
+        leaf=np.array([[1.0, 2.0], [10.0, 20.0]]),
+        prior=np.zeros(2),
+        calibration=np.array([1.0, 0.0, 0.0]),
+        frequency=np.array([0.5, 0.5]),
+        known=np.array([9.0, 9.0]),
+        alarm=0.5,
+    )
+    features = np.array([[-1.0, 1.0], [np.nan, 1.0], [-1.0, np.nan], [np.nan, np.nan]])
+    expected = [[1.0, 20.0], [2.0, 20.0], [1.0, 10.0], [2.0, 10.0]]
+    np.testing.assert_array_equal(trees.logits(features), expected)
+    fewer = trees.at(np.array([1]))
+    np.testing.assert_array_equal(fewer.logits(features[:2, 1:]), [[2.0, 20.0], [2.0, 20.0]])
+    np.testing.assert_array_equal(trees.at(np.array([0])).logits(features[:1, :1]), [[1.0, 10.0]])
+
+
+@pytest.mark.parametrize("leaves", [2, 4])
+def test_trees_have_the_probabilities_of_scikit_learn_where_features_are_missing(leaves):
+    from sklearn.ensemble import HistGradientBoostingClassifier
+
+    random = np.random.default_rng(0)
+    features = random.normal(size=(500, 5))
+    targets = (features[:, 0] > features[:, 2]).astype(int) + (features[:, 1] > 0.5)
+    features[random.random(features.shape) < 0.3] = np.nan
+    profile = replace(models.GENERAL.at(1000.0), rounds=10, leaves=leaves)
+    ours = Trees.fit(features, targets, np.array(["one"] * 500), profile)
+    theirs = HistGradientBoostingClassifier(
+        max_iter=10, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
+        early_stopping=False, random_state=0,
+    ).fit(features, targets)  # fmt: skip
+    points = random.normal(size=(100, 5))
+    points[random.random(points.shape) < 0.3] = np.nan
+    np.testing.assert_allclose(
+        ours.score(ours.decision(points)), theirs.predict_proba(points), rtol=1e-9
+    )
+
+
+# --- the file
+
+
+def test_a_model_that_was_saved_decides_as_before(path):
+    loaded = models.load(path)
+    assert isinstance(loaded, models.General)
+    assert (loaded.recipe, loaded.classes) == (RECIPE, trained().classes)
+    assert (loaded.runs, loaded.metrics) == (trained().runs, trained().metrics)
+    for rate in RATES:
+        for names in GIVEN.values():
+            there = signals(rate, "impact", seed=30, names=names)
+            ours, theirs = (m.at(rate, there).classify(there, rate) for m in (trained(), loaded))
+            np.testing.assert_array_equal(ours.scores, theirs.scores)
+            np.testing.assert_array_equal(ours.label, theirs.label)
+    assert loaded.at(500.0).sha256 == loaded.sha256 != ""
+
+
+def test_a_model_saved_twice_has_the_same_bytes(path, tmp_path):
+    models.load(path).save(tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
+    with pytest.raises(models.OutputError, match="exists already"):
+        trained().save(path)
+
+
+def test_training_twice_gives_the_same_bytes(path, tmp_path):
+    models.General.train(frames(), RECIPE).save(tmp_path / "again.npz")
+    assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
+
+
+def test_a_model_bound_to_a_robot_is_a_file_of_its_own(tmp_path):
+    names, rate = (*MOTION, *JOINTS), 125.0
+    profile = trained().at(rate, names).profile
+    _, good = frame_features(signals(rate, "ok", seed=20), profile)
+    reference = Reference.of(good[:, : good.shape[1] // 2])
+    bound = trained().at(rate, names, reference=reference)
+    bound.save(tmp_path / "model.npz")
+    loaded = models.load(tmp_path / "model.npz")
+    there = signals(rate, "impact", seed=31)
+    np.testing.assert_array_equal(
+        loaded.classify(there, rate).scores, bound.classify(there, rate).scores
+    )
+    for changes, reason in (
+        ({"spread": -reference.spread - 1.0}, "location and spread are no reference"),
+        ({"spread": reference.spread[1:]}, "location and spread are no reference"),
+        ({"location": reference.location * np.nan}, "'location' holds values that are not finite"),
+        ({"location": None}, "is no model file: holds"),
+    ):
+        bound.save(tmp_path / "model.npz", overwrite=True)
+        rewrite(tmp_path / "model.npz", **changes)
+        with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
+            models.load(tmp_path / "model.npz")
+
+
+def test_a_model_for_any_rate_is_no_classifier(path):
+    with pytest.raises(models.ModelFileError, match="is a model for any rate"):
+        models.Classifier.load(path)
+
+
+@pytest.mark.parametrize(
+    ("changes", "reason"),
+    [
+        (None, "a recipe has alarm, classes, .*, and nothing else"),
+        ({"colour": 1}, "a recipe has alarm, classes, .*, and nothing else"),
+        ({"frame": "long"}, "frame is 'long', expected a number from 0 to 10000"),
+        ({"frame": -0.4}, "frame is -0.4, expected a number from 0 to 10000"),
+        ({"lowest": float("-inf")}, "lowest is -inf, expected a number from 0 to 10000"),
+        ({"quick": float("inf")}, "quick is inf, expected a number from 0 to 10000"),
+        ({"per_octave": 0.0}, "a setting of the recipe is wrong"),
+        ({"window": 0.0}, "a setting of the recipe is wrong"),
+        ({"lowest": 30.0}, "a rate of 80 Hz leaves 1 bands"),
+        ({"hop": 0.001}, "hop is 0, expected more than 0"),
+        ({"classes": ["ok"]}, "classes are ok, expected"),
+        ({"rounds": 9}, "array 'feature' has shape"),
+        ({"leaves": 8}, "array 'feature' has shape"),
+        ({"highest": 1000.0}, "array 'known' has shape"),
+        ({"estimator": "svm"}, "a recipe for any rate has trees and a reference"),
+        ({"reference": False}, "expected 'log' and one of both"),
+        (
+            {"reference": False, "relative": True},
+            "a recipe for any rate has trees and a reference, not trees and reference False",
+        ),
+    ],
+)
+def test_a_wrong_recipe_is_refused(path, changes, reason):
+    recipe = [] if changes is None else {**asdict(RECIPE), **changes}
+    rewrite(path, {"recipe": recipe})
+    with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
+        models.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "reason"),
+    [
+        ("mean", lambda array: array[1:], r"array 'mean' has shape \(\d+,\), its profile asks"),
+        ("scale", lambda array: 0 * array, "array 'scale' holds values that are not above 0"),
+        ("scale", lambda array: np.nan * array, "'scale' holds values that are not finite"),
+        ("known", lambda array: array[:-1], "array 'known' has shape"),
+        ("missing", lambda array: array + 1.0, "array 'missing' holds values beyond 0 to 1"),
+        ("missing", lambda array: array[1:], "array 'missing' has shape"),
+        ("feature", lambda array: array + 1e4, "array 'feature' holds values beyond 0 to"),
+        ("threshold", lambda array: np.nan * array, "'threshold' holds values that are not fin"),
+        ("leaf", lambda _: None, "is no model file: holds"),
+    ],
+)
+def test_a_damaged_file_is_refused(path, name, change, reason):
+    with np.load(path, allow_pickle=False) as members:
+        array = members[name]
+    rewrite(path, **{name: change(array)})
+    with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
+        models.load(path)
+
+
+# --- files of older formats
+
+
+def older(path, version):
+    """Write a file of trees as an older version did: without `missing` and `reference`."""
+    with np.load(path, allow_pickle=False) as members:
+        manifest = json.loads(str(members["manifest"]))
+    profile = dict(manifest["profile"])
+    del profile["reference"]
+    if version == 4:
+        profile["machine"] = profile.pop("estimator")
+    changes = {"format": f"noise-model/{version}", "profile": profile}
+    rewrite(path, changes, missing=None)
+
+
+@pytest.mark.parametrize("version", [4, 5])
+def test_trees_of_older_formats_decide_as_before(version, tmp_path):
+    profile = replace(models.EACH.at(500.0), rounds=5)
+    recordings = [
+        recording(500.0, label, seed) for seed in range(2) for label in ("ok", "oscillations")
+    ]
+    before = models.Classifier.train(models.Dataset.of(recordings, profile), profile)
+    before.save(tmp_path / "model.npz")
+    older(tmp_path / "model.npz", version)
+    loaded = models.load(tmp_path / "model.npz")
+    assert isinstance(loaded, models.Classifier)
+    assert loaded.profile == profile
+    there = signals(500.0, "oscillations", seed=40)
+    np.testing.assert_array_equal(
+        loaded.classify(there, 500.0).scores, before.classify(there, 500.0).scores
+    )

@@ -1,0 +1,162 @@
+"""Features relative to a reference: of good motion, or of the signal as far as it has come."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import models
+from models.framefeatures import frame_features
+from models.reference import LEAST, MOST, NORMAL, Reference, RunningReference
+
+RECIPE = replace(models.ANY, rounds=5)
+RATES = (80.0, 125.0, 500.0, 1000.0)
+
+
+def frames(seed=0, count=40, features=5):
+    """Features of good frames, in [Np]."""
+    return -2.0 + 0.5 * np.random.default_rng(seed).normal(size=(count, features))
+
+
+def signal(rate, seconds=6.0, seed=0):
+    """A walk that hums in its second half."""
+    time, random = np.arange(round(seconds * rate)) / rate, np.random.default_rng(seed)
+    hum = 0.2 * np.sin(60 * np.pi * time) * (time > seconds / 2)
+    return 1.0 + 0.3 * np.sin(7.0 * time) + 0.02 * random.normal(size=len(time)) + hum
+
+
+def relative_part(features):
+    return features[:, features.shape[1] // 2 :]
+
+
+def test_a_reference_is_the_median_and_the_scaled_median_deviation():
+    good = frames()
+    reference = Reference.of(good)
+    np.testing.assert_array_equal(reference.location, np.median(good, axis=0))
+    deviation = np.median(np.abs(good - np.median(good, axis=0)), axis=0)
+    np.testing.assert_allclose(reference.spread, NORMAL * deviation, rtol=1e-12)
+
+
+def test_the_spread_of_normal_features_is_their_standard_deviation():
+    good = 0.5 * np.random.default_rng(0).normal(size=(100_000, 1))
+    assert Reference.of(good).spread[0] == pytest.approx(0.5, rel=0.02)
+
+
+def test_features_relative_to_a_reference_count_spreads_from_its_location():
+    reference = Reference(np.array([1.0, -3.0]), np.array([0.5, 0.0]))
+    found = reference.relative(np.array([[1.0, -3.0], [1.0 + 0.5 + LEAST, -3.0 - 2 * LEAST]]))
+    np.testing.assert_allclose(found, [[0.0, 0.0], [1.0, -2.0]], atol=1e-12)
+
+
+def test_relative_features_are_bounded():
+    reference = Reference.of(frames())
+    found = reference.relative(np.array([np.full(5, 1e6), np.full(5, -1e6)]))
+    np.testing.assert_array_equal(found, [np.full(5, MOST), np.full(5, -MOST)])
+
+
+def test_one_loud_frame_hardly_moves_a_reference():
+    good = frames()
+    plain, moved = Reference.of(good), Reference.of(np.vstack((good, np.full(5, 1e6))))
+    assert (np.abs(moved.location - plain.location) < 0.1).all()
+    assert (np.abs(moved.spread - plain.spread) < 0.1).all()
+
+
+def test_the_first_frame_of_a_signal_is_its_own_reference():
+    np.testing.assert_array_equal(RunningReference().relative(frames()[:1]), np.zeros((1, 5)))
+    second = RunningReference().relative(np.array([[0.0], [0.01]]))[1, 0]
+    assert 0.0 < second < 0.01 / LEAST  # the spread before anything is known is not 0
+
+
+@given(first=st.integers(0, 40), louder=st.floats(-50.0, 50.0))
+def test_a_running_reference_knows_nothing_of_frames_to_come(first, louder):
+    known = frames()
+    other = known.copy()
+    other[first:] += louder
+    ours, theirs = (RunningReference().relative(each) for each in (known, other))
+    np.testing.assert_array_equal(ours[:first], theirs[:first])
+
+
+@given(cuts=st.lists(st.integers(0, 40), max_size=10))
+def test_a_running_reference_does_not_depend_on_the_chunks(cuts):
+    features, running = frames(), RunningReference()
+    edges = [0, *sorted(cuts), len(features)]
+    parts = [running.relative(features[a:b]) for a, b in pairwise(edges)]
+    np.testing.assert_array_equal(np.concatenate(parts), RunningReference().relative(features))
+
+
+@given(
+    place=st.integers(0, 39),
+    column=st.integers(0, 4),
+    steps=st.lists(st.floats(0.0, 20.0), min_size=1, max_size=4),
+    seed=st.integers(0, 20),
+)
+@pytest.mark.parametrize("fixed", [True, False])
+def test_a_relative_feature_never_falls_when_its_frame_becomes_louder(
+    fixed, place, column, steps, seed
+):
+    features, good = frames(seed), frames(seed + 100)
+    before = -np.inf
+    for louder in np.cumsum([0.0, *steps]):
+        each = features.copy()
+        each[place, column] += louder
+        reference = Reference.of(good) if fixed else RunningReference()
+        found = reference.relative(each)[place, column]
+        assert found >= before - 1e-12
+        before = found
+
+
+def test_a_running_reference_approaches_that_of_all_frames():
+    good = frames(count=600)
+    found = RunningReference().relative(np.vstack((good, good)))[600:]
+    np.testing.assert_allclose(found, Reference.of(good).relative(good), atol=0.5)
+    assert np.abs(np.median(found)) < 0.1
+
+
+def test_a_lasting_change_becomes_the_reference():
+    before, after = np.zeros((100, 1)), np.full((600, 1), 2.0)
+    found = RunningReference().relative(np.vstack((before, after)))[:, 0]
+    assert found[100] > 4.0
+    assert found[-1] < found[100] / 4
+    assert (np.diff(found[101:]) <= 0.0).all()
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("fixed", [True, False])
+def test_relative_features_do_not_change_with_the_scale_of_all_amplitudes(rate, fixed):
+    profile = replace(RECIPE, floor=1e-9).bound(rate, ("measured",))
+    good, plain = {"measured": signal(rate, seed=1)}, {"measured": signal(rate)}
+    found = []
+    for scale in (1.0, 30.0, 1000.0):
+        scaled = ({"measured": scale * each["measured"]} for each in (good, plain))
+        of_good, of_plain = scaled
+        half = frame_features(of_good, profile)[1].shape[1] // 2
+        reference = Reference.of(frame_features(of_good, profile)[1][:, :half]) if fixed else None
+        found.append(frame_features(of_plain, profile, None, reference)[1])
+    for each, scale in zip(found[1:], (30.0, 1000.0), strict=True):
+        np.testing.assert_allclose(relative_part(each), relative_part(found[0]), atol=1e-3)
+        louder = (each - found[0])[:, : each.shape[1] // 2]
+        np.testing.assert_allclose(louder, np.log(scale), atol=1e-3)
+
+
+def test_a_run_relative_to_itself_has_medians_of_zero():
+    profile = RECIPE.bound(1000.0, ("measured",))
+    _, features = frame_features({"measured": signal(1000.0)}, profile)
+    plain = features[:, : features.shape[1] // 2]
+    _, found = frame_features({"measured": signal(1000.0)}, profile, None, Reference.of(plain))
+    np.testing.assert_allclose(np.median(relative_part(found), axis=0), 0.0, atol=1e-12)
+    np.testing.assert_array_equal(found[:, : plain.shape[1]], plain)
+
+
+@settings(max_examples=10, deadline=None)
+@given(cut=st.integers(400, 5999))
+def test_what_follows_changes_no_feature_of_the_frames_before(cut):
+    profile = RECIPE.bound(1000.0, ("measured",))
+    starts, features = frame_features({"measured": signal(1000.0)}, profile)
+    whole = starts + profile.length <= cut
+    shorter, fewer = frame_features({"measured": signal(1000.0)[:cut]}, profile)
+    regular = shorter % profile.hop == 0  # a last frame is flush with the end
+    np.testing.assert_array_equal(shorter[regular], starts[whole])
+    np.testing.assert_array_equal(fewer[regular], features[whole])
