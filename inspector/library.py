@@ -8,6 +8,8 @@ import models
 import noisemodel as nm
 from inspector import assets
 from inspector.errors import InspectorError
+from inspector.hold import without_hold
+from models.profile import TOLERANCE
 from noisemodel.types import Array, Real
 
 Library = Mapping[str, models.Model]
@@ -72,6 +74,9 @@ def _fits(model: models.Model, robot: str | None) -> bool:
 def label_run(run: nm.Run, library: Library) -> Labelled:
     """Label a run by the model of the nearest rate at or below its own whose signals it has.
 
+    Where each value of a slower log is there several times (`hold.without_hold`), it is labelled as
+    that slower log.
+
     Args:
         run: The run.
         library: Models to choose from.
@@ -84,9 +89,19 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
             or has no frame without a gap.
         SignalError: If the run is too short for a frame.
     """
-    signals = signals_of(run)
-    name, classifier = _choose(for_robot(library, run.robot), run.rate, signals)
+    slower = without_hold(run)
+    signals = signals_of(slower)
+    try:
+        own = for_robot(library, run.robot)
+        name, classifier = nearest(own, slower.rate, signals, logged=run.rate)
+    except models.ModelsError as error:
+        held = "" if slower is run else "measured values are held: "
+        raise CannotTellError(f"{held}{error}") from error
     rate, remark = classifier.rate, ""
+    if slower is not run and rate > slower.rate * (1 + TOLERANCE):
+        signals = signals_of(run)
+    elif slower is not run:
+        run, remark = slower, f"Labelled at {slower.rate:g} Hz, the rate of its values."
     if not _close(run.rate, rate):
         run = nm.decimated(run, rate)
         signals = signals_of(run)
@@ -98,6 +113,36 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
             " requires"
         )
     return _counted(Labelled(labels, name, remark))
+
+
+def nearest(
+    library: Library, rate: float, signals: Collection[str], *, logged: float
+) -> tuple[str, models.Classifier]:
+    """Model of the nearest rate at or below that of a log's values, bound to them.
+
+    Args:
+        library: Models to choose from.
+        rate: Rate of the log's values, in [Hz].
+        signals: Names of the signals that there are.
+        logged: Rate of the log, in [Hz]: higher where values are held. If no model takes the rate
+            of the values, it is one of a single rate that takes this one.
+
+    Returns:
+        Its name, and the model at its rate.
+
+    Raises:
+        MissingSignalError: If each model needs a signal that is missing.
+        RateError: If all others are of higher rates, or there are no models.
+    """
+    try:
+        return models.nearest(library, rate, signals)
+    except models.ModelsError:
+        single = {
+            name: each for name, each in library.items() if isinstance(each, models.Classifier)
+        }
+        if logged == rate or not single:
+            raise
+        return models.nearest(single, logged, signals)
 
 
 def signals_of(run: nm.Run) -> dict[str, Real]:
@@ -140,7 +185,10 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
         SignalError: If the noise is too short for a frame.
     """
     rate = models.nominal_rate(time)
-    name, classifier = _choose(library, rate, (models.NOISE,))
+    try:
+        name, classifier = models.nearest(library, rate, (models.NOISE,))
+    except models.ModelsError as error:
+        raise CannotTellError(str(error)) from error
     if not _close(rate, classifier.rate):
         raise CannotTellError(
             f"a noise of {rate:g} Hz cannot be decimated to the {classifier.rate:g} Hz of"
@@ -150,14 +198,5 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
     return _counted(Labelled(labels, name))
 
 
-def _choose(
-    library: Library, rate: float, signals: Collection[str]
-) -> tuple[str, models.Classifier]:
-    try:
-        return models.nearest(library, rate, signals)
-    except models.ModelsError as error:
-        raise CannotTellError(str(error)) from error
-
-
 def _close(rate: float, other: float) -> bool:
-    return abs(rate / other - 1) < 1e-3
+    return abs(rate / other - 1) < TOLERANCE

@@ -4,9 +4,9 @@ from scipy.signal import butter, savgol_filter, sosfilt
 
 from inspector.audit.bandwidth import ENCODER_NOISE, bandwidth
 from inspector.audit.differentiation import CENTRAL, SMOOTH, differentiator_of
-from inspector.audit.hold import hold_length
 from inspector.audit.quantisation import step_of
 from inspector.audit.spectrum import spectrum
+from inspector.hold import hold_length
 from noisemodel import Run
 
 RATES = [200.0, 1000.0, 10_000.0]

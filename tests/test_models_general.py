@@ -2,11 +2,11 @@
 
 import json
 from dataclasses import asdict, replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from generalmodel import RATES, RECIPE, frames, recording, signals, trained
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,9 +19,6 @@ from models.pooling import columns
 from models.reference import Reference
 from models.signals import JOINTS, MOTION, NOISE
 
-RECIPE = replace(models.ANY, rounds=8)
-RATES = (80.0, 125.0, 500.0, 1000.0)
-SECONDS = 5.0
 GIVEN = {
     "motion and joints": (*MOTION, *JOINTS),
     "motion": MOTION,
@@ -30,45 +27,6 @@ GIVEN = {
     "noise": (NOISE,),
 }
 """Signals of logs, by what they have."""
-
-
-def signals(rate, label="ok", seed=0, names=(*MOTION, *JOINTS), seconds=SECONDS):
-    """Three joints that follow a motion; a failure shakes the second one."""
-    random = np.random.default_rng([seed, len(label)])
-    time = np.arange(round(seconds * rate)) / rate
-    phase = random.uniform(0, 6, (3, 1))
-    desired = np.array([[0.9], [0.3], [0.1]]) * np.sin(2 * np.pi * 0.5 * time + phase)
-    error = 0.01 * random.normal(size=desired.shape)
-    if label == "oscillations":
-        error[1] += 0.3 * np.sin(2 * np.pi * 27 * time)
-    if label == "impact":
-        error[1] += np.exp(-np.mod(time, 0.4) / 0.02) * random.normal(size=len(time))
-    joints = dict(zip(JOINTS, (desired, desired + error, error), strict=True))
-    norms = {name: np.linalg.norm(joints[f"{name}_joints"], axis=0) for name in MOTION}
-    every = {**norms, **joints, NOISE: np.hypot(norms["measured"], norms["desired"])}
-    return {name: every[name] for name in names}
-
-
-def recording(rate, label, seed, names=(*MOTION, *JOINTS)):
-    blocks = (models.Block(0.0, SECONDS, label),)
-    found = signals(rate, label, seed, names)
-    return models.Recording(f"panda/{label}-{rate:g}-{seed:03d}", found, rate, blocks)
-
-
-@cache
-def frames(recipe=RECIPE):
-    recordings = [
-        recording(rate, label, seed)
-        for rate in RATES
-        for seed in range(2)
-        for label in ("ok", "impact", "oscillations")
-    ]
-    return models.Frames.joined(models.frames_of(recordings, recipe))
-
-
-@cache
-def trained():
-    return models.General.train(frames(), RECIPE)
 
 
 @pytest.fixture

@@ -154,8 +154,9 @@ class Analysis:
     @property
     def remarks(self) -> tuple[str, ...]:
         """What is missing or uncertain and why, a sentence each."""
-        seen = () if self.audit is None else summary(self.audit)
         reason = (f"No labels: {self.reason}.",) if self.labels is None else ()
+        told = bool(reason) and self.audit is not None and not self.audit.observable
+        seen = () if self.audit is None else summary(self.audit, classes=not told)
         links = () if self.links is None else self.links.remarks
         return (*self.missing, *self.notes, *reason, *seen, *links)
 

@@ -9,10 +9,10 @@ import numpy as np
 import models
 from inspector.audit.bandwidth import Bandwidth, bandwidth
 from inspector.audit.copies import copies
-from inspector.audit.hold import hold_length
 from inspector.audit.observability import ClassObservability, Observability, observable_classes
 from inspector.audit.placeholder import placeholder
 from inspector.audit.units import unit_warnings
+from inspector.hold import hold_length, without_hold
 from inspector.library import for_robot, signals_of
 from noisemodel import Run
 from noisemodel.run import part
@@ -99,7 +99,11 @@ def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
         warnings=tuple(_warnings(part, reach)),
         notes=tuple(_notes(part, reach)),
         classes=observable_classes(
-            reach, run.mask, for_robot(library, run.robot), signals_of(part)
+            reach,
+            run.mask,
+            for_robot(library, run.robot),
+            signals_of(part),
+            rate=without_hold(run).rate,
         ),
     )
 

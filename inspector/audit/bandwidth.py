@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspector.audit.differentiation import Differentiator, differentiator_of
-from inspector.audit.hold import hold_length
 from inspector.audit.quantisation import floor_frequency, quantisation_noise, steps_of
 from inspector.audit.spectrum import PER_OCTAVE, Spectrum, smoothed, spectrum
+from inspector.hold import hold_length
 from models import LogBands
 from noisemodel import Run
 from noisemodel.types import Array, Mask

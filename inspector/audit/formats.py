@@ -6,7 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from inspector.audit.audit import Audit
-from inspector.audit.observability import ClassObservability, Observability
+from inspector.audit.observability import MASKED, ClassObservability, Observability
 
 
 def text(name: str, audit: Audit) -> str:
@@ -19,14 +19,15 @@ def text(name: str, audit: Audit) -> str:
     return "\n".join([f"{name}: {audit.duration:.2f} s, {audit.joints} joints", *_lines(audit)])
 
 
-def summary(audit: Audit) -> tuple[str, ...]:
+def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
     """Write the one or two lines that a report has for an audit: classes, then warnings.
 
     Args:
         audit: The audit.
+        classes: Whether to say what can be seen, or cannot.
     """
     warnings = f"Warnings: {'; '.join(audit.warnings)}." if audit.warnings else ""
-    return tuple(line for line in (_classes(audit), warnings) if line)
+    return tuple(line for line in (_classes(audit) if classes else "", warnings) if line)
 
 
 def shortcomings(audit: Audit) -> tuple[str, ...]:
@@ -65,28 +66,33 @@ def _lines(audit: Audit) -> Iterator[str]:
 
 
 def _classes(audit: Audit) -> str:
-    """Write a sentence on which classes are observable."""
+    """Write a sentence on what cannot be seen, or that all classes can."""
     if not audit.classes:
         return ""
-    whole = Observability.OBSERVABLE
-    shown = [each.label for each in audit.classes if each.observability is whole]
-    others = [each for each in audit.classes if each.observability is not whole]
-    if len({_rest(each) for each in others}) == 1 and len(others) > 1:
-        clauses = [f"{_listed([each.label for each in others])} {_rest(others[0])}"]
-    else:
-        clauses = [f"{each.label} {_rest(each)}" for each in others]
-    if shown:
-        clauses = [f"the log can show {_listed(shown)}", *clauses]
+    limited: dict[tuple[str, str], list[str]] = {}
+    for each in audit.classes:
+        if each.observability is not Observability.OBSERVABLE:
+            limited.setdefault(_limit(each, audit), []).append(each.label)
+    clauses = [f"{lead}{_listed(labels)} {rest}" for (lead, rest), labels in limited.items()]
+    if not clauses:
+        clauses = [f"the log can show {_listed([each.label for each in audit.classes])}"]
     sentence = "; ".join(clauses)
     return f"{sentence[0].upper()}{sentence[1:]}."
 
 
-def _rest(each: ClassObservability) -> str:
+def _limit(each: ClassObservability, audit: Audit) -> tuple[str, str]:
+    """What cannot be seen of a class: the words before and after its name."""
     if each.observability is Observability.CANNOT_TELL:
         needed = f"; requires {each.needed:g} Hz" if each.needed else ""
-        return f"cannot be observed ({each.reason}{needed})"
+        return "", f"cannot be observed ({each.reason}{needed})"
+    if each.reason.startswith(MASKED):
+        return "", f"only from {each.low:.3g} to {each.high:.4g} Hz ({each.reason})"
+    above = f"above {each.high:.4g} Hz cannot be seen"
+    reach = audit.bandwidth
+    if each.reason == reach.limit and reach.usable == reach.nyquist / reach.hold:
+        return f"at {2 * reach.usable:.4g} Hz, ", above
     needed = f"; all of it requires {each.needed:g} Hz" if each.needed else ""
-    return f"only from {each.low:.3g} to {each.high:.4g} Hz ({each.reason}{needed})"
+    return "", f"{above} ({each.reason}{needed})"
 
 
 def _listed(words: list[str]) -> str:

@@ -5,9 +5,9 @@ The limits:
 - *The bands of a class.* The paper puts oscillations at 20 to 1000 Hz (its table of scenarios:
   multi-sines of 20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations,
   which are short and broad: theirs is that of the model, from its first band to its last.
-- *The model.* A run is labelled by the general model at the run's own rate, or by the model of the
-  nearest rate at or below. Outside of its bands nothing is observable; below all models the status
-  is *cannot tell*.
+- *The model.* A run is labelled by the general model at the rate of its values, or by the model of
+  the nearest rate at or below. Outside of its bands nothing is observable; below all models the
+  status is *cannot tell*.
 - *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
   or a filter.
 - *Two bands.* Fewer than two of the model's bands are no spectrum; `models.LogBands` has the same
@@ -18,7 +18,7 @@ A class is observable if all of its band is, partly if two bands of the model or
 some are at the quantisation floor: then a failure must exceed that.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -26,12 +26,16 @@ import numpy as np
 
 import models
 from inspector.audit.bandwidth import Bandwidth
+from inspector.library import Library, nearest
 from models import Profile
-from models.logbands import FEWEST, LOWEST
+from models.logbands import FEWEST, HIGHEST, LOWEST
 from noisemodel.types import Array, Mask
 
 OSCILLATIONS = (20.0, 1000.0)
 """The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz]."""
+
+MASKED = "quantisation masks amplitudes"
+"""What the reason begins with where a class is observable in all of its band, if it is loud."""
 
 
 class Observability(StrEnum):
@@ -74,8 +78,10 @@ class ClassObservability:
 def observable_classes(
     bandwidth: Bandwidth,
     valid: Mask,
-    library: Mapping[str, models.Model],
+    library: Library,
     signals: Collection[str],
+    *,
+    rate: float,
 ) -> tuple[ClassObservability, ...]:
     """Determine the observability of each failure class.
 
@@ -84,25 +90,22 @@ def observable_classes(
         valid: False in gaps, shape (samples,).
         library: Models to choose from.
         signals: Names of the signals that the run has.
+        rate: Rate of its values, in [Hz]: lower than that of the log where they are held.
 
     Returns:
         One for each class of the model that would label the run, without `ok`.
     """
-    rate = 2 * bandwidth.nyquist
-    profiles = [
-        model.recipe.bound(LOWEST) if isinstance(model, models.General) else model.profile
-        for model in library.values()
-    ]
+    logged = 2 * bandwidth.nyquist
     try:
-        _, chosen = models.nearest(library, rate, signals)
+        name, chosen = nearest(library, rate, signals, logged=logged)
     except models.ModelsError as error:
-        classes = dict.fromkeys(name for profile in profiles for name in profile.classes[1:])
+        classes = dict.fromkeys(name for model in library.values() for name in _failures(model))
         if isinstance(error, models.MissingSignalError):
             return tuple(
                 ClassObservability(label, Observability.CANNOT_TELL, reason=str(error))
                 for label in classes
             )
-        slowest = min((profile.rate for profile in profiles), default=None)
+        slowest = min(map(_lowest, library.values()), default=None)
         reason = f"{rate:g} Hz is below the rate of every model"
         return tuple(
             ClassObservability(label, Observability.CANNOT_TELL, needed=slowest, reason=reason)
@@ -110,12 +113,15 @@ def observable_classes(
         )
     profile = chosen.profile
     labels = [label for label in chosen.classes if label != "ok"]
-    if not has_frame(valid, profile.duration * rate):
+    if not has_frame(valid, profile.duration * logged):
         reason = f"no stretch of {profile.duration:g} s without a gap"
         return tuple(
             ClassObservability(label, Observability.CANNOT_TELL, reason=reason) for label in labels
         )
-    return tuple(_observability(label, bandwidth, profile, profiles) for label in labels)
+    general = isinstance(library[name], models.General)
+    return tuple(
+        _observability(label, bandwidth, profile, library, general=general) for label in labels
+    )
 
 
 def has_frame(valid: Mask, length: float) -> bool:
@@ -130,27 +136,33 @@ def has_frame(valid: Mask, length: float) -> bool:
 
 
 def _observability(
-    label: str, bandwidth: Bandwidth, profile: Profile, profiles: list[Profile]
+    label: str,
+    bandwidth: Bandwidth,
+    profile: Profile,
+    library: Library,
+    *,
+    general: bool,
 ) -> ClassObservability:
     edges = band_edges(profile)
     wanted = OSCILLATIONS if label == "oscillations" else (edges[0], edges[-1])
     low, high = max(wanted[0], edges[0]), min(wanted[1], edges[-1], bandwidth.usable)
     if np.sum((edges[:-1] < high) & (edges[1:] <= high) & (edges[1:] > low)) < FEWEST:
-        needed = _rate_for(low, profiles) if bandwidth.usable >= bandwidth.nyquist else None
+        needed = _rate_for(low, library) if bandwidth.usable >= bandwidth.nyquist else None
         return ClassObservability(
             label, Observability.CANNOT_TELL, needed=needed, reason=bandwidth.limit
         )
     if high < wanted[1]:
-        by_model = edges[-1] <= bandwidth.usable
+        # A general model has the bands that the log has.
+        by_model = edges[-1] <= bandwidth.usable and not general
         reason = f"the model of {profile.rate:g} Hz ends there" if by_model else bandwidth.limit
-        needed = _rate_for(wanted[1], profiles)
+        needed = _rate_for(wanted[1], library)
         helps = bandwidth.usable >= bandwidth.nyquist and needed > 2 * bandwidth.nyquist
         return ClassObservability(
             label, Observability.PARTLY, low, high, needed if helps else None, reason
         )
     if bandwidth.floor_from is not None and bandwidth.floor_from < high:
         reason = (
-            f"quantisation masks amplitudes below {bandwidth.floor_amplitude:.2g} rad/s"
+            f"{MASKED} below {bandwidth.floor_amplitude:.2g} rad/s"
             f" above {bandwidth.floor_from:.3g} Hz"
         )
         return ClassObservability(label, Observability.PARTLY, low, high, reason=reason)
@@ -166,7 +178,26 @@ def band_edges(profile: Profile) -> Array:
     return np.arange(1.0, profile.bins, 3.0) * bin_width
 
 
-def _rate_for(frequency: float, profiles: list[Profile]) -> float:
-    """Lowest rate of a model that reaches a frequency; without one, twice the latter."""
-    reaching = [each.rate for each in profiles if band_edges(each)[-1] >= frequency]
+def _failures(model: models.Model) -> tuple[str, ...]:
+    """All classes of a model but the first, which is `ok`."""
+    known = model.recipe if isinstance(model, models.General) else model.profile
+    return known.classes[1:]
+
+
+def _lowest(model: models.Model) -> float:
+    """Lowest rate that a model takes, in [Hz]."""
+    return LOWEST if isinstance(model, models.General) else model.rate
+
+
+def _rate_for(frequency: float, library: Library) -> float:
+    """Lowest rate at which a model has a band up to a frequency; without one, twice the latter."""
+    reaching = []
+    for model in library.values():
+        if isinstance(model, models.General):
+            edges = band_edges(model.recipe.bound(HIGHEST))
+            # A band is there from twice its upper edge on.
+            above = edges[edges >= frequency]
+            reaching += [max(LOWEST, float(np.ceil(2 * each))) for each in above[:1]]
+        elif band_edges(model.profile)[-1] >= frequency:
+            reaching.append(model.rate)
     return min(reaching, default=2 * frequency)

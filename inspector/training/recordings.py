@@ -10,6 +10,7 @@ import models
 import noisemodel as nm
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
+from inspector.hold import without_hold
 from inspector.training.part import Part
 from models.logbands import HIGHEST, LOWEST
 from scenarios.sample import DECIMATED, Sample, is_sample
@@ -68,7 +69,8 @@ def classified(
     """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
 
     A desired velocity that is a placeholder, and an error of zero throughout, are left out of run
-    files; samples have a desired motion of their own.
+    files, and values that are held count once (`hold.without_hold`); samples have a desired motion
+    of their own.
 
     Args:
         inputs: Files, and folders of them, however deep.
@@ -120,7 +122,11 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
         if is_sample(path):
             return of_sample(path, DECIMATED if rate is None else rate), None
         run, _ = without_placeholder(nm.Run.load(path))
-        found = of_run(path, run, min(max(run.rate, LOWEST), HIGHEST) if rate is None else rate)
+        slower = without_hold(run)
+        if rate is None:
+            found = of_run(path, slower, min(max(slower.rate, LOWEST), HIGHEST))
+        else:
+            found = of_run(path, run if slower.rate < rate * (1 - SLOWER) else slower, rate)
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {error.wanted:g} Hz"
         return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None

@@ -1,0 +1,91 @@
+"""Zero-order hold: a slow signal that was sampled faster by holding its values, and without it."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from models.types import Index
+from noisemodel import Run
+from noisemodel.run import SAMPLED
+from noisemodel.types import Mask, Real
+
+FEWEST = 10
+"""Fewest jumps that show a hold."""
+
+REGULAR = 0.8
+"""Least share of the jumps that come at the median distance."""
+
+ALIGNED = 0.99
+"""Least share of the jumps that come a multiple of the hold after each other."""
+
+LARGER = 1.5
+"""Least ratio of median to smallest jump: jumps of one size are quantisation."""
+
+
+def hold_length(signal: Real, valid: Mask) -> float:
+    """Length of the zero-order hold of a signal.
+
+    Args:
+        signal: Shape (samples, joints).
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        Samples from jump to jump, 1.0 without a hold.
+    """
+    return _length(signal, _jumps(signal, valid))
+
+
+def without_hold(run: Run) -> Run:
+    """The run at the rate of its values: one of each n samples, if each value is there n times.
+
+    Args:
+        run: The run.
+
+    Returns:
+        The run itself unless its measured velocities have a zero-order hold of a whole number of
+        samples throughout.
+    """
+    jumps = _jumps(run.velocity, run.mask)
+    hold = _length(run.velocity, jumps)
+    count = round(hold)
+    if count < 2 or abs(hold - count) > 1e-3:
+        return run
+    phases = np.bincount((jumps + 1) % count, minlength=count)
+    first = int(phases.argmax())
+    if phases[first] < ALIGNED * len(jumps) or len(run.time) <= first + count:
+        return run
+    own = slice(first, None, count)
+    every = {name: getattr(run, name) for name in SAMPLED}
+    fields: dict[str, Any] = {
+        name: None if each is None else np.ascontiguousarray(each[own])
+        for name, each in every.items()
+    }
+    return replace(run, **fields, stages={name: each[own] for name, each in run.stages.items()})
+
+
+def _jumps(signal: Real, valid: Mask) -> Index:
+    """Samples before each change of a signal, outside of gaps."""
+    changes = (signal[1:] != signal[:-1]).any(axis=1)
+    return np.flatnonzero(changes & valid[1:] & valid[:-1])
+
+
+def _length(signal: Real, jumps: Index) -> float:
+    if len(jumps) < FEWEST:
+        return 1.0
+    distances = np.diff(jumps)
+    middle = np.median(distances)
+    regular = np.abs(distances - middle) <= max(1.0, 0.1 * middle)
+    if middle < 2 or regular.mean() < REGULAR:
+        return 1.0
+    if _one_size(np.abs(signal[jumps + 1].astype(np.float64) - signal[jumps])):
+        return 1.0
+    return float(distances[regular].mean())
+
+
+def _one_size(sizes: Real) -> bool:
+    """Whether each joint jumps by one quantisation step, up or down."""
+    sizes = np.where(sizes > 0, sizes, np.nan)
+    moving = ~np.isnan(sizes).all(axis=0)
+    middle, least = np.nanmedian(sizes[:, moving], axis=0), np.nanmin(sizes[:, moving], axis=0)
+    return bool((middle < LARGER * least).all())

@@ -1,0 +1,227 @@
+"""Runs of any rate, labelled by a general model: what could not be seen, and held values."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from commandline import call
+from generalmodel import RATES, run_at, trained
+from scipy.signal import butter, sosfilt
+
+import models
+import noisemodel as nm
+from inspector.analysis.analyse import analyse
+from inspector.analysis.status import Status
+from inspector.assets import model_files
+from inspector.audit import Observability, audit
+from inspector.hold import without_hold
+from inspector.library import CannotTellError, label_run, load_library, signals_of
+from inspector.report.markdown import report
+from inspector.training.recordings import classified
+
+LIBRARY = {"general": trained()}
+SHIPPED = load_library(model_files())
+SCALAR = {"scalar-1khz": SHIPPED["scalar-1khz"]}
+
+
+def held(run, count, lead=0):
+    """Each sample ``count`` times; ``lead`` samples of another hold come first."""
+    places = np.repeat(np.arange(len(run.time)), count)[count - lead if lead else 0 :]
+    rate = run.rate * count
+    return replace(
+        run,
+        time=np.arange(len(places)) / rate,
+        valid=run.mask[places],
+        velocity=run.velocity[places],
+        velocity_desired=run.velocity_desired[places],
+        blocks=(),
+    )
+
+
+# --- what could not be seen
+
+
+@pytest.mark.parametrize(
+    ("rate", "edge"), [(80.0, 35), (125.0, 55), (250.0, 110), (1000.0, 440), (2000.0, 880)]
+)
+def test_a_verdict_says_which_oscillations_cannot_be_seen(rate, edge):
+    found = analyse(run_at(rate), LIBRARY)
+    sentence = f"At {rate:g} Hz, oscillations above {edge} Hz cannot be seen."
+    assert found.model == "general"
+    assert found.message.count(sentence) == 1
+    assert found.remarks.count(sentence) == 1
+    assert sum("cannot be seen" in remark for remark in found.remarks) == 1
+    assert "can show" not in found.message
+    assert report(found).count(sentence) == 1
+
+
+def test_at_5_khz_every_class_can_be_seen():
+    found = analyse(run_at(5000.0, seconds=2.0), LIBRARY)
+    assert "cannot be seen" not in found.message
+    assert "The log can show impact and oscillations." in found.remarks
+    assert {each.needed for each in found.audit.classes} == {None}
+
+
+@pytest.mark.parametrize("rate", [80.0, 1000.0])
+def test_the_rate_that_is_needed_shows_all_oscillations(rate):
+    oscillations = audit(run_at(rate), LIBRARY).classes[-1]
+    assert (oscillations.observability, oscillations.reason) == (
+        Observability.PARTLY,
+        f"half the rate of {rate:g} Hz",
+    )
+    enough = audit(run_at(oscillations.needed, seconds=2.0), LIBRARY).classes[-1]
+    assert enough.observability is Observability.OBSERVABLE
+    fewer = audit(run_at(oscillations.needed - 2.0, seconds=2.0), LIBRARY).classes[-1]
+    assert fewer.observability is Observability.PARTLY
+
+
+@pytest.mark.parametrize("rate", [20.0, 50.0, 79.0])
+def test_below_80_hz_there_is_no_verdict_and_the_rate_that_is_needed_is_told_once(rate):
+    found = analyse(run_at(rate, seconds=8.0), LIBRARY)
+    assert found.status is Status.CANNOT_TELL
+    assert f"rate of {rate:g} Hz" in found.message
+    assert "log at 80 Hz or above" in found.message
+    assert sum("80 Hz" in remark for remark in found.remarks) == 1
+    assert {each.needed for each in found.audit.classes} == {80.0}
+
+
+def test_a_filter_ends_what_can_be_seen_earlier():
+    run = run_at(1000.0, seconds=10.0)
+    sections = butter(4, 100, fs=1000, output="sos")
+    noise = np.random.default_rng(0).normal(0, 0.01, run.velocity.shape)
+    slow = replace(run, velocity=run.velocity_desired + sosfilt(sections, noise, axis=0))
+    (line,) = (each for each in analyse(slow, LIBRARY).remarks if "cannot be seen" in each)
+    high = audit(slow, LIBRARY).classes[0].high
+    assert line == (
+        f"Impact and oscillations above {high:.4g} Hz cannot be seen (the log looks filtered)."
+    )
+    assert high == pytest.approx(100, rel=0.2)
+
+
+def test_differentiated_velocities_end_what_can_be_seen_earlier():
+    run = run_at(1000.0)
+    position = np.cumsum(run.velocity, axis=0) / 1000.0
+    central = np.gradient(position, 1e-3, axis=0)
+    log = replace(run, velocity=central, position=position, velocity_desired=None)
+    (line,) = (each for each in analyse(log, LIBRARY).remarks if "cannot be seen" in each)
+    assert "(velocities were differentiated)" in line
+
+
+def test_text_and_json_have_the_sentence(tmp_path):
+    trained().save(tmp_path / "general.npz")
+    run_at(125.0).save(tmp_path / "run.npz")
+    sentence = "At 125 Hz, oscillations above 55 Hz cannot be seen."
+    options = (tmp_path / "run.npz", "--model", tmp_path / "general.npz")
+    _, out, _ = call("classify", *options)
+    assert out.count(sentence) == 1
+    _, out, _ = call("classify", *options, "--format", "json")
+    assert json.dumps(json.loads(out)).count(sentence) == 1
+    call("report", *options, "-o", tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text().count(sentence) == 1
+
+
+# --- held values
+
+
+@pytest.mark.parametrize(("count", "lead"), [(2, 0), (4, 0), (4, 3), (8, 1)])
+@pytest.mark.parametrize("rate", RATES)
+def test_a_held_log_has_the_labels_of_the_log_that_was_not_held(rate, count, lead):
+    plain = run_at(rate, "oscillations")
+    log = held(plain, count, lead)
+    ours, theirs = label_run(log, LIBRARY), label_run(plain, LIBRARY)
+    # Samples of a hold before the first whole one have no time of their own.
+    skip = 1 if lead else 0
+    if lead:
+        theirs = label_run(plain.cut(plain.time[1] - 1e-6, np.inf), LIBRARY)
+    assert ours.remark.split(".")[0] == f"Labelled at {rate:g} Hz, the rate of its values"
+    np.testing.assert_array_equal(ours.labels.label, theirs.labels.label)
+    np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
+    offset = lead / log.rate - skip / rate
+    np.testing.assert_allclose(ours.labels.start, theirs.labels.start + offset, atol=1e-9)
+
+
+def test_a_held_log_says_what_the_log_that_was_not_held_says():
+    plain = run_at(125.0)
+    found = analyse(held(plain, 8), LIBRARY)
+    sentence = "At 125 Hz, oscillations above 55 Hz cannot be seen."
+    assert analyse(plain, LIBRARY).message == sentence
+    assert found.message == (
+        f"Labelled at 125 Hz, the rate of its values. {sentence} Warnings: measured values have a"
+        " zero-order hold of 8 samples: they come at 125 Hz."
+    )
+
+
+def test_values_held_at_less_than_80_hz_have_no_verdict():
+    found = analyse(held(run_at(40.0, seconds=20.0), 25), LIBRARY)
+    assert found.status is Status.CANNOT_TELL
+    assert found.message == (
+        "measured values are held: rate of 40 Hz; the models' rates are 80 Hz: too low for any;"
+        " log at 80 Hz or above"
+    )
+
+
+def test_a_model_of_one_rate_labels_a_held_log_at_that_rate():
+    log = held(run_at(250.0), 4)
+    labelled = label_run(log, SCALAR)
+    whole = SHIPPED["scalar-1khz"].classify(signals_of(log), 1000.0)
+    np.testing.assert_array_equal(labelled.labels.scores, whole.scores)
+    assert "Labelled" not in labelled.remark
+    with pytest.raises(CannotTellError, match="measured values are held: rate of 500 Hz"):
+        label_run(held(run_at(100.0), 5), SCALAR)
+
+
+def test_a_log_held_from_1_khz_is_labelled_at_1_khz_by_a_model_of_one_rate():
+    plain = run_at(1000.0)
+    ours, theirs = label_run(held(plain, 4), SCALAR), label_run(plain, SCALAR)
+    np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
+
+
+def test_only_values_that_are_there_equally_often_are_taken_once():
+    run = run_at(1000.0)
+    assert without_hold(run) is run
+    assert without_hold(replace(run, velocity=np.round(run.velocity, 2))).rate == 1000.0
+    places = np.arange(5000) * 3 // 10  # a hold of 3 1/3 samples
+    fractional = replace(run, velocity=run.velocity[places])
+    assert without_hold(fractional) is fractional
+    shifted = held(run_at(250.0), 4)
+    moved = np.concatenate((np.arange(1001), np.arange(1000, len(shifted.time) - 1)))
+    apart = replace(shifted, velocity=shifted.velocity[moved])  # by a sample, after a second
+    assert without_hold(apart) is apart
+
+
+def test_a_run_without_its_hold_keeps_all_that_it_has():
+    blocks = (nm.Block(0.5, 1.0, "ok"),)
+    base = np.arange(5000.0)[:, None] * np.ones(6)
+    log = held(run_at(250.0), 4)
+    log = replace(log, blocks=blocks, base_velocity=base, stages={"sent": log.velocity})
+    found = without_hold(log)
+    assert (found.rate, found.blocks, found.joint_names) == (250.0, blocks, ("a", "b", "c"))
+    np.testing.assert_array_equal(found.base_velocity, base[::4])
+    np.testing.assert_array_equal(found.stages["sent"], found.velocity)
+    np.testing.assert_array_equal(found.velocity, run_at(250.0).velocity)
+
+
+def test_gaps_stay_gaps_without_the_hold():
+    plain = run_at(250.0)
+    valid = np.ones(len(plain.time), dtype=bool)
+    valid[300:400] = False
+    gaps = replace(plain, velocity=plain.velocity * valid[:, None], valid=valid)
+    ours, theirs = label_run(held(gaps, 4), LIBRARY), label_run(gaps, LIBRARY)
+    np.testing.assert_array_equal(ours.labels.start, theirs.labels.start)
+    np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
+
+
+def test_evaluation_takes_held_logs_as_classify_does(tmp_path):
+    block = nm.Block(0.0, 5.0, "ok")
+    plain = replace(run_at(250.0), blocks=(block,))
+    replace(held(plain, 4), blocks=(block,)).save(tmp_path / "held.npz")
+    ((ours, run),) = classified([tmp_path / "held.npz"], None)
+    assert (ours.rate, run.rate) == (250.0, 1000.0)
+    np.testing.assert_array_equal(ours.signal["measured"], signals_of(plain)["measured"])
+    ((ours, _),) = classified([tmp_path / "held.npz"], 1000.0)
+    assert ours.rate == 1000.0
+    replace(held(run_at(40.0), 25), blocks=(block,)).save(tmp_path / "slow.npz")
+    ((slow, _),) = classified([tmp_path / "slow.npz"], None)
+    assert isinstance(slow, models.Unanswered)
+    assert slow.reason == "rate 40 Hz < 80 Hz"
