@@ -1,6 +1,7 @@
 """Labels of motion while it arrives, by the model that fits its rate."""
 
 from collections.abc import Callable, Mapping, Sequence
+from math import ceil
 
 import numpy as np
 
@@ -92,6 +93,9 @@ class Labeller:
             self.remark = f"No labels: {error}."
             return
         ratio = round(rate / chosen.rate)
+        if rate > chosen.rate and isinstance(model := library[self.model], models.General):
+            ratio = ceil(rate / chosen.rate * (1.0 - TOLERANCE))
+            chosen = model.at(rate / ratio, self._signals.names)
         if abs(rate / ratio / chosen.rate - 1.0) > TOLERANCE:
             self.remark = (
                 f"No labels: {rate:g} Hz is no multiple of the {chosen.rate:g} Hz of the nearest"
