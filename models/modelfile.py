@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from models.errors import ModelFileError, OutputError, ProfileError
 from models.estimators.estimator import ESTIMATORS
+from models.estimators.trees import Trees
 from models.features import feature_count
 from models.labels import ANOMALY
 from models.logbands import HIGHEST, LogBands
@@ -255,7 +256,7 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
         count = feature_count(profile)
         if "recipe" in manifest:
             recipe = LogBands.of(manifest["recipe"])
-            if recipe.estimator != "trees" or not recipe.reference:
+            if not (issubclass(ESTIMATORS[recipe.estimator], Trees) and recipe.reference):
                 raise ProfileError(
                     f"a recipe for any rate has trees and a reference, not {recipe.estimator} and"
                     f" reference {recipe.reference}"

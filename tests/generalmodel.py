@@ -9,7 +9,7 @@ import models
 import noisemodel as nm
 from models.signals import JOINTS, MOTION, NOISE
 
-RECIPE = replace(models.ANY, rounds=8)
+RECIPE = replace(models.ANY, rounds=8, leaves=4)
 RATES = (80.0, 125.0, 500.0, 1000.0)
 SECONDS = 5.0
 
@@ -61,3 +61,13 @@ def frames(recipe=RECIPE):
 @cache
 def trained():
     return models.General.train(frames(), RECIPE)
+
+
+@cache
+def fixed():
+    """A model of 1 kHz that takes the noise alone."""
+    profile = models.LogBands().at(1000.0)
+    recordings = [
+        recording(1000.0, label, seed, (NOISE,)) for seed in range(2) for label in ("ok", "impact")
+    ]
+    return models.Classifier.train(models.Dataset.of(recordings, profile), profile)

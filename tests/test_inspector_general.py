@@ -6,23 +6,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from commandline import call
-from generalmodel import RATES, run_at, trained
+from generalmodel import RATES, fixed, run_at, trained
 from scipy.signal import butter, sosfilt
 
 import models
 import noisemodel as nm
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status
-from inspector.assets import model_files
 from inspector.audit import Observability, audit
 from inspector.hold import without_hold
-from inspector.library import CannotTellError, label_run, load_library, signals_of
+from inspector.library import CannotTellError, label_run, signals_of
 from inspector.report.markdown import report
 from inspector.training.recordings import classified
 
 LIBRARY = {"general": trained()}
-SHIPPED = load_library(model_files())
-SCALAR = {"scalar-1khz": SHIPPED["scalar-1khz"]}
+FIXED = {"fixed": fixed()}
 
 
 def held(run, count, lead=0):
@@ -163,17 +161,17 @@ def test_values_held_at_less_than_80_hz_have_no_verdict():
 
 def test_a_model_of_one_rate_labels_a_held_log_at_that_rate():
     log = held(run_at(250.0), 4)
-    labelled = label_run(log, SCALAR)
-    whole = SHIPPED["scalar-1khz"].classify(signals_of(log), 1000.0)
+    labelled = label_run(log, FIXED)
+    whole = fixed().classify(signals_of(log), 1000.0)
     np.testing.assert_array_equal(labelled.labels.scores, whole.scores)
     assert "Labelled" not in labelled.remark
     with pytest.raises(CannotTellError, match="measured values are held: rate of 500 Hz"):
-        label_run(held(run_at(100.0), 5), SCALAR)
+        label_run(held(run_at(100.0), 5), FIXED)
 
 
 def test_a_log_held_from_1_khz_is_labelled_at_1_khz_by_a_model_of_one_rate():
     plain = run_at(1000.0)
-    ours, theirs = label_run(held(plain, 4), SCALAR), label_run(plain, SCALAR)
+    ours, theirs = label_run(held(plain, 4), FIXED), label_run(plain, FIXED)
     np.testing.assert_array_equal(ours.labels.scores, theirs.labels.scores)
 
 
