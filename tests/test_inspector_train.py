@@ -1,5 +1,7 @@
 """Training on many logs: those that a profile cannot be trained on are left out, and counted."""
 
+import json
+
 import numpy as np
 import pytest
 from commandline import call
@@ -78,3 +80,22 @@ def test_nothing_left_to_train_on_is_one_line(tmp_path, changes, text):
     assert status == 3
     assert err.endswith(text)
     assert err.count("\n") == 1
+
+
+def test_a_model_for_any_rate_is_trained_and_evaluated_on_logs_of_several_rates(tmp_path):
+    logs, model = tmp_path / "logs", tmp_path / "m.npz"
+    logs.mkdir()
+    for seed, rate in enumerate((100.0, 125.0, 500.0, 50.0)):
+        log(logs / f"log{rate:g}.npz", rate=rate, seed=seed)
+    log(logs / "missing.npz", rate=250.0, desired="missing", seed=9)
+    status, _, err = call("train", logs, "-o", model, "--rate", 500)
+    assert (status, err) == (
+        3,
+        "inspector: profile general is for any rate; leave out --rate 500\n",
+    )
+    status, out, _ = call("train", logs, "-o", model)
+    assert (status, "left out: 1 run below 80 Hz, e.g. log50" in out) == (0, True)
+    assert set(models.load(model).runs) == {"log100", "log125", "log500", "missing"}
+    log(tmp_path / "new.npz", rate=200.0, seed=20)
+    status, out, _ = call("evaluate", model, tmp_path / "new.npz", "--json")
+    assert (status, json.loads(out)["runs"]) == (0, 1)

@@ -127,8 +127,8 @@ def test_a_tone_is_in_features_of_one_name_at_any_rate(frequency):
 def test_failures_are_found_at_any_rate(rate):
     bound = trained().at(rate, (*MOTION, *JOINTS))
     ok = bound.classify(signals(rate, "ok", seed=11), rate)
-    assert ok.events() == ()
     shaken = bound.classify(signals(rate, "oscillations", seed=11), rate)
+    assert ok.flagged.mean() < 0.3 < 0.7 < shaken.flagged.mean()
     assert "oscillations" in {event.label for event in shaken.events()}
 
 
@@ -276,6 +276,18 @@ def test_trees_have_the_probabilities_of_scikit_learn_where_features_are_missing
     )
 
 
+def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
+    recordings = [
+        recording(rate, label, seed)
+        for seed, rate in enumerate((80.0, 125.0, 125.0, 500.0))
+        for label in ("ok", "oscillations")
+    ]
+    model = models.General.train(models.Frames.joined(models.frames_of(recordings, RECIPE)), RECIPE)
+    shaken = signals(500.0, "oscillations", seed=12)
+    labels = model.at(500.0, shaken).classify(shaken, 500.0)
+    assert "oscillations" in {event.label for event in labels.events()}
+
+
 # --- the file
 
 
@@ -355,7 +367,7 @@ def test_a_model_for_any_rate_is_no_classifier(path):
         ({"reference": False}, "expected 'log' and one of both"),
         (
             {"reference": False, "relative": True},
-            "a recipe for any rate has trees and a reference, not trees and reference False",
+            "reference False",
         ),
     ],
 )

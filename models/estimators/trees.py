@@ -149,7 +149,7 @@ class Trees(Probable):
             missing=missing,
             leaf=leaf.reshape(-1, profile.leaves),
             prior=prior,
-            known=np.nanquantile(features[train], 1.0 - TAIL, axis=0),
+            known=np.nanquantile(_known(features[train]), 1.0 - TAIL, axis=0),
             calibration=identity(classes),
             frequency=np.bincount(targets[train], minlength=classes) / len(train),
             alarm=profile.alarm,
@@ -348,7 +348,7 @@ def _boosted(
         random_state=0,
     )
     with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
-        boosting.fit(features[train], targets[train])
+        boosting.fit(_known(features[train]), targets[train])
     # Its trees are private attributes; a test compares ours with them. It has none for a class
     # without frames, and of two classes for the second alone.
     learnt = there if len(there) > 2 else there[1:]
@@ -359,6 +359,11 @@ def _boosted(
             splits[:, number, kind, : len(rows)] = np.transpose(rows)
             leaf[number, kind, : len(values)] = values
     return splits, leaf, prior
+
+
+def _known(features: Array) -> Array:
+    """Features, 0 where no frame has one: it tells nothing, and scikit-learn cannot bin it."""
+    return np.where(np.isnan(features).all(axis=0), 0.0, features)
 
 
 def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
