@@ -122,7 +122,7 @@ class General:
         mean, scale = standard(features, profile)
         targets = np.array([classes.index(label) for label in frames.labels.tolist()])
         scaled = (features - mean) / scale
-        trees = Detector.fit(scaled, targets, frames.groups, profile)
+        trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising)
         relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
         trees = replace(
             trees,
@@ -225,7 +225,8 @@ def frames_of(
     """Labelled frames of recordings, once for each of the inputs that they feed.
 
     Frames are those that classifying would cut, relative to the recording itself. Frames of which
-    the annotations tell no class are left out.
+    the annotations tell no class are left out. Of inputs after the first that a recording feeds,
+    every other frame is enough.
 
     Args:
         recordings: Annotated, of any rates.
@@ -238,15 +239,14 @@ def frames_of(
     """
     count = len(recipe.columns)
     for recording in recordings:
-        for names in inputs:
-            if not feeds(named(recording.signal), names):
-                continue
+        fed = [names for names in inputs if feeds(named(recording.signal), names)]
+        for number, names in enumerate(fed):
             profile = recipe.bound(recording.rate, names)
             starts, features = frame_features(recording.signal, profile, recording.valid)
             frames = silent(recording, starts, profile.duration)
             truth = Matched.of([frames]).frames.truth
-            known = kept(truth, thin)
-            full = np.full((int(known.sum()), count), np.nan, dtype=np.float32)
+            known = np.flatnonzero(kept(truth, thin))[:: 2 if number else 1]
+            full = np.full((len(known), count), np.nan, dtype=np.float32)
             full[:, recipe.places(profile)] = features[known]
             full[:, recipe.without_unit] = np.nan
             groups = np.full(len(full), frames.group)

@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from math import ceil
 from typing import Any, Self
 
 import numpy as np
 
 from models.errors import ProfileError
-from models.pooling import POOLED, columns
+from models.pooling import POOLED, RELATIVE, columns
 from models.profile import CLASSES, EstimatorKind, Profile
 from models.signals import EFFORT, JOINTS, MOTION, NOISE
 from models.types import Index
@@ -91,7 +92,7 @@ class LogBands:
     """Least standard deviation of a feature in the standardisation, in [Np]."""
 
     def at(self, rate: float) -> Profile:
-        """Profile for a sample rate, each duration rounded to the nearest sample.
+        """Profile for a sample rate, each duration rounded to the nearest sample, windows up.
 
         Args:
             rate: Sample rate of the signal, in [Hz].
@@ -117,7 +118,8 @@ class LogBands:
             rate=rate,
             length=round(self.frame * rate),
             hop=round(self.hop * rate),
-            window=round(self.window * rate),
+            # A window that is shorter by a fraction lets the speed leak into the first band.
+            window=ceil(self.window * rate - 1e-6),
             stride=round(self.stride * rate),
             bands="log",
             edges=edges,
@@ -187,6 +189,19 @@ class LogBands:
         """Indices of the features as they are of efforts, whose unit is not known."""
         return np.array([n for n, name in enumerate(self.columns) if name.startswith(EFFORT)])
 
+    @cached_property
+    def rising(self) -> Index:
+        """1 for each feature that rises with the level of a fault, else 0, shape (features,).
+
+        These are the energies of what is measured and of its error, but for the speed itself.
+        """
+        plain = [name.removeprefix(f"{RELATIVE} ") for name in self.columns]
+        fixed = ("desired", "error less", "error_joints less")
+        return np.array(
+            [not name.startswith(fixed) and not name.endswith(" 0") for name in plain],
+            dtype=np.intp,
+        )
+
     def places(self, profile: Profile) -> Index:
         """Indices among all features of those that a profile has, ascending, shape (features,)."""
         number = {name: place for place, name in enumerate(self.columns)}
@@ -226,7 +241,7 @@ ANY = LogBands(
     estimator="detector",
     quick=0.02,
     speed=True,
-    rounds=200,
+    rounds=150,
     leaves=8,
 )
 """For any rate and whatever signals there are; features relative to a reference beside."""

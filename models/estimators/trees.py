@@ -79,7 +79,14 @@ class Trees(Probable):
     known: Array
 
     @classmethod
-    def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> "Trees":
+    def fit(
+        cls,
+        features: Array,
+        targets: Index,
+        groups: Words,
+        profile: Profile,
+        rising: Index | None = None,
+    ) -> "Trees":
         """Train trees on all frames, and calibrate them by trees that left a part out.
 
         Args:
@@ -87,11 +94,13 @@ class Trees(Probable):
             targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
             groups: Runs of a group share their motion, shape (frames,).
             profile: Number and size of the trees.
+            rising: 1 for each feature that, larger, never makes a failure less likely, else 0,
+                shape (features,); a detector alone heeds it.
 
         Returns:
             The trees; equal input gives equal trees. Those of one group are not calibrated.
         """
-        return cls.staged(features, targets, groups, profile, (profile.rounds,))[0]
+        return cls.staged(features, targets, groups, profile, (profile.rounds,), rising)[0]
 
     @classmethod
     def staged(
@@ -101,6 +110,7 @@ class Trees(Probable):
         groups: Words,
         profile: Profile,
         rounds: Sequence[int],
+        rising: Index | None = None,
     ) -> list["Trees"]:
         """Train trees once for several numbers of rounds.
 
@@ -110,6 +120,7 @@ class Trees(Probable):
             groups: Runs of a group share their motion, shape (frames,).
             profile: Most rounds, and size of the trees.
             rounds: Numbers of rounds, none above the profile's.
+            rising: As `fit` takes it.
 
         Returns:
             For each number, the trees that `fit` gives for it.
@@ -120,7 +131,7 @@ class Trees(Probable):
         everything = np.arange(len(targets))
         parallel = Parallel(n_jobs=-1 if len(targets) > MANY else 1)
         fitted: list[Trees] = parallel(
-            delayed(cls.uncalibrated)(features, targets, train, profile)
+            delayed(cls.uncalibrated)(features, targets, train, profile, rising)
             for train in (everything, *(train for train, _ in parts))
         )
         seen = [of_seen_classes(targets, train, test) for train, test in parts]
@@ -136,11 +147,16 @@ class Trees(Probable):
 
     @classmethod
     def uncalibrated(
-        cls, features: Array, targets: Index, train: Index, profile: Profile
+        cls,
+        features: Array,
+        targets: Index,
+        train: Index,
+        profile: Profile,
+        rising: Index | None = None,
     ) -> "Trees":
         """Train trees on some of the frames, without calibration."""
         classes = int(targets.max()) + 1
-        splits, leaf, prior = cls._learnt(features, targets, train, classes, profile)
+        splits, leaf, prior = cls._learnt(features, targets, train, classes, profile, rising)
         feature, threshold, missing, *left = splits.reshape(5, -1, profile.leaves - 1)
         return cls(
             feature=feature,
@@ -157,7 +173,12 @@ class Trees(Probable):
 
     @staticmethod
     def _learnt(
-        features: Array, targets: Index, train: Index, classes: int, profile: Profile
+        features: Array,
+        targets: Index,
+        train: Index,
+        classes: int,
+        profile: Profile,
+        _: Index | None,
     ) -> tuple[Array, Array, Array]:
         """Splits, leaves and prior, as `_boosted` gives them."""
         return _boosted(features, targets, train, classes, profile)
@@ -275,19 +296,23 @@ class Detector(Trees):
 
     The first class has the trees that tell it from all failures; those of the other classes are
     trained on failures alone. In each round of boosting there are as many trees as of `Trees`, but
-    only one sees all frames.
+    only one sees all frames. In that one, features that rise with the level of a fault never make a
+    failure less likely: a fault made louder is not found less.
     """
 
     @staticmethod
     def _learnt(
-        features: Array, targets: Index, train: Index, classes: int, profile: Profile
+        features: Array,
+        targets: Index,
+        train: Index,
+        classes: int,
+        profile: Profile,
+        rising: Index | None,
     ) -> tuple[Array, Array, Array]:
         failing = train[targets[train] > 0]
         splits, leaf, prior = _boosted(features, targets, failing, classes, profile)
-        ours = _boosted(features, (targets == 0).astype(np.intp), train, 2, profile)
-        for whole, part in zip((splits, leaf), ours[:2], strict=True):
-            whole[..., 0, :] = part[..., 1, :]
-        prior[0] = ours[2][1]
+        ours = _boosted(features, (targets > 0).astype(np.intp), train, 2, profile, rising)
+        splits[:, :, 0], leaf[:, 0], prior[0] = ours[0][:, :, 1], -ours[1][:, 1], -ours[2][1]
         return splits, leaf, prior
 
     def logits(self, features: Array) -> Array:
@@ -320,7 +345,12 @@ def _parts(targets: Index, groups: Words) -> list[tuple[Index, Index]]:
 
 
 def _boosted(
-    features: Array, targets: Index, train: Index, classes: int, profile: Profile
+    features: Array,
+    targets: Index,
+    train: Index,
+    classes: int,
+    profile: Profile,
+    rising: Index | None = None,
 ) -> tuple[Array, Array, Array]:
     """Boosted trees of some of the frames.
 
@@ -345,6 +375,7 @@ def _boosted(
         max_leaf_nodes=profile.leaves,
         l2_regularization=profile.penalty,
         early_stopping=False,  # it would hold back frames that overlap others
+        monotonic_cst=rising,
         random_state=0,
     )
     with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
