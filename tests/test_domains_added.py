@@ -1,0 +1,62 @@
+"""Faults that are added to good logs."""
+
+import numpy as np
+import pytest
+
+from noisemodel import Block, Run
+from scenarios.domains.added import APART, KINDS, LEVELS, fault, with_faults
+
+
+def log(rate=500.0, seconds=7.0, noise=1e-4):
+    count = round(rate * seconds)
+    velocity = noise * np.random.default_rng(0).standard_normal((count, 3))
+    return Run(
+        time=np.arange(count) / rate,
+        velocity=velocity.astype(np.float32),
+        joint_names=("a", "b", "c"),
+        blocks=(Block(0.0, seconds, "ok"),),
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("rate", [80.0, 1000.0])
+def test_a_fault_has_level_one(kind, rate):
+    signal = fault(kind, round(rate), 30.0, rate, np.random.default_rng(1))
+    assert np.sqrt(np.mean(signal**2)) == pytest.approx(1.0)
+
+
+def test_a_tone_has_its_frequency():
+    signal = fault("tone", 1000, 90.0, 1000.0, np.random.default_rng(0))
+    assert np.abs(np.fft.rfft(signal)).argmax() == 90
+
+
+def test_nothing_changes_where_no_fault_is():
+    run = log()
+    found = with_faults(run, seed=3)
+    inside = np.zeros(len(run.time), dtype=bool)
+    for event in found.meta["events"]:
+        inside |= (run.time >= event["start"] - 0.01) & (run.time <= event["stop"] + 0.01)
+    assert np.array_equal(found.velocity[~inside], run.velocity[~inside])
+    assert not np.array_equal(found.velocity[inside], run.velocity[inside])
+
+
+def test_each_fault_that_can_be_seen_has_its_label_and_class():
+    found = with_faults(log(), seed=5)
+    bad = [block for block in found.blocks if block.label != "ok"]
+    events = found.meta["events"]
+    assert len(events) == 2  # one every APART, away from the ends
+    assert events[1]["start"] - events[0]["start"] == pytest.approx(APART)
+    assert [(b.start, b.label) for b in bad] == [(e["start"], e["label"]) for e in events]
+
+
+def test_a_fault_far_below_the_noise_has_no_label():
+    found = with_faults(log(noise=100.0 * LEVELS[1]), seed=5)
+    assert {block.label for block in found.blocks} == {"ok"}
+    assert all(event["labelled"] == 0.0 for event in found.meta["events"])
+
+
+def test_equal_seeds_add_equal_faults():
+    assert np.array_equal(with_faults(log(), seed=1).velocity, with_faults(log(), seed=1).velocity)
+    assert not np.array_equal(
+        with_faults(log(), seed=1).velocity, with_faults(log(), seed=2).velocity
+    )
