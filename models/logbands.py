@@ -243,6 +243,7 @@ ANY = LogBands(
     speed=True,
     rounds=150,
     leaves=8,
+    alarm=0.79,
 )
 """For any rate and whatever signals there are; features relative to a reference beside."""
 

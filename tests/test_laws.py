@@ -1,8 +1,9 @@
 """A fault made louder is never found less: laws of the verdict on good runs with a fault added.
 
-A tone, a blow or noise is added to one joint of a good run. Its level is that of the run in the
-band of the model, or `FLOOR` if the run is quieter there: how faint a fault a model finds is
-measured elsewhere (docs/classifier.md), that it finds a loud one is a law.
+A tone, a blow or noise is added to one joint of a good run. Its level is that of the loudest tenth
+of a second of the run in the band of the model, as a touchdown has, or `FLOOR` if the run is
+quieter there: how faint a fault a model finds is measured elsewhere (docs/measured.md), that it
+finds a loud one is a law.
 """
 
 import tempfile
@@ -27,8 +28,6 @@ FLOOR = 0.3
 rule of the scenarios takes for felt."""
 LOUDER = (1.0, 3.0, 10.0, 100.0, 1000.0)
 KINDS = ("tone", "noise", "blow")
-FLOORS = {"talos": 0.8}
-"""A robot that no model knows: slow blows of 0.3 to 0.5 rad/s are missed."""
 SECONDS = 3.0
 
 LIBRARY = load_library()
@@ -38,7 +37,7 @@ LIBRARY = load_library()
 def good_run(robot, rate):
     """Seconds of the first simulated run in which nothing is wrong and nothing is found, at a rate.
 
-    Models raise false alarms in most trots of Go2 (docs/measured.md); the law is about the rest.
+    Models raise false alarms in some trots (docs/measured.md); the law is about the rest.
     """
     for seed in range(9001, 9031):
         run = scenarios.simulate(robot, "straight", seed)
@@ -50,11 +49,14 @@ def good_run(robot, rate):
 
 
 def level_in_band(run, low, high):
-    """Root mean square of all joints between two frequencies, in [rad/s]."""
+    """Root mean square of all joints between two frequencies where it is highest, in [rad/s]."""
     waves = np.fft.rfft(run.velocity.astype(np.float64), axis=0)
     frequency = np.fft.rfftfreq(len(run.time), 1 / run.rate)
     inside = (frequency >= low) & (frequency < high)
-    return float(np.sqrt(2 * np.sum(np.abs(waves[inside]) ** 2)) / len(run.time))
+    waves[~inside] = 0.0
+    power = np.square(np.fft.irfft(waves, len(run.time), axis=0)).sum(axis=1)
+    tenth = round(0.1 * run.rate)
+    return float(np.sqrt(np.convolve(power, np.ones(tenth) / tenth, "valid").max()))
 
 
 def fault(run, kind, frequency, seed):
@@ -85,9 +87,9 @@ def check_the_law(robot, rate, kind, joint, frequency, seed):
     run = good_run(robot, rate)
     good = analyse(run, LIBRARY)
     assert good.status is Status.OK
-    low, high = (LIBRARY[good.model].profile.edges[i] for i in (0, -1))
+    low, high = (LIBRARY[good.model].recipe.bound(rate).edges[i] for i in (0, -1))
     frequency = 20.0 * (min(0.9 * high, 1000.0) / 20.0) ** frequency  # from 20 Hz, in octaves
-    level = max(level_in_band(run, low, high), FLOORS.get(robot, FLOOR))
+    level = max(level_in_band(run, low, high), FLOOR)
     signal = fault(run, kind, frequency, seed)
     joint = joint % run.velocity.shape[1]
     for louder in LOUDER:
@@ -107,16 +109,16 @@ FAULTS = {
 
 @pytest.mark.parametrize("rate", [1000.0, 10_000.0])
 @given(**FAULTS)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6, deadline=None, derandomize=True)
 def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, frequency, seed):
     check_the_law("panda", rate, kind, joint, frequency, seed)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [1000.0, 2000.0, 10_000.0])
+@pytest.mark.parametrize("rate", [250.0, 1000.0, 10_000.0])
 @pytest.mark.parametrize("robot", ["panda", "go2", "talos", "ur5"])
 @given(**FAULTS)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30, deadline=None, derandomize=True)
 def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
     robot, rate, kind, joint, frequency, seed
 ):
@@ -124,7 +126,7 @@ def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
 
 
 @given(**FAULTS, faint=st.floats(0.001, 0.3))
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6, deadline=None, derandomize=True)
 def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency, seed, faint):
     run = good_run("panda", 1000.0)
     signal = fault(run, kind, 20.0 * 20.0**frequency, seed)
