@@ -6,11 +6,11 @@
 The same probe runs in each checkout, by that checkout's Python: its `.venv`, or this one if it has
 none. Inputs are the demo run, simulated runs of four robots (simulated once, in the checkout
 AFTER), and the stand-in for NoisyTest's data set, where `../shared/tools/standin_lola.py` is at
-hand. Compared are the simplified noise, the extended noise of each link, and, for each model that
-BEFORE ships, features, decisions and scores of all frames; of two runs also the simulated run file.
-On the stand-in, a model of each kind is trained, and its decisions and scores are compared.
-Where model files differ, AFTER also reads those of BEFORE. Labels and findings are not compared:
-the rule that makes them of scores changes from 0.1 to 0.2.
+hand. Compared are the simplified noise, the extended noise of each link, and, for each model file
+that BEFORE ships, which both read, features, decisions and scores of all frames; of two runs also
+the simulated run file. On the stand-in, a model of each kind is trained, and its decisions and
+scores are compared. Labels and findings are not compared: the rule that makes them of scores
+changes from 0.1 to 0.2.
 
 `docs/renamed.csv` says what a checkout that is older than this file calls by another name. Exit
 status 1 if anything differs, or if nothing was compared. Noises of all links take about 1 GB in
@@ -25,7 +25,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -269,49 +269,16 @@ def compare_checkouts(
         else:
             print(f"skipped    lola: its maker is not there ({STANDIN})")
     simulate = {name: SIMULATED[name] for name in AGAIN if name in wanted}
-    models = {name: path for name, path in after.models.items() if name in before.models}
-    for name in sorted(after.models.keys() - models):
-        print(f"skipped    model {name}: the checkout before has none of this name")
-    for side, checkout, own in (("before", before, before.models), ("after", after, models)):
+    tasks = (simulate, runs, logs, train, before.models)
+    for side, checkout in (("before", before), ("after", after)):
         shutil.rmtree(folder / side, ignore_errors=True)
-        job = {"simulate": simulate, "runs": runs, "logs": logs, "train": train, "models": own}
-        checkout.probe(folder / side, **job)
+        checkout.probe(folder / side, **dict(zip(TASKS, tasks, strict=True)))
     versions = [(folder / side / "versions.json").read_text() for side in ("before", "after")]
     if versions[0] != versions[1]:
         print(f"caution    not the same packages: {versions[0]} before, {versions[1]} after")
     found = compare(folder / "before", folder / "after")
-    changed = [
-        name for name, path in models.items() if not filecmp.cmp(before.models[name], path, False)
-    ]
-    if changed and runs:
-        found += _old_files(before, after, folder, changed, runs)
     for side in ("before", "after"):
         shutil.rmtree(folder / side)
-    return found
-
-
-def _old_files(
-    before: Checkout,
-    after: Checkout,
-    folder: Path,
-    changed: Iterable[str],
-    runs: Mapping[str, Path],
-) -> list[Comparison]:
-    """Compare what both checkouts decide by the older one's model files, on one run."""
-    run = next(iter(runs))
-    files = {f"{name}": before.models[name] for name in changed}
-    results = folder / "old files"
-    shutil.rmtree(results, ignore_errors=True)
-    after.probe(results, runs={run: runs[run]}, models=files)
-    found = [
-        _compare_files(
-            Path(run, f"model file of before, {name}.npz"),
-            folder / "before" / run / f"{name}.npz",
-            results / run / f"{name}.npz",
-        )
-        for name in files
-    ]
-    shutil.rmtree(results)
     return found
 
 

@@ -10,7 +10,7 @@ version; a job for an older one says what they are called there. Every result is
 import importlib
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
@@ -100,7 +100,10 @@ class Probe:
     def __init__(self, names: Names, output: Path, models: Mapping[str, str]) -> None:
         """Load the models, by the names of their files."""
         self.names, self.output = names, output
-        load = names("models.Classifier.load")
+        try:
+            load = names("models.load")
+        except AttributeError:  # before 0.4, all models are of one rate
+            load = names("models.Classifier.load")
         self._models = {name: load(path) for name, path in models.items()}
 
     def keep(self, run: str, what: str, **arrays: Any) -> None:
@@ -135,12 +138,13 @@ class Probe:
         time, noise = self.names("models.read_log")(path)
         rate = self.names("models.nominal_rate")(time)
         self.keep(name, "log", time=time, noise=noise, rate=rate)
-        for model, classifier in self._models.items():
+        for model in self._models:
+            classifier = self._bound(model, rate, (self.names("models.NOISE"),))
             profile = self.names.field("models.Classifier.profile", classifier)
             signals = self.names.field("models.Profile.signals", profile)
             same_rate = abs(rate / self.names.field("models.Profile.rate", profile) - 1) < 1e-3
             if same_rate and tuple(signals) == (self.names("models.NOISE"),):
-                self._classify(name, model, {"noise": noise}, valid=None)
+                self._classify(name, model, classifier, {"noise": noise}, valid=None)
 
     def train(self, name: str, folder: str) -> None:
         """Train each kind of model on NoisyTest's data set, and decide on the validation part."""
@@ -187,22 +191,35 @@ class Probe:
 
     def _classify_run(self, name: str, run: Any, model: str) -> None:
         """Classify a run, at the lower rate of the model if it has one."""
-        profile = self.names.field("models.Classifier.profile", self._models[model])
-        rate = self.names.field("models.Profile.rate", profile)
         own = self.names.field("noisemodel.Run.rate", run)
+        classifier = self._bound(model, own, self._signals(run))
+        profile = self.names.field("models.Classifier.profile", classifier)
+        rate = self.names.field("models.Profile.rate", profile)
         if own < rate * (1 - 1e-3):
             return
         if own > rate * (1 + 1e-3):
             run = self.names("noisemodel.decimated")(run, rate)
-        norms, joints = self.names("noisemodel.norms")(run), self.names("noisemodel.by_joint")(run)
-        signals = {**norms, **joints}
+        signals = self._signals(run)
         if set(self.names.field("models.Profile.signals", profile)) <= set(signals):
             valid = self.names.field("noisemodel.Run.valid", run)
-            self._classify(name, model, signals, valid=valid)
+            self._classify(name, model, classifier, signals, valid=valid)
 
-    def _classify(self, name: str, model: str, signals: Mapping[str, Any], *, valid: Any) -> None:
-        """Keep features and decisions of all frames, and scores as `classify` gives them."""
-        classifier = self._models[model]
+    def _signals(self, run: Any) -> dict[str, Any]:
+        """Norms and velocities joint by joint of a run, by name."""
+        return {**self.names("noisemodel.norms")(run), **self.names("noisemodel.by_joint")(run)}
+
+    def _bound(self, model: str, rate: float, signals: Collection[str]) -> Any:
+        """A model of one rate as it is, one for any rate bound to a rate and to signals."""
+        found = self._models[model]
+        return found.at(rate, signals) if hasattr(found, "recipe") else found
+
+    def _classify(
+        self, name: str, model: str, classifier: Any, signals: Mapping[str, Any], *, valid: Any
+    ) -> None:
+        """Keep features and decisions of all frames, and scores as `classify` gives them.
+
+        Of a model with a reference, features and decisions are those without it.
+        """
         profile = self.names.field("models.Classifier.profile", classifier)
         rate = self.names.field("models.Profile.rate", profile)
         wanted = self.names.field("models.Profile.signals", profile)

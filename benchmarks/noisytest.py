@@ -36,12 +36,12 @@ TASKS = {
     "file": "label a file of 10 s",
     "hop": "label a hop of 0.1 s",
     "hop, stream": "label a hop of 0.1 s, `Stream`",
-    "hop, scalar": "label a hop of 0.1 s, `Stream` of `scalar-10khz`",
+    "hop, general": "label a hop of 0.1 s, `Stream` of `general`",
     "point": "a point of the grid by itself",
     "points": "a point of the grid as `inspector tune` does it",
 }
 """The timed tasks, by their titles in the table."""
-INSTEAD = {"hop, stream": "hop", "hop, scalar": "hop", "points": "point"}
+INSTEAD = {"hop, stream": "hop", "hop, general": "hop", "points": "point"}
 """The task of the original that replaces one that it does not have."""
 
 

@@ -19,7 +19,7 @@ FILE = "earlycontacttoe.log"
 HOPS = 100
 POINTS = 3
 """Points of the grid that are trained and measured by themselves."""
-TIMES = {"hop": HOPS, "hop, stream": HOPS, "hop, scalar": HOPS, "point": POINTS}
+TIMES = {"hop": HOPS, "hop, stream": HOPS, "hop, general": HOPS, "point": POINTS}
 """Repetitions of a task per call."""
 
 
@@ -94,7 +94,7 @@ class Ours:
             "file": self._label,
             "hop": self._hop,
             "hop, stream": lambda: self._push(self._classifier),
-            "hop, scalar": lambda: self._push(self._scalar),
+            "hop, general": lambda: self._push(self._general),
             "point": self._point,
             "points": self._points,
         }
@@ -109,8 +109,8 @@ class Ours:
 
     def _prepare(self) -> None:
         models, profile = self._models, self._profile
-        shipped = Path(__file__).parents[1] / "assets" / "models" / "scalar-10khz.npz"
-        self._scalar = models.Classifier.load(shipped)
+        shipped = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
+        self._general = models.load(shipped).at(profile.rate)
         _, self._noise = models.read_log(self._folder / "validation" / FILE)
         self._windows = models.frame(self._noise[1:], length=profile.length, hop=profile.hop)
         self._recordings = [

@@ -10,6 +10,7 @@ import noisemodel as nm
 from models.signals import JOINTS, MOTION, NOISE
 
 RECIPE = replace(models.ANY, rounds=8, leaves=4)
+ONE_RATE = replace(models.EACH, rounds=8)
 RATES = (80.0, 125.0, 500.0, 1000.0)
 SECONDS = 5.0
 
@@ -64,10 +65,14 @@ def trained():
 
 
 @cache
-def fixed():
-    """A model of 1 kHz that takes the noise alone."""
-    profile = models.LogBands().at(1000.0)
+def fixed(names=(NOISE,), rate=1000.0):
+    """A model of one rate that has learnt from a Panda, by the noise alone unless told."""
+    profile = replace(ONE_RATE, signals=names).at(rate)
     recordings = [
-        recording(1000.0, label, seed, (NOISE,)) for seed in range(2) for label in ("ok", "impact")
+        recording(rate, label, seed, names)
+        for seed in range(2)
+        for label in ("ok", "impact", "oscillations")
     ]
+    still = {name: np.zeros_like(each) for name, each in recordings[0].signal.items()}
+    recordings.append(replace(recordings[0], name="panda/still-009", signal=still))
     return models.Classifier.train(models.Dataset.of(recordings, profile), profile)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from generalmodel import fixed
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
@@ -9,9 +10,11 @@ from inspector.audit import Observability, audit, shortcomings, summary
 from inspector.audit.observability import OSCILLATIONS, band_edges, has_frame
 from inspector.library import CannotTellError, label_run, load_library
 from models import Profile
+from models.signals import MOTION
 from noisemodel import Run, decimated
 
 LIBRARY = load_library(model_files())
+FIXED = {"slow": fixed(), "fast": fixed(rate=10_000.0)}
 FAILURES = ("impact", "highaccelerations", "oscillations")
 
 
@@ -34,26 +37,32 @@ def test_a_log_of_10_khz_shows_all_classes():
 
 @pytest.mark.parametrize("rate", [1000.0, 1250.0, 2000.0, 5000.0])
 def test_what_lies_outside_of_the_models_bands_is_not_observable(rate):
-    found = classes_of(noisy_run(rate))
+    found = classes_of(noisy_run(rate), FIXED)
     assert found["impact"].observability is Observability.OBSERVABLE
     oscillations = found["oscillations"]
-    top = band_edges(LIBRARY["scalar-1khz"].profile)[-1]
+    top = band_edges(FIXED["slow"].profile)[-1]
     assert (oscillations.observability, oscillations.high) == (Observability.PARTLY, top)
     assert oscillations.needed == 10_000.0
     assert oscillations.reason == "the model of 1000 Hz ends there"
 
 
-@pytest.mark.parametrize("rate", [30.0, 100.0, 500.0, 990.0])
-def test_below_every_model_nothing_is_observable(rate):
-    found = audit(noisy_run(rate), LIBRARY)
+@pytest.mark.parametrize(
+    ("rate", "library", "lowest"),
+    [
+        *((rate, FIXED, 1000.0) for rate in (30.0, 100.0, 500.0, 990.0)),
+        *((rate, LIBRARY, 80.0) for rate in (30.0, 79.0)),
+    ],
+)
+def test_below_every_model_nothing_is_observable(rate, library, lowest):
+    found = audit(noisy_run(rate), library)
     assert not found.observable
     for each in found.classes:
-        assert (each.observability, each.needed) == (Observability.CANNOT_TELL, 1000.0)
+        assert (each.observability, each.needed) == (Observability.CANNOT_TELL, lowest)
         assert each.reason == f"{rate:g} Hz is below the rate of every model"
 
 
 def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason_is_given():
-    alone = {"general-1khz": LIBRARY["general-1khz"]}
+    alone = {"norms": fixed(MOTION)}
     found = audit(noisy_run(1000.0), alone)
     assert not found.observable
     for each in found.classes:
@@ -64,7 +73,7 @@ def test_a_run_that_lacks_the_signals_of_all_models_shows_nothing_and_the_reason
 
 
 def test_without_the_faster_model_twice_the_frequency_is_required():
-    slow = {"scalar-1khz": LIBRARY["scalar-1khz"]}
+    slow = {"slow": FIXED["slow"]}
     assert classes_of(noisy_run(1000.0), slow)["oscillations"].needed == 2 * OSCILLATIONS[1]
     assert audit(noisy_run(1000.0), {}).classes == ()
 
@@ -73,7 +82,7 @@ def test_the_bands_are_those_of_the_profile():
     edges = band_edges(Profile.paper())
     assert edges[0] == pytest.approx(9.8, abs=0.1)  # the paper's f_min, Sec. III-A
     assert edges[-1] == pytest.approx(5000, abs=20)
-    profile = LIBRARY["scalar-10khz"].profile
+    profile = FIXED["fast"].profile
     assert tuple(band_edges(profile)) == profile.edges
 
 
@@ -103,8 +112,9 @@ def test_a_zero_order_hold_limits_observability_to_the_rate_of_its_values():
     noisy = velocity + noise(velocity.shape)
     for length, degree in ((4, Observability.PARTLY), (33, Observability.CANNOT_TELL)):
         held = run_of(np.repeat(noisy[::length], length, axis=0)[: len(noisy)], 1000.0)
-        assert classes_of(held)["oscillations"].observability is degree
-        assert f"hold of {length} samples" in classes_of(held)["oscillations"].reason
+        oscillations = classes_of(held, FIXED)["oscillations"]
+        assert oscillations.observability is degree
+        assert f"hold of {length} samples" in oscillations.reason
 
 
 def test_with_quantisation_loud_failures_stay_observable():
@@ -145,7 +155,7 @@ def test_a_run_without_findings_in_which_nothing_is_observable_is_not_ok(tmp_pat
 def test_one_class_that_is_partly_observable_is_a_remark(tmp_path):
     zeros = np.zeros((6000, 2))
     run_of(zeros, 1000.0).save(tmp_path / "still.npz")
-    verdict = classify_file(tmp_path / "still.npz", LIBRARY)
+    verdict = classify_file(tmp_path / "still.npz", FIXED)
     assert verdict.status is Status.OK
     assert verdict.message == (
         "Oscillations above 440 Hz cannot be seen"

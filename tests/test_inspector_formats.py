@@ -12,11 +12,11 @@ from inspector.report.formats import ANNOTATIONS, FORMATS, as_json, github, juni
 from models import Event
 
 BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
-QUIET = Verdict(Path("quiet.npz"), Status.OK, "scalar-10khz")
+QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")
 LOUD = Verdict(
     Path("loud.npz"),
     Status.FINDINGS,
-    "scalar-10khz",
+    "general",
     (BLOW, RATTLE),
     model_sha256="1f2e",
 )
@@ -40,7 +40,7 @@ def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
 
 def test_text_states_what_was_found_and_when():
     lines = text([QUIET, LOUD]).splitlines()
-    assert lines[0] == "quiet.npz: ok [scalar-10khz]"
+    assert lines[0] == "quiet.npz: ok [general]"
     assert lines[2] == "  impact from 1.00 s to 1.50 s"
     assert lines[3] == "  oscillations from 2.00 s to 3.00 s, out of distribution"
 
@@ -55,7 +55,7 @@ def test_json_is_noise_verdict_2():
     }  # fmt: skip
     assert loud["events"][0]["novel"] is False
     assert (loud["run"], loud["status"], loud["unknown"]) == ("loud.npz", "findings", "finding")
-    assert (loud["model"], loud["model_sha256"]) == ("scalar-10khz", "1f2e")
+    assert (loud["model"], loud["model_sha256"]) == ("general", "1f2e")
     assert (slow["status"], slow["events"]) == ("cannot-tell", [])
     assert slow["message"] == "30 Hz is below every model"
 

@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from generalmodel import fixed
 
 from inspector.assets import model_files
 from inspector.library import (
@@ -11,9 +12,12 @@ from inspector.library import (
     label_run,
     load_library,
 )
+from models.signals import JOINTS, MOTION
 from noisemodel import Run
 
 LIBRARY = load_library(model_files())
+FIXED = {"noise": fixed(), "norms": fixed(MOTION), "joints": fixed((*MOTION, *JOINTS))}
+"""Models of 1 kHz that know a Panda."""
 
 
 def run_of(velocity, rate):
@@ -49,10 +53,14 @@ def test_a_rattle_on_a_smooth_motion_is_found_when_it_happens(rate):
 
 
 def test_a_faster_run_is_decimated_and_a_slower_one_is_not_classified():
-    labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), LIBRARY)
-    assert labelled.remark == "Labelled at 1000 Hz, the rate of model scalar-1khz."
+    labelled = label_run(run_of(np.zeros((20_000, 1)), 5000.0), FIXED)
+    assert labelled.remark == "Labelled at 1000 Hz, the rate of model noise."
     with pytest.raises(CannotTellError, match="500 Hz"):
-        label_run(run_of(np.zeros((2000, 1)), 500.0), LIBRARY)
+        label_run(run_of(np.zeros((2000, 1)), 500.0), FIXED)
+    labelled = label_run(run_of(np.zeros((20_000, 1)), 20_000.0), LIBRARY)
+    assert labelled.remark == "Labelled at 10000 Hz, the rate of model general."
+    with pytest.raises(CannotTellError, match="79 Hz"):
+        label_run(run_of(np.zeros((2000, 1)), 79.0), LIBRARY)
 
 
 def test_a_scalar_noise_cannot_be_decimated():
@@ -60,22 +68,26 @@ def test_a_scalar_noise_cannot_be_decimated():
     with pytest.raises(
         CannotTellError, match="5000 Hz cannot be decimated to the 1000 Hz of model"
     ):
-        label_noise(time, np.ones(20_000), LIBRARY)
+        label_noise(time, np.ones(20_000), FIXED)
+    with pytest.raises(
+        CannotTellError, match="20000 Hz cannot be decimated to the 10000 Hz of model"
+    ):
+        label_noise(time / 4.0, np.ones(20_000), LIBRARY)
 
 
 def test_the_model_with_most_of_the_signals_of_a_run_is_taken():
     generator = np.random.default_rng(0)
     noisy = 0.1 + 1e-3 * generator.normal(size=(3000, 3))
-    assert label_run(run_of(noisy, 1000.0), LIBRARY).model == "scalar-1khz"  # desired is measured
+    assert label_run(run_of(noisy, 1000.0), FIXED).model == "noise"  # desired is measured
     time, names = np.arange(3000) / 1000.0, ("a", "b", "c")
     followed = Run(time=time, velocity=noisy, velocity_desired=0 * noisy + 0.1, joint_names=names)
-    assert label_run(followed, LIBRARY).model == "general-1khz"
+    assert label_run(followed, FIXED).model == "norms"
     known = replace(followed, robot="panda")
-    assert label_run(known, LIBRARY).model == "joints-1khz"
+    assert label_run(known, FIXED).model == "joints"
     apart = replace(followed, desired_joint_names=("tool", "wrist", "base"))
-    assert label_run(apart, LIBRARY).model == "scalar-1khz"  # no joint that is both
+    assert label_run(apart, FIXED).model == "noise"  # no joint that is both
     measured = Run(time=time, velocity=noisy, joint_names=names)
-    assert label_run(measured, LIBRARY).model == "scalar-1khz"
+    assert label_run(measured, FIXED).model == "noise"
 
 
 def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
@@ -89,31 +101,31 @@ def test_a_run_out_of_distribution_is_never_ok_and_its_frames_are_counted():
     assert "ok" not in whole.labels.label
     assert whole.labels.novel.all()
     count = len(whole.labels)
-    remark = f"{count} of {count} frames are out of distribution for model general-1khz."
+    remark = f"{count} of {count} frames are out of distribution for model general."
     assert whole.remark == remark
     known = np.where(run.time[:, None] < 3.0, odd, 0.1 + 1e-7 * odd)
     labelled = label_run(replace(run, velocity=known, velocity_desired=0 * odd + 0.1), LIBRARY)
-    assert "frames are out of distribution for model general-1khz" in labelled.remark
+    assert "frames are out of distribution for model general" in labelled.remark
     assert set(labelled.labels.label[~labelled.labels.novel]) == {"ok"}
 
 
 def test_a_run_without_the_signals_of_a_model_is_not_classified_and_the_error_has_the_reason():
-    alone = {"general-1khz": LIBRARY["general-1khz"]}
+    alone = {"norms": FIXED["norms"]}
     run = Run(time=np.arange(3000) / 1000.0, velocity=np.ones((3000, 1)), joint_names=("a",))
     with pytest.raises(CannotTellError, match="no signal desired, error; there is noise, measured"):
         label_run(run, alone)
 
 
 def test_joints_are_classified_of_robots_in_the_training_set_and_norms_of_all_others():
-    both = {name: LIBRARY[name] for name in ("general-1khz", "joints-1khz")}
+    both = {name: FIXED[name] for name in ("norms", "joints")}
     assert for_robot(both, "panda") == both
     for robot in (None, "xarm7", "my.urdf"):
-        assert list(for_robot(both, robot)) == ["general-1khz"]
-    alone = {"joints-1khz": LIBRARY["joints-1khz"]}
+        assert list(for_robot(both, robot)) == ["norms"]
+    alone = {"joints": FIXED["joints"]}
     assert for_robot(alone, "xarm7") == alone  # who names one model means it
 
 
 def test_a_model_whose_runs_name_no_robot_classifies_the_joints_of_any():
-    own = replace(LIBRARY["joints-1khz"], runs={"monday": "", "tuesday": ""})
-    library = {"general-1khz": LIBRARY["general-1khz"], "own": own}
+    own = replace(FIXED["joints"], runs={"monday": "", "tuesday": ""})
+    library = {"norms": FIXED["norms"], "own": own}
     assert for_robot(library, "xarm7") == library

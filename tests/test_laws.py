@@ -21,7 +21,7 @@ import scenarios
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run
-from inspector.library import load_library
+from inspector.library import load_library, signals_of
 
 FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
@@ -87,7 +87,8 @@ def check_the_law(robot, rate, kind, joint, frequency, seed):
     run = good_run(robot, rate)
     good = analyse(run, LIBRARY)
     assert good.status is Status.OK
-    low, high = (LIBRARY[good.model].recipe.bound(rate).edges[i] for i in (0, -1))
+    edges = LIBRARY[good.model].at(run.rate, signals_of(run)).profile.edges
+    low, high = edges[0], edges[-1]
     frequency = 20.0 * (min(0.9 * high, 1000.0) / 20.0) ** frequency  # from 20 Hz, in octaves
     level = max(level_in_band(run, low, high), FLOOR)
     signal = fault(run, kind, frequency, seed)

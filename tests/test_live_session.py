@@ -7,15 +7,17 @@ from types import FunctionType, ModuleType
 import numpy as np
 import pytest
 import rerun as rr
+from generalmodel import fixed
 from recordings import entities, read
 from rerun.chunk import RrdReader
 
 import inspector
 import noisemodel as nm
 from inspector import assets
-from inspector.library import load_library
+from inspector.library import label_run, load_library
 from inspector.live import LiveError
 from inspector.live.session import BATCH
+from models.signals import JOINTS, MOTION, NOISE
 from noisemodel import OutputError, UnknownJointError
 
 RATE = 1000.0
@@ -29,9 +31,8 @@ def strict():
 
 @pytest.fixture(scope="module")
 def library():
-    """The models that listen to the noise alone."""
-    models = load_library(assets.model_files())
-    return {name: model for name, model in models.items() if name.startswith("scalar")}
+    """The model that ships."""
+    return load_library(assets.model_files())
 
 
 def motion(seconds, joints=3, hum=(1.0, 2.0)):
@@ -85,7 +86,7 @@ def test_a_session_shows_everything(tmp_path, library):
     } <= entities(path)
     assert len(RrdReader(path).blueprints()) == 1
     assert summary.samples == 3000
-    assert summary.model == "scalar-1khz"
+    assert summary.model == "general"
     assert sum(summary.labels.values()) == 27
     assert summary.warnings == {}
     assert "delay from a sample to its label: median" in str(summary)
@@ -96,8 +97,7 @@ def test_a_session_shows_everything(tmp_path, library):
 def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, library, size):
     signals = motion(2.5)
     path, _, _ = shown(tmp_path, signals, range(size, 2500, size), library=library)
-    noise = nm.simplified(signals["velocity"], signals["velocity_desired"])
-    batch = library["scalar-1khz"].classify(noise, RATE)
+    batch = label_run(nm.Run(joint_names=("a", "b", "c"), **signals), library).labels
     time, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
@@ -109,15 +109,13 @@ def test_labels_are_those_of_the_whole_run_however_samples_come(tmp_path, librar
 
 
 @pytest.mark.parametrize("size", [7, 1301])
-@pytest.mark.parametrize("name", ["general-1khz", "joints-1khz"])
-def test_models_of_several_signals_label_as_in_the_whole_run(tmp_path, size, name):
-    signals = motion(2.5)
-    every = load_library(assets.model_files())
-    library = {name: every[name]}
-    path, _, summary = shown(tmp_path, signals, range(size, 2500, size), library=library)
-    assert summary.model == name
+@pytest.mark.parametrize("names", [(NOISE,), MOTION, (*MOTION, *JOINTS)])
+def test_models_of_one_rate_label_as_in_the_whole_run(tmp_path, size, names):
+    signals, own = motion(2.5), fixed(names)
+    path, _, summary = shown(tmp_path, signals, range(size, 2500, size), library={"own": own})
+    assert summary.model == "own"
     run = nm.Run(joint_names=("a", "b", "c"), **signals)
-    batch = library[name].classify({**nm.norms(run), **nm.by_joint(run)}, RATE)
+    batch = own.classify({**nm.norms(run), **nm.by_joint(run)}, RATE)
     _, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
     assert summary.labels == dict(Counter(batch.raw.tolist()))
@@ -190,8 +188,7 @@ def test_missing_samples_end_the_lane_and_labels_resume_after_them(tmp_path, lib
         joint_names=("a", "b", "c"),
         valid=kept,
     )
-    noise = nm.simplified(valid.velocity, valid.velocity_desired)
-    batch = library["scalar-1khz"].classify(noise, RATE, valid=kept)
+    batch = label_run(valid, library).labels
     time, scores = read(path, "/score", "Scalars:scalars")
     np.testing.assert_allclose(time, (batch.start + batch.stop) / 2, atol=1e-6)
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
@@ -265,12 +262,12 @@ def test_without_stamps_samples_follow_each_other(tmp_path, library):
 def test_a_rate_without_a_model_shows_noise_and_warns_that_there_are_no_labels(tmp_path, library):
     warned = []
     with inspector.LiveSession(
-        250.0, save=tmp_path / "live.rrd", library=library, on_warning=warned.append
+        50.0, save=tmp_path / "live.rrd", library=library, on_warning=warned.append
     ) as session:
         session.push(velocity=np.ones((500, 2)))
     assert warned == [
-        "No labels: rate of 250 Hz; the models' rates are 1000, 10000 Hz: too low for any; log"
-        " at 1000 Hz or above."
+        "No labels: rate of 50 Hz; the models' rates are 80 Hz: too low for any; log at 80 Hz or"
+        " above."
     ]
     assert "no labels" in str(session.summary)
     found = entities(tmp_path / "live.rrd")

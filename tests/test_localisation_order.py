@@ -168,7 +168,7 @@ PHRASE = "goes with the speed of knee: 160 periods per turn"
 FOUND = Verdict(
     Path("run.npz"),
     Status.FINDINGS,
-    "joints-1khz",
+    "general",
     (FINDING, Event("impact", 2.0, 2.1, 0.8)),
     orders={FINDING: KNEE},
 )

@@ -40,7 +40,7 @@ def test_a_real_robots_log_is_imported_viewed_and_classified(tmp_path):
     assert classified.returncode in (0, 1), classified.stderr
     (verdict,) = json.loads(classified.stdout)["runs"]
     assert verdict["status"] in ("ok", "findings")
-    assert "1khz" in verdict["model"]
+    assert verdict["model"] == "general"
     gaps = run.time[~run.mask]
     for event in verdict["events"]:
         assert not np.any((gaps > event["start"]) & (gaps < event["stop"]))
