@@ -209,9 +209,11 @@ class Probe:
         return {**self.names("noisemodel.norms")(run), **self.names("noisemodel.by_joint")(run)}
 
     def _bound(self, model: str, rate: float, signals: Collection[str]) -> Any:
-        """A model of one rate as it is, one for any rate bound to a rate and to signals."""
+        """A model of one rate as it is, one for any rate bound to one it takes, and to signals."""
         found = self._models[model]
-        return found.at(rate, signals) if hasattr(found, "recipe") else found
+        if not hasattr(found, "recipe"):
+            return found
+        return found.at(max(rate, self.names("models.logbands.LOWEST")), signals)
 
     def _classify(
         self, name: str, model: str, classifier: Any, signals: Mapping[str, Any], *, valid: Any
