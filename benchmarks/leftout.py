@@ -321,7 +321,7 @@ def main() -> None:
     try:
         profile, names = wanted(given.profile, given.rate, given.without)
         thin = given.thin or (THIN if names else 1)
-        several = [*candidates(profile, given.grid)]
+        several = [*candidates(profile, given.grid, names)]
         if not given.no_logistic:
             several.append(logistic(profile))
         began = perf_counter()
@@ -541,8 +541,15 @@ def line_of(robot: str) -> str:
     return re.sub(r"\d|-", "", robot.partition("_")[0]) or robot
 
 
-def candidates(profile: models.Profile, grid: Sequence[str]) -> Iterator[Candidates]:
+def candidates(
+    profile: models.Profile, grid: Sequence[str], names: Sequence[str] = ()
+) -> Iterator[Candidates]:
     """Points of a grid; trees that differ in their number of rounds alone are trained together.
+
+    Args:
+        profile: What the grid changes.
+        grid: Settings and their values.
+        names: Features of a general model; of a profile of one rate, none.
 
     Raises:
         GridError: If the grid is wrong.
@@ -553,22 +560,25 @@ def candidates(profile: models.Profile, grid: Sequence[str]) -> Iterator[Candida
         axes = Grid.of(grid, profile.kernel)
         profiles = axes.profiles(profile)
         points = [", ".join(f"{k} {v:g}" for k, v in point.items()) for point in axes.points()]
+    known = dict(zip(ANY.columns, ANY.rising.tolist(), strict=True))
+    rising = np.array([known[name] for name in names]) if names else None
     together: dict[models.Profile, list[tuple[str, models.Profile]]] = {}
     for name, one in zip(points, profiles, strict=True):
         key = replace(one, rounds=1) if issubclass(ESTIMATORS[one.estimator], Trees) else one
         together.setdefault(key, []).append((name, one))
     for group in together.values():
-        names, mine = zip(*group, strict=True)
-        yield Candidates(names, _trained(mine))
+        labels, mine = zip(*group, strict=True)
+        yield Candidates(labels, _trained(mine, rising))
 
 
-def _trained(profiles: Sequence[models.Profile]) -> Fit:
+def _trained(profiles: Sequence[models.Profile], rising: Any) -> Fit:
     def fit(scaled: np.ndarray, targets: np.ndarray, groups: np.ndarray) -> Sequence[Any]:
         most = max(profiles, key=lambda profile: profile.rounds)
         kind = ESTIMATORS[most.estimator]
         if not issubclass(kind, Trees):
             return [kind.fit(scaled, targets, groups, most)]
-        return kind.staged(scaled, targets, groups, most, [each.rounds for each in profiles])
+        rounds = [each.rounds for each in profiles]
+        return kind.staged(scaled, targets, groups, most, rounds, rising)
 
     return fit
 

@@ -320,7 +320,7 @@ def test_a_general_candidate_decides_as_the_model_that_training_makes(logs, monk
 
     monkeypatch.setattr(leftout, "counted", counted)
     every = np.arange(len(runs))  # none is left out
-    candidates = [*leftout.candidates(profile, ["rounds=3", "leaves=4"])]
+    candidates = [*leftout.candidates(profile, ["rounds=3", "leaves=4"], names)]
     threshold = [Threshold(0.5, NOVELTY_LIMIT)]
     leftout.measure(runs, [(every, every)], candidates, profile, threshold, names=names, thin=8)
     for run, decisions in zip(runs, decided, strict=True):
