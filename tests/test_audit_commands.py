@@ -29,7 +29,7 @@ def test_the_audit_of_a_30_hz_episode_in_degrees_gives_its_limits(episode):
     assert "positions look like degrees (joint3" in out
     assert "measured position of all joints is the desired one, 1 sample later" in out
     assert "velocities are differentiated positions" in out
-    assert "impact: cannot tell: 30 Hz is below the rate of every model; needs 1000 Hz" in out
+    assert "impact: cannot tell: 30 Hz is below the rate of every model; needs 80 Hz" in out
 
 
 def test_all_classes_are_observable_in_the_demo(tmp_path):
@@ -47,7 +47,7 @@ def test_audits_as_json(episode):
     demo, slow = found["runs"]
     assert demo["bandwidth"]["usable"] == 5000
     assert {each["observability"] for each in demo["classes"]} == {"observable"}
-    assert {each["needed"] for each in slow["classes"]} == {1000}
+    assert {each["needed"] for each in slow["classes"]} == {80}
     assert slow["warnings"][0].startswith("positions look like degrees")
 
 
