@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from inspector.commands.adapt import adapt
 from inspector.commands.audit import audit
 from inspector.commands.baseline import baseline
 from inspector.commands.classify import classify
@@ -76,6 +77,7 @@ _add("Import and export", import_, "inspector import log.csv -o run.npz", name="
 _add("Import and export", labels, "inspector labels run.npz --to labels.txt")
 _add("Import and export", export, "inspector export run.npz -o run.mcap")
 _add("Train", train, "inspector train data/ --part training --rate 1000 -o model.npz")
+_add("Train", adapt, "inspector adapt good1.npz good2.npz -o robot.npz --alarms 1")
 _add("Train", baseline, "inspector baseline good1.npz good2.npz -o baseline.npz --alarms 1")
 _add("Train", tune, "inspector tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl")
 _add("Train", evaluate, "inspector evaluate model.npz data/ --part test")

@@ -63,8 +63,10 @@ def for_robot(library: Library, robot: str | None) -> Library:
 
 
 def _fits(model: models.Model, robot: str | None) -> bool:
-    if isinstance(model, models.General) or not any(
-        map(models.signals.by_joint, model.profile.signals)
+    if (
+        isinstance(model, models.General)
+        or model.profile.reference
+        or not any(map(models.signals.by_joint, model.profile.signals))
     ):
         return True
     robots = {models.splitting.robot_of(name) for name in model.runs} - {""}

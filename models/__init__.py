@@ -6,7 +6,7 @@ after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Pro
 all settings: NoisyTest's, the paper's, or ours for any rate (`LogBands`). A `Dataset` holds
 annotated frames, a `Classifier` is trained on them and labels signals, `evaluate` measures frames,
 and `assess` whole recordings. A `Stream` labels a signal sample by sample. `learn_baseline` takes
-good runs alone.
+good runs alone, and so does `adapt`, which adapts a general model to a robot.
 
 This package needs no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
 only to train.
@@ -43,6 +43,7 @@ from models.general import Frames, General, frames_of
 from models.labels import ANOMALY, UNKNOWN, Event, Labels
 from models.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
 from models.logfile import nominal_rate, read_log
+from models.novelty.adaptation import adapt
 from models.novelty.frames import GoodMotion
 from models.novelty.limit import Limit
 from models.novelty.training import Learnt, learn_baseline
@@ -97,6 +98,7 @@ __all__ = [
     "Stream",
     "Unanswered",
     "UnknownLabelError",
+    "adapt",
     "assess",
     "check_apart",
     "evaluate",

@@ -22,13 +22,13 @@ from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
+from models.novelty.faults import KINDS, fault
 from scenarios.domains.added import LEVELS
 
 FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
 rule of the scenarios takes for felt."""
 LOUDER = (1.0, 3.0, 10.0, 100.0, 1000.0)
-KINDS = ("tone", "noise", "blow")
 SECONDS = 3.0
 
 LIBRARY = load_library()
@@ -60,22 +60,9 @@ def level_in_band(run, low, high):
     return float(np.sqrt(np.convolve(power, np.ones(tenth) / tenth, "valid").max()))
 
 
-def fault(run, kind, frequency, seed):
-    """A signal of level 1 while it lasts, shape (samples,)."""
-    time = run.time - run.time[0]
-    if kind == "blow":
-        since = np.maximum(time - 1.0, 0.0)
-        signal = np.exp(-since * frequency / 3.0) * np.sin(2 * np.pi * frequency * since)
-        lasts = (time >= 1.0) & (time < 1.1)
-        return signal / np.sqrt(np.mean(signal[lasts] ** 2))
-    during = (time >= 1.0) & (time < 2.0)
-    if kind == "tone":
-        return np.sqrt(2.0) * np.sin(2 * np.pi * frequency * time) * during
-    white = np.fft.rfft(np.random.default_rng(seed).normal(size=len(time)))
-    place = np.fft.rfftfreq(len(time), 1 / run.rate)
-    white[(place < frequency / np.sqrt(2.0)) | (place > frequency * np.sqrt(2.0))] = 0.0
-    noise = np.fft.irfft(white, len(time))
-    return noise / noise.std() * during
+def added(run, kind, frequency, seed):
+    """A fault from 1 s on, of level 1, shape (samples,)."""
+    return fault(run.time - run.time[0], kind, frequency, seed, start=1.0)
 
 
 def with_fault(run, joint, signal, level):
@@ -92,7 +79,7 @@ def check_the_law(robot, rate, kind, joint, frequency, seed):
     low, high = edges[0], edges[-1]
     frequency = 20.0 * (min(0.9 * high, 1000.0) / 20.0) ** frequency  # from 20 Hz, in octaves
     level = max(level_in_band(run, low, high), FLOOR)
-    signal = fault(run, kind, frequency, seed)
+    signal = added(run, kind, frequency, seed)
     joint = joint % run.velocity.shape[1]
     for louder in LOUDER:
         found = analyse(with_fault(run, joint, signal, louder * level), LIBRARY)
@@ -131,7 +118,7 @@ def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
 @settings(max_examples=6, deadline=None, derandomize=True)
 def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency, seed, faint):
     run = good_run("panda", 1000.0)
-    signal = fault(run, kind, 20.0 * 20.0**frequency, seed)
+    signal = added(run, kind, 20.0 * 20.0**frequency, seed)
     joint = joint % run.velocity.shape[1]
     levels = faint * np.array([1.0, 2.0, 5.0, 20.0, 100.0])
     found = [bool(analyse(with_fault(run, joint, signal, x), LIBRARY).findings) for x in levels]
@@ -142,7 +129,7 @@ def test_a_faint_fault_that_is_found_is_found_louder_too(kind, joint, frequency,
 @pytest.mark.parametrize("frequency", [35.0, 90.0, 180.0])
 def test_a_tone_on_one_joint_of_a_panda_is_a_finding_however_loud(frequency, amplitude):
     run = good_run("panda", 10_000.0)
-    tone = fault(run, "tone", frequency, 0) / np.sqrt(2.0)
+    tone = added(run, "tone", frequency, 0) / np.sqrt(2.0)
     found = analyse(with_fault(run, 2, tone, amplitude), LIBRARY)
     assert found.status is Status.FINDINGS
     if amplitude / np.sqrt(2.0) > LEVELS[1]:  # louder than the faults that are learnt from
@@ -152,7 +139,7 @@ def test_a_tone_on_one_joint_of_a_panda_is_a_finding_however_loud(frequency, amp
 def test_to_ignore_unknown_frames_never_adds_a_finding():
     run = good_run("panda", 1000.0)
     for kind in KINDS:
-        loud = with_fault(run, 1, fault(run, kind, 60.0, 0), 10.0)
+        loud = with_fault(run, 1, added(run, kind, 60.0, 0), 10.0)
         reported = analyse(loud, LIBRARY)
         ignoring = analyse(loud, LIBRARY, unknown=Unknown.IGNORE)
         spans = {(span.start, span.stop) for span in reported.spans}

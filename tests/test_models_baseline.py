@@ -7,8 +7,8 @@ import pytest
 
 import models
 from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, distance, k_centers
+from models.novelty.frames import GUARD, parts
 from models.novelty.limit import HOUR, PEAKS, alarm_peaks, limit
-from models.novelty.training import GUARD, _parts
 
 RATE = 1000.0
 PROFILE = MOTION.at(RATE)
@@ -130,7 +130,7 @@ def test_little_good_motion_gives_a_remark(learnt):
 def test_of_a_single_run_parts_are_left_out_with_time_between():
     long = models.Recording("long", signals(0, seconds=30), RATE)
     good = models.GoodMotion.read([long], PROFILE)
-    for train, test in _parts(good):
+    for train, test in parts(good):
         gap = np.maximum(good.start[train][:, None] - good.stop[test], 0)
         gap += np.maximum(good.start[test] - good.stop[train][:, None], 0)
         assert gap.min() >= GUARD

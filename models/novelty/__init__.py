@@ -1,1 +1,1 @@
-"""Novelty: learnt from good runs alone, how far a frame is from them."""
+"""Good runs alone: a baseline of them, and a general model that is adapted to them."""

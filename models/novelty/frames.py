@@ -12,10 +12,14 @@ from models.features import feature_count
 from models.framefeatures import frame_features
 from models.profile import TOLERANCE, Profile
 from models.recording import Recording
-from models.splitting import group_of
-from models.types import Array, Mask, Words
+from models.splitting import folds, group_of
+from models.types import Array, Index, Mask, Words
 
 OK = "ok"
+FOLDS = 10
+"""Parts of the good motion that are left out in turn, at most."""
+GUARD = 1.0
+"""Time before and after a left-out part of a single run that is not for training, in [s]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +104,27 @@ class GoodMotion:
         return len(self.runs)
 
 
+def parts(good: GoodMotion) -> list[tuple[Index, Index]]:
+    """Split good motion into parts that are left out in turn.
+
+    Returns:
+        For each part, indices of the frames to train on, and of those of the part: by groups, or by
+        the time of a single one.
+    """
+    groups = good.groups.tolist()
+    if (count := len(set(groups))) > 1:
+        return folds(groups, min(count, FOLDS))
+    found = []
+    for test in np.array_split(np.arange(len(good)), FOLDS):
+        near = np.zeros(len(good), dtype=bool)
+        for run in np.unique(good.runs[test]):
+            own = test[good.runs[test] == run]
+            begin, end = good.start[own].min() - GUARD, good.stop[own].max() + GUARD
+            near |= (good.runs == run) & (good.stop > begin) & (good.start < end)
+        found.append((np.flatnonzero(~near), test))
+    return found
+
+
 def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array]:
     """Features, start and stop of each good frame of a recording."""
     if abs(recording.rate / profile.rate - 1.0) > TOLERANCE:
@@ -111,14 +136,14 @@ def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array
     if recording.samples < profile.length:
         return np.empty((0, feature_count(profile))), np.empty(0), np.empty(0)
     try:
-        starts, found = frame_features(recording.signal, profile, _good(recording))
+        starts, found = frame_features(recording.signal, profile, good_samples(recording))
     except MissingSignalError as error:
         raise RecordingError(recording.name, str(error)) from error
     time = recording.start + starts / recording.rate
     return found, time, time + profile.length / recording.rate
 
 
-def _good(recording: Recording) -> Mask:
+def good_samples(recording: Recording) -> Mask:
     """Whether samples are good: not in a gap, and `ok` where something is annotated."""
     good = np.ones(recording.samples, dtype=bool)
     if recording.blocks:

@@ -1,4 +1,4 @@
-"""The limit of a baseline: the distance at which false alarms keep to a budget.
+"""The limit: how far a frame may lie from good motion so that false alarms keep to a budget.
 
 Conventions: an *alarm* is a stretch of frames beyond the limit that overlap or touch, as everywhere
 in this package. Alarms are rare and good motion is short, so that the limit often lies beyond all
@@ -33,12 +33,13 @@ class Limit:
     """The limit, and what it follows from.
 
     Attributes:
-        distance: The limit, in deviations.
+        distance: The limit, in ``unit``.
         budget: False-alarm budget, per hour of good motion.
         hours: Good motion that there was, in [h].
         alarms: Alarms at the limit in that, by cross-validation.
-        level: The level beyond which the tail is assumed exponential, in deviations.
+        level: The level beyond which the tail is assumed exponential, in ``unit``.
         peaks: Alarms at that level.
+        unit: What distances are in: deviations, or log odds.
     """
 
     distance: float
@@ -47,6 +48,7 @@ class Limit:
     alarms: int
     level: float
     peaks: int
+    unit: str = "deviations"
 
     @property
     def shown(self) -> float:
@@ -60,26 +62,35 @@ class Limit:
 
     def __str__(self) -> str:
         lines = [
-            f"limit {self.distance:.2f} deviations, for {self.budget:g} false alarms per hour;"
-            f" {self.alarms} in {self.hours:.3g} h, each part classified by a baseline without it"
+            f"limit {self.distance:.2f} {self.unit}, for {self.budget:g} false alarms per hour;"
+            f" {self.alarms} in {self.hours:.3g} h, each part classified without learning from it"
         ]
         if self.extrapolated:
             lines.append(
                 f"{self.hours:.3g} h of good motion can show no fewer than {self.shown:.3g} alarms"
                 f" per hour: the limit is extrapolated from {self.peaks} alarms beyond"
-                f" {self.level:.2f} deviations, assuming an exponential tail"
+                f" {self.level:.2f} {self.unit}, assuming an exponential tail"
             )
         return "\n".join(lines)
 
 
-def limit(distance: Array, good: GoodMotion, budget: float) -> Limit:
+def limit(
+    distance: Array,
+    good: GoodMotion,
+    budget: float,
+    *,
+    least: float = LEAST,
+    unit: str = "deviations",
+) -> Limit:
     """Limit for a false-alarm budget.
 
     Args:
-        distance: Of each frame from good motion, by a baseline that was trained without it, shape
-            (frames,), in deviations.
+        distance: Of each frame from good motion, by a model that was trained without it, shape
+            (frames,), in ``unit``.
         good: The frames.
         budget: False alarms in an hour.
+        least: Least limit, in ``unit``.
+        unit: What distances are in.
     """
     hours = good.seconds / HOUR
     allowed = max(PEAKS, int(budget * hours))
@@ -88,9 +99,9 @@ def limit(distance: Array, good: GoodMotion, budget: float) -> Limit:
     # N(t) = N(u) exp(-(t - u) / mean) = budget hours
     mean = float((peaks - level).mean()) if len(peaks) else 0.0
     found = level + mean * np.log(max(len(peaks) / (budget * hours), 1.0))
-    found = max(float(found), LEAST)
+    found = max(float(found), least)
     alarms = len(alarm_peaks(distance, good, found))
-    return Limit(found, budget, hours, alarms, level, len(peaks))
+    return Limit(found, budget, hours, alarms, level, len(peaks), unit)
 
 
 def alarm_peaks(distance: Array, good: GoodMotion, level: float) -> Array:

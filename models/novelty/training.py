@@ -10,23 +10,18 @@ from models.errors import DatasetError, ProfileError
 from models.estimators.baseline import Baseline, distance, k_centers
 from models.features import standard
 from models.modelfile import versions
-from models.novelty.frames import GoodMotion
+from models.novelty.frames import GoodMotion, parts
 from models.novelty.limit import Limit, limit
 from models.profile import Profile
-from models.splitting import folds
-from models.types import Array, Index
+from models.types import Array
 
-FOLDS = 10
-"""Parts of the good motion that are left out in turn, at most."""
-GUARD = 1.0
-"""Time before and after a left-out part of a single run that is not for training, in [s]."""
 LEAST = 5.0
 """Least good motion, in [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Learnt:
-    """A baseline, and facts of its training set.
+    """A model learnt from good runs alone, and facts of its training set.
 
     Attributes:
         classifier: The model.
@@ -72,13 +67,7 @@ def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -
         ProfileError: If the alarms are not above 0.
         DatasetError: If there is too little good motion.
     """
-    if not (isfinite(alarms) and alarms > 0):
-        raise ProfileError(f"{alarms:g} alarms per hour, expected more than 0: say, 1")
-    if good.seconds < LEAST:
-        raise DatasetError(
-            f"{good.seconds:.3g} s of good motion are too short to learn from, expected {LEAST:g} s"
-            " or more: give longer runs, or more of them"
-        )
+    check(good, alarms, LEAST)
     found = limit(_unseen(good, profile), good, alarms)
     mean, scale = standard(good.features, profile)
     estimator = Baseline(k_centers((good.features - mean) / scale), np.array([found.distance]))
@@ -90,30 +79,30 @@ def learn_baseline(good: GoodMotion, profile: Profile, *, alarms: float = 1.0) -
     return Learnt(classifier, found, len(good.hashes), groups, len(good.annotated))
 
 
+def check(good: GoodMotion, alarms: float, least: float) -> None:
+    """Check a false-alarm budget, per hour, and that there is enough good motion, in [s].
+
+    Raises:
+        ProfileError: If the alarms are not above 0.
+        DatasetError: If there is too little good motion.
+    """
+    if not (isfinite(alarms) and alarms > 0):
+        raise ProfileError(f"{alarms:g} alarms per hour, expected more than 0: say, 1")
+    if good.seconds < least:
+        raise DatasetError(
+            f"{good.seconds:.3g} s of good motion are too short to learn from, expected {least:g} s"
+            " or more: give longer runs, or more of them"
+        )
+
+
 def _unseen(good: GoodMotion, profile: Profile) -> Array:
     """Distance of each frame from the good motion of all other parts, shape (frames,)."""
     apart = np.zeros(len(good))
-    for train, test in _parts(good):
+    for train, test in parts(good):
         mean, scale = standard(good.features[train], profile)
         centres = k_centers((good.features[train] - mean) / scale)
         apart[test] = distance((good.features[test] - mean) / scale, centres)
     return apart
-
-
-def _parts(good: GoodMotion) -> list[tuple[Index, Index]]:
-    """Training and left-out frames: by groups, or by the time of a single one."""
-    groups = good.groups.tolist()
-    if (count := len(set(groups))) > 1:
-        return folds(groups, min(count, FOLDS))
-    parts = []
-    for test in np.array_split(np.arange(len(good)), FOLDS):
-        near = np.zeros(len(good), dtype=bool)
-        for run in np.unique(good.runs[test]):
-            own = test[good.runs[test] == run]
-            begin, end = good.start[own].min() - GUARD, good.stop[own].max() + GUARD
-            near |= (good.runs == run) & (good.stop > begin) & (good.start < end)
-        parts.append((np.flatnonzero(~near), test))
-    return parts
 
 
 def _many(count: int, what: str) -> str:

@@ -1,0 +1,54 @@
+"""`inspector adapt`: adapt a general model to a robot by good runs of it."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import InPart, Inputs, Output, Overwrite
+from inspector.training.part import Part
+
+
+def adapt(
+    inputs: Inputs,
+    output: Output,
+    alarms: Annotated[
+        float, typer.Option(help="False-alarm budget, per hour of good motion.")
+    ] = 1.0,
+    model: Annotated[
+        Path | None,
+        typer.Option(
+            help="The general model: a file, or the name of a shipped one; by default the shipped"
+            " one.",
+            show_default=False,
+        ),
+    ] = None,
+    rate: Annotated[
+        float | None,
+        typer.Option(
+            min=1.0,
+            help="Rate of the model in [Hz]; faster runs are decimated.",
+            show_default=False,
+        ),
+    ] = None,
+    part: InPart = Part.ALL,
+    overwrite: Overwrite = False,
+) -> None:
+    """Adapt a general model to a robot: 1 to 10 minutes of good runs, its classes kept."""
+    from inspector.training.adaptation import adapt as adapt_model
+
+    adapted = adapt_model(
+        inputs,
+        output,
+        alarms=alarms,
+        model=model,
+        rate=rate,
+        part=part,
+        overwrite=overwrite,
+    )
+    typer.echo(str(adapted))
+    profile = adapted.learnt.classifier.profile
+    typer.echo(
+        f"{output}: written, for {profile.rate:g} Hz and {', '.join(profile.signals)};"
+        f" classify --model {output} finds failures of this robot"
+    )

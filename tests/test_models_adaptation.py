@@ -1,0 +1,238 @@
+"""A general model is adapted to a robot by good motion of it, with a false-alarm budget."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import poisson
+
+import models
+from models.novelty.faults import CASES, KINDS, LEVELS, fault, recall, with_fault
+
+RATE = 250.0
+RECIPE = replace(models.ANY, rounds=20)
+SIGNALS = models.logbands.INPUTS[models.logbands.INPUTS.index(models.signals.MOTION) - 1]
+
+
+def signals(seed, *, noise=0.01, scale=1.0, seconds=20.0):
+    """A motion of three joints whose measurements are noisy."""
+    generator = np.random.default_rng(seed)
+    time = np.arange(round(seconds * RATE)) / RATE
+    phase = generator.uniform(0, 6, (3, 1))
+    desired = np.sin(2 * np.pi * np.array([[0.3], [0.5], [0.7]]) * time + phase)
+    measured = desired + noise * generator.normal(size=desired.shape)
+    joints = {"desired": desired, "measured": measured, "error": desired - measured}
+    return {
+        **{name: scale * np.linalg.norm(each, axis=0) for name, each in joints.items()},
+        **{f"{name}_joints": scale * each for name, each in joints.items()},
+    }
+
+
+def good(seed, **how):
+    return models.Recording(f"good{seed}", signals(seed, **how), RATE)
+
+
+def faulty(seed, kind, level, **how):
+    """A motion with a fault from 5 s on, annotated."""
+    motion = signals(seed, **how)
+    time = np.arange(len(motion["measured"])) / RATE
+    added = level * fault(time, kind, 60.0, seed, start=5.0)
+    label, stop = ("impact", 5.1) if kind == "blow" else ("oscillations", 6.0)
+    blocks = ((0.0, 4.5, "ok"), (5.0, stop, label), (7.0, 20.0, "ok"))
+    return models.Recording(
+        f"{kind}{seed}",
+        with_fault(motion, seed % 3, added),
+        RATE,
+        tuple(models.Block(*block) for block in blocks),
+    )
+
+
+@pytest.fixture(scope="module")
+def general():
+    """A small general model of eighteen synthetic recordings, at a rate."""
+    recordings = [
+        faulty(seed, KINDS[seed % 3], LEVELS[seed // 3 % 3], noise=0.005 * 2 ** (seed % 4))
+        for seed in range(18)
+    ]
+    frames = models.Frames.joined(models.frames_of(recordings, RECIPE))
+    return models.General.train(frames, RECIPE).at(RATE, SIGNALS)
+
+
+ROBOT = {"noise": 0.15}
+"""A robot that is noisier than any that the general model learnt from."""
+
+
+@pytest.fixture(scope="module")
+def motion(general):
+    recordings = [good(seed, **ROBOT) for seed in range(100, 106)]
+    return models.GoodMotion.read(recordings, general.profile)
+
+
+@pytest.fixture(scope="module")
+def adapted(general, motion):
+    return models.adapt(general, motion, alarms=20.0).classifier
+
+
+def alarms(model, recordings):
+    """Stretches of flagged frames in recordings."""
+    flagged = [
+        model.classify(each.signal, RATE, valid=each.valid).flagged.astype(int)
+        for each in recordings
+    ]
+    return sum(int((np.diff(np.append(0, each)) == 1).sum()) for each in flagged)
+
+
+def test_good_motion_of_the_robot_raises_no_more_alarms_than_the_budget(general, motion):
+    fresh = [good(seed, **ROBOT) for seed in range(200, 215)]
+    hours = 20.0 * len(fresh) / 3600
+    for budget in (20.0, 200.0):
+        model = models.adapt(general, motion, alarms=budget).classifier
+        assert alarms(model, fresh) <= poisson.ppf(0.999, budget * hours)
+    assert alarms(general, fresh) >= 10
+
+
+def test_a_fault_is_found_and_keeps_its_class(adapted):
+    labels = adapted.classify(faulty(300, "tone", 1.0, **ROBOT).signal, RATE)
+    (event,) = labels.events()
+    assert event.label == "oscillations"
+    assert 4.6 <= event.start <= 5.0
+    assert 6.0 <= event.stop <= 6.4
+    assert adapted.classes == ("ok", "impact", "oscillations")
+
+
+def test_a_larger_budget_never_finds_less(general, motion):
+    recordings = [good(seed, **ROBOT) for seed in range(100, 106)]
+    budgets = (1.0, 2.0, 50.0)
+    learnt = {str(each): models.adapt(general, motion, alarms=each) for each in budgets}
+    limits = [each.limit.distance for each in learnt.values()]
+    assert limits == sorted(limits, reverse=True)
+    models_of = {name: each.classifier for name, each in learnt.items()}
+    found = np.array(list(recall(models_of, recordings, motion).found.values()))
+    assert (np.diff(found, axis=0) >= 0).all()
+    assert (np.diff(found, axis=1) >= 0).all()
+    assert found[:, 0].max() <= 2
+    assert found[-1, -1] > 0.7 * CASES
+
+
+def test_a_robot_that_is_louder_as_a_whole_is_adapted_to_alike(general):
+    louder = [good(seed, scale=5.0) for seed in range(100, 106)]
+    motion = models.GoodMotion.read(louder, general.profile)
+    model = models.adapt(general, motion).classifier
+    fresh = [good(seed, scale=5.0) for seed in range(200, 205)]
+    assert alarms(model, fresh) <= poisson.ppf(0.999, 1.0 * 20.0 * len(fresh) / 3600)
+    assert alarms(model, [faulty(300, "tone", 5.0, scale=5.0)]) == 1
+
+
+def test_good_motion_is_in_distribution_after_adapting(general, adapted):
+    fresh = good(201, **ROBOT).signal
+    assert general.classify(fresh, RATE).novel.mean() > 0.05
+    assert adapted.classify(fresh, RATE).novel.mean() == 0.0
+    loud = adapted.classify(faulty(300, "tone", 100.0, **ROBOT).signal, RATE)
+    assert loud.novel.any()
+    assert [event.label for event in loud.events()] == ["oscillations"]
+
+
+def test_a_robot_that_stands_does_not_alarm_whenever_it_moves_a_little(general):
+    still = [good(seed, noise=1e-4, scale=0.0) for seed in range(6)]
+    motion = models.GoodMotion.read(still, general.profile)
+    learnt = models.adapt(general, motion, alarms=100.0)
+    assert learnt.limit.distance >= np.log(0.05 / 0.95)
+    assert alarms(learnt.classifier, still) == 0
+
+
+def test_an_adapted_model_is_a_model_file_and_the_same_runs_give_the_same_bytes(
+    general, motion, adapted, tmp_path
+):
+    adapted.save(tmp_path / "one.npz")
+    models.adapt(general, motion, alarms=20.0).classifier.save(tmp_path / "two.npz")
+    assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
+    loaded = models.load(tmp_path / "one.npz")
+    assert isinstance(loaded, models.Classifier)
+    assert loaded.metrics["adapted"]["budget"] == 20.0
+    assert {f"good{seed}" for seed in range(100, 106)} <= loaded.runs.keys()
+    bad = faulty(300, "blow", 1.0, **ROBOT).signal
+    before, after = (each.classify(bad, RATE) for each in (adapted, loaded))
+    np.testing.assert_array_equal(before.scores, after.scores)
+    np.testing.assert_array_equal(before.label, after.label)
+
+
+def test_a_stream_has_the_labels_of_the_whole_signal(adapted):
+    whole = faulty(300, "noise", 1.0, **ROBOT).signal
+    stream = models.Stream(adapted, joints=3)
+    parts = [
+        stream.push({name: each[..., first : first + 37] for name, each in whole.items()})
+        for first in range(0, round(20 * RATE), 37)
+    ]
+    found = models.Labels.concatenated([*parts, stream.finish()])
+    batch = adapted.classify(whole, RATE)
+    np.testing.assert_array_equal(found.scores, batch.scores)
+    np.testing.assert_array_equal(found.label, batch.label)
+    assert found.flagged.any()
+
+
+def test_what_it_learnt_from_is_said_with_the_least_rate_that_it_can_show(general, motion):
+    learnt = models.adapt(general, motion, alarms=1.0)
+    text = str(learnt)
+    assert "learnt from 0.0333 h of good motion in 6 runs" in text
+    assert "log odds of a failure, for 1 false alarms per hour" in text
+    assert "can show no fewer than 90 alarms per hour: the limit is extrapolated" in text
+    alone = models.Recording("long", signals(0, **ROBOT, seconds=60), RATE)
+    single = models.adapt(general, models.GoodMotion.read([alone], general.profile))
+    assert "which does not show how much another run differs" in str(single)
+
+
+def test_only_what_is_annotated_ok_is_learnt_from(general):
+    recordings = [faulty(seed, "tone", 1.0, **ROBOT) for seed in range(4)]
+    motion = models.GoodMotion.read(recordings, general.profile)
+    assert not ((motion.stop > 4.51) & (motion.start < 6.99)).any()
+    learnt = models.adapt(general, motion)
+    assert "of 4 runs with annotations, the part annotated `ok` alone" in str(learnt)
+
+
+def test_too_little_good_motion_is_refused(general):
+    short = models.GoodMotion.read([good(0, seconds=29.0)], general.profile)
+    wanted = "29 s of good motion are too short to learn from, expected 30 s or more"
+    with pytest.raises(models.DatasetError, match=wanted):
+        models.adapt(general, short)
+
+
+@pytest.mark.parametrize("budget", [0.0, -1.0, np.nan, np.inf])
+def test_a_budget_of_no_alarm_is_refused(general, motion, budget):
+    with pytest.raises(models.ProfileError, match="alarms per hour, expected more than 0: say, 1"):
+        models.adapt(general, motion, alarms=budget)
+
+
+def test_only_a_general_model_can_be_adapted(general, motion):
+    other = replace(general, profile=models.EACH.at(RATE))
+    wanted = "only a general model, whose features take a reference, can be adapted"
+    with pytest.raises(models.ProfileError, match=wanted):
+        models.adapt(other, motion)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_fault_has_level_1_while_it_lasts_and_is_0_before(kind):
+    time = np.arange(4000) / 1000.0
+    added = fault(time, kind, 100.0, 1, start=1.0)
+    lasts = (time >= 1.0) & (time < (1.1 if kind == "blow" else 2.0))
+    assert not added[time < 1.0].any()
+    assert np.sqrt(np.mean(added[lasts] ** 2)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_fault_of_a_joint_is_in_all_signals_that_contain_the_joint():
+    before = signals(0)
+    before["noise"] = np.hypot(before["measured"], before["desired"])
+    added = np.full(len(before["measured"]), 0.5)
+    after = with_fault(before, 1, added)
+    measured, desired = after["measured_joints"], after["desired_joints"]
+    np.testing.assert_array_equal(measured[1], before["measured_joints"][1] + 0.5)
+    np.testing.assert_array_equal(desired, before["desired_joints"])
+    np.testing.assert_allclose(after["error_joints"], desired - measured, atol=1e-12)
+    for name in ("measured", "error"):
+        norm = np.linalg.norm(after[f"{name}_joints"], axis=0)
+        np.testing.assert_allclose(after[name], norm, rtol=1e-9)
+    np.testing.assert_allclose(after["noise"], np.hypot(after["measured"], after["desired"]))
+
+
+def test_recall_takes_joints(general, motion):
+    norms = models.Recording("norms", {"measured": np.ones(9000)}, RATE)
+    assert recall({"general": general}, [norms], motion) is None
