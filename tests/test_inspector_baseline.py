@@ -91,6 +91,17 @@ def test_runs_without_desired_motion_have_the_scalar_profile(tmp_path):
     assert trained.classifier.profile.signals == (models.NOISE,)
 
 
+def test_a_placeholder_of_the_desired_motion_is_left_out_as_classify_does(tmp_path):
+    for seed in range(3):
+        run = run_of(seed)
+        placeholder = replace(run, velocity_desired=np.zeros_like(run.velocity))
+        placeholder.save(tmp_path / f"run{seed}.npz")
+    trained = train([tmp_path / "run0.npz", tmp_path / "run1.npz"], tmp_path / "model.npz")
+    assert trained.classifier.profile.signals == (models.NOISE,)
+    status, _, _ = call("classify", tmp_path / "run2.npz", "--model", tmp_path / "model.npz")
+    assert status in (0, 1)
+
+
 def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
     run_of(0).save(tmp_path / "slow.npz")
     run_of(1, rate=2000.0).save(tmp_path / "fast.npz")

@@ -34,7 +34,7 @@ def adapt(
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
 ) -> None:
-    """Adapt a general model to a robot: 1 to 10 minutes of good runs, its classes kept."""
+    """Adapt a general model to a robot by good runs of it."""
     from inspector.training.adaptation import adapt as adapt_model
 
     adapted = adapt_model(
