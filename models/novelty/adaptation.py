@@ -5,7 +5,7 @@ The logit of `ok` is shifted, which changes the odds of all failures alike, as a
 (M. Saerens et al., *Adjusting the Outputs of a Classifier to New a Priori Probabilities*, 2002):
 at the alarm threshold, alarms in the good motion keep to a budget. The bounds beyond which a frame
 is out of distribution are raised above the good motion. Half of the budget is for failures, half
-for `unknown`.
+for `unknown`. Neither limit is so low that more alarms than that were counted.
 
 A finding takes two frames of evidence (`models.labels`). What counts of a frame is therefore the
 lower one of its own score and of the higher one of its neighbours'.
@@ -22,7 +22,7 @@ from models.estimators.probabilistic import NOVELTY_LIMIT
 from models.estimators.trees import TAIL, Trees
 from models.general import UNBOUNDED
 from models.novelty.frames import GoodMotion, parts
-from models.novelty.limit import alarm_peaks, limit
+from models.novelty.limit import HOUR, alarm_peaks, counted, limit
 from models.novelty.training import Learnt, check
 from models.reference import Reference
 from models.types import Array, Index, Mask
@@ -53,9 +53,11 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
         raise ProfileError("only a general model, whose features take a reference, can be adapted")
     check(good, alarms, LEAST)
     failing, novel = _unseen(general, good, trees.known < UNBOUNDED)
-    unit = "log odds of a failure"
-    odds = limit(failing, good, alarms / 2, least=_log_odds(LEAST_PROBABILITY), unit=unit)
-    far = limit(novel, good, alarms / 2, least=NOVELTY_LIMIT)
+    unit, half = "log odds of a failure", alarms / 2
+    allowed = int(half * good.seconds / HOUR)
+    least = max(counted(failing, good, allowed), _log_odds(LEAST_PROBABILITY))
+    odds = limit(failing, good, half, least=least, unit=unit)
+    far = limit(novel, good, half, least=max(counted(novel, good, allowed), NOVELTY_LIMIT))
     beyond = np.maximum(failing - odds.distance, novel - far.distance)
     found = replace(odds, budget=alarms, alarms=len(alarm_peaks(beyond, good, 0.0)))
     groups = len(set(good.groups.tolist()))

@@ -94,7 +94,7 @@ def limit(
     """
     hours = good.seconds / HOUR
     allowed = max(PEAKS, int(budget * hours))
-    level = _level(distance, good, allowed)
+    level = counted(distance, good, allowed)
     peaks = alarm_peaks(distance, good, level)
     # N(t) = N(u) exp(-(t - u) / mean) = budget hours
     mean = float((peaks - level).mean()) if len(peaks) else 0.0
@@ -126,8 +126,14 @@ def alarm_peaks(distance: Array, good: GoodMotion, level: float) -> Array:
     return peaks
 
 
-def _level(distance: Array, good: GoodMotion, allowed: int) -> float:
-    """Lowest level in the tail above which there are never more alarms than allowed."""
+def counted(distance: Array, good: GoodMotion, allowed: int) -> float:
+    """Lowest level in the tail above which there are never more alarms than allowed.
+
+    Args:
+        distance: Of each frame, shape (frames,).
+        good: The frames.
+        allowed: How many alarms.
+    """
     falling = np.sort(distance)[::-1]
     last = max(round(TAIL * len(falling)), 1)
     ranks = np.unique(np.geomspace(1, last, LEVELS).round().astype(np.intp)) - 1
