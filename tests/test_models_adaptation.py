@@ -123,9 +123,10 @@ def test_a_larger_budget_never_finds_less(general, motion):
 def test_a_robot_that_is_louder_as_a_whole_is_adapted_to_alike(general):
     louder = [good(seed, scale=5.0) for seed in range(100, 106)]
     motion = models.GoodMotion.read(louder, general.profile)
-    model = models.adapt(general, motion).classifier
-    fresh = [good(seed, scale=5.0) for seed in range(200, 205)]
-    assert alarms(model, fresh) <= poisson.ppf(0.999, 1.0 * 20.0 * len(fresh) / 3600)
+    model = models.adapt(general, motion, alarms=100.0).classifier
+    fresh = [good(seed, scale=5.0) for seed in range(200, 215)]
+    assert alarms(model, fresh) <= poisson.ppf(0.999, 100.0 * 20.0 * len(fresh) / 3600)
+    assert alarms(general, fresh) == len(fresh)
     assert alarms(model, [faulty(300, "tone", 5.0, scale=5.0)]) == 1
 
 

@@ -80,6 +80,7 @@ def limit(
     budget: float,
     *,
     least: float = LEAST,
+    expected: float | None = None,
     unit: str = "deviations",
 ) -> Limit:
     """Limit for a false-alarm budget.
@@ -90,6 +91,8 @@ def limit(
         good: The frames.
         budget: False alarms in an hour.
         least: Least limit, in ``unit``.
+        expected: Mean by which alarms of other robots exceed such a level, in ``unit``, as much
+            evidence as ``PEAKS`` alarms; None if it is not known.
         unit: What distances are in.
     """
     hours = good.seconds / HOUR
@@ -97,7 +100,9 @@ def limit(
     level = counted(distance, good, allowed)
     peaks = alarm_peaks(distance, good, level)
     # N(t) = N(u) exp(-(t - u) / mean) = budget hours
-    mean = float((peaks - level).mean()) if len(peaks) else 0.0
+    prior = 0 if expected is None else PEAKS  # mean of the posterior, of a gamma prior of 1 / mean
+    excess = float((peaks - level).sum()) + prior * (expected or 0.0)
+    mean = excess / max(len(peaks) + prior, 1)
     found = level + mean * np.log(max(len(peaks) / (budget * hours), 1.0))
     found = max(float(found), least)
     alarms = len(alarm_peaks(distance, good, found))
