@@ -34,6 +34,8 @@ LEAST_PROBABILITY = 0.05
 EXCESS = 0.4
 """Mean by which alarms in the good motion of a robot exceed a level, in log odds: that of twelve
 simulated robots of the source domains."""
+FITTED = 10
+"""Alarms by which its tail is fitted at most: log odds below fall faster."""
 
 
 def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Learnt:
@@ -59,7 +61,7 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
     unit, half = "log odds of a failure", alarms / 2
     allowed = int(half * good.seconds / HOUR)
     least = max(counted(failing, good, allowed), _log_odds(LEAST_PROBABILITY))
-    odds = limit(failing, good, half, least=least, expected=EXCESS, unit=unit)
+    odds = limit(failing, good, half, least=least, fitted=FITTED, expected=EXCESS, unit=unit)
     far = limit(novel, good, half, least=max(counted(novel, good, allowed), NOVELTY_LIMIT))
     beyond = np.maximum(failing - odds.distance, novel - far.distance)
     found = replace(odds, budget=alarms, alarms=len(alarm_peaks(beyond, good, 0.0)))

@@ -80,6 +80,7 @@ def limit(
     budget: float,
     *,
     least: float = LEAST,
+    fitted: int = PEAKS,
     expected: float | None = None,
     unit: str = "deviations",
 ) -> Limit:
@@ -91,12 +92,13 @@ def limit(
         good: The frames.
         budget: False alarms in an hour.
         least: Least limit, in ``unit``.
+        fitted: Alarms by which the tail is fitted at most.
         expected: Mean by which alarms of other robots exceed such a level, in ``unit``, as much
             evidence as ``PEAKS`` alarms; None if it is not known.
         unit: What distances are in.
     """
     hours = good.seconds / HOUR
-    allowed = max(PEAKS, int(budget * hours))
+    allowed = max(fitted, int(budget * hours))
     level = counted(distance, good, allowed)
     peaks = alarm_peaks(distance, good, level)
     # N(t) = N(u) exp(-(t - u) / mean) = budget hours
