@@ -414,7 +414,8 @@ def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
             values.append(node["value"])
             return
         right = float(not node["missing_go_to_left"])
-        split = [node["feature_idx"], node["num_threshold"], right, len(values)]
+        threshold = np.nan_to_num(node["num_threshold"])  # infinite if only missing ones are apart
+        split = [node["feature_idx"], float(threshold), right, len(values)]
         splits.append(split)
         visit(node["left"])
         split.append(len(values))
