@@ -18,7 +18,7 @@ RATE = 250.0
 NAMES = ("shoulder", "elbow", "wrist")
 
 
-def run_of(seed, *, noise=0.06, seconds=12.0, rate=RATE, robot=None, names=NAMES, desired=True):
+def run_of(seed, *, noise=0.03, seconds=12.0, rate=RATE, robot=None, names=NAMES, desired=True):
     """Joints that swing, with noisy measurements."""
     generator = np.random.default_rng(seed)
     time = np.arange(round(seconds * rate)) / rate

@@ -106,6 +106,14 @@ def test_alarms_counted_in_the_good_motion_keep_to_the_budget(general, motion, b
     assert found.alarms <= budget * found.hours
 
 
+def test_scores_that_all_equal_the_highest_one_are_no_alarms(general):
+    flat = replace(general.estimator, leaf=np.zeros_like(general.estimator.leaf))
+    flat = replace(general, estimator=flat)
+    recordings = [good(seed, **ROBOT) for seed in range(6)]
+    model = models.adapt(flat, models.GoodMotion.read(recordings, flat.profile)).classifier
+    assert alarms(model, recordings) == 0
+
+
 def test_a_larger_budget_never_finds_less(general, motion):
     recordings = [good(seed, **ROBOT) for seed in range(100, 106)]
     budgets = (1.0, 2.0, 50.0)

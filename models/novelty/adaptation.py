@@ -31,6 +31,9 @@ LEAST = 30.0
 """Least good motion, in [s]."""
 LEAST_PROBABILITY = 0.05
 """Least probability of a failure at the limit: a robot that stands has far lower ones."""
+MARGIN = 1e-3
+"""Log odds by which the limit lies above scores that equal it: scores of trees have a highest one,
+which much of a motion may have, and a probability at the alarm threshold is above it."""
 EXCESS = 0.4
 """Mean by which alarms in the good motion of a robot exceed a level, in log odds: that of twelve
 simulated robots of the source domains."""
@@ -74,7 +77,7 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
     highest = (_highest(plain) - general.mean[own]) / general.scale[own]
     known, calibration = trees.known.copy(), trees.calibration.copy()
     known[own] = np.maximum(known[own], highest + (far.distance - NOVELTY_LIMIT))
-    calibration[1] += found.distance - _log_odds(trees.alarm)
+    calibration[1] += found.distance + MARGIN - _log_odds(trees.alarm)
     classifier = replace(
         general,
         estimator=replace(trees, known=known, calibration=calibration),
