@@ -456,7 +456,10 @@ def _known(
         inputs = [each for each in LEARNT if feeds(named(recording.signal), each)]
         profiles = [ANY.bound(recording.rate, each) for each in inputs]
     try:
-        return [of_recording(recording, each, thin=thin, names=names) for each in profiles]
+        return [
+            of_recording(recording, each, thin=thin, names=names, first=each is profiles[0])
+            for each in profiles
+        ]
     except models.SignalError:  # too short
         return recording.name, f"shorter than {profile.duration:g} s"
 
@@ -467,6 +470,7 @@ def of_recording(
     *,
     thin: int = 1,
     names: Sequence[str] = (),
+    first: bool = True,
 ) -> Known:
     """Features of a recording.
 
@@ -489,7 +493,7 @@ def of_recording(
             cut, labels = examples.features.astype(np.float32), examples.labels
         except models.NoFrameError:
             cut, labels = whole[:0], truth[:0]
-    learnt = kept(labels, thin)
+    learnt = kept(labels, thin, first=first)
     return Known(
         profile,
         base,

@@ -30,7 +30,7 @@ from models.profile import TOLERANCE
 from models.recording import Recording
 from models.reference import Reference
 from models.signals import NOISE, feeds, named
-from models.types import Array, Mask, Real, Words
+from models.types import Array, Index, Real, Words
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
 """Of the inputs, those that training takes of each log: the others lack features of the first."""
@@ -245,7 +245,7 @@ def frames_of(
             starts, features = frame_features(recording.signal, profile, recording.valid)
             frames = silent(recording, starts, profile.duration)
             truth = Matched.of([frames]).frames.truth
-            known = np.flatnonzero(kept(truth, thin))[:: 2 if number else 1]
+            known = kept(truth, thin, first=not number)
             full = np.full((len(known), count), np.nan, dtype=np.float32)
             full[:, recipe.places(profile)] = features[known]
             full[:, recipe.without_unit] = np.nan
@@ -253,13 +253,18 @@ def frames_of(
             yield Frames(full, truth[known], groups, {recording.name: recording.sha256})
 
 
-def kept(truth: Words, thin: int) -> Mask:
-    """Which frames to train on: all of a known class, but only every ``thin``-th `ok` one.
+def kept(truth: Words, thin: int, *, first: bool = True) -> Index:
+    """Frames to train on: all of a known class, but only every ``thin``-th `ok` one.
 
     Args:
         truth: True class of each frame, `UNCLEAR` where that is not known, shape (frames,).
         thin: Of `ok` frames.
+        first: Whether they are of the first input that a recording feeds; of the others, every
+            other frame is enough.
+
+    Returns:
+        Their indices.
     """
     ok = truth == OK
-    known: Mask = (truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0))
-    return known
+    known = np.flatnonzero((truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0)))
+    return known if first else known[::2]

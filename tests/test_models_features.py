@@ -117,7 +117,8 @@ def test_log_bands_of_a_tone_are_equal_at_any_rate(rate):
         return models.features(tone(profile, 61.0), profile)[0, 4]
 
     low, high = models.LogBands().at(rate), models.LogBands().at(10_000.0)
-    assert mean(low) == pytest.approx(mean(high), abs=0.05)
+    # At 333 Hz, a window of 34 samples is a fiftieth longer than 0.1 s.
+    assert mean(low) == pytest.approx(mean(high), abs=0.08)
 
 
 def test_log_bands_do_not_depend_on_the_time_of_a_burst():

@@ -193,6 +193,7 @@ def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_fe
     for names, part in zip(feeding, parts, strict=True):
         profile = RECIPE.bound(500.0, names)
         _, features = frame_features(one.signal, profile)
+        features = features if names is feeding[0] else features[::2]
         assert part.features.shape == (len(features), len(RECIPE.columns))
         places = RECIPE.places(profile)
         there = ~np.isnan(part.features[:, places])
