@@ -107,10 +107,14 @@ def test_alarms_counted_in_the_good_motion_keep_to_the_budget(general, motion, b
 
 
 def test_scores_that_all_equal_the_highest_one_are_no_alarms(general):
-    flat = replace(general.estimator, leaf=np.zeros_like(general.estimator.leaf))
+    trees = general.estimator
+    calibration = np.append([1.0, -50.0], np.zeros(len(trees.calibration) - 2))
+    flat = replace(trees, leaf=np.zeros_like(trees.leaf), calibration=calibration)
     flat = replace(general, estimator=flat)
     recordings = [good(seed, **ROBOT) for seed in range(6)]
     model = models.adapt(flat, models.GoodMotion.read(recordings, flat.profile)).classifier
+    probability = 1.0 - model.classify(recordings[0].signal, RATE).scores[:, 0]
+    assert 0.499 < probability.max() < 0.4999
     assert alarms(model, recordings) == 0
 
 
