@@ -9,6 +9,7 @@ finds a loud one is a law.
 import tempfile
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,9 @@ FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling
 rule of the scenarios takes for felt."""
 LOUDER = (1.0, 3.0, 10.0, 100.0, 1000.0)
+ABOVE = {"go2": 3.0}
+"""Times the loudest tenth of a second: a blow on one joint of a trot, as loud as the touchdowns of
+all, is one more touchdown to the model (docs/measured.md)."""
 SECONDS = 3.0
 
 LIBRARY = load_library()
@@ -77,8 +81,8 @@ def check_the_law(robot, rate, kind, joint, frequency, seed):
     assert good.status is Status.OK
     edges = LIBRARY[good.model].at(run.rate, signals_of(run)).profile.edges
     low, high = edges[0], edges[-1]
-    frequency = 20.0 * (min(0.9 * high, 1000.0) / 20.0) ** frequency  # from 20 Hz, in octaves
-    level = max(level_in_band(run, low, high), FLOOR)
+    frequency = 20.0 * (min(0.8 * high, 1000.0) / 20.0) ** frequency  # from 20 Hz, in octaves
+    level = max(ABOVE.get(robot, 1.0) * level_in_band(run, low, high), FLOOR)
     signal = added(run, kind, frequency, seed)
     joint = joint % run.velocity.shape[1]
     for louder in LOUDER:
@@ -104,8 +108,13 @@ def test_a_loud_fault_of_a_panda_is_a_finding_and_stays_one(rate, kind, joint, f
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("rate", [250.0, 1000.0, 10_000.0])
-@pytest.mark.parametrize("robot", ["panda", "go2", "talos", "ur5"])
+@pytest.mark.parametrize(
+    ("robot", "rate"),
+    [
+        *((robot, 250.0) for robot in ("panda", "talos", "ur5")),
+        *product(("panda", "go2", "talos", "ur5"), (1000.0, 2000.0, 10_000.0)),
+    ],
+)
 @given(**FAULTS)
 @settings(max_examples=30, deadline=None, derandomize=True)
 def test_a_loud_fault_of_any_robot_is_a_finding_and_stays_one(
