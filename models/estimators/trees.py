@@ -296,8 +296,8 @@ class Detector(Trees):
 
     The first class has the trees that tell it from all failures; those of the other classes are
     trained on failures alone. In each round of boosting there are as many trees as of `Trees`, but
-    only one sees all frames. In that one, features that rise with the level of a fault never make a
-    failure less likely: a fault made louder is not found less.
+    only one sees all frames. In that one, no feature that rises with the level of a fault makes a
+    failure less likely; differences of signals, which may fall with it, are free.
     """
 
     @staticmethod
