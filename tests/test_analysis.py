@@ -23,6 +23,7 @@ from inspector.report import html, markdown
 from inspector.report.formats import FORMATS
 from models import Event, Labels
 from noisemodel import Run
+from noisemodel.differentiate import METHOD, joint_velocity
 
 LIBRARY = load_library(model_files())
 RATE = 1000.0
@@ -209,6 +210,29 @@ def test_a_standing_arm_that_is_pushed_keeps_its_zeros(push):
     assert remark == ""
 
 
+def stepping(step):
+    """A run whose desired positions are rounded to a step, and differentiated."""
+    run = moving(desired=False)
+    target = step * np.round(np.sin(2 * np.pi * 0.3 * run.time)[:, None] * np.ones(2) / step)
+    return replace(
+        run,
+        position_desired=target,
+        velocity_desired=joint_velocity(run.time, target),
+        desired_joint_names=run.joint_names,
+        meta={"differentiated": {"velocity_desired": METHOD}},
+    )
+
+
+def test_a_desired_velocity_made_of_coarse_positions_is_left_out():
+    run, remark = without_placeholder(stepping(0.01))
+    assert run.velocity_desired is None
+    assert remark == (
+        "The desired velocity has 1.5 rad/s of noise, since it was differentiated from positions in"
+        " steps of 0.01 rad: it was left out."
+    )
+    assert without_placeholder(stepping(1e-4))[1] == ""
+
+
 def test_a_desired_velocity_that_is_not_all_zero_stays():
     run = moving()
     assert without_placeholder(run) == (run, "")
@@ -290,6 +314,6 @@ def test_short_findings_are_written_to_the_millisecond():
 
 
 def test_the_audit_names_a_placeholder_of_the_desired_velocity():
-    clause = "zero throughout while joints move at more than 0.1 rad/s for seconds: a placeholder"
+    clause = "zero throughout while joints move at more than 0.1 rad/s for seconds: it is left out"
     assert any(clause in warning for warning in audit(zeros(moving()), LIBRARY).warnings)
-    assert not any("placeholder" in warning for warning in audit(moving(), LIBRARY).warnings)
+    assert not any("left out" in warning for warning in audit(moving(), LIBRARY).warnings)

@@ -120,7 +120,7 @@ def _jitter(run: Run) -> tuple[float, float] | None:
 def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
     yield from unit_warnings(run)
     if clause := placeholder(run):
-        yield f"{clause}: a placeholder, which is left out"
+        yield f"{clause}: it is left out"
     for copy in copies(run):
         whose = "all joints" if len(copy.joints) == len(run.joint_names) else ", ".join(copy.joints)
         samples = f"{abs(copy.lag)} sample{'' if abs(copy.lag) == 1 else 's'}"

@@ -1,9 +1,11 @@
-"""A desired velocity that is none: zeros that position-target controllers write."""
+"""A desired velocity that is none: zeros as a placeholder, or slopes of rounded positions."""
 
 from dataclasses import replace
 
 import numpy as np
 
+from inspector.audit.differentiation import SMOOTH, derived
+from inspector.audit.quantisation import step_of
 from noisemodel import Run
 
 MOVES = 0.1
@@ -14,14 +16,18 @@ SHARE = 0.75
 """Share of that time: a motion reverses now and then, a push is over sooner."""
 STEP = 1e-6
 """Change of a desired position from which it changes, in [rad] or [m]."""
+FAINTEST = 0.05
+"""Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there."""
 
 
 def placeholder(run: Run) -> str:
-    """Check whether the desired velocity is zero throughout although the robot has to move.
+    """Check whether the desired velocity is not the desired motion.
 
     Controllers that take position targets write zeros in its place. They are a placeholder if the
     desired position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters
     of any two seconds. The zeros of a robot that has to stand remain, also when it is pushed.
+    A velocity that was differentiated from desired positions is none if their quantisation steps
+    alone make more than 0.05 rad/s of it.
 
     Args:
         run: The run.
@@ -30,8 +36,10 @@ def placeholder(run: Run) -> str:
         A clause that says so; empty if the desired velocity is one, or there is none.
     """
     desired = run.velocity_desired
-    if desired is None or not desired.size or np.any(desired):
+    if desired is None or not desired.size:
         return ""
+    if np.any(desired):
+        return _coarse(run)
     if _changes(run):
         return "the desired velocity is zero throughout while the desired position changes"
     if _moves(run):
@@ -65,6 +73,21 @@ def _changes(run: Run) -> bool:
         return False
     positions = run.position_desired[run.mask]
     return len(positions) > 0 and bool(np.ptp(positions, axis=0).max() > STEP)
+
+
+def _coarse(run: Run) -> str:
+    """Say that desired positions have steps too large to be differentiated; empty if not."""
+    if not derived(run, "velocity_desired") or run.position_desired is None:
+        return ""
+    step = max(step_of(position) for position in run.position_desired[run.mask].T)
+    # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
+    noise = step / 12**0.5 * run.rate * float(np.linalg.norm(SMOOTH.weights))
+    if noise <= FAINTEST:
+        return ""
+    return (
+        f"the desired velocity has {noise:.2g} rad/s of noise, since it was differentiated from"
+        f" positions in steps of {step:.2g} rad"
+    )
 
 
 def _moves(run: Run) -> bool:
