@@ -34,6 +34,9 @@ PARTS = 3
 """Parts of the groups; each is left out of the training of some trees, for the calibration."""
 UNSEEN = -30.0
 """Prior of a class without training frames."""
+NAMING = 3
+"""Rounds of boosting of the trees that tell failures from `ok`, for each of those that name one:
+these have a small part of the frames."""
 TAIL = 1e-3
 """Share of the training frames above the upper bound of a feature."""
 
@@ -181,7 +184,7 @@ class Trees(Probable):
         _: Index | None,
     ) -> tuple[Array, Array, Array]:
         """Splits, leaves and prior, as `_boosted` gives them."""
-        return _boosted(features, targets, train, classes, profile)
+        return _boosted(features, targets, train, classes, profile, profile.rounds)
 
     def first(self, rounds: int) -> "Trees":
         """Trees of the first rounds of boosting, with the same calibration."""
@@ -260,29 +263,46 @@ class Trees(Probable):
             right |= np.isnan(values) & missing
         ruled_out = np.bitwise_or.reduce(right * left, 1)
         place = first + _FIRST.take(np.invert(ruled_out, out=ruled_out))
-        added = leaf.take(place).reshape(len(features), -1, len(self.prior))
-        sums: Array = np.add.reduce(added, 1)
+        sums: Array = np.add.reduceat(leaf.take(place), self._begins, 1)
         sums += self.prior
         return sums
 
     @cached_property
+    def _by_class(self) -> Index:
+        """Trees that have leaves, and one of each class, class by class."""
+        classes = len(self.prior)
+        kept = self.leaf.any(axis=1)
+        kept[:classes] = True
+        number = np.flatnonzero(kept)
+        order: Index = number[np.argsort(number % classes, kind="stable")]
+        return order
+
+    @cached_property
+    def _begins(self) -> Index:
+        """Where the trees of each class begin, shape (classes,)."""
+        classes = len(self.prior)
+        begins: Index = np.searchsorted(self._by_class % classes, np.arange(classes))
+        return begins
+
+    @cached_property
     def _side_by_side(self) -> tuple[Index, Array, Mask, NDArray[np.uint16], Array, Index]:
-        """All first splits of the trees side by side, and then all second ones.
+        """All first splits of the trees that count side by side, and then all second ones.
 
         Returns:
             Features, thresholds, whether missing features are on the right, and leaves on the
             left, as bits, shape (splits, trees); all leaves in a row, and where those of each tree
             begin, shape (trees,).
         """
-        start, stop = self.left.astype(np.int64)
+        own = self._by_class
+        start, stop = self.left[:, own].astype(np.int64)
         bits = ((1 << stop) - (1 << start)).astype(np.uint16)
-        trees, leaves = self.leaf.shape
+        trees, leaves = self.leaf[own].shape
         return (
-            np.ascontiguousarray(self.feature.T.astype(np.intp)),
-            np.ascontiguousarray(self.threshold.T),
-            np.ascontiguousarray(self.missing.T > 0),
+            np.ascontiguousarray(self.feature[own].T.astype(np.intp)),
+            np.ascontiguousarray(self.threshold[own].T),
+            np.ascontiguousarray(self.missing[own].T > 0),
             np.ascontiguousarray(bits.T),
-            self.leaf.ravel(),
+            self.leaf[own].ravel(),
             leaves * np.arange(trees),
         )
 
@@ -295,9 +315,9 @@ class Detector(Trees):
     """Trees that tell failures from `ok`, and others that name a failure.
 
     The first class has the trees that tell it from all failures; those of the other classes are
-    trained on failures alone. In each round of boosting there are as many trees as of `Trees`, but
-    only one sees all frames. In that one, no feature that rises with the level of a fault makes a
-    failure less likely; differences of signals, which may fall with it, are free.
+    trained on failures alone, in a third of the rounds of boosting. In the trees of the first
+    class, no feature that rises with the level of a fault makes a failure less likely; differences
+    of signals, which may fall with it, are free.
     """
 
     @staticmethod
@@ -310,8 +330,10 @@ class Detector(Trees):
         rising: Index | None,
     ) -> tuple[Array, Array, Array]:
         failing = train[targets[train] > 0]
-        splits, leaf, prior = _boosted(features, targets, failing, classes, profile)
-        ours = _boosted(features, (targets > 0).astype(np.intp), train, 2, profile, rising)
+        named = max(1, profile.rounds // NAMING)
+        splits, leaf, prior = _boosted(features, targets, failing, classes, profile, named)
+        detected = (targets > 0).astype(np.intp)
+        ours = _boosted(features, detected, train, 2, profile, profile.rounds, rising)
         splits[:, :, 0], leaf[:, 0], prior[0] = ours[0][:, :, 1], -ours[1][:, 1], -ours[2][1]
         return splits, leaf, prior
 
@@ -350,9 +372,10 @@ def _boosted(
     train: Index,
     classes: int,
     profile: Profile,
+    rounds: int,
     rising: Index | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Boosted trees of some of the frames.
+    """Boosted trees of some of the frames; none in rounds of the profile beyond these.
 
     Returns:
         Of each split the feature, the threshold, whether a missing feature is on its right, and its
@@ -370,7 +393,7 @@ def _boosted(
     if len(there) < 2:
         return splits, leaf, prior
     boosting = HistGradientBoostingClassifier(
-        max_iter=profile.rounds,
+        max_iter=rounds,
         learning_rate=profile.learning_rate,
         max_leaf_nodes=profile.leaves,
         l2_regularization=profile.penalty,
