@@ -1,0 +1,238 @@
+"""Which score of smoothness separates chattering from clean rollouts of policies, at 50 Hz.
+
+    python -m benchmarks.smoothness [--episodes 40]
+
+Scripted policies move three robots in MuJoCo: two arms in the air and a quadruped that sways on its
+feet. A policy reads noisy encoders 50 times a second and answers with position targets, which the
+drives hold until the next: the reference, and a correction of what it sees, as a policy with
+feedback has it. A chattering policy is the same one with one of three defects. All amplitudes are
+constants below; they were fixed before any score was computed, and so was the choice: the default
+order of `inspector smoothness` is by the score whose area under the ROC curve, chattering (all
+defects) against clean, is largest on its worst robot.
+"""
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from benchmarks.elsewhere.references import KINDS, Reference, draw
+from noisemodel import Run
+from noisemodel.types import Array
+from scenarios.mujoco_model import build
+from scenarios.physics import Physics
+from scenarios.quadruped.standing import stand
+from scenarios.reduced import reduced_model
+from scenarios.robots import ROBOTS
+from scenarios.shapes import Box
+
+RATE, STEPS = 50.0, 20
+"""Of the policy and of the log, in [Hz]; steps of the simulation in between."""
+SETTLING, DURATION = 1.0, 6.0
+"""Before the log begins, and of the log, in [s]."""
+POSITION_NOISE, VELOCITY_NOISE = 1e-4, 5e-3
+"""Standard deviations of what encoders tell: about 16 bits, in [rad], and what a drive that
+differentiates and filters them leaves, in [rad/s]."""
+FURTHEST = 0.05
+"""Largest correction of an action, three degrees: actions of policies are bounded, in [rad]."""
+
+NOISE = (0.003, 0.02)
+"""Standard deviation of noise on each action, from a fifth of a degree, which is just visible, to a
+degree, which nobody would deploy, in [rad]. Drawn for each episode, evenly in its logarithm."""
+DELAY = (2, 4)
+"""Further delay of observations: 40 to 80 ms, the latency of inference, in ticks."""
+JUMP, CHUNK = (0.01, 0.04), (10, 25)
+"""Standard deviation of the jump of each joint where an action chunk begins, from half a degree to
+two, in [rad], drawn as that of noise; and the length of chunks, 0.2 to 0.5 s, in ticks. The offset
+decays linearly to 0 at the end of its chunk, where the next one jumps."""
+CLEAN, DEFECTS = "clean", ("noise", "delay", "chunk jumps")
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A robot with the drives that a policy commands.
+
+    Attributes:
+        robot: Name of the robot.
+        stiffness: Of each joint's drive, in [N m/rad].
+        damping: Of each joint's drive, in [N m s/rad].
+        reach: Furthest reference from the posture at rest, in [rad].
+        fastest: Highest speed of a reference, in [rad/s].
+        gain: Of the policy's correction: half of the largest gain at which a push dies away without
+            delay, the rule of Ziegler and Nichols (1942), found by simulation.
+    """
+
+    robot: str
+    stiffness: tuple[float, ...]
+    damping: tuple[float, ...]
+    reach: float
+    fastest: float
+    gain: float
+
+
+RIGS = (
+    # Joint impedance as in the examples of libfranka.
+    Rig(
+        "panda",
+        stiffness=(600.0,) * 4 + (250.0, 150.0, 50.0),
+        damping=(50.0,) * 4 + (30.0, 25.0, 15.0),
+        reach=0.6,
+        fastest=1.2,
+        gain=4.5,
+    ),
+    # Stiff drives of an industrial arm: those of the scenarios.
+    Rig(
+        "ur5",
+        stiffness=(4000.0,) * 3 + (1000.0,) * 3,
+        damping=(80.0,) * 3 + (15.0,) * 3,
+        reach=0.6,
+        fastest=1.2,
+        gain=0.9,
+    ),
+    # Soft drives, as policies for legs are trained with.
+    Rig("go2", stiffness=(60.0,) * 12, damping=(2.0,) * 12, reach=0.15, fastest=0.5, gain=2.6),
+)
+SWAY = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -2.0], [0.0, 1.0, 0.0]])
+"""Hip, thigh and calf of each leg when the body goes sideways, up and down, or to and fro."""
+
+
+def rollout(rig: Rig, defect: str, seed: int) -> Run:
+    """One episode of a policy.
+
+    Args:
+        rig: The robot.
+        defect: One of ``DEFECTS``, or ``CLEAN``.
+        seed: Random seed.
+
+    Returns:
+        The log: measured positions and velocities, and actions as desired positions, at 50 Hz.
+    """
+    random = np.random.default_rng((seed, [CLEAN, *DEFECTS].index(defect), _number(rig)))
+    model, start, joints = _world(rig.robot)
+    for index, (stiffness, damping) in enumerate(zip(rig.stiffness, rig.damping, strict=True)):
+        model.actuator_gainprm[index, 0] = stiffness
+        model.actuator_biasprm[index, 1:3] = -stiffness, -damping
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    home = start[-joints:]
+    data.ctrl[:] = home
+    mujoco.mj_step(model, data, nstep=round(SETTLING * RATE) * STEPS)
+    rest = data.qpos[-joints:].copy()
+    reference = _reference(rig, rest, random)
+    disturbed = _disturbance(defect, len(reference.position), joints, random)
+    late = random.integers(*DELAY, endpoint=True) if defect == "delay" else 0
+    seen: list[Array] = []
+    actions = []
+    for position, offset in zip(reference.position, disturbed, strict=True):
+        noise = random.standard_normal((2, joints)) * ((POSITION_NOISE,), (VELOCITY_NOISE,))
+        seen.append(np.array((data.qpos[-joints:], data.qvel[-joints:])) + noise)
+        known = seen[max(0, len(seen) - 1 - late)]
+        correction = np.clip(rig.gain * (position - known[0]), -FURTHEST, FURTHEST)
+        action = position + (home - rest) + correction + offset
+        actions.append(action)
+        data.ctrl[:] = action
+        mujoco.mj_step(model, data, nstep=STEPS)
+    measured = np.array(seen)
+    return Run(
+        time=np.arange(len(actions)) / RATE,
+        velocity=measured[:, 1],
+        position=measured[:, 0],
+        position_desired=np.array(actions),
+        joint_names=ROBOTS[rig.robot].drives.joints,
+        robot=rig.robot,
+        meta={"defect": defect, "seed": seed, "reference": reference.kind},
+    )
+
+
+def rollouts(rig: Rig, defect: str, episodes: int) -> Iterator[Run]:
+    """Episodes of a policy, with seeds from 0 on."""
+    return (rollout(rig, defect, seed) for seed in range(episodes))
+
+
+def _reference(rig: Rig, rest: Array, random: np.random.Generator) -> Reference:
+    """A motion around rest; all legs of a quadruped move alike."""
+    legs = ROBOTS[rig.robot].family == "quadruped"
+    kind = KINDS[random.integers(len(KINDS))]
+    drawn = draw(
+        random,
+        kind,
+        np.zeros(3) if legs else rest,
+        reach=rig.reach,
+        duration=DURATION,
+        rate=RATE,
+        fastest=rig.fastest,
+    )
+    if not legs:
+        return drawn
+    return Reference(
+        kind, rest + np.tile(drawn.position @ SWAY, 4), np.tile(drawn.velocity @ SWAY, 4)
+    )
+
+
+def _disturbance(defect: str, ticks: int, joints: int, random: np.random.Generator) -> Array:
+    """What a defect adds to actions, shape (ticks, joints), in [rad]."""
+    if defect == "noise":
+        return _size(NOISE, random) * random.standard_normal((ticks, joints))
+    added = np.zeros((ticks, joints))
+    if defect == "chunk jumps":
+        size, first = _size(JUMP, random), 0
+        while first < ticks:
+            length = int(random.integers(*CHUNK, endpoint=True))
+            ramp = np.linspace(1.0, 0.0, length)[:, None] * random.standard_normal(joints)
+            added[first : first + length] = size * ramp[: ticks - first]
+            first += length
+    return added
+
+
+def _size(between: tuple[float, float], random: np.random.Generator) -> float:
+    return float(np.exp(random.uniform(*np.log(between))))
+
+
+def _number(rig: Rig) -> int:
+    return RIGS.index(rig)
+
+
+@lru_cache(maxsize=1)
+def _world(name: str) -> tuple[Any, Array, int]:
+    """MuJoCo model with position drives, its configuration at rest, and the number of joints.
+
+    Arms have no weight, as if their drives bore it.
+    """
+    robot = ROBOTS[name]
+    physics = Physics(
+        timestep=1 / (RATE * STEPS),
+        armature=np.array(robot.drives.armature),
+        damping=np.array(robot.drives.viscous),
+        friction=np.array(robot.drives.friction),
+    )
+    joints = len(robot.drives.joints)
+    if robot.family == "quadruped":
+        ground = Box(centre=(0.0, 0.0, -0.5), half=(5.0, 5.0, 0.5))
+        model = build(reduced_model(robot), physics, effectors=robot.feet, boxes=(ground,))
+        start = stand(robot).configuration.copy()
+        start[3:7] = start[[6, 3, 4, 5]]  # MuJoCo has w first
+    else:
+        model = build(reduced_model(robot), physics)
+        model.opt.gravity[:] = 0.0
+        start = np.array(robot.rest)
+    model.actuator_biastype[:] = mujoco.mjtBias.mjBIAS_AFFINE
+    model.actuator_forcelimited[:] = True
+    model.actuator_forcerange[:] = np.outer(robot.drives.torque, (-1.0, 1.0))
+    return model, start, joints
+
+
+def main() -> None:
+    """Print the table."""
+    arguments = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    arguments.add_argument("--episodes", type=int, default=40, help="of each robot and policy")
+    arguments.parse_args()
+
+
+if __name__ == "__main__":
+    main()
