@@ -15,12 +15,15 @@ import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 
 from benchmarks.elsewhere.references import KINDS, Reference, draw
+from inspector.smoothness.measures import sparc, speed_of
+from inspector.smoothness.scores import SCORES, scored
+from models.evaluation.ranking import auc
 from noisemodel import Run
 from noisemodel.types import Array
 from scenarios.mujoco_model import build
@@ -49,7 +52,9 @@ JUMP, CHUNK = (0.01, 0.04), (10, 25)
 """Standard deviation of the jump of each joint where an action chunk begins, from half a degree to
 two, in [rad], drawn as that of noise; and the length of chunks, 0.2 to 0.5 s, in ticks. The offset
 decays linearly to 0 at the end of its chunk, where the next one jumps."""
-CLEAN, DEFECTS = "clean", ("noise", "delay", "chunk jumps")
+CLEAN, DEFECTS, ALL = "clean", ("noise", "delay", "chunk jumps"), "all"
+Areas: TypeAlias = dict[str, dict[tuple[str, str], float]]
+"""Area under the ROC curve by score, and by robot and defect."""
 
 
 @dataclass(frozen=True)
@@ -225,13 +230,67 @@ def _world(name: str) -> tuple[Any, Array, int]:
     return model, start, joints
 
 
+WIDER = "sparc to 25 Hz"
+"""SPARC without its cut-off, beside the scores that the command has."""
+
+
+def scores_of(run: Run) -> dict[str, float | None]:
+    """Roughness by each score, higher is rougher; None where the run has none."""
+    episode = scored(run, "")
+    found = {
+        name: None if value is None else -SCORES[name].smooth * value
+        for name, value in episode.scores.items()
+    }
+    wider = sparc(speed_of(run.velocity), run.rate, cutoff=run.rate / 2)
+    return found | {WIDER: None if wider is None else -wider}
+
+
+def areas(episodes: int) -> Areas:
+    """Area under the ROC curve by score, and by robot and defect; "all" are all defects."""
+    found: Areas = {}
+    for rig in RIGS:
+        scores = {
+            defect: [scores_of(run) for run in rollouts(rig, defect, episodes)]
+            for defect in (CLEAN, *DEFECTS)
+        }
+        for name in scores[CLEAN][0]:
+            columns = {defect: [row[name] for row in rows] for defect, rows in scores.items()}
+            if any(value is None for column in columns.values() for value in column):
+                continue
+            values = {defect: np.array(column, float) for defect, column in columns.items()}
+            values[ALL] = np.concatenate([values[defect] for defect in DEFECTS])
+            for defect in (*DEFECTS, ALL):
+                found.setdefault(name, {})[rig.robot, defect] = auc(values[CLEAN], values[defect])
+    return found
+
+
+def table(found: Areas) -> Iterator[str]:
+    """Lines of the table in Markdown, the score that is best on its worst robot first."""
+    cells = [(rig.robot, defect) for rig in RIGS for defect in (*DEFECTS, ALL)]
+    head = ["score", *(f"{robot}, {defect}" for robot, defect in cells), "mean", "worst robot"]
+    yield f"| {' | '.join([*head, 'worst cell'])} |"
+    yield f"|{'---|' * (len(head) + 1)}"
+
+    def overall(name: str) -> list[float]:
+        return [found[name][rig.robot, ALL] for rig in RIGS]
+
+    for name in sorted(found, key=lambda name: -min(overall(name))):
+        areas, pooled = found[name], overall(name)
+        numbers = [areas[cell] for cell in cells] + [np.mean(pooled), min(pooled)]
+        worst = min((cell for cell in cells if cell[1] != ALL), key=lambda cell: areas[cell])
+        yield (
+            f"| `{name}` | {' | '.join(f'{number:.2f}' for number in numbers)}"
+            f" | {areas[worst]:.2f} ({worst[0]}, {worst[1]}) |"
+        )
+
+
 def main() -> None:
     """Print the table."""
     arguments = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     arguments.add_argument("--episodes", type=int, default=40, help="of each robot and policy")
-    arguments.parse_args()
+    print("\n".join(table(areas(arguments.parse_args().episodes))))
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ from inspector.commands.report import report
 from inspector.commands.robots import robots
 from inspector.commands.shot import shot
 from inspector.commands.simulate import app as simulate
+from inspector.commands.smoothness import smoothness
 from inspector.commands.train import train
 from inspector.commands.tune import tune
 from inspector.commands.view import view
@@ -73,6 +74,7 @@ _add("Look", compare, "inspector compare --robots panda,go2 --csv comparison.csv
 _add("Look", robots, "inspector robots")
 _add("Judge", classify, "inspector classify run.npz --format junit")
 _add("Judge", audit, "inspector audit run.npz")
+_add("Judge", smoothness, "inspector smoothness episodes/ --picture smoothness.png")
 _add("Import and export", import_, "inspector import log.csv -o run.npz", name="import")
 _add("Import and export", labels, "inspector labels run.npz --to labels.txt")
 _add("Import and export", export, "inspector export run.npz -o run.mcap")

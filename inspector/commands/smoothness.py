@@ -1,0 +1,93 @@
+"""`inspector smoothness`: episodes from the smoothest to the roughest."""
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from inspector.commands.options import ModelFiles, Overwrite
+
+
+class Format(StrEnum):
+    """The output formats of a ranking."""
+
+    TEXT = "text"
+    CSV = "csv"
+    JSON = "json"
+
+
+class By(StrEnum):
+    """The scores, by their names in ``inspector.smoothness.scores``, too slow to import here."""
+
+    LEVEL = "level"
+    SPARC = "sparc"
+    LDLJ = "ldlj"
+    ACTION_RATE = "action_rate"
+    ACTION_CURVATURE = "action_curvature"
+    FLAGGED = "flagged"
+    TRACKING = "tracking"
+
+
+def smoothness(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Run files, logs that `import` reads, LeRobot data sets, or folders of them.",
+            show_default=False,
+        ),
+    ],
+    by: Annotated[By | None, typer.Option(help="The score to order by.")] = None,
+    format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
+    picture: Annotated[
+        Path | None,
+        typer.Option(help="Write histograms of the scores as PNG (needs the extra `report`)."),
+    ] = None,
+    labels: Annotated[
+        bool, typer.Option("--labels/--no-labels", help="Classify episodes from 80 Hz on.")
+    ] = True,
+    robot: Annotated[
+        str | None, typer.Option(help="A name that `robots` lists, or a URDF.")
+    ] = None,
+    rate: Annotated[
+        float | None, typer.Option(min=1.0, help="Rate of the logs in [Hz], if it is known.")
+    ] = None,
+    units: Annotated[
+        str | None, typer.Option(help="Unit of angles: radians, degrees or normalised.")
+    ] = None,
+    map_: Annotated[
+        list[str] | None,
+        typer.Option("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
+    ] = None,
+    model: ModelFiles = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Rank the episodes of policies and demonstrations by their smoothness.
+
+    The exit status is 3 if a log cannot be read; the others are ranked.
+    """
+    from inspector import assets
+    from inspector.library import load_library
+    from inspector.logs.reading import read_options
+    from inspector.progress import progress
+    from inspector.smoothness import picture as histograms
+    from inspector.smoothness import ranking
+    from inspector.smoothness.episodes import episodes_of, scored_episodes
+    from noisemodel.atomic import refuse_existing
+
+    if picture:
+        refuse_existing(picture, overwrite=overwrite)
+        histograms.require()
+    options = read_options(map_ or (), robot=robot, rate=rate, units=units)
+    library = load_library(assets.model_files(model)) if labels else None
+    episodes, failed = episodes_of(logs, options)
+    found = progress(scored_episodes(episodes, library), "score", total=len(episodes))
+    order = ranking.ranked([*found, *failed], by=by or ranking.DEFAULT)
+    write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
+    typer.echo(write[format](order))
+    if picture and order.episodes:
+        histograms.draw(order.episodes, picture, overwrite=overwrite)
+        typer.echo(f"{picture}", err=True)
+    for each in order.failed:
+        typer.echo(f"inspector: {each.name}: {each.problem}", err=True)
+    raise typer.Exit(3 if order.failed else 0)

@@ -1,0 +1,197 @@
+"""Episodes from the smoothest to the roughest, as a table, as CSV and as JSON."""
+
+import csv
+import io
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from inspector.smoothness.episodes import Failed
+from inspector.smoothness.measures import CUTOFF, PADDING, THRESHOLD
+from inspector.smoothness.scores import FAST, SCORES, TRACKED, Episode
+
+FORMAT = "noise-smoothness/1"
+DEFAULT = "level"
+"""The score that episodes are ordered by: docs/smoothness.md says why."""
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Episodes in order.
+
+    Attributes:
+        by: The score that they are ordered by.
+        episodes: The smoothest first; those without this score last.
+        failed: What could not be read.
+    """
+
+    by: str
+    episodes: tuple[Episode, ...]
+    failed: tuple[Failed, ...] = ()
+
+    @property
+    def ranks(self) -> tuple[int | None, ...]:
+        """Rank of each episode, from 1; equal scores have equal ranks, None without a score."""
+        values = [episode.scores[self.by] for episode in self.episodes]
+        return tuple(None if value is None else values.index(value) + 1 for value in values)
+
+
+def ranked(found: Iterable[Episode | Failed], *, by: str = DEFAULT) -> Ranking:
+    """Order episodes from the smoothest to the roughest.
+
+    Args:
+        found: Episodes, and what could not be read.
+        by: One of ``SCORES``.
+
+    Returns:
+        The ranking.
+    """
+    each = tuple(found)
+
+    def roughness(episode: Episode) -> tuple[bool, float]:
+        value = episode.scores[by]
+        return value is None, 0.0 if value is None else -SCORES[by].smooth * value
+
+    episodes = sorted((one for one in each if isinstance(one, Episode)), key=roughness)
+    return Ranking(by, tuple(episodes), tuple(one for one in each if isinstance(one, Failed)))
+
+
+def as_text(ranking: Ranking) -> str:
+    """Write a ranking as a table, with what is missing and why below it."""
+    episodes = ranking.episodes
+    if not episodes:
+        return "0 episodes"
+    count = f"{len(episodes)} episode{'' if len(episodes) == 1 else 's'}"
+    score = SCORES[ranking.by]
+    heads = [
+        ("rank", ""),
+        ("episode", ""),
+        ("duration", "s"),
+        ("rate", "Hz"),
+        *((score.title, score.unit) for score in SCORES.values()),
+    ]
+    names = _short([episode.name for episode in episodes])
+    rows = [
+        [
+            "" if rank is None else str(rank),
+            name,
+            f"{episode.duration:.2f}",
+            f"{episode.rate:g}",
+            *(_cell(name, value) for name, value in episode.scores.items()),
+        ]
+        for rank, name, episode in zip(ranking.ranks, names, episodes, strict=True)
+    ]
+    columns = list(zip(*([list(head) for head in zip(*heads, strict=True)] + rows), strict=True))
+    widths = [max(len(cell) for cell in column) for column in columns]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if place == 1 else cell.rjust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in zip(*columns, strict=True)
+    ]
+    head = f"{count}, the smoothest first by {score.meaning}"
+    return "\n".join([head, "", *lines, "", *_notes(ranking)])
+
+
+def as_csv(ranking: Ranking) -> str:
+    """Write a ranking as CSV; a score that is missing is an empty cell."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["rank", "episode", "duration", "rate", *SCORES])
+    for rank, episode in zip(ranking.ranks, ranking.episodes, strict=True):
+        values = [rank, episode.name, episode.duration, episode.rate, *episode.scores.values()]
+        writer.writerow(["" if value is None else _plain(value) for value in values])
+    return out.getvalue().removesuffix("\n")
+
+
+def as_json(ranking: Ranking) -> str:
+    """Write a ranking as JSON; a score that is missing is null, with its reason."""
+    return json.dumps(
+        {
+            "format": FORMAT,
+            "by": ranking.by,
+            "scores": {
+                score.name: {
+                    "meaning": score.meaning,
+                    "unit": score.unit,
+                    "smoother": "higher" if score.smooth > 0 else "lower",
+                }
+                for score in SCORES.values()
+            },
+            "settings": {
+                "level_above_hz": FAST,
+                "tracking_above_hz": TRACKED,
+                "sparc_cutoff_hz": CUTOFF,
+                "sparc_threshold": THRESHOLD,
+                "sparc_padding": PADDING,
+            },
+            "episodes": [
+                {
+                    "rank": rank,
+                    "episode": episode.name,
+                    "duration": episode.duration,
+                    "rate": episode.rate,
+                    **episode.scores,
+                    "missing": dict(episode.reasons),
+                    "remarks": list(episode.remarks),
+                }
+                for rank, episode in zip(ranking.ranks, ranking.episodes, strict=True)
+            ],
+            "failed": {failed.name: failed.problem for failed in ranking.failed},
+        },
+        indent=2,
+        ensure_ascii=False,
+    )
+
+
+def _notes(ranking: Ranking) -> Iterator[str]:
+    """Say what is missing and what was decided, each once."""
+    episodes = ranking.episodes
+    for score in SCORES.values():
+        reasons = Counter(
+            episode.reasons[score.name] for episode in episodes if score.name in episode.reasons
+        )
+        if not reasons:
+            continue
+        (reason, _), others = reasons.most_common(1)[0], len(reasons) - 1
+        more = f" (and {others} other reasons: --format json)" if others else ""
+        missing = reasons.total()
+        where = "" if missing == len(episodes) else f" for {missing} of {len(episodes)}"
+        yield f"{score.title}: empty{where}, {reason}{more}"
+    remarks = Counter(remark for episode in episodes for remark in episode.remarks)
+    for remark, count in remarks.items():
+        yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
+    rates = sorted({episode.rate for episode in episodes})
+    if len(rates) > 1:
+        yield (
+            f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only;"
+            " they count all up to half of it."
+        )
+    yield (
+        f"SPARC has a cut-off of {CUTOFF:g} Hz; SPARC and LDLJ are higher, all others lower, the"
+        " smoother."
+    )
+
+
+def _short(names: Sequence[str]) -> list[str]:
+    """Names without the folders that all share."""
+    parts = [Path(name).parts for name in names]
+    shared = 0
+    while all(len(each) > shared + 1 and each[shared] == parts[0][shared] for each in parts):
+        shared += 1
+    return [str(Path(*each[shared:])) for each in parts]
+
+
+def _cell(name: str, value: float | None) -> str:
+    if value is None:
+        return ""
+    if name == "flagged":
+        return f"{100 * value:.0f} %"
+    return f"{value:.2f}" if name in ("sparc", "ldlj") else f"{value:.3g}"
+
+
+def _plain(value: float | str) -> str:
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
