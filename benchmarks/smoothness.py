@@ -1,6 +1,6 @@
 """Which score of smoothness separates chattering from clean rollouts of policies, at 50 Hz.
 
-    python -m benchmarks.smoothness [--episodes 40]
+    python -m benchmarks.smoothness [--episodes 40] [--amplitude 1]
 
 Scripted policies move three robots in MuJoCo: two arms in the air and a quadruped that sways on its
 feet. A policy reads noisy encoders 50 times a second and answers with position targets, which the
@@ -12,7 +12,7 @@ defects) against clean, is largest on its worst robot.
 """
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, TypeAlias
@@ -105,13 +105,14 @@ SWAY = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, -2.0], [0.0, 1.0, 0.0]])
 """Hip, thigh and calf of each leg when the body goes sideways, up and down, or to and fro."""
 
 
-def rollout(rig: Rig, defect: str, seed: int) -> Run:
+def rollout(rig: Rig, defect: str, seed: int, amplitude: float = 1.0) -> Run:
     """One episode of a policy.
 
     Args:
         rig: The robot.
         defect: One of ``DEFECTS``, or ``CLEAN``.
         seed: Random seed.
+        amplitude: Of noise and jumps, times the constants.
 
     Returns:
         The log: measured positions and velocities, and actions as desired positions, at 50 Hz.
@@ -128,7 +129,7 @@ def rollout(rig: Rig, defect: str, seed: int) -> Run:
     mujoco.mj_step(model, data, nstep=round(SETTLING * RATE) * STEPS)
     rest = data.qpos[-joints:].copy()
     reference = _reference(rig, rest, random)
-    disturbed = _disturbance(defect, len(reference.position), joints, random)
+    disturbed = amplitude * _disturbance(defect, len(reference.position), joints, random)
     late = random.integers(*DELAY, endpoint=True) if defect == "delay" else 0
     seen: list[Array] = []
     actions = []
@@ -153,9 +154,9 @@ def rollout(rig: Rig, defect: str, seed: int) -> Run:
     )
 
 
-def rollouts(rig: Rig, defect: str, episodes: int) -> Iterator[Run]:
+def rollouts(rig: Rig, defect: str, episodes: int, amplitude: float = 1.0) -> Iterator[Run]:
     """Episodes of a policy, with seeds from 0 on."""
-    return (rollout(rig, defect, seed) for seed in range(episodes))
+    return (rollout(rig, defect, seed, amplitude) for seed in range(episodes))
 
 
 def _reference(rig: Rig, rest: Array, random: np.random.Generator) -> Reference:
@@ -245,12 +246,12 @@ def scores_of(run: Run) -> dict[str, float | None]:
     return found | {WIDER: None if wider is None else -wider}
 
 
-def areas(episodes: int) -> Areas:
+def areas(episodes: int, amplitude: float = 1.0) -> Areas:
     """Area under the ROC curve by score, and by robot and defect; "all" are all defects."""
     found: Areas = {}
     for rig in RIGS:
         scores = {
-            defect: [scores_of(run) for run in rollouts(rig, defect, episodes)]
+            defect: [scores_of(run) for run in rollouts(rig, defect, episodes, amplitude)]
             for defect in (CLEAN, *DEFECTS)
         }
         for name in scores[CLEAN][0]:
@@ -264,24 +265,30 @@ def areas(episodes: int) -> Areas:
     return found
 
 
-def table(found: Areas) -> Iterator[str]:
-    """Lines of the table in Markdown, the score that is best on its worst robot first."""
-    cells = [(rig.robot, defect) for rig in RIGS for defect in (*DEFECTS, ALL)]
-    head = ["score", *(f"{robot}, {defect}" for robot, defect in cells), "mean", "worst robot"]
-    yield f"| {' | '.join([*head, 'worst cell'])} |"
-    yield f"|{'---|' * (len(head) + 1)}"
+def tables(found: Areas) -> Iterator[str]:
+    """Lines of two tables in Markdown, the score that is best on its worst robot first."""
 
     def overall(name: str) -> list[float]:
         return [found[name][rig.robot, ALL] for rig in RIGS]
 
-    for name in sorted(found, key=lambda name: -min(overall(name))):
-        areas, pooled = found[name], overall(name)
-        numbers = [areas[cell] for cell in cells] + [np.mean(pooled), min(pooled)]
-        worst = min((cell for cell in cells if cell[1] != ALL), key=lambda cell: areas[cell])
-        yield (
-            f"| `{name}` | {' | '.join(f'{number:.2f}' for number in numbers)}"
-            f" | {areas[worst]:.2f} ({worst[0]}, {worst[1]}) |"
-        )
+    def row(cells: Iterable[str]) -> str:
+        return f"| {' | '.join(cells)} |"
+
+    robots = [rig.robot for rig in RIGS]
+    each = [(robot, defect) for robot in robots for defect in DEFECTS]
+    names = sorted(found, key=lambda name: -min(overall(name)))
+    yield row(["all defects", *robots, "mean", "worst robot"])
+    yield "|" + "---|" * (len(robots) + 3)
+    for name in names:
+        values = overall(name)
+        numbers = [*values, float(np.mean(values)), min(values)]
+        yield row([f"`{name}`", *(f"{number:.3f}" for number in numbers)])
+    yield ""
+    yield row(["by defect", *(f"{robot}, {defect}" for robot, defect in each), "worst"])
+    yield "|" + "---|" * (len(each) + 2)
+    for name in names:
+        numbers = [found[name][cell] for cell in each]
+        yield row([f"`{name}`", *(f"{number:.3f}" for number in [*numbers, min(numbers)])])
 
 
 def main() -> None:
@@ -290,7 +297,11 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     arguments.add_argument("--episodes", type=int, default=40, help="of each robot and policy")
-    print("\n".join(table(areas(arguments.parse_args().episodes))))
+    arguments.add_argument(
+        "--amplitude", type=float, default=1.0, help="of noise and jumps, times the constants"
+    )
+    given = arguments.parse_args()
+    print("\n".join(tables(areas(given.episodes, given.amplitude))))
 
 
 if __name__ == "__main__":

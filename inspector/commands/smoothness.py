@@ -37,7 +37,12 @@ def smoothness(
             show_default=False,
         ),
     ],
-    by: Annotated[By | None, typer.Option(help="The score to order by.")] = None,
+    by: Annotated[
+        By | None,
+        typer.Option(
+            help="The score to order by; by default action_curvature, or level without actions."
+        ),
+    ] = None,
     format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     picture: Annotated[
         Path | None,
@@ -82,7 +87,7 @@ def smoothness(
     library = load_library(assets.model_files(model)) if labels else None
     episodes, failed = episodes_of(logs, options)
     found = progress(scored_episodes(episodes, library), "score", total=len(episodes))
-    order = ranking.ranked([*found, *failed], by=by or ranking.DEFAULT)
+    order = ranking.ranked([*found, *failed], by=by or "")
     write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
     typer.echo(write[format](order))
     if picture and order.episodes:

@@ -20,12 +20,14 @@ class Unread:
     """An episode that is not read yet.
 
     Attributes:
-        name: The log, and the episode if it holds several.
+        log: Path of its log.
+        episode: Its name within the log, empty if that holds one only.
         source: The argument of the command that it came from.
         read: Reads it.
     """
 
-    name: str
+    log: str
+    episode: str
     source: str
     read: Callable[[], Imported]
 
@@ -67,9 +69,7 @@ def episodes_of(
             except EXPECTED as error:
                 failed.append(Failed(str(log), str(error).removeprefix(f"{log}: ")))
                 continue
-            for job in jobs:
-                name = f"{log} episode {job.episode}" if len(jobs) > 1 else str(log)
-                found.append(Unread(name, str(source), job.read))
+            found += [Unread(str(log), job.episode, str(source), job.read) for job in jobs]
     return tuple(found), tuple(failed)
 
 
@@ -88,9 +88,12 @@ def scored_episodes(
     for episode in episodes:
         try:
             run = episode.read().run
-            yield scored(run, episode.name, source=episode.source, library=library)
+            yield scored(
+                run, episode.log, episode=episode.episode, source=episode.source, library=library
+            )
         except EXPECTED as error:
-            yield Failed(episode.name, str(error))
+            name = f"{episode.log} episode {episode.episode}" if episode.episode else episode.log
+            yield Failed(name, str(error).removeprefix(f"{episode.log}: "))
 
 
 def _logs_in(path: Path) -> Iterator[Path]:

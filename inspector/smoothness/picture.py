@@ -69,14 +69,13 @@ def draw(episodes: Sequence[Episode], path: Path, *, overwrite: bool = False) ->
 
 
 def _histogram(axes: "Axes", episodes: Sequence[Episode], score: Score) -> None:
-    groups: dict[str, list[float]] = {}
-    sources = dict.fromkeys(episode.source for episode in episodes)
+    sources = sorted({episode.source for episode in episodes})
     together = len(sources) > len(COLORS)
+    groups: dict[str, list[float]] = {source: [] for source in ([""] if together else sources)}
     for episode in episodes:
         value = episode.scores[score.name]
-        group = groups.setdefault("" if together else episode.source, [])
         if value is not None:
-            group.append(value)
+            groups["" if together else episode.source].append(value)
     values = np.concatenate([np.array(group) for group in groups.values()])
     positive = bool((values > 0).all()) and values.max() > SPREAD * np.median(values)
     low, high = float(values.min()), float(values.max())

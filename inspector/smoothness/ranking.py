@@ -13,8 +13,8 @@ from inspector.smoothness.measures import CUTOFF, PADDING, THRESHOLD
 from inspector.smoothness.scores import FAST, SCORES, TRACKED, Episode
 
 FORMAT = "noise-smoothness/1"
-DEFAULT = "level"
-"""The score that episodes are ordered by: docs/smoothness.md says why."""
+ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc")
+"""Scores by how well they separate chattering from clean rollouts (docs/smoothness.md)."""
 
 
 @dataclass(frozen=True)
@@ -38,24 +38,46 @@ class Ranking:
         return tuple(None if value is None else values.index(value) + 1 for value in values)
 
 
-def ranked(found: Iterable[Episode | Failed], *, by: str = DEFAULT) -> Ranking:
+def default_order(episodes: Sequence[Episode]) -> str:
+    """Name of the first of ``ORDERS`` that can be compared: all episodes have it, of one quantity.
+
+    Args:
+        episodes: The episodes.
+
+    Returns:
+        Its name; "level" if there is none.
+    """
+
+    def comparable(name: str) -> bool:
+        quantities = {episode.quantities.get(name) for episode in episodes}
+        return len(quantities) == 1 and all(each.scores[name] is not None for each in episodes)
+
+    return next((name for name in ORDERS if comparable(name)), "level")
+
+
+def ranked(found: Iterable[Episode | Failed], *, by: str = "") -> Ranking:
     """Order episodes from the smoothest to the roughest.
 
     Args:
         found: Episodes, and what could not be read.
-        by: One of ``SCORES``.
+        by: One of ``SCORES``; by default as `default_order` has it.
 
     Returns:
         The ranking.
     """
     each = tuple(found)
+    scored = [one for one in each if isinstance(one, Episode)]
+    by = by or default_order(scored)
 
     def roughness(episode: Episode) -> tuple[bool, float]:
         value = episode.scores[by]
         return value is None, 0.0 if value is None else -SCORES[by].smooth * value
 
-    episodes = sorted((one for one in each if isinstance(one, Episode)), key=roughness)
-    return Ranking(by, tuple(episodes), tuple(one for one in each if isinstance(one, Failed)))
+    return Ranking(
+        by,
+        tuple(sorted(scored, key=roughness)),
+        tuple(one for one in each if isinstance(one, Failed)),
+    )
 
 
 def as_text(ranking: Ranking) -> str:
@@ -100,9 +122,10 @@ def as_csv(ranking: Ranking) -> str:
     """Write a ranking as CSV; a score that is missing is an empty cell."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(["rank", "episode", "duration", "rate", *SCORES])
+    writer.writerow(["rank", "log", "episode", "duration", "rate", *SCORES])
     for rank, episode in zip(ranking.ranks, ranking.episodes, strict=True):
-        values = [rank, episode.name, episode.duration, episode.rate, *episode.scores.values()]
+        known = [rank, episode.log, episode.episode, episode.duration, episode.rate]
+        values = [*known, *episode.scores.values()]
         writer.writerow(["" if value is None else _plain(value) for value in values])
     return out.getvalue().removesuffix("\n")
 
@@ -131,10 +154,12 @@ def as_json(ranking: Ranking) -> str:
             "episodes": [
                 {
                     "rank": rank,
-                    "episode": episode.name,
+                    "log": episode.log,
+                    "episode": episode.episode,
                     "duration": episode.duration,
                     "rate": episode.rate,
                     **episode.scores,
+                    "of": dict(episode.quantities),
                     "missing": dict(episode.reasons),
                     "remarks": list(episode.remarks),
                 }
@@ -148,19 +173,27 @@ def as_json(ranking: Ranking) -> str:
 
 
 def _notes(ranking: Ranking) -> Iterator[str]:
-    """Say what is missing and what was decided, each once."""
+    """Say what is missing, what was decided, and what to look at, each once."""
     episodes = ranking.episodes
+
+    def where(count: int) -> str:
+        return "" if count == len(episodes) else f" for {count} of {len(episodes)}"
+
+    missing: dict[str, list[str]] = {}
     for score in SCORES.values():
         reasons = Counter(
-            episode.reasons[score.name] for episode in episodes if score.name in episode.reasons
+            each.reasons[score.name] for each in episodes if score.name in each.reasons
         )
-        if not reasons:
-            continue
-        (reason, _), others = reasons.most_common(1)[0], len(reasons) - 1
-        more = f" (and {others} other reasons: --format json)" if others else ""
-        missing = reasons.total()
-        where = "" if missing == len(episodes) else f" for {missing} of {len(episodes)}"
-        yield f"{score.title}: empty{where}, {reason}{more}"
+        if reasons:
+            (reason, _), others = reasons.most_common(1)[0], len(reasons) - 1
+            more = f" (and {others} other reasons: --format json)" if others else ""
+            missing.setdefault(f"empty{where(reasons.total())}, {reason}{more}", []).append(
+                score.title
+            )
+    yield from (f"{', '.join(titles)}: {text}" for text, titles in missing.items())
+    for name, titles in (("action_curvature", "action rate and 2nd diff."), ("tracking", "error")):
+        kinds = Counter(each.quantities[name] for each in episodes if name in each.quantities)
+        yield from (f"{titles}: of {kind}{where(count)}" for kind, count in kinds.items())
     remarks = Counter(remark for episode in episodes for remark in episode.remarks)
     for remark, count in remarks.items():
         yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
@@ -170,10 +203,12 @@ def _notes(ranking: Ranking) -> Iterator[str]:
             f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only;"
             " they count all up to half of it."
         )
-    yield (
-        f"SPARC has a cut-off of {CUTOFF:g} Hz; SPARC and LDLJ are higher, all others lower, the"
-        " smoother."
-    )
+    yield f"SPARC has a cut-off of {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
+    ordered = [each for each in episodes if each.scores[ranking.by] is not None]
+    if len(ordered) > 1:
+        roughest = ordered[-1]
+        command = f"inspector import {roughest.log} --episode {roughest.episode} -o roughest.npz"
+        yield f"The roughest: {command if roughest.episode else f'inspector view {roughest.log}'}"
 
 
 def _short(names: Sequence[str]) -> list[str]:

@@ -20,10 +20,11 @@ from inspector.smoothness.measures import (
 )
 from noisemodel import Run
 from noisemodel.differentiate import stretches
-from noisemodel.types import Array
+from noisemodel.types import Array, Real
 
 FAST, TRACKED = 10.0, 4.0
 """Lowest frequencies of the level and of the tracking error, in [Hz]."""
+POSITIONS, VELOCITIES = "positions", "velocities"
 STANDING = 0.01
 """Highest speed of an episode without motion: half a degree a second, in [rad/s]."""
 
@@ -65,25 +66,37 @@ class Episode:
     """An episode and its scores.
 
     Attributes:
-        name: Its name.
+        log: Path of its log.
+        episode: Its name within the log, empty if that holds one only.
         source: The argument of the command that it came from.
         duration: Of what was scored, in [s].
         rate: Of what was scored, in [Hz].
         scores: By name, in the order of ``SCORES``; None where there is none.
         reasons: Why a score is missing, by its name.
+        quantities: What the scores of actions and of tracking are of, positions or velocities, by
+            their names.
         remarks: What was decided, a sentence each.
     """
 
-    name: str
+    log: str
+    episode: str
     source: str
     duration: float
     rate: float
     scores: Mapping[str, float | None]
     reasons: Mapping[str, str] = field(default_factory=dict)
+    quantities: Mapping[str, str] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
 
+    @property
+    def name(self) -> str:
+        """The log, and the episode within it."""
+        return f"{self.log} episode {self.episode}" if self.episode else self.log
 
-def scored(run: Run, name: str, *, source: str = "", library: Library | None = None) -> Episode:
+
+def scored(
+    run: Run, log: str, *, episode: str = "", source: str = "", library: Library | None = None
+) -> Episode:
     """Scores of a run.
 
     The longest stretch without a gap is scored, of a log with held values at the rate of its
@@ -92,7 +105,8 @@ def scored(run: Run, name: str, *, source: str = "", library: Library | None = N
 
     Args:
         run: The run.
-        name: Its name.
+        log: Path of its log.
+        episode: Its name within the log, empty if that holds one only.
         source: The argument of the command that it came from.
         library: Models to choose from; None for no labels.
 
@@ -126,18 +140,27 @@ def scored(run: Run, name: str, *, source: str = "", library: Library | None = N
         reasons["sparc"] = reasons["ldlj"] = "the motion is too short, or has no jerk"
     else:
         reasons["sparc"] = reasons["ldlj"] = f"no joint is faster than {STANDING:g} rad/s"
-    action = _action(run, part)
+    quantities: dict[str, str] = {}
+    action, quantity = _action(run, part)
     if action is None:
         reasons["action_rate"] = reasons["action_curvature"] = "the log has no desired motion"
     else:
         scores["action_rate"] = squared_difference(action)
         scores["action_curvature"] = squared_difference(action, order=2)
         reasons["action_rate"] = reasons["action_curvature"] = "too few actions"
+        quantities |= {"action_rate": quantity, "action_curvature": quantity}
     scores["flagged"] = flagged
-    scores["tracking"], reasons["tracking"], quantity = _tracking(run, part)
-    remarks += [f"The tracking error is of {quantity}."] if quantity else []
+    error, quantity = _error(run, part)
+    if error is None:
+        reasons["tracking"] = "the log has no desired motion of its joints"
+    else:
+        scores["tracking"] = level_above(error, rate, TRACKED)
+        reasons["tracking"] = _too_little(rate, duration, TRACKED)
+        quantities["tracking"] = quantity
     missing = {name: reasons[name] for name, score in scores.items() if score is None}
-    return Episode(name, source, duration, rate, scores, missing, tuple(remarks))
+    return Episode(
+        log, episode, source, duration, rate, scores, missing, quantities, tuple(remarks)
+    )
 
 
 def _length(part: slice) -> int:
@@ -146,45 +169,47 @@ def _length(part: slice) -> int:
 
 def _velocity(run: Run, part: slice) -> tuple[Array, str]:
     """Measured velocities, or first differences of positions, shape (samples, joints)."""
-    if "velocity" in run.meta.get("differentiated", {}) and run.position is not None:
-        angles = np.unwrap(np.asarray(run.position[part], dtype=np.float64), axis=0)
-        return np.diff(angles, axis=0) * run.rate, "Velocities are first differences of positions."
-    return np.asarray(run.velocity[part], dtype=np.float64), ""
+    if "velocity" not in run.meta.get("differentiated", {}) or run.position is None:
+        return np.asarray(run.velocity[part], dtype=np.float64), ""
+    velocity = np.diff(_angles(run.position[part]), axis=0) * run.rate
+    return velocity, "Velocities are first differences of positions."
 
 
-def _action(run: Run, part: slice) -> Array | None:
-    """What was commanded, once for each action, shape (actions, joints): positions if there are."""
+def _action(run: Run, part: slice) -> tuple[Array | None, str]:
+    """What was commanded, once for each action, shape (actions, joints), and of what it is."""
     if run.position_desired is not None:
-        action = np.unwrap(np.asarray(run.position_desired[part], dtype=np.float64), axis=0)
+        action, quantity = _angles(run.position_desired[part]), POSITIONS
     elif run.velocity_desired is not None:
         action = np.asarray(run.velocity_desired[part], dtype=np.float64)
+        quantity = VELOCITIES
     else:
-        return None
+        return None, ""
     held = round(hold_length(action, np.ones(len(action), dtype=bool)))
     if held < 2:
-        return action
+        return action, quantity
     changes = np.flatnonzero((action[1:] != action[:-1]).any(axis=1)) + 1
-    return action[changes[0] % held :: held]
+    return action[changes[0] % held :: held], quantity
 
 
-def _tracking(run: Run, part: slice) -> tuple[float | None, str, str]:
-    """Tracking error, why there is none, and of what it is: of positions if there are both."""
+def _error(run: Run, part: slice) -> tuple[Array | None, str]:
+    """Tracking error of the joints that have a desired motion, and of what it is."""
     joints = [name for name in run.joint_names if name in run.desired_joint_names]
     measured = [run.joint_names.index(name) for name in joints]
     desired = [run.desired_joint_names.index(name) for name in joints]
     pairs = {
-        "positions, in rad": (run.position, run.position_desired),
-        "velocities, in rad/s": (run.velocity, run.velocity_desired),
+        POSITIONS: (run.position, run.position_desired),
+        VELOCITIES: (run.velocity, run.velocity_desired),
     }
     for quantity, (actual, wanted) in pairs.items():
-        if actual is None or wanted is None or not joints:
-            continue
-        error = np.asarray(actual[part][:, measured], dtype=np.float64) - wanted[part][:, desired]
-        if actual is run.position:
-            error = np.unwrap(error, axis=0)
-        reason = _too_little(run.rate, _length(part) / run.rate, TRACKED)
-        return level_above(error, run.rate, TRACKED), reason, quantity
-    return None, "the log has no desired motion of its joints", ""
+        if actual is not None and wanted is not None and joints:
+            error = np.asarray(actual[part][:, measured] - wanted[part][:, desired], np.float64)
+            return (_angles(error) if quantity == POSITIONS else error), quantity
+    return None, ""
+
+
+def _angles(position: Real) -> Array:
+    """Positions without the jumps of angles that wrap, shape (samples, joints)."""
+    return np.unwrap(np.asarray(position, dtype=np.float64), axis=0)
 
 
 def _flagged(run: Run, library: Library) -> tuple[float | None, str]:
