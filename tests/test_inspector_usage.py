@@ -99,10 +99,11 @@ def test_the_example_of_a_command_is_accepted(path):
 
 def test_the_help_of_inspector_shows_each_command_on_one_line(help_of):
     rows = [line.strip("│ ") for line in help_of()]
+    width = max(len(path[0]) for path in COMMANDS) + 2
     for path, command in COMMANDS.items():
         if len(path) == 1:
             summary, *_ = command.help.split("\n\n")
-            assert f"{path[0]:10}{summary}" in rows
+            assert f"{path[0]:{width}}{summary}" in rows
 
 
 def test_no_help_holds_brackets_that_would_be_taken_for_markup():

@@ -67,7 +67,7 @@ def smoothness(
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Rank the episodes of policies and demonstrations by their smoothness.
+    """Rank episodes of policies and demonstrations by smoothness.
 
     The exit status is 3 if a log cannot be read; the others are ranked.
     """

@@ -66,7 +66,7 @@ def tune(
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")] = 1,
     overwrite: Overwrite = False,
 ) -> None:
-    """Tune the settings of a profile by grid search; resumes if killed."""
+    """Tune a profile's settings by grid search; resumes if killed."""
     if validation and folds:
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
     from json import dumps

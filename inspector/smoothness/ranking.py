@@ -10,7 +10,7 @@ from pathlib import Path
 
 from inspector.smoothness.episodes import Failed
 from inspector.smoothness.measures import CUTOFF, PADDING, THRESHOLD
-from inspector.smoothness.scores import FAST, SCORES, TRACKED, Episode
+from inspector.smoothness.scores import FAST, SCORES, TRACKED, VELOCITIES, Episode
 
 FORMAT = "noise-smoothness/1"
 ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc")
@@ -193,7 +193,9 @@ def _notes(ranking: Ranking) -> Iterator[str]:
     yield from (f"{', '.join(titles)}: {text}" for text, titles in missing.items())
     for name, titles in (("action_curvature", "action rate and 2nd diff."), ("tracking", "error")):
         kinds = Counter(each.quantities[name] for each in episodes if name in each.quantities)
-        yield from (f"{titles}: of {kind}{where(count)}" for kind, count in kinds.items())
+        for kind, count in kinds.items():
+            unit = ", rad/s in place of rad" if kind == VELOCITIES else ""
+            yield f"{titles}: of {kind}{unit}{where(count)}"
     remarks = Counter(remark for episode in episodes for remark in episode.remarks)
     for remark, count in remarks.items():
         yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
@@ -203,7 +205,7 @@ def _notes(ranking: Ranking) -> Iterator[str]:
             f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only;"
             " they count all up to half of it."
         )
-    yield f"SPARC has a cut-off of {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
+    yield f"SPARC: cut-off {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
     ordered = [each for each in episodes if each.scores[ranking.by] is not None]
     if len(ordered) > 1:
         roughest = ordered[-1]

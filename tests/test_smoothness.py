@@ -1,0 +1,250 @@
+"""`inspector smoothness`: scores of runs, their order, and what the command prints."""
+
+import csv
+import io
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from samplelogs import JOINTS, write_lerobot
+
+from inspector.commands.smoothness import By
+from inspector.smoothness.ranking import as_text, default_order, ranked
+from inspector.smoothness.scores import SCORES, scored
+from noisemodel import Run
+
+ROOT = Path(__file__).parents[1]
+RATE = 50.0
+TIME = np.arange(200) / RATE
+
+
+def rollout(chatter=0.0, frequency=18.0, phase=0.0, *, samples=200, **changes):
+    """Two joints that reach a minimum-jerk target every two seconds, and chatter in the actions."""
+    share = (TIME % 2.0) / 2.0
+    path = np.floor(TIME / 2.0) + share**3 * (10 - 15 * share + 6 * share**2)
+    vibration = chatter * np.sin(2 * np.pi * frequency * TIME + phase)
+    action = np.column_stack((path + vibration, -0.5 * path))
+    lagging = np.column_stack((path + 0.5 * vibration, -0.5 * path))
+    fields = {
+        "time": TIME,
+        "position": lagging,
+        "velocity": np.gradient(lagging, 1 / RATE, axis=0),
+        "position_desired": action,
+        "joint_names": ("shoulder", "elbow"),
+    } | changes
+    sampled = {"time", "position", "velocity", "position_desired", "velocity_desired", "valid"}
+    return Run(
+        **{
+            name: value[:samples] if name in sampled and value is not None else value
+            for name, value in fields.items()
+        }
+    )
+
+
+@settings(deadline=None, max_examples=40)
+@given(st.floats(1e-3, 0.3), st.floats(11.0, 24.0), st.floats(0.0, 6.3))
+def test_chatter_never_ranks_an_episode_smoother(size, frequency, phase):
+    clean, rough = scored(rollout(), "clean"), scored(rollout(size, frequency, phase), "rough")
+    for by in ("", "level", "ldlj", "action_rate", "action_curvature", "tracking"):
+        order = ranked([rough, clean], by=by)
+        assert [episode.log for episode in order.episodes] == ["clean", "rough"], by
+
+
+@settings(deadline=None, max_examples=15)
+@given(st.integers(1, 40), st.booleans())
+def test_short_and_standing_episodes_have_numbers_or_reasons(samples, still):
+    run = rollout(samples=samples + 1)
+    if still:
+        run = rollout(
+            samples=samples + 1,
+            **{name: np.zeros((200, 2)) for name in ("position", "velocity", "position_desired")},
+        )
+    episode = scored(run, "short")
+    assert set(episode.scores) == set(SCORES)
+    for name, value in episode.scores.items():
+        assert (value is None) == (name in episode.reasons)
+        assert value is None or np.isfinite(value)
+    assert "nan" not in as_text(ranked([episode]))
+
+
+def test_an_episode_that_stands_still_has_no_dimensionless_score():
+    noise = 1e-4 * np.random.default_rng(0).standard_normal((200, 2))
+    episode = scored(rollout(velocity=noise, position=None, position_desired=None), "still")
+    assert episode.scores["sparc"] is None
+    assert episode.reasons["ldlj"] == "no joint is faster than 0.01 rad/s"
+    assert episode.scores["level"] < 1e-3
+
+
+def test_the_longest_stretch_between_gaps_is_scored():
+    valid = np.ones(200, dtype=bool)
+    valid[60:70] = False
+    run = rollout()
+    signals = {
+        name: np.where(valid[:, None], getattr(run, name), 0.0)
+        for name in ("position", "velocity", "position_desired")
+    }
+    episode = scored(rollout(valid=valid, **signals), "gaps")
+    assert episode.duration == pytest.approx(2.6)
+    assert episode.remarks == ("The longest stretch without a gap was scored.",)
+    assert episode.scores["level"] < 0.2  # of the jump from 0 it would be 0.5
+
+
+def test_velocities_that_were_smoothed_are_replaced_by_differences(tmp_path):
+    chattering = rollout(0.05)
+    path = tmp_path / "run.npz"
+    np.savez(path, time=TIME, position=chattering.position)
+    loaded = scored(Run.load(path), "run")
+    smoothed = scored(Run(time=TIME, velocity=Run.load(path).velocity, joint_names=("a", "b")), "")
+    assert "Velocities are first differences of positions." in loaded.remarks
+    assert loaded.scores["level"] > 3 * smoothed.scores["level"]
+
+
+def test_actions_that_a_log_holds_are_counted_once():
+    run = rollout(0.02)
+    every = np.repeat(np.arange(200), 10)
+    faster = Run(
+        time=np.arange(2000) / (10 * RATE),
+        velocity=np.random.default_rng(0).standard_normal((2000, 2)),
+        position_desired=run.position_desired[every],
+        joint_names=run.joint_names,
+    )
+    held, plain = scored(faster, "held"), scored(run, "plain")
+    assert held.scores["action_rate"] == pytest.approx(plain.scores["action_rate"], rel=0.05)
+    assert held.scores["action_curvature"] == pytest.approx(
+        plain.scores["action_curvature"], rel=0.05
+    )
+
+
+def test_an_angle_that_wraps_is_no_jump():
+    turning = 3.0 * TIME[:, None] * np.ones(2)
+    wrapped = (turning + np.pi) % (2 * np.pi) - np.pi
+    episodes = [
+        scored(rollout(position=each, position_desired=each, velocity=0 * each + 3.0), "")
+        for each in (turning, wrapped)
+    ]
+    for name in ("action_rate", "action_curvature", "tracking"):
+        first, second = (episode.scores[name] for episode in episodes)
+        assert second == pytest.approx(first, abs=1e-12)
+
+
+def test_the_order_is_by_actions_only_where_all_episodes_have_them_of_one_quantity():
+    positions = scored(rollout(), "positions")
+    none = scored(rollout(position_desired=None), "none")
+    velocities = scored(rollout(position_desired=None, velocity_desired=rollout().velocity), "v")
+    assert default_order([positions]) == "action_curvature"
+    assert default_order([positions, none]) == "level"
+    assert default_order([positions, velocities]) == "level"
+    assert ranked([scored(rollout(samples=2), "")]).by == "action_rate"
+
+
+def test_an_episode_without_the_score_has_no_rank_and_comes_last():
+    episodes = [scored(rollout(samples=5), "short"), scored(rollout(), "long")]
+    order = ranked(episodes, by="level")
+    assert [episode.log for episode in order.episodes] == ["long", "short"]
+    assert order.ranks == (1, None)
+
+
+def test_the_command_knows_all_scores():
+    assert {by.value for by in By} == set(SCORES)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name, chatter in (("smooth", 0.0), ("rough", 0.1), ("middle", 0.01)):
+        rollout(chatter).save(tmp_path / f"{name}.npz")
+    (tmp_path / "notes.md").write_text("no log")
+    return tmp_path
+
+
+def test_a_folder_is_ranked_in_one_table(folder):
+    status, out, err = call("smoothness", folder)
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "3 episodes, the smoothest first by mean square second difference of actions"
+    assert [line.split()[1] for line in lines[4:7]] == ["smooth.npz", "middle.npz", "rough.npz"]
+    assert "flagged: empty, rate of 50 Hz" in out
+    assert lines[-1] == f"The roughest: inspector view {folder / 'rough.npz'}"
+    assert out.count("empty") == 1
+
+
+def test_csv_and_json_have_the_same_numbers(folder):
+    _, table, _ = call("smoothness", folder, "--format", "csv", "--by", "ldlj")
+    _, document, _ = call("smoothness", folder, "--format", "json", "--by", "ldlj")
+    rows, found = list(csv.DictReader(io.StringIO(table))), json.loads(document)
+    assert found["format"] == "noise-smoothness/1"
+    assert found["settings"]["sparc_cutoff_hz"] == 10.0
+    assert [row["rank"] for row in rows] == ["1", "2", "3"]
+    for row, episode in zip(rows, found["episodes"], strict=True):
+        assert row["log"] == episode["log"]
+        assert row["flagged"] == ""
+        assert episode["flagged"] is None
+        assert "80 Hz" in episode["missing"]["flagged"]
+        assert float(row["ldlj"]) == pytest.approx(episode["ldlj"], rel=1e-5)
+
+
+def test_one_bad_log_is_named_and_the_others_are_ranked(folder):
+    (folder / "bad.csv").write_text("hello\nworld\n")
+    status, out, err = call("smoothness", folder, "--no-labels")
+    assert status == 3
+    assert out.startswith("3 episodes")
+    assert err.startswith(f"inspector: {folder / 'bad.csv'}: no time column is named")
+    assert "not classified (--no-labels)" in out
+
+
+def test_a_folder_without_logs_says_what_it_looked_for(tmp_path):
+    status, out, err = call("smoothness", tmp_path)
+    assert (status, out) == (3, "0 episodes\n")
+    assert err.startswith(f"inspector: {tmp_path}: holds no log (.npz, .csv")
+
+
+def test_a_lerobot_data_set_is_ranked_by_episode(tmp_path):
+    states = [rollout(chatter).position[:, [0, 1, 1]] for chatter in (0.1, 0.0)]
+    names = [f"{joint}.pos" for joint in JOINTS]
+    data = write_lerobot(tmp_path / "set", states, names=names, fps=50)
+    status, _, err = call("smoothness", data)
+    assert status == 3
+    assert "LeRobot does not log the unit" in err
+    status, out, err = call("smoothness", data, "--units", "radians")
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert [line.split()[1:4] for line in lines[4:6]] == [
+        ["set", "episode", "1"],
+        ["set", "episode", "0"],
+    ]
+    assert lines[-1] == f"The roughest: inspector import {data} --episode 0 -o roughest.npz"
+
+
+def test_a_run_at_a_higher_rate_has_a_share_of_time_flagged():
+    status, out, _ = call("smoothness", ROOT / "assets" / "runs" / "demo.npz", "--format", "json")
+    assert status == 0
+    (episode,) = json.loads(out)["episodes"]
+    assert 0.0 < episode["flagged"] < 1.0
+    assert episode["missing"] == {}
+
+
+def test_the_picture_has_a_histogram_of_each_score(folder, tmp_path):
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "out.png"
+    status, _, err = call("smoothness", folder, "--picture", picture, "--no-labels")
+    assert (status, err) == (0, f"{picture}\n")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    status, _, err = call("smoothness", folder, "--picture", picture)
+    assert status == 3
+    assert "exists" in err
+
+
+def test_rollouts_of_the_benchmark_are_the_same_for_a_seed_and_chatter_by_their_defect(monkeypatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.syspath_prepend(ROOT)
+    from benchmarks.smoothness import CLEAN, DEFECTS, RIGS, rollout
+
+    for rig in RIGS:
+        clean = rollout(rig, CLEAN, 7)
+        np.testing.assert_array_equal(clean.velocity, rollout(rig, CLEAN, 7).velocity)
+        assert clean.rate == 50.0
+        smooth = scored(clean, CLEAN).scores["level"]
+        assert all(scored(rollout(rig, each, 7), each).scores["level"] > smooth for each in DEFECTS)
