@@ -11,6 +11,7 @@ from inspector.audit.placeholder import without_placeholder
 from inspector.hold import hold_length, without_hold
 from inspector.library import Library
 from inspector.smoothness.measures import (
+    BAND,
     CUTOFF,
     level_above,
     log_dimensionless_jerk,
@@ -227,6 +228,6 @@ def _flagged(run: Run, library: Library) -> tuple[float | None, str]:
 
 def _too_little(rate: float, duration: float, frequency: float) -> str:
     """Why a log has no level above a frequency."""
-    if rate < 2.4 * frequency:
+    if rate < 2 * BAND * frequency:
         return f"a log of {rate:g} Hz has too little above {frequency:g} Hz"
     return f"{duration:.3g} s are too short for {frequency:g} Hz"
