@@ -3,6 +3,7 @@
     python -m benchmarks.leftout LOGS... [--profile general] [--rate 1000] [--thin 8]
         [--grid rounds=100,200 leaves=4,8 learning_rate=0.05,0.15] [--without relative joints]
         [--alarms 0.5 0.7 0.9] [--novelty 2 4 inf] [--budget 30]
+        [--learn-only LOGS...] [--wildest 0.5]
 
 LOGS are annotated run files of source domains, and folders of them; a run of a target domain is
 refused. Robots are dealt into folds, those of one line (anymal, anymal_c) together and each family
@@ -12,7 +13,9 @@ points of the grid, and logistic regression on the same features, missing ones a
 
 The general profile takes logs of any rates, each once with each of the inputs that training takes
 of it (`models.general.LEARNT`): what is said of runs below holds for each pair of a run and an
-input. Features can be left out by name, for ablations. Other profiles are of one rate.
+input. Other profiles are of one rate. For ablations, features can be left out by name, and domains
+above a wildness are measured on but not learnt from. Logs to learn from only, say copies with
+added faults, are never measured on.
 
 All measures are computed for each robot while it is left out, and averaged over robots: AUC and
 pAUC of runs by the harmonic mean, shares and rates by the mean. The thresholds of a candidate, of
@@ -27,6 +30,7 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, product
+from math import inf
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -309,6 +313,8 @@ def main() -> None:
     arguments.add_argument("--alarms", type=float, nargs="+", default=ALARMS)
     arguments.add_argument("--novelty", type=float, nargs="+", default=(NOVELTY_LIMIT,))
     arguments.add_argument("--budget", type=float, default=30.0, help="false alarms per hour")
+    arguments.add_argument("--learn-only", type=Path, nargs="+", default=[], help="more logs")
+    arguments.add_argument("--wildest", type=float, default=inf, help="wildness to learn from")
     arguments.add_argument("--folds", type=int, default=6)
     arguments.add_argument(
         "--thin", type=int, help=f"train on every k-th ok frame; {THIN} or, of one rate, 1"
@@ -326,12 +332,19 @@ def main() -> None:
             several.append(logistic(profile))
         began = perf_counter()
         paths = files(given.logs, given.limit)
-        runs, left_out = read(paths, profile, thin=thin, names=names, jobs=given.jobs)
+        options = {"thin": thin, "names": names, "wildest": given.wildest, "jobs": given.jobs}
+        runs, left_out = read(paths, profile, **options)
+        more = files(given.learn_only, given.limit)
+        extra = read(more, profile, **options)[0] if more else []
         print(
-            f"{len(runs)} pairs of run and input of {len(paths)} runs, read in"
-            f" {perf_counter() - began:.0f} s; {left_out}"
+            f"{len(runs)} pairs of run and input of {len(paths)} runs, and {len(extra)} to learn"
+            f" from alone, read in {perf_counter() - began:.0f} s; {left_out}"
         )
-        split = robot_folds([run.robot for run in runs], given.folds)
+        everything = [*runs, *extra]
+        split = [
+            (learn, test[test < len(runs)])
+            for learn, test in robot_folds([run.robot for run in everything], given.folds)
+        ]
         for number, (_, test) in enumerate(split, start=1):
             robots = sorted({runs[index].robot for index in test})
             print(f"fold {number} leaves out {len(test)} of {', '.join(robots)}", flush=True)
@@ -340,7 +353,8 @@ def main() -> None:
         shown = progress(split, "fold", total=len(split))
         with threadpool_limits(1):  # a thread that waits for a core keeps all others waiting
             measured = measure(
-                *(runs, shown, several, profile, thresholds),
+                *(everything, shown, several, profile, thresholds),
+                measured=len(runs),
                 names=names,
                 thin=thin,
                 quick=given.quick,
@@ -400,6 +414,7 @@ def read(
     *,
     thin: int = 1,
     names: Sequence[str] = (),
+    wildest: float = inf,
     jobs: int = 1,
 ) -> tuple[list[Known], LeftOut]:
     """Features of runs; only they are kept, and runs that lack a signal are left out.
@@ -409,6 +424,7 @@ def read(
         profile: What to compute, at one rate or, with ``names``, at that of each run.
         thin: Train on every ``thin``-th `ok` frame of a run.
         names: Of the features of the general profile.
+        wildest: No frame to train on is of a domain whose wildness is above.
         jobs: Processes.
 
     Raises:
@@ -417,7 +433,7 @@ def read(
     """
     runs: list[Known] = []
     left_out = LeftOut()
-    each = (delayed(known)(path, profile, thin, names) for path in paths)
+    each = (delayed(known)(path, profile, thin, names, wildest) for path in paths)
     for found in Parallel(n_jobs=jobs)(each):
         if isinstance(found, list):
             runs += found
@@ -429,11 +445,11 @@ def read(
 
 
 def known(
-    path: Path, profile: models.Profile, thin: int, names: Sequence[str]
+    path: Path, profile: models.Profile, thin: int, names: Sequence[str], wildest: float = inf
 ) -> list[Known] | tuple[str, str]:
     """Features of a run, of each of its inputs; its name and a reason if it cannot be used."""
     try:
-        return _known(path, profile, thin, names)
+        return _known(path, profile, thin, names, wildest)
     except TargetError:
         raise
     except (InspectorError, models.ModelsError, NoiseModelError) as error:
@@ -441,7 +457,7 @@ def known(
 
 
 def _known(
-    path: Path, profile: models.Profile, thin: int, names: Sequence[str]
+    path: Path, profile: models.Profile, thin: int, names: Sequence[str], wildest: float
 ) -> list[Known] | tuple[str, str]:
     ((recording, run),) = classified([path], None if names else profile.rate, bare_too=True)
     robot = recording.facts.get("robot", "")
@@ -455,11 +471,18 @@ def _known(
     if names:
         inputs = [each for each in LEARNT if feeds(named(recording.signal), each)]
         profiles = [ANY.bound(recording.rate, each) for each in inputs]
+    domain = run.meta.get("domain") if run else None
+    wild = isinstance(domain, Mapping) and domain.get("wildness", 0.0) > wildest
     try:
-        return [
+        found = [
             of_recording(recording, each, thin=thin, names=names, first=each is profiles[0])
             for each in profiles
         ]
+        return (
+            [replace(each, cut=each.cut[:0], labels=each.labels[:0]) for each in found]
+            if wild
+            else found
+        )
     except models.SignalError:  # too short
         return recording.name, f"shorter than {profile.duration:g} s"
 
@@ -603,6 +626,7 @@ def measure(
     profile: models.Profile,
     thresholds: Sequence[Threshold],
     *,
+    measured: int | None = None,
     names: Sequence[str] = (),
     thin: int = 1,
     quick: bool = False,
@@ -615,6 +639,7 @@ def measure(
         several: The candidates.
         profile: What the features are of.
         thresholds: All thresholds.
+        measured: How many of the runs are measured on, the first ones; all unless given.
         names: Of the features of the general profile.
         thin: The runs have every ``thin``-th `ok` frame to train on; the prior of `ok` is corrected
             for it.
@@ -625,8 +650,9 @@ def measure(
         DatasetError: If there is one class alone.
     """
     candidates = [name for each in several for name in each.names]
-    counts = np.zeros((len(candidates), len(COUNTS), len(thresholds), len(runs)))
-    score, seconds = np.full((len(candidates), len(runs)), np.nan), np.zeros(len(candidates))
+    own_runs = runs[:measured]
+    counts = np.zeros((len(candidates), len(COUNTS), len(thresholds), len(own_runs)))
+    score, seconds = np.full((len(candidates), len(own_runs)), np.nan), np.zeros(len(candidates))
     count = len(names) or runs[0].whole.shape[1]
     for learn, test in split:
         features = np.concatenate([runs[each].wide(runs[each].cut, count) for each in learn])
@@ -659,7 +685,7 @@ def measure(
                     found = counted(run, classifier, decisions, thresholds)
                     score[number, index], counts[number, :, :, index] = found
                 number += 1
-    robots, parts = np.array([run.robot for run in runs]), [run.part for run in runs]
+    robots, parts = np.array([run.robot for run in own_runs]), [run.part for run in own_runs]
     return [
         Measured(
             *(name, robots, parts, mine, thresholds),

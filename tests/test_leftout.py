@@ -264,6 +264,7 @@ def files(folder, robots, *, rate, desired=True):
                 velocity_desired=one.signal["desired_joints"].T if desired else None,
                 robot=robot,
                 blocks=tuple(Block(*block) for block in one.blocks),
+                meta={"domain": {"name": "mujoco-pd", "wildness": 0.5}},
             ).save(path)
 
 
@@ -400,3 +401,19 @@ def test_the_benchmark_prints_its_tables(logs, monkeypatch, capsys, options):
     names = [line.split(" | ")[0] for line in max(rows, key=len)[1:]]
     assert {"| rounds 2, leaves 4", "| logistic regression"} <= set(names)
     assert counts == ([4, 7] if options else [4, 7, 1 + 3 * 6])
+
+
+def test_logs_to_learn_from_alone_and_wild_domains_are_not_measured_and_not_learnt(logs):
+    profile, names = leftout.wanted("general")
+    runs, _ = leftout.read(leftout.files([logs[0]]), profile, names=names)
+    wild, _ = leftout.read(leftout.files([logs[0]]), profile, names=names, wildest=0.4)
+    assert [len(run.whole) for run in wild] == [len(run.whole) for run in runs]
+    assert sum(len(run.cut) for run in runs) > sum(len(run.cut) for run in wild) == 0
+    both, split = [*runs, *runs], leftout.robot_folds([run.robot for run in (*runs, *runs)], 3)
+    split = [(learn, test[test < len(runs)]) for learn, test in split]
+    (one,) = leftout.measure(
+        *(both, split, [leftout.logistic(profile)], profile, [leftout.Threshold(0.5, 2.0)]),
+        measured=len(runs),
+        names=names,
+    )
+    assert len(one.score) == len(runs)
