@@ -71,6 +71,7 @@ class Outcome:
         onsets = np.abs(spans[:, None, 0] - wanted[None, :, 0])
         met = meet(spans, wanted)
         kind = _kind(run, spans, met)
+        unknown = np.array([finding.label == UNKNOWN for finding in findings], dtype=bool)
         found: Mask = np.any(met, axis=0)
         close: Mask = np.any(met & (onsets <= CLOSE), axis=0)
         felt = np.array([fault.felt for fault in faults], dtype=bool)
@@ -87,6 +88,7 @@ class Outcome:
             "unlabelled_hours": (duration(heard) - duration(common(heard, known))) / HOUR,
             "findings": len(findings),
             "false_alarms": int((kind == FALSE).sum()),
+            "unknown_false_alarms": int((unknown & (kind == FALSE)).sum()),
             "alarms_in_unlabelled": int((kind == UNLABELLED).sum()),
             "faults": len(faults),
             "felt": int(felt.sum()),

@@ -21,6 +21,7 @@ from models.types import Array, Index, Mask
 
 RATES = {
     "false_alarms_per_hour": ("false_alarms", "ok_hours"),
+    "unknown_false_alarms_per_hour": ("unknown_false_alarms", "ok_hours"),
     "alarms_in_unlabelled_per_hour": ("alarms_in_unlabelled", "unlabelled_hours"),
 }
 """Rates: what is counted, and the time of it in [h]."""

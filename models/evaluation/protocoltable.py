@@ -13,6 +13,7 @@ LONGEST = 32
 """Characters of a name at most."""
 ROWS = (
     ("False alarms per hour of ok time", "false_alarms_per_hour", "false_alarms"),
+    ("  by findings unknown", "unknown_false_alarms_per_hour", "unknown_false_alarms"),
     ("Ok time flagged", "ok_flagged", ""),
     ("Alarms per hour of unlabelled time", "alarms_in_unlabelled_per_hour", "alarms_in_unlabelled"),
     ("Faults found, of all injected", "recall_injected", "found/faults"),
