@@ -1,4 +1,4 @@
-"""HDF5 logs, with a group per episode (robomimic, Isaac Lab) or a row per sample."""
+"""HDF5 logs, with a group for each episode (robomimic, Isaac Lab, Minari) or a row per sample."""
 
 import json
 import re
@@ -10,21 +10,29 @@ import h5py
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.log import Field, Log, LogReader, Stamps
-from inspector.logs.options import Entry, ReadOptions
-from inspector.logs.signals import array_signal, listed
-from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
+from inspector.logs.arrays import (
+    EPISODE_ENDS,
+    JOINT_STATES,
+    Episode,
+    episodes_of,
+    log_of,
+    single_numbers,
+)
+from inspector.logs.log import Log, LogReader
+from inspector.logs.options import ReadOptions
+from inspector.logs.signals import listed
 
 EPISODES = "data"
-"""The group that holds the episodes."""
+"""The group that holds the episodes of robomimic and Isaac Lab."""
+
+NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
+"""Names of episodes in a file without that group: Minari's, ManiSkill's and others."""
 
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 """Errors that h5py raises for damaged files."""
 
-RELATIVE = "obs/joint_pos may be relative to a default pose (Isaac Lab)"
-
-STATES = re.compile(r"states/articulation/(?P<robot>[^/]+)/(?P<what>root_pose|root_velocity)")
-"""Isaac Lab's base pose, with the quaternion w, x, y, z, and base velocity in world axes."""
+CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
+"""Type of the controller of an arm in robosuite's arguments."""
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
@@ -39,97 +47,74 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     """
     try:
         with h5py.File(path) as file:
-            group = file.get(EPISODES)
-            episodes = _episodes(group) if isinstance(group, h5py.Group) else ("",)
+            home, episodes = _episodes(file)
     except DAMAGE as error:
         raise LogError(path, f"damaged or cut off ({_one_line(error)})") from error
     return LogReader(
         "HDF5",
         episodes,
-        lambda episode, progress: _read(path, options, episode),
-        lambda: _listing(path, episodes),
+        lambda episode, progress: _read(path, options, home, episode),
+        lambda: _listing(path, home, episodes),
     )
 
 
-def _episodes(group: Any) -> tuple[str, ...]:
-    groups = [name for name, each in group.items() if isinstance(each, h5py.Group)]
-    numbered = sorted(groups, key=lambda name: [int(n) for n in re.findall(r"\d+", name)])
-    return tuple(numbered) or ("",)
+def _episodes(file: Any) -> tuple[str, tuple[str, ...]]:
+    """Name of the group that holds a group for each episode, and names of these.
+
+    The name is empty where the episodes are in the file itself, one after the other or alone.
+    """
+    for home in (EPISODES, "/"):
+        if isinstance(group := file.get(home), h5py.Group):
+            names = [name for name, each in group.items() if isinstance(each, h5py.Group)]
+            found = [name for name in names if home == EPISODES or NUMBERED.fullmatch(name)]
+            if found:
+                by_number = lambda name: [int(n) for n in re.findall(r"\d+", name)]  # noqa: E731
+                return home, tuple(sorted(found, key=by_number))
+    flags = {
+        name: file[name][()] for name in EPISODE_ENDS if isinstance(file.get(name), h5py.Dataset)
+    }
+    return "", tuple(episodes_of(flags))
 
 
-def _read(path: Path, options: ReadOptions, episode: str) -> Log:
+def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
     try:
         with h5py.File(path) as file:
-            group = file[f"{EPISODES}/{episode}"] if episode else file
+            group = file[f"{home}/{episode}"] if home else file
             arrays = dict(_arrays(group))
-            rate = options.rate or _rate(file.get(EPISODES, file).attrs.get("env_args"))
+            about = file.get(EPISODES, file).attrs.get("env_args")
+            attributes = {**file.attrs, **group.attrs}
     except DAMAGE as error:
         raise LogError(path, f"{episode or 'it'} is damaged ({_one_line(error)})") from error
-    time = time_name((name for name, each in arrays.items() if each.ndim == 1), options)
-    motion = [each for name, each in arrays.items() if _is_motion(name, options)]
-    if not motion:
-        raise LogError(
+    if not home:
+        part, samples = episodes_of(arrays)[episode], max(map(len, arrays.values()), default=0)
+        arrays = {n: each[part] if len(each) == samples else each for n, each in arrays.items()}
+    controller = CONTROLLER.search(str(about))
+    return log_of(
+        Episode(
             path,
-            f"{episode or 'the file'} holds no known joint positions or velocities; name them,"
-            f" such as --map position=obs/q; it has {listed(sorted(arrays))}",
-        )
-    samples = len(motion[0])
-    if time:
-        stamps = stamps_of(path, time, arrays[time], options.rate)
-    elif rate:
-        stamps = Stamps.every(1 / rate, samples)
-    else:
-        stamps = stamps_at_rate(path, samples, options, arrays)
-    fields = [
-        Field(
-            name,
-            each.reshape(samples, -1),
-            stamps,
-            source=path.name,
-            rank=0 if name.startswith("states/") else 1,
-        )
-        for name, each in arrays.items()
-        if len(each) == len(stamps.time) == samples and each.ndim <= 2 and name != time
-    ]
-    relative = "obs/joint_pos" in arrays and not any(n.startswith("states/") for n in arrays)
-    return Log(
-        path,
-        tuple(fields),
-        episode,
-        remarks=(RELATIVE,) if relative else (),
-        suggested=tuple(_suggested(arrays)),
+            {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
+            episode,
+            rate=_rate(about),
+            numbers=single_numbers(attributes | arrays),
+            controller=controller[1] if controller else "",
+        ),
+        options,
     )
 
 
 def _arrays(group: Any) -> Iterator[tuple[str, Any]]:
-    """Numeric arrays of one or two dimensions, with their names within the group."""
+    """Numeric arrays of up to two dimensions, or three of joint states, by name in the group."""
     found: list[tuple[str, Any]] = []
 
     def visit(name: str, each: Any) -> None:
-        if isinstance(each, h5py.Dataset) and each.dtype.kind in "iuf" and 1 <= each.ndim <= 2:
-            found.append((name, each))
+        if isinstance(each, h5py.Dataset) and each.dtype.kind in "iufb":
+            last = name.rpartition("/")[2].lower()
+            if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
+                found.append((name, each))
 
     group.visititems(visit)
     for name, dataset in found:
-        values = dataset[()]
-        yield name, values if values.dtype.kind == "f" else values.astype(np.float64)
-
-
-def _is_motion(name: str, options: ReadOptions) -> bool:
-    mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
-    return name in mapped or array_signal(name) is not None
-
-
-def _suggested(arrays: dict[str, Any]) -> Iterator[Entry]:
-    robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
-    chosen = "robot" if "robot" in robots else min(robots, default="")
-    for signal, convention, what in (
-        ("base_pose", "wxyz", "root_pose"),
-        ("base_velocity", "world", "root_velocity"),
-    ):
-        name = f"states/articulation/{chosen}/{what}"
-        if name in arrays:
-            yield Entry(signal, convention, name)
+        yield name, np.atleast_1d(dataset[()])
 
 
 def _rate(env_args: Any) -> float | None:
@@ -144,9 +129,9 @@ def _rate(env_args: Any) -> float | None:
         return None
 
 
-def _listing(path: Path, episodes: tuple[str, ...]) -> tuple[str, ...]:
+def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:
     with h5py.File(path) as file:
-        group = file[f"{EPISODES}/{episodes[0]}"] if episodes[0] else file
+        group = file[f"{home}/{episodes[0]}"] if home else file
         rows = [f"{len(episodes)} episodes: {listed(episodes)}"] if episodes[0] else []
         group.visititems(
             lambda name, each: (

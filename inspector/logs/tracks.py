@@ -320,7 +320,8 @@ def _array(
     names: Sequence[str] = field.joints[part]
     if not names or len(options.joints) == width:
         names = options.joints or (robot.joint_names if robot else ())
-        if names and (len(names) < width or (options.joints and len(names) != width)):
+        other = options.joints and len(names) != width and not signal.endswith("_desired")
+        if names and (len(names) < width or other):
             whose = "--joints names" if options.joints else f"robot {robot and robot.name!r} has"
             raise LogError(
                 log.path,
