@@ -1,6 +1,7 @@
 """Zero-order hold: a slow signal that was sampled faster by holding its values, and without it."""
 
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,31 @@ def hold_length(signal: Real, valid: Mask) -> float:
         Samples from jump to jump, 1.0 without a hold.
     """
     return _length(signal, _jumps(signal, valid))
+
+
+def updates(signal: Real, valid: Mask) -> Index | None:
+    """Samples at which the values of a signal with a zero-order hold were set.
+
+    Args:
+        signal: Shape (samples, joints).
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        Indices, at the distance of the hold also where a value was set to what it was before;
+        the first may be negative, as the first value was set before the first sample. None
+        without a hold.
+    """
+    jumps = _jumps(signal, valid)
+    hold = _length(signal, jumps)
+    if hold <= 1:
+        return None
+    first = jumps[0] + 1
+    changes = [first - hold * np.ceil(first / hold), *(jumps + 1), len(signal)]
+    found = [
+        start + hold * np.arange(max(1, round((stop - start) / hold)))
+        for start, stop in pairwise(changes)
+    ]
+    return np.round(np.concatenate(found)).astype(np.int64)
 
 
 def without_hold(run: Run) -> Run:

@@ -59,6 +59,11 @@ ARMS = re.compile(r"(?:.*/)?(?P<arm>robot\d+)_joint_(?:pos|vel)")
 EPISODE_ENDS = ("terminals", "timeouts", "terminations", "truncations", "dones")
 """Flags of D4RL and Gymnasium: the last step of an episode has one."""
 
+CELLS = re.compile(
+    r"(?P<array>qpos|qvel|qfrc_actuator|ctrl|actions?)[_.\[]?(?P<number>\d+)\]?", re.IGNORECASE
+)
+"""Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``."""
+
 RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate")
 STEPS = ("dt", "timestep", "time_step", "control_dt")
 """Names of the number that is the rate in [Hz], or the step in [s]."""
@@ -183,6 +188,51 @@ def log_of(episode: Episode, options: ReadOptions) -> Log:
         not_read=tuple(name for name in arrays if name not in read),
         remarks=(*((f"taken: {taken}",) if taken else ()), *remarks),
         suggested=tuple(suggested),
+    )
+
+
+def gathered(log: Log, options: ReadOptions) -> Log:
+    """Log of a table with the columns of MuJoCo's state as arrays; itself if it has none.
+
+    Args:
+        log: A log with a field for each column, of one clock.
+        options: How to read it; columns that they map stay columns.
+    """
+    mapped = {entry.source for entry in options.entries}
+    groups: dict[str, dict[int, Field]] = {}
+    for each in log.fields:
+        if match := CELLS.fullmatch(each.name):
+            groups.setdefault(match["array"].lower(), {})[int(match["number"])] = each
+    groups = {
+        name: columns
+        for name, columns in groups.items()
+        if not mapped & {each.name for each in columns.values()}
+    }
+    if not {QPOS, QVEL} & set(groups):
+        return log
+    arrays: dict[str, NDArray[Any]] = {
+        name: np.hstack([columns[number].values for number in sorted(columns)])
+        for name, columns in groups.items()
+    }
+    roles, remarks = {name: meaning(name) for name in arrays}, list[str]()
+    suggested = [*_of_mujoco(arrays, {name: name for name in arrays})]
+    place = _source("position", options, suggested, roles)
+    position = _values(arrays, place)
+    suggested += _targets(
+        Episode(log.path, arrays), arrays, roles, options, position, place.source, remarks
+    )
+    columns = {id(each) for members in groups.values() for each in members.values()}
+    stamps, source = log.fields[0].stamps, log.path.name
+    fields = (
+        *(each for each in log.fields if id(each) not in columns),
+        *(Field(name, each, stamps, source=source) for name, each in arrays.items()),
+    )
+    taken = _taken((), suggested, options)
+    return replace(
+        log,
+        fields=fields,
+        suggested=tuple(suggested),
+        remarks=(*log.remarks, f"taken: {taken}", *remarks),
     )
 
 

@@ -11,6 +11,7 @@ from typing import TextIO
 import numpy as np
 
 from inspector.errors import LogError
+from inspector.logs.arrays import CELLS, gathered
 from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import TIMES, column_signal, listed
@@ -72,7 +73,8 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
     wanted = [time] + [
         place
         for place, name in enumerate(header)
-        if place != time and (name in mapped or column_signal(name) is not None)
+        if place != time
+        and (name in mapped or column_signal(name) is not None or CELLS.fullmatch(name))
     ]
     not_read = tuple(name for place, name in enumerate(header) if name and place not in wanted)
     pick, names = itemgetter(*wanted, time), [header[place] for place in wanted]
@@ -101,7 +103,7 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
         for place, name in enumerate(names)
         if place
     )
-    return Log(path, tuple(fields), not_read=not_read)
+    return gathered(Log(path, tuple(fields), not_read=not_read), options)
 
 
 def _check_header(path: Path, header: Sequence[str]) -> None:

@@ -20,6 +20,7 @@ MAGIC = {
     b"\x89HDF\r\n\x1a\n": "hdf5",
     b"PK\x03\x04": "npz",
     b"PK\x05\x06": "npz",
+    b"\x93NUMPY": "npz",
 }
 """The first bytes of a file, and the module here that reads it; other files are CSV."""
 

@@ -15,6 +15,7 @@ from inspector.logs.preparation import PreparedLog, check_mapping, with_desired
 from inspector.logs.resample import UNIFORM, Clock, TimedTrack, clock_of, common_time, resampled
 from inspector.logs.signals import listed
 from inspector.logs.synchronisation import Synchronised, no_overlap, synchronise
+from inspector.logs.targets import without_held_targets
 from noisemodel import Robot, Run
 from noisemodel.types import Array, Mask
 
@@ -74,17 +75,18 @@ def run_of(
         offset=options.offset,
     )
     main_track = next(each for each in synchronised.tracks if each.track.stamps is main)
-    time, valid = common_time(synchronised.tracks, main_track)
+    targets, interpolated = without_held_targets(synchronised.tracks)
+    time, valid = common_time(targets, main_track)
     if len(time) < 2 or not valid.any():
         others = [each for each in synchronised.tracks if each.track.stamps is not main]
         raise LogError(logs[-1].path, no_overlap(others[-1] if others else main_track, main_track))
     clock, covered = main_track.clock, float(main_track.time[-1])
-    remarks = [*_remarks(logs, synchronised)]
+    remarks = [*_remarks(logs, synchronised), *interpolated]
     meta = _meta(logs, synchronised, main.start + Decimal(str(time[0])), clock)
     urdf = logs[0].urdf if robot and not options.robot else ""
-    tracks = list(synchronised.tracks)
+    tracks = list(targets)
     logs.clear()
-    del synchronised, main_track  # each signal is freed when it has been resampled
+    del synchronised, targets, main_track  # each signal is freed when it has been resampled
     motion = motion_of([*_resampled(tracks, time, valid, clock)], time - time[0], valid)
     if motion.differentiated:
         meta["differentiated"] = dict(motion.differentiated)

@@ -1,4 +1,4 @@
-"""NumPy archives: run files, arrays of MuJoCo and Isaac, and others by mapping."""
+"""NumPy files: run files, archives of simulators' arrays, and others by mapping."""
 
 import zipfile
 from pathlib import Path
@@ -13,6 +13,14 @@ from inspector.logs.log import Log, LogReader
 from inspector.logs.options import ReadOptions
 from noisemodel import Run, RunError, checks
 from noisemodel.runfile import ARRAYS, DAMAGE, MAX_BYTES, STAGE
+
+OBJECTS = (
+    "Python objects, such as None, or PyBullet's joint states as they are; save numbers:"
+    " np.savez(path, time=times, position=positions, velocity=velocities)"
+)
+
+ALONE = "array"
+"""Name of the array in a .npy file, for a mapping."""
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
@@ -40,17 +48,36 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     try:
+        if not zipfile.is_zipfile(path):
+            return _alone(np.load(path, allow_pickle=False))
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
         if size > MAX_BYTES:
             raise LogError(path, f"unpacks to {size} bytes; the limit is {MAX_BYTES}")
         with np.load(path, allow_pickle=False) as archive:
-            return {name: np.asarray(archive[name]) for name in archive.files}
+            return {name: _plain(path, archive, name) for name in archive.files}
     except LogError:
         raise
     except (OSError, ValueError, KeyError, zipfile.BadZipFile, *DAMAGE) as error:
         problem = " ".join(str(error).split()) or type(error).__name__
         raise LogError(path, f"not an archive of plain arrays ({problem})") from error
+
+
+def _plain(path: Path, archive: Any, name: str) -> NDArray[Any]:
+    try:
+        return np.asarray(archive[name])
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        problem = f"not an archive of plain arrays: {name!r} holds {OBJECTS}"
+        raise LogError(path, problem) from error
+
+
+def _alone(array: Any) -> dict[str, NDArray[Any]]:
+    """Arrays of a .npy file: its fields, if it has some."""
+    array = np.asarray(array)
+    names = array.dtype.names or ()
+    return {name: array[name] for name in names} if names else {ALONE: array}
 
 
 def _is_run(arrays: dict[str, NDArray[Any]]) -> bool:
