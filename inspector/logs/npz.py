@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
@@ -48,8 +49,10 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 
 def _arrays(path: Path) -> dict[str, NDArray[Any]]:
     try:
-        if not zipfile.is_zipfile(path):
-            return _alone(np.load(path, allow_pickle=False))
+        with path.open("rb") as stream:
+            if stream.read(len(MAGIC_PREFIX)) == MAGIC_PREFIX:
+                stream.seek(0)
+                return _alone(np.load(stream, allow_pickle=False))
         with zipfile.ZipFile(path) as archive:
             size = sum(member.file_size for member in archive.infolist())
         if size > MAX_BYTES:
