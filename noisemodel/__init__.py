@@ -31,6 +31,7 @@ from noisemodel.extended import extended, extended_chunks
 from noisemodel.kinematics import link_twists
 from noisemodel.noise import Noise
 from noisemodel.norms import by_joint, norms
+from noisemodel.recorder import Recorder
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.simplified import simplified
@@ -52,6 +53,7 @@ __all__ = [
     "Noise",
     "NoiseModelError",
     "OutputError",
+    "Recorder",
     "Robot",
     "RobotComparison",
     "RobotError",

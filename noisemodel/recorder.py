@@ -1,0 +1,329 @@
+"""A recorder for a loop of one's own: samples are pushed one by one and become a run."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from noisemodel import differentiate
+from noisemodel.catalog import ROBOTS
+from noisemodel.errors import RunError, UnknownJointError, hint
+from noisemodel.robot import Robot
+from noisemodel.run import Run
+from noisemodel.types import Array, Mask
+
+Values: TypeAlias = ArrayLike | Mapping[str, float]
+
+WIDTHS = {"base_pose": 7, "base_velocity": 6}
+FIRST_SAMPLES = 1024
+"""Samples that there is room for at first; the room doubles when it is full."""
+
+UNIFORM = 1e-3
+"""Largest deviation of a step from the median, as a share of it, of stamps that are kept."""
+
+GAP = 5.0
+"""Length of a step, in median ones, above which it is a gap."""
+
+NEAR = 0.05
+"""Largest relative difference of the stamps' rate from the recorder's, which replaces it."""
+
+
+class Recorder:
+    """Samples of a control or simulation loop, which become a run.
+
+    What the first sample has, each has: signals that are not pushed are missing in the run. A
+    sample with a value that is not finite is a gap. Missing velocities are differentiated from
+    positions.
+
+    Args:
+        robot: A robot, a listed name, or the path of its description; None for none.
+        rate: Samples per second, in [Hz].
+        path: Where ``with`` saves the run when it ends, also if it ends by an error.
+        joint_names: The joints whose values are pushed, in order; the robot's unless given.
+        desired_joint_names: Those of desired values; ``joint_names`` unless given.
+        meta: What else is known, for the run.
+
+    Raises:
+        RunError: If the rate is not above 0.
+        RobotError: If the robot cannot be read.
+        UnknownJointError: If it lacks one of the joints.
+
+    Example:
+        >>> recorder = Recorder(None, 100, joint_names=["elbow"])
+        >>> for step in range(200):
+        ...     recorder.push(velocity=[np.sin(step / 20)])
+        >>> recorder.run()
+        Run(no robot, 1 joints, 200 samples at 100 Hz, 2 s, 0 blocks)
+    """
+
+    def __init__(
+        self,
+        robot: Robot | str | Path | None,
+        rate: float,
+        *,
+        path: str | Path | None = None,
+        joint_names: Sequence[str] = (),
+        desired_joint_names: Sequence[str] = (),
+        meta: Mapping[str, Any] | None = None,
+    ) -> None:
+        if not (np.isfinite(rate) and rate > 0):
+            raise RunError(f"rate: {rate:g} Hz, expected a number above 0")
+        known: tuple[str, ...] = ()
+        self._robot: str | None = None
+        if robot is not None:
+            loaded = robot if isinstance(robot, Robot) else Robot.load(robot)
+            known = loaded.joint_names
+            self._robot = loaded.name if loaded.name in ROBOTS else str(loaded.path)
+            for joint in (*joint_names, *desired_joint_names):
+                if joint not in known:
+                    raise UnknownJointError(joint, loaded.name, known)
+        self._rate, self._path, self._meta = float(rate), path, dict(meta or {})
+        self._joints = tuple(joint_names) or known
+        self._desired = tuple(desired_joint_names) or self._joints
+        self._buffers: dict[str, Array] = {}
+        self._count = 0
+
+    def __len__(self) -> int:
+        """Number of samples."""
+        return self._count
+
+    def push(
+        self,
+        *,
+        position: Values | None = None,
+        velocity: Values | None = None,
+        position_desired: Values | None = None,
+        velocity_desired: Values | None = None,
+        effort: Values | None = None,
+        base_pose: ArrayLike | None = None,
+        base_velocity: ArrayLike | None = None,
+        time: float | None = None,
+    ) -> None:
+        """Add a sample.
+
+        Args:
+            position: A number for each joint, or by the joint's name, in [rad] or [m].
+            velocity: In [rad/s] or [m/s].
+            position_desired: As ``position``, of the desired joints.
+            velocity_desired: As ``velocity``, of the desired joints.
+            effort: In [N m] or [N].
+            base_pose: x, y, z and the quaternion x, y, z, w of a floating base.
+            base_velocity: Linear, then angular velocity of the base in its own axes.
+            time: Stamp of the sample, in [s]; the samples are at the recorder's rate without.
+
+        Raises:
+            RunError: If a signal has another width than the robot has joints, names a joint that
+                is not known, is new, or is missing; or if time does not rise.
+        """
+        given: dict[str, Values | None] = {
+            "position": position,
+            "velocity": velocity,
+            "position_desired": position_desired,
+            "velocity_desired": velocity_desired,
+            "effort": effort,
+            "base_pose": base_pose,
+            "base_velocity": base_velocity,
+            "time": None if time is None else [time],
+        }
+        rows = {
+            name: self._row(name, values) for name, values in given.items() if values is not None
+        }
+        self._check(rows)
+        if self._count == 0:
+            self._buffers = {
+                name: np.empty((FIRST_SAMPLES, len(row))) for name, row in rows.items()
+            }
+        elif self._count == len(next(iter(self._buffers.values()))):
+            self._buffers = {
+                name: np.concatenate((each, np.empty_like(each)))
+                for name, each in self._buffers.items()
+            }
+        for name, row in rows.items():
+            self._buffers[name][self._count] = row
+        self._count += 1
+
+    def run(self) -> Run:
+        """Run of the samples so far.
+
+        Stamps that jitter are resampled to the recorder's rate (to their own, if that is another
+        by more than 5 %), with ``valid`` False where samples are missing.
+
+        Raises:
+            RunError: If there are fewer than two samples, or all of them are gaps.
+        """
+        if self._count < 2:
+            samples = f"{self._count or 'no'} sample{'' if self._count == 1 else 's'}"
+            raise RunError(f"the recorder has {samples}, a run needs at least 2: push some first")
+        signals = {name: each[: self._count].copy() for name, each in self._buffers.items()}
+        valid = np.logical_and.reduce([np.isfinite(each).all(axis=1) for each in signals.values()])
+        if not valid.any():
+            raise RunError("every sample of the recorder has a value that is not finite")
+        meta = dict(self._meta)
+        if "time" in signals:
+            stamps = signals.pop("time")[:, 0]
+            meta["start"] = f"{stamps[0]:.9g}"
+            time, valid, signals = self._uniform(stamps - stamps[0], valid, signals, meta)
+        else:
+            time = np.arange(self._count) / self._rate
+        signals = {name: np.where(valid[:, None], each, 0.0) for name, each in signals.items()}
+        if "base_pose" in signals:
+            signals["base_pose"][~valid, 6] = 1.0  # a quaternion also in gaps
+        filled, differentiated = differentiate.fill_in({"time": time, "valid": valid, **signals})
+        fields: dict[str, Any] = dict(filled)
+        if differentiated:
+            meta["differentiated"] = differentiated
+        return Run(
+            **fields,
+            joint_names=self._joints,
+            desired_joint_names=self._desired,
+            robot=self._robot,
+            meta=meta,
+        )
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the run of the samples so far, for ``inspector view`` and the like.
+
+        Args:
+            path: The file to write.
+            overwrite: Whether a file that exists may be replaced.
+
+        Raises:
+            RunError: As ``run``.
+            OutputError: If the file exists or cannot be written.
+        """
+        self.run().save(path, overwrite=overwrite)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Save what there is; an error of the loop counts for more than one of saving."""
+        if self._path is None:
+            return
+        try:
+            self.save(self._path, overwrite=True)
+        except RunError:
+            if error is None:
+                raise
+
+    def _row(self, name: str, values: Values) -> Array:
+        """Values of a sample, checked."""
+        names = () if name in (*WIDTHS, "time") else self._joints
+        names = self._desired if name.endswith("_desired") else names
+        if isinstance(values, Mapping):
+            names = names or tuple(values)
+            _check_names(name, values, names)
+            row = np.array([values[joint] for joint in names], dtype=np.float64)
+        else:
+            try:
+                row = np.asarray(values, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise RunError(f"{name}: {values!r}, expected a number for each joint") from error
+        width = 1 if name == "time" else WIDTHS.get(name, len(names))
+        if row.ndim != 1 or (width and len(row) != width):
+            what = f"({', '.join(names[:10])}{', …' if len(names) > 10 else ''})" if names else ""
+            how = "; joint_names=… names others" if names and row.ndim == 1 else ""
+            raise RunError(
+                f"{name}: shape {row.shape}, expected ({width or 'joints'},) {what}".rstrip() + how
+            )
+        if name == "time" and not np.isfinite(row[0]):
+            raise RunError(f"time: {row[0]} in sample {self._count + 1}")
+        if not names and name not in (*WIDTHS, "time"):
+            numbered = [
+                *(values if isinstance(values, Mapping) else map(_number, range(1, len(row) + 1)))
+            ]
+            self._joints = tuple(numbered)
+            self._desired = self._desired or self._joints
+        return row
+
+    def _check(self, rows: Mapping[str, Array]) -> None:
+        """Refuse a sample with other signals than the first one, and time that does not rise."""
+        sample = self._count + 1
+        if self._count == 0 and not {"position", "velocity"} & set(rows):
+            has = ", ".join(rows) or "nothing"
+            raise RunError(f"velocity: missing, and position too; the sample has {has}")
+        if self._count:
+            for name in self._buffers.keys() - rows.keys():
+                raise RunError(f"{name}: missing in sample {sample}; push it each time or never")
+            for name in rows.keys() - self._buffers.keys():
+                raise RunError(f"{name}: new in sample {sample}; push it each time or never")
+            if "time" in rows:
+                before, now = self._buffers["time"][self._count - 1, 0], rows["time"][0]
+                if now <= before:
+                    how = "stands still" if now == before else "runs backwards"
+                    raise RunError(
+                        f"time: {how} in sample {sample} ({before:.9g} s, then {now:.9g} s)"
+                    )
+
+    def _uniform(
+        self, stamps: Array, valid: Mask, signals: dict[str, Array], meta: dict[str, Any]
+    ) -> tuple[Array, Mask, dict[str, Array]]:
+        """Time base, validity and signals, resampled unless the stamps are uniform."""
+        steps = np.diff(stamps)
+        step = float(np.median(steps))
+        if (np.abs(steps - step) <= UNIFORM * step).all():
+            return stamps, valid, signals
+        rate = self._rate if abs(self._rate * step - 1) <= NEAR else float(f"{1 / step:.6g}")
+        deviations = steps[steps <= GAP * step] - 1 / rate
+        rms = float(np.sqrt(np.mean(deviations**2)))
+        meta["jitter"] = {"rms": rms, "max": float(np.abs(deviations).max())}
+        time = np.arange(int(stamps[-1] * rate + UNIFORM) + 1) / rate
+        found = {name: np.zeros((len(time), each.shape[1])) for name, each in signals.items()}
+        reached = np.zeros(len(time), dtype=bool)
+        known, kept = stamps[valid], {name: each[valid] for name, each in signals.items()}
+        edges = [0, *(np.flatnonzero(np.diff(known) > GAP * step) + 1), len(known)]
+        for start, stop in pairwise(edges):
+            if stop - start < 2:
+                continue
+            inside = (time >= known[start]) & (time <= known[stop - 1])
+            reached |= inside
+            for name, each in kept.items():
+                part = _continuous(name, each[start:stop])
+                found[name][inside] = _interpolated(name, known[start:stop], part, time[inside])
+        return time, reached, found
+
+
+def _number(number: int) -> str:
+    return f"joint{number}"
+
+
+def _check_names(name: str, values: Iterable[str], names: Sequence[str]) -> None:
+    given = tuple(values)
+    for joint in given:
+        if joint not in names:
+            raise RunError(
+                f"{name}: no joint {joint!r}{hint(joint, names)}; expected {', '.join(names)}"
+            )
+    missing = [joint for joint in names if joint not in given]
+    if missing:
+        raise RunError(f"{name}: missing for {', '.join(missing)}; joint_names=… names fewer")
+
+
+def _continuous(name: str, values: Array) -> Array:
+    """Angles without turns, and quaternions of the sign nearer to the sample before."""
+    if name.startswith("position"):
+        return np.asarray(np.unwrap(values, axis=0))
+    if name == "base_pose":
+        flips = np.einsum("si,si->s", values[1:, 3:], values[:-1, 3:]) < 0
+        signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
+        return np.hstack((values[:, :3], values[:, 3:] * signs[:, None]))
+    return values
+
+
+def _interpolated(name: str, stamps: Array, values: Array, time: Array) -> Array:
+    """Values at other instants: monotone between samples (PCHIP), without overshoot."""
+    from scipy.interpolate import PchipInterpolator
+
+    found = np.asarray(PchipInterpolator(stamps, values, axis=0)(time))
+    if name == "base_pose" and len(found):
+        found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
+    return found
