@@ -300,8 +300,10 @@ def followed(command: Real, position: Real) -> int:
     """
     count = moving = 0
     for wanted, actual in zip(command.T, position.T, strict=False):
-        extent = float(np.ptp(actual))
-        moves = min(extent, float(np.ptp(wanted))) > STILL
+        extent, asked = float(np.ptp(actual)), float(np.ptp(wanted))
+        moves = min(extent, asked) > STILL
+        if not moves and max(extent, asked) > NEARBY:
+            break
         if abs(float(np.mean(wanted) - np.mean(actual))) > max(extent, NEARBY):
             break
         if moves:

@@ -19,6 +19,9 @@ from inspector.logs.signals import listed
 
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
 
+FURTHER = {"observation.velocity": "velocity", "observation.effort": "effort"}
+"""Features that some data sets have besides (ALOHA's), and their signals."""
+
 PARTS = {"pos": "position", "vel": "velocity", "effort": "effort", "torque": "effort"}
 """Signals by the last part of a name: ``shoulder_pan.pos``."""
 
@@ -73,7 +76,7 @@ def _read(
     features = info["features"]
     present = parquet.schema_of(files[0]).names
     mapped = {entry.part()[0] for entry in options.entries}
-    wanted = [name for name in present if name in (STATE, ACTION) or name in mapped]
+    wanted = [name for name in present if name in (STATE, ACTION, *FURTHER) or name in mapped]
     clock = [name for name in (STAMP, FRAME) if name in present]
     table = parquet.table_of(files, [*wanted, *clock], episode)
     stamps = _stamps(path, info, table, options)
@@ -87,7 +90,14 @@ def _read(
         if not names and name == STATE:
             remarks.append(f"{STATE} has no names; it is read as joint positions")
         fields += _fields(name, values, stamps, names, mapped=name in mapped)
-    fields = _checked(path, fields, mapped)
+    found, fields = fields, _checked(path, fields, mapped)
+    taken = [f"{each.signal} = {each.name}" for each in fields if each.signal]
+    remarks += [f"taken: {', '.join(taken)}"] if taken else []
+    if ACTION in {each.source for each in found} - {each.source for each in fields}:
+        remarks.append(
+            f"{ACTION} not taken as desired positions: its columns are not those of {STATE};"
+            f" --map position_desired={ACTION}[0:6] takes some"
+        )
     not_read = tuple(name for name in features if name not in {each.source for each in fields})
     dotted = any(part in PARTS for each in fields for part in _ends(features, each.source))
     meta = {"robot_type": info.get("robot_type"), "dataset": info.get("codebase_version")}
@@ -107,12 +117,13 @@ def _fields(
 ) -> Iterator[Field]:
     """Fields of a feature, one for each signal that its columns hold."""
     ends = [each.rpartition(".") for each in names]
-    kinds = ["position" if mapped else PARTS.get(end, "position") for _, _, end in ends]
+    whole_kind = FURTHER.get(name, "position")
+    kinds = ["position" if mapped else PARTS.get(end, whole_kind) for _, _, end in ends]
     suffix = "_desired" if name == ACTION else ""
-    for kind in dict.fromkeys(kinds) or ["position"]:
+    for kind in dict.fromkeys(kinds) or [whole_kind]:
         columns = [place for place, each in enumerate(kinds) if each == kind]
         joints = tuple(ends[place][0] or ends[place][2] for place in columns)
-        signal = f"{kind}{suffix}" if name in (STATE, ACTION) else ""
+        signal = f"{kind}{suffix}" if name in (STATE, ACTION, *FURTHER) and not mapped else ""
         part = values[:, columns] if len(columns) not in (0, values.shape[1]) else values
         whole = name if part is values else f"{name}/{kind}"
         yield Field(

@@ -1,0 +1,408 @@
+"""Logs of simulators and policies, in files of a few lines that have their true layouts."""
+
+import json
+
+import h5py
+import mujoco
+import numpy as np
+import pytest
+from samplelogs import motion
+
+from inspector import read_log, read_logs
+from inspector.errors import LogError
+
+STEPS = 400
+TURN = [np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
+"""A quarter turn about z, w first."""
+
+
+def moved(rate, joints=7, samples=STEPS):
+    """Stamps, positions and velocities of joints that move smoothly."""
+    time = np.arange(samples) / rate
+    return (time, *motion(time, joints))
+
+
+def said(path, **options):
+    """The run of a log, and what is said of it without the log's name."""
+    found = read_log(path, **options)
+    return found.run, [remark.removeprefix(f"{path.name}: ") for remark in found.remarks]
+
+
+def hdf5(path, arrays, **attributes):
+    with h5py.File(path, "w") as file:
+        for name, values in arrays.items():
+            file[name] = values
+        for place, more in attributes.items():
+            file[place.replace("_root", "/")].attrs.update(more)
+    return path
+
+
+def savez(path, **arrays):
+    np.savez(path, **arrays)
+    return path
+
+
+def isaac_lab(path, *, rate=50, sim=True, pose=None, twist=None):
+    """What Isaac Lab's recorder writes of a Franka in its cube-stacking task."""
+    _, position, velocity = moved(rate, 9)
+    target = np.roll(position, -2, axis=0) if rate < 100 else position
+    target[-2:] = position[-1]
+    still = np.tile([0.5, 0, 0, 1, 0, 0, 0], (STEPS, 1))
+    robot = {
+        "joint_position": position,
+        "joint_velocity": velocity,
+        "root_pose": np.tile([0, 0, 0, 1, 0, 0, 0], (STEPS, 1)) if pose is None else pose,
+        "root_velocity": np.zeros((STEPS, 6)) if twist is None else twist,
+    }
+    arrays = {
+        "actions": np.sin(np.arange(STEPS * 8)).reshape(STEPS, 8),
+        "processed_actions": np.hstack((target[:, :7], still[:, :1])),
+        "obs/actions": np.zeros((STEPS, 8)),
+        "obs/joint_pos": position - position[0],
+        "obs/joint_vel": velocity,
+        "obs/eef_pos": np.zeros((STEPS, 3)),
+        "states/rigid_object/cube_1/root_pose": still,
+        "states/articulation/cabinet/joint_position": np.zeros((STEPS, 9)),
+    }
+    arrays |= {f"states/articulation/robot/{name}": each for name, each in robot.items()}
+    arrays |= {f"initial_state/articulation/robot/{n}": each[:1] for n, each in robot.items()}
+    about = {"env_name": "Isaac-Stack-Cube-Franka-v0", "type": 2}
+    if sim:
+        about["sim_args"] = {"dt": 0.01, "decimation": 2, "render_interval": 2, "num_envs": 1}
+    return (
+        hdf5(
+            path,
+            {
+                f"data/demo_{number}/{n}": np.float32(each)
+                for number in (0, 1)
+                for n, each in arrays.items()
+            },
+            data={"total": 2 * STEPS, "env_args": json.dumps(about)},
+        ),
+        position,
+        velocity,
+        target,
+    )
+
+
+def test_isaac_labs_episodes_are_runs_with_their_targets(tmp_path):
+    path, position, velocity, target = isaac_lab(tmp_path / "dataset.hdf5")
+    runs = list(read_logs(path))
+    assert [each.name for each in runs] == ["dataset-demo_0", "dataset-demo_1"]
+    run, remarks = said(path, episode="demo_0")
+    assert run.rate == 50.0
+    assert np.array_equal(run.position, np.float32(position))
+    assert np.array_equal(run.velocity, np.float32(velocity))
+    assert run.desired_joint_names == tuple(f"joint_{number}" for number in range(7))
+    assert np.allclose(run.position_desired, target[:, :7], atol=1e-6)
+    assert run.base_pose is None
+    home = "states/articulation/robot"
+    assert remarks[:3] == [
+        f"taken: position = {home}/joint_position, velocity = {home}/joint_velocity,"
+        " position_desired = processed_actions[0:7]",
+        f"{home}/root_pose stands still: the base is taken as fixed",
+        f"processed_actions[0:7] is taken as desired positions: {home}/joint_position follows it",
+    ]
+
+
+def test_isaac_labs_rate_is_found_from_positions_and_velocities_where_it_is_not_said(tmp_path):
+    path, *_ = isaac_lab(tmp_path / "dataset.hdf5", rate=60, sim=False)
+    run, remarks = said(path, episode="demo_1")
+    assert run.rate == pytest.approx(60.0)
+    expected = "there are no stamps: 60 Hz, at which positions and velocities fit; --rate sets"
+    assert remarks[0].startswith(expected)
+    assert read_log(path, episode="demo_1", rate=30).run.rate == 30.0
+
+
+@pytest.mark.parametrize("order", ["wxyz", "xyzw"])
+def test_isaac_labs_quaternions_are_in_the_order_that_fits_its_angular_velocity(tmp_path, order):
+    time, yaw = np.arange(STEPS) / 50, 0.8
+    turn = np.column_stack((np.cos(yaw * time / 2), 0 * time, 0 * time, np.sin(yaw * time / 2)))
+    if order == "xyzw":  # Isaac Lab 3.0
+        turn = turn[:, [1, 2, 3, 0]]
+    pose = np.hstack((np.tile([1.0, 2.0, 0.3], (STEPS, 1)), turn))
+    twist = np.tile([0.0, 0.0, 0.0, 0.0, 0.0, yaw], (STEPS, 1))
+    path, *_ = isaac_lab(tmp_path / "go2.hdf5", pose=pose, twist=twist)
+    run, remarks = said(path, episode="demo_0")
+    assert np.allclose(run.base_pose[:, 5], np.sin(yaw * time / 2), atol=1e-5)
+    assert np.allclose(run.base_velocity[:, 5], yaw)
+    words = ", ".join(order)
+    assert f"base_pose = states/articulation/robot/root_pose ({words})" in remarks[0]
+
+
+def robomimic(path, arms=("robot0",), controller="OSC_POSE"):
+    """What robomimic writes of robosuite: observations, the same one step later, and actions."""
+    _, position, velocity = moved(20)
+    arrays = {
+        "actions": np.sin(np.arange(STEPS * 7)).reshape(STEPS, 7),
+        "dones": np.zeros(STEPS, dtype=int),
+        "rewards": np.zeros(STEPS),
+        "states": np.zeros((STEPS, 32)),
+    }
+    for arm in arms:
+        for name in ("obs", "next_obs"):
+            arrays[f"{name}/{arm}_joint_pos"] = position
+            arrays[f"{name}/{arm}_joint_vel"] = velocity
+            arrays[f"{name}/{arm}_joint_pos_cos"] = np.cos(position)
+            arrays[f"{name}/{arm}_eef_pos"] = position[:, :3]
+            arrays[f"{name}/{arm}_gripper_qpos"] = position[:, :2]
+    kwargs = {"control_freq": 20, "controller_configs": {"type": controller}}
+    about = {"env_name": "Lift", "type": 1, "env_version": "1.4.1", "env_kwargs": kwargs}
+    arrays = {f"data/demo_0/{name}": each for name, each in arrays.items()}
+    return hdf5(path, arrays, data={"total": STEPS, "env_args": json.dumps(about)}), position
+
+
+def test_robomimics_actions_are_not_taken_for_joint_targets(tmp_path):
+    path, position = robomimic(tmp_path / "low_dim.hdf5")
+    run, remarks = said(path)
+    assert np.array_equal(run.position, position)
+    assert run.rate == 20.0
+    assert run.position_desired is None
+    assert remarks[:2] == [
+        "taken: position = obs/robot0_joint_pos, velocity = obs/robot0_joint_vel",
+        "actions not taken as desired positions: obs/robot0_joint_pos does not follow, they are the"
+        " input of a controller of type OSC_POSE; --map position_desired=actions takes it",
+    ]
+    assert read_log(path, mapping=["position_desired=actions"]).run.position_desired.shape[1] == 7
+
+
+def test_the_arms_of_two_robots_are_told_apart(tmp_path):
+    path, _ = robomimic(tmp_path / "handover.hdf5", arms=("robot0", "robot1"))
+    run = read_log(path).run
+    assert run.joint_names[:2] == ("robot0_joint_0", "robot0_joint_1")
+    assert run.joint_names[7] == "robot1_joint_0"
+
+
+SCENE = """<mujoco><option timestep="0.002" integrator="implicitfast"/>
+<default><joint armature="0.2" damping="1"/><position kp="80" kv="8"/></default><worldbody>
+<body pos="0 0 1">{base}<geom size="0.1"/>
+<body pos="0.2 0 0"><joint name="a" axis="0 0 1"/><geom size="0.05"/>
+<body pos="0.2 0 0"><joint name="b" axis="0 1 0"/><geom size="0.05"/></body></body></body>
+<body name="box" pos="1 1 0"><freejoint/><geom size="0.1"/></body></worldbody>
+<actuator><position joint="a"/><position joint="b"/></actuator></mujoco>"""
+
+
+def simulated(base):
+    """Arrays that a loop around MuJoCo collects, targets set at 50 Hz."""
+    model = mujoco.MjModel.from_xml_string(SCENE.format(base=base))
+    data = mujoco.MjData(model)
+    log = {"time": [], "qpos": [], "qvel": [], "ctrl": [], "qfrc_actuator": []}
+    for step in range(1500):
+        if step % 10 == 0:
+            data.ctrl[:] = [0.7 * np.sin(2 * data.time), 0.5 * np.cos(3 * data.time)]
+        mujoco.mj_step(model, data)
+        for name, rows in log.items():
+            rows.append(np.copy(getattr(data, name)))
+    return {name: np.array(rows) for name, rows in log.items()}
+
+
+@pytest.mark.parametrize(("base", "first"), [("", 0), ("<freejoint/>", 7)])
+def test_mujocos_arrays_are_joints_base_and_targets_without_floating_objects(tmp_path, base, first):
+    log = simulated(base)
+    run, remarks = said(savez(tmp_path / "log.npz", **log))
+    rows = slice(round(float(run.meta["start"]) * 500) - 1, None)
+    rows = slice(rows.start, rows.start + len(run.time))
+    speed = 6 if first else 0
+    assert run.rate == pytest.approx(500.0)
+    assert np.array_equal(run.position, log["qpos"][rows, first : first + 2])
+    assert np.array_equal(run.velocity, log["qvel"][rows, speed : speed + 2])
+    assert np.array_equal(run.effort, log["qfrc_actuator"][rows, speed : speed + 2])
+    assert (run.base_pose is not None) == bool(base)
+    taken = f"position = qpos[{first}:{first + 2}], velocity = qvel[{speed}:{speed + 2}]"
+    assert taken in remarks[0]
+    held = "position_desired: each target is held for 10 samples (50 Hz); interpolated from target"
+    assert any(remark.startswith(held) for remark in remarks)
+    # The jumps of held targets would be pulses of 10 rad/s and more.
+    assert np.abs(run.velocity_desired).max() < 1.6
+    assert np.abs(run.velocity_desired - run.velocity).std() < 0.5
+
+
+def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
+    log = simulated("")
+    names = [
+        f"{name}_{n}"
+        for name, width in (("qpos", 9), ("qvel", 8), ("ctrl", 2))
+        for n in range(width)
+    ]
+    table = np.hstack([log["time"][:, None], log["qpos"], log["qvel"], log["ctrl"]])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=",".join(["time", *names]))
+    npz = read_log(savez(tmp_path / "log.npz", **log)).run
+    del log["qfrc_actuator"]
+    for path in (hdf5(tmp_path / "log.h5", log), tmp_path / "log.csv"):
+        run, remarks = said(path)
+        assert run.joint_names == ("joint_0", "joint_1")
+        assert np.allclose(run.position, npz.position, atol=1e-12)
+        assert np.allclose(run.velocity_desired, npz.velocity_desired, atol=1e-9)
+        taken = "taken: position = qpos[0:2], velocity = qvel[0:2], position_desired = ctrl"
+        assert remarks.count(taken) == 1
+
+
+def test_torques_are_not_taken_for_targets(tmp_path):
+    _, position, velocity = moved(500)
+    path = savez(tmp_path / "log.npz", qpos=position, qvel=velocity, ctrl=-20 * velocity, dt=0.002)
+    run, remarks = said(path)
+    assert run.velocity_desired is None
+    assert remarks[0] == "there are no stamps: 500 Hz, by dt"
+    assert "ctrl not taken as desired positions: qpos[0:7] does not follow" in " ".join(remarks)
+
+
+def test_a_rate_that_contradicts_the_motion_is_not_believed(tmp_path):
+    _, position, velocity = moved(50)
+    path = savez(tmp_path / "log.npz", qpos=position, qvel=velocity, timestep=0.002)
+    run, remarks = said(path)
+    assert run.rate == 50.0
+    expected = "there are no stamps: 50 Hz, at which positions and velocities fit (timestep says"
+    assert remarks[0].startswith(expected)
+
+
+def test_pybullets_joint_states_are_read_as_arrays_and_stacked(tmp_path):
+    _, position, velocity = moved(240)
+    effort = np.cos(position)
+    path = savez(
+        tmp_path / "apart.npz",
+        jointPosition=position,
+        jointVelocity=velocity,
+        appliedJointMotorTorque=effort,
+        targetPositions=position,
+    )
+    forces = np.zeros((*position.shape, 6))
+    stacked = np.dstack((position, velocity, forces, effort))
+    for each in (path, savez(tmp_path / "stacked.npz", joint_states=stacked)):
+        run = read_log(each).run
+        assert run.rate == 240.0
+        assert np.array_equal(run.position, position)
+        assert np.array_equal(run.velocity, velocity)
+        assert np.array_equal(run.effort, effort)
+    assert np.array_equal(read_log(path).run.position_desired, position)
+
+
+def test_pybullets_tuples_are_an_error_that_says_what_to_save(tmp_path):
+    states = np.array([[(0.1, 0.2, (0,) * 6, 0.3)] * 2] * 9, dtype=object)
+    path = savez(tmp_path / "log.npz", states=states)
+    with pytest.raises(LogError, match="'states' holds Python objects, such as None, or PyB"):
+        read_log(path)
+
+
+def test_minaris_episodes_have_one_state_more_than_actions(tmp_path):
+    _, position, velocity = moved(25, samples=101)
+    arrays = {
+        "observations": np.hstack((position, velocity)),
+        "actions": position[:-1],
+        "rewards": np.zeros(100),
+        "terminations": np.zeros(100, dtype=bool),
+        "infos/qpos": position,
+        "infos/qvel": velocity,
+    }
+    both = {f"episode_{n}/{name}": each for n in (0, 10, 2) for name, each in arrays.items()}
+    path = hdf5(tmp_path / "main_data.hdf5", both)
+    assert [each.name for each in read_logs(path)] == [
+        f"main_data-episode_{number}" for number in (0, 2, 10)
+    ]
+    run, remarks = said(path, episode="episode_10")
+    assert run.rate == 25.0
+    assert np.array_equal(run.position, position[:-1])
+    assert np.array_equal(run.position_desired, position[:-1])
+    assert "actions is taken as desired positions: infos/qpos[0:7] follows it" in remarks
+
+
+def test_d4rls_episodes_are_told_apart_by_their_ends(tmp_path):
+    _, position, velocity = moved(20)
+    ends = np.zeros(STEPS, dtype=bool)
+    ends[[149, 399]] = True
+    arrays = {
+        "observations": position,
+        "actions": np.zeros((STEPS, 7)),
+        "terminals": np.zeros(STEPS, dtype=bool),
+        "timeouts": ends,
+        "infos/qpos": position,
+        "infos/qvel": velocity,
+    }
+    for path in (hdf5(tmp_path / "pen.hdf5", arrays), savez(tmp_path / "pen.npz", **arrays)):
+        first, second = read_logs(path)
+        assert (first.name, second.name) == ("pen-0", "pen-1")
+        assert np.array_equal(first.run.position, position[:150])
+        assert np.array_equal(second.run.velocity, velocity[150:])
+
+
+def test_alohas_actions_are_targets(tmp_path):
+    _, position, velocity = moved(50, 14)
+    arrays = {
+        "action": np.roll(position, -1, axis=0),
+        "observations/qpos": position,
+        "observations/qvel": velocity,
+        "observations/effort": np.sin(position),
+    }
+    arrays["action"][-1] = position[-1]
+    run, remarks = said(hdf5(tmp_path / "episode_3.hdf5", arrays, _root={"sim": True}))
+    assert run.rate == 50.0
+    assert np.array_equal(run.position_desired, arrays["action"])
+    assert np.array_equal(run.effort, np.sin(position))
+    assert "action is taken as desired positions: observations/qpos[0:14] follows it" in remarks
+
+
+def test_maniskills_trajectories_are_runs(tmp_path):
+    _, position, velocity = moved(20, 9, samples=STEPS + 1)
+    arrays = {
+        "traj_0/obs/agent/qpos": position,
+        "traj_0/obs/agent/qvel": velocity,
+        "traj_0/actions": np.sin(np.arange(STEPS * 8)).reshape(STEPS, 8),
+        "traj_0/env_states/articulations/panda": np.zeros((STEPS + 1, 31)),
+    }
+    run = read_log(hdf5(tmp_path / "trajectory.h5", arrays)).run
+    assert run.rate == 20.0
+    assert np.array_equal(run.velocity, velocity[:-1])
+
+
+def test_observations_without_names_are_an_error_with_the_line_to_type(tmp_path):
+    _, position, velocity = moved(25)
+    observations = np.hstack((position, velocity))
+    path = savez(tmp_path / "rollout.npz", observations=observations, actions=np.zeros((STEPS, 2)))
+    with pytest.raises(LogError) as caught:
+        read_log(path)
+    line = "--map position=observations[0:7] --map velocity=observations[7:14]"
+    assert str(caught.value) == (
+        f"{path}: the file holds no known joint positions or velocities; name them, such as {line};"
+        " it has observations (400, 14), actions (400, 2)"
+    )
+    run = read_log(path, mapping=line.replace("--map ", "").split()).run
+    assert run.rate == 25.0
+    assert np.array_equal(run.velocity, velocity)
+
+
+def test_a_single_array_is_read_by_mapping(tmp_path):
+    _, position, velocity = moved(100)
+    np.save(tmp_path / "log.npy", np.hstack((position, velocity)))
+    mapping = ["position=array[0:7]", "velocity=array[7:14]"]
+    run = read_log(tmp_path / "log.npy", mapping=mapping).run
+    assert run.rate == 100.0
+    assert np.array_equal(run.position, position)
+
+
+def test_lerobots_velocities_and_efforts_are_read_where_a_set_has_them(tmp_path):
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    _, position, velocity = moved(50)
+    feature = {"dtype": "float32", "shape": [7], "names": {"motors": [*"abcdefg"]}}
+    names = ("observation.state", "observation.velocity", "observation.effort", "action")
+    info = {"fps": 50, "features": dict.fromkeys(names, feature)}
+    (tmp_path / "set" / "meta").mkdir(parents=True)
+    (tmp_path / "set" / "meta" / "info.json").write_text(json.dumps(info))
+    held = position[np.arange(STEPS) // 5 * 5]  # targets at 10 Hz
+    columns = dict(zip(names, (position, velocity, np.sin(position), held), strict=True))
+    table = {name: list(np.float32(each)) for name, each in columns.items()}
+    table |= {"frame_index": np.arange(STEPS), "episode_index": np.zeros(STEPS, dtype=int)}
+    (tmp_path / "set" / "data").mkdir()
+    pq.write_table(pa.table(table), tmp_path / "set" / "data" / "file-000.parquet")
+    run, remarks = said(tmp_path / "set")
+    assert remarks[0] == (
+        "taken: position = observation.state, velocity = observation.velocity,"
+        " effort = observation.effort, position_desired = action"
+    )
+    expected = (
+        "position_desired: each target is held for 5 samples (10 Hz); interpolated from target to"
+        " target"
+    )
+    assert expected in remarks
+    assert np.array_equal(run.velocity, np.float32(velocity)[: len(run.time)])
+    assert np.abs(run.position_desired - position[: len(run.time)]).max() < 0.02
