@@ -10,6 +10,7 @@ from samplelogs import motion
 
 from inspector import read_log, read_logs
 from inspector.errors import LogError
+from inspector.logs.arrays import followed, rate_of
 
 STEPS = 400
 TURN = [np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
@@ -98,10 +99,10 @@ def test_isaac_labs_episodes_are_runs_with_their_targets(tmp_path):
     assert run.base_pose is None
     home = "states/articulation/robot"
     assert remarks[:3] == [
+        "there are no stamps: 50 Hz, by env_args",
         f"taken: position = {home}/joint_position, velocity = {home}/joint_velocity,"
-        " position_desired = processed_actions[0:7]",
+        " position_desired = processed_actions[0:7] (position follows it)",
         f"{home}/root_pose stands still: the base is taken as fixed",
-        f"processed_actions[0:7] is taken as desired positions: {home}/joint_position follows it",
     ]
 
 
@@ -127,7 +128,7 @@ def test_isaac_labs_quaternions_are_in_the_order_that_fits_its_angular_velocity(
     assert np.allclose(run.base_pose[:, 5], np.sin(yaw * time / 2), atol=1e-5)
     assert np.allclose(run.base_velocity[:, 5], yaw)
     words = ", ".join(order)
-    assert f"base_pose = states/articulation/robot/root_pose ({words})" in remarks[0]
+    assert f"base_pose = states/articulation/robot/root_pose ({words})" in remarks[1]
 
 
 def robomimic(path, arms=("robot0",), controller="OSC_POSE"):
@@ -158,7 +159,8 @@ def test_robomimics_actions_are_not_taken_for_joint_targets(tmp_path):
     assert np.array_equal(run.position, position)
     assert run.rate == 20.0
     assert run.position_desired is None
-    assert remarks[:2] == [
+    assert remarks[:3] == [
+        "there are no stamps: 20 Hz, by env_args",
         "taken: position = obs/robot0_joint_pos, velocity = obs/robot0_joint_vel",
         "actions not taken as desired positions: obs/robot0_joint_pos does not follow, they are the"
         " input of a controller of type OSC_POSE; --map position_desired=actions takes it",
@@ -234,6 +236,7 @@ def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
         assert np.allclose(run.position, npz.position, atol=1e-12)
         assert np.allclose(run.velocity_desired, npz.velocity_desired, atol=1e-9)
         taken = "taken: position = qpos[0:2], velocity = qvel[0:2], position_desired = ctrl"
+        taken += " (position follows it)"
         assert remarks.count(taken) == 1
 
 
@@ -244,6 +247,18 @@ def test_torques_are_not_taken_for_targets(tmp_path):
     assert run.velocity_desired is None
     assert remarks[0] == "there are no stamps: 500 Hz, by dt"
     assert "ctrl not taken as desired positions: qpos[0:7] does not follow" in " ".join(remarks)
+
+
+def test_a_command_is_a_target_if_the_positions_follow_it():
+    _, position, _ = moved(100)
+    late = np.vstack((position[:1].repeat(3, axis=0), position[:-3]))
+    assert followed(position, late) == 7
+    assert followed(position[:, :4], late) == 4
+    assert followed(position[:, :3], late) == 0  # fewer than half
+    assert followed(10 * position, late) == 0
+    assert followed(position + 9, late) == 0
+    assert followed(np.sign(position), late) == 0
+    assert followed(np.zeros((STEPS, 7)), np.zeros((STEPS, 7))) == 0  # nothing moves
 
 
 def test_a_rate_that_contradicts_the_motion_is_not_believed(tmp_path):
@@ -302,7 +317,7 @@ def test_minaris_episodes_have_one_state_more_than_actions(tmp_path):
     assert run.rate == 25.0
     assert np.array_equal(run.position, position[:-1])
     assert np.array_equal(run.position_desired, position[:-1])
-    assert "actions is taken as desired positions: infos/qpos[0:7] follows it" in remarks
+    assert "position_desired = actions (position follows it)" in remarks[1]
 
 
 def test_d4rls_episodes_are_told_apart_by_their_ends(tmp_path):
@@ -337,7 +352,7 @@ def test_alohas_actions_are_targets(tmp_path):
     assert run.rate == 50.0
     assert np.array_equal(run.position_desired, arrays["action"])
     assert np.array_equal(run.effort, np.sin(position))
-    assert "action is taken as desired positions: observations/qpos[0:14] follows it" in remarks
+    assert "position_desired = action (position follows it)" in remarks[1]
 
 
 def test_maniskills_trajectories_are_runs(tmp_path):
@@ -367,6 +382,30 @@ def test_observations_without_names_are_an_error_with_the_line_to_type(tmp_path)
     run = read_log(path, mapping=line.replace("--map ", "").split()).run
     assert run.rate == 25.0
     assert np.array_equal(run.velocity, velocity)
+
+
+def test_robosuites_raw_states_are_an_error_that_says_what_they_are(tmp_path):
+    states = np.random.default_rng(0).normal(size=(60, 32))
+    arrays = {"data/demo_1/states": states, "data/demo_1/actions": np.zeros((60, 7))}
+    path = hdf5(tmp_path / "demo.hdf5", arrays)
+    message = (
+        r"such as --map position=states\[1:8\] \(MuJoCo's flattened states are time, qpos, qvel"
+    )
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+    run = read_log(path, mapping=["position=states[1:8]"], rate=20).run
+    assert np.array_equal(run.position, states[:, 1:8])
+
+
+@pytest.mark.parametrize(("rate", "frequency"), [(20, 2.5), (30, 0.3), (240, 5), (500, 40)])
+def test_the_rate_is_that_at_which_velocities_are_the_steps_of_positions(rate, frequency):
+    phase = 2 * np.pi * frequency * np.arange(400)[:, None] / rate
+    position, velocity = np.sin(phase), 2 * np.pi * frequency * np.cos(phase)
+    assert rate_of(position, velocity) == rate
+    explicit = np.cumsum(velocity, axis=0) / rate  # a simulator's positions
+    assert rate_of(explicit, velocity) == rate
+    assert rate_of(position, np.roll(velocity, 7, axis=0)) is None
+    assert rate_of(np.zeros_like(position), velocity) is None
 
 
 def test_a_single_array_is_read_by_mapping(tmp_path):

@@ -87,7 +87,10 @@ COMMON_RATES = (
 NEAR_RATE = 0.02
 """A rate found from the values is one of these, in [Hz], if it differs by no more than that."""
 
-FITS, DISAGREE = 0.98, 0.05
+LARGEST_STEP = 1.0
+"""Larger steps of a position are a turn or a reset, in [rad] or [m]."""
+
+FITS, DISAGREE = 0.98, 0.25
 """Least correlation of velocities with the steps of positions from which the rate is found; the
 relative difference from which it counts for more than what the file says."""
 
@@ -276,16 +279,26 @@ def rate_of(position: Real, velocity: Real) -> float | None:
     Returns:
         The common rate nearby, or else the rate to three digits; None if they do not fit.
     """
-    steps = np.diff(position.astype(np.float64), axis=0)
-    speed = (velocity[1:].astype(np.float64) + velocity[:-1]) / 2
-    usable = np.isfinite(steps) & np.isfinite(speed) & (np.abs(steps) < 1.0)  # no turn, no reset
-    steps, speed = steps[usable], speed[usable]
-    both, own, other = steps @ speed, steps @ steps, speed @ speed
-    if not own * other > 0 or both / np.sqrt(own * other) < FITS:
+    position, velocity = position.astype(np.float64), velocity.astype(np.float64)
+    step = np.diff(position, axis=0)
+    simpson = (velocity[2:] + 4 * velocity[1:-1] + velocity[:-2]) / 6
+    correlation, rate = max(
+        _slope((position[2:] - position[:-2]) / 2, simpson),
+        _slope(step, velocity[1:]),  # of simulators, whose velocity comes first,
+        _slope(step, velocity[:-1]),  # or whose position does
+    )
+    if correlation < FITS:
         return None
-    rate = both / own  # least squares of v = rate * dq
     near = min(COMMON_RATES, key=lambda common: abs(common / rate - 1))
     return float(near if abs(near / rate - 1) <= NEAR_RATE else f"{rate:.3g}")
+
+
+def _slope(steps: Array, speed: Array) -> tuple[float, float]:
+    """Correlation of steps and velocities, and their ratio by least squares."""
+    usable = np.isfinite(steps) & np.isfinite(speed) & (np.abs(steps) < LARGEST_STEP)
+    steps, speed = steps[usable], speed[usable]
+    both, own, other = (float(each) for each in (steps @ speed, steps @ steps, speed @ speed))
+    return (both / np.sqrt(own * other), both / own) if own * other > 0 else (0.0, 0.0)
 
 
 def followed(command: Real, position: Real) -> int:
@@ -380,12 +393,10 @@ def _stamps(
     """Stamps of an episode without: at a rate that is given, stated, or found from the values."""
     if options.rate:
         return Stamps.every(1 / options.rate, samples)
-    if episode.rate:
-        return Stamps.every(1 / episode.rate, samples)
     found = None
     if position is not None and velocity is not None and position.shape == velocity.shape:
         found = rate_of(position, velocity)
-    name, stated = _stated(episode.numbers)
+    name, stated = ("env_args", episode.rate) if episode.rate else _stated(episode.numbers)
     if stated and (found is None or abs(found / stated - 1) <= DISAGREE):
         remark = f"there are no stamps: {stated:g} Hz, by {name}"
         return replace(Stamps.every(1 / stated, samples), remark=remark)
@@ -502,9 +513,7 @@ def _targets(
         command = arrays[name]
         count = followed(command, position) if len(command) == len(position) else 0
         if count:
-            entry = Entry("position_desired", "", _part(name, 0, count, command.shape[1]))
-            remarks.append(f"{entry.source} is taken as desired positions: {source} follows it")
-            yield entry
+            yield Entry("position_desired", "", _part(name, 0, count, command.shape[1]))
             return
     if commands:
         to = f", they are the input of a controller of type {episode.controller}"
@@ -574,17 +583,15 @@ def _taken(fields: Sequence[Field], suggested: Sequence[Entry], options: ReadOpt
         for each in fields
         if each.signal and each.rank == best[each.signal]
     ]
-    known += [
-        (
-            each.signal,
-            f"{each.source} ({QUATERNION[each.joint]})"
-            if each.joint in QUATERNION
-            else each.source,
-        )
-        for each in suggested
-    ]
+    known += [(each.signal, f"{each.source}{_why(each)}") for each in suggested]
     order = sorted(known, key=lambda each: SIGNALS.index(each[0]))
     return ", ".join(f"{signal} = {name}" for signal, name in order if signal not in targets)
+
+
+def _why(entry: Entry) -> str:
+    if entry.signal == "position_desired":
+        return " (position follows it)"
+    return f" ({QUATERNION[entry.joint]})" if entry.joint in QUATERNION else ""
 
 
 def _shape(name: str, each: NDArray[Any]) -> str:
@@ -600,6 +607,8 @@ def _nothing(episode: Episode, arrays: Mapping[str, NDArray[Any]]) -> str:
     example = f"--map position={name}"
     if re.fullmatch(r"(.*/)?obs(ervations?)?", name) and half:
         example = f"--map position={name}[0:{half}] --map velocity={name}[{half}:{2 * half}]"
+    if name == "states":  # of robosuite, before robomimic has extracted observations
+        example = "--map position=states[1:8] (MuJoCo's flattened states are time, qpos, qvel)"
     return (
         f"{where} holds no known joint positions or velocities; name them, such as {example};"
         f" it has {listed([_shape(*each) for each in arrays.items()])}"
