@@ -293,7 +293,7 @@ def rate_of(position: Real, velocity: Real) -> float | None:
     return float(near if abs(near / rate - 1) <= NEAR_RATE else f"{rate:.3g}")
 
 
-def _slope(steps: Array, speed: Array) -> tuple[float, float]:
+def _slope(steps: Real, speed: Real) -> tuple[float, float]:
     """Correlation of steps and velocities, and their ratio by least squares."""
     usable = np.isfinite(steps) & np.isfinite(speed) & (np.abs(steps) < LARGEST_STEP)
     steps, speed = steps[usable], speed[usable]

@@ -11,6 +11,7 @@ import numpy as np
 
 from inspector.hold import hold_length, updates
 from inspector.logs.resample import TimedTrack, clock_of
+from noisemodel.types import Array, Indices
 
 SLOWER = 1.5
 """Least ratio of the targets' hold to that of the measured values."""
@@ -64,16 +65,31 @@ def _joined(timed: TimedTrack, measured: float) -> TimedTrack | None:
     if places is None or _hold(timed) < SLOWER * measured:
         return None
     places = places[places < len(values)]
-    first = timed.time[0] + np.minimum(places, 0) / timed.clock.nominal
-    known = np.where(places < 0, first, timed.time[places.clip(min=0)])
     held = values[places.clip(min=0)]
     held = np.where(timed.angles, np.unwrap(held, axis=0), held)
-    time = timed.time[: places[-1] + 1]
+    set_at = _evenly(places)
+    samples = np.arange(len(values))
+    before = np.minimum(set_at, 0) / timed.clock.nominal
+    known = np.interp(set_at, samples, timed.time) + before
+    time = timed.time[: int(set_at[-1]) + 1]
     # Akima's polynomials hardly overshoot jumps, and meet peaks better than monotone ones.
     joined = Akima1DInterpolator(known, held, axis=0)(time)
     stamps = replace(timed.track.stamps, time=timed.track.stamps.time[: len(time)])
     track = replace(timed.track, stamps=stamps, values=joined)
     return TimedTrack(track, time, clock_of(time, held=stamps.held), timed.angles)
+
+
+def _evenly(places: Indices) -> Array:
+    """Places at even distances, in samples, if all are within a sample of theirs.
+
+    A policy whose rate does not divide the log's sets targets between samples.
+    """
+    steps = np.diff(places)
+    ticks = np.concatenate(([0.0], np.cumsum(np.round(steps / np.mean(steps)))))
+    slope, first = np.polyfit(ticks, places, 1)
+    even = first + slope * ticks
+    chosen = even if np.abs(even - places).max() < 1 else places.astype(np.float64)
+    return np.concatenate(([min(chosen[0], 0.0)], chosen[1:]))
 
 
 def _hold(timed: TimedTrack) -> float:

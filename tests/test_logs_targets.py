@@ -1,0 +1,94 @@
+"""Desired positions that are held from target to target."""
+
+import numpy as np
+import pytest
+from samplelogs import motion
+
+from inspector import read_log
+from inspector.hold import updates
+
+RATE, SAMPLES = 500, 4000
+TIME = np.arange(SAMPLES) / RATE
+POSITION, VELOCITY = motion(TIME, 4)
+HELD = "position_desired: each target is held for "
+
+
+def read(tmp_path, desired, **more):
+    """The run of a log with desired positions, and whether it says that these were held."""
+    arrays = {"time": TIME, "q": POSITION, "dq": VELOCITY, "q_des": desired} | more
+    np.savez(tmp_path / "log.npz", **arrays)
+    found = read_log(tmp_path / "log.npz")
+    return found.run, [remark for remark in found.remarks if remark.startswith(HELD)]
+
+
+def held(every, start=0):
+    """What a policy sets every so many samples, a whole number or not."""
+    ticks = np.floor((np.arange(SAMPLES) - start) / every)
+    return POSITION[np.round(ticks * every + start).astype(int).clip(min=0)]
+
+
+@pytest.mark.parametrize(
+    ("every", "start", "said"),
+    [(10, 0, "10 samples (50 Hz)"), (7, 3, "7 samples (71.43 Hz)"), (25, 0, "25 samples (20 Hz)")],
+)
+def test_held_targets_are_interpolated_from_target_to_target(tmp_path, every, start, said):
+    run, remarks = read(tmp_path, held(every, start))
+    assert remarks == [f"{HELD}{said}; interpolated from target to target"]
+    inside = slice(2 * every, -2 * every)
+    truth = VELOCITY[: len(run.time)][inside]
+    error = run.velocity_desired[inside] - truth
+    assert np.abs(error).max() < 0.05 * np.abs(truth).max()
+    pulses = np.gradient(held(every, start), 1 / RATE, axis=0)
+    assert np.abs(pulses).max() > 3 * np.abs(run.velocity_desired).max()
+    assert len(run.time) > SAMPLES - every
+    assert np.array_equal(run.velocity, VELOCITY[: len(run.time)])
+
+
+def test_a_policys_rate_need_not_divide_the_logs(tmp_path):
+    run, remarks = read(tmp_path, motion(np.floor(TIME * 60) / 60, 4)[0])
+    assert remarks[0].startswith(f"{HELD}8.33 samples (60")
+    error = run.velocity_desired[50:-50] - VELOCITY[50 : len(run.time) - 50]
+    assert np.sqrt(np.mean(error**2)) < 0.02 * VELOCITY.std()
+
+
+def test_a_target_that_rests_stays_at_rest(tmp_path):
+    desired = held(10)
+    desired[:1005] = desired[1005]
+    desired[2000:3000] = desired[1999]
+    run, remarks = read(tmp_path, desired)
+    assert remarks
+    assert np.abs(run.velocity_desired[20:980]).max() < 1e-9
+    assert np.abs(run.velocity_desired[2030:2960]).max() < 1e-9
+    assert np.abs(run.position_desired - desired[: len(run.time)])[2030:2960].max() < 1e-9
+
+
+def test_targets_of_every_sample_are_left_as_they_are(tmp_path):
+    run, remarks = read(tmp_path, POSITION)
+    assert not remarks
+    assert np.array_equal(run.position_desired, POSITION)
+
+
+def test_targets_with_a_logged_velocity_are_left_as_they_are(tmp_path):
+    run, remarks = read(tmp_path, held(10), dq_des=VELOCITY)
+    assert not remarks
+    assert np.array_equal(run.position_desired, held(10))
+
+
+def test_a_log_that_holds_all_its_values_is_left_as_it_is(tmp_path):
+    places = np.arange(SAMPLES) // 10 * 10
+    run, remarks = read(tmp_path, held(10), q=POSITION[places], dq=VELOCITY[places])
+    assert not remarks
+    assert np.array_equal(run.position_desired, held(10))
+
+
+def test_encoder_steps_are_no_hold(tmp_path):
+    run, remarks = read(tmp_path, np.round(POSITION, 3))
+    assert not remarks
+    assert np.array_equal(run.position_desired, np.round(POSITION, 3))
+
+
+def test_updates_are_where_values_are_set_before_the_first_sample_too():
+    values = np.repeat([0.0, 0.0, *np.cumsum(np.arange(1.0, 20.0))], 5)[2:, None]
+    everywhere = np.ones(len(values), dtype=bool)
+    assert updates(values, everywhere).tolist() == list(range(-2, len(values), 5))
+    assert updates(np.zeros((100, 1)), np.ones(100, dtype=bool)) is None
