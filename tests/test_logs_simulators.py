@@ -240,6 +240,16 @@ def test_mujocos_state_is_found_in_hdf5_and_in_the_columns_of_a_csv(tmp_path):
         assert remarks.count(taken) == 1
 
 
+def test_a_single_joint_and_velocities_alone_are_read(tmp_path):
+    time, position, velocity = moved(500, 1)
+    path = savez(tmp_path / "one.npz", time=time, qpos=position[:, 0], qvel=velocity[:, 0])
+    run = read_log(path).run
+    assert np.array_equal(run.position, position)
+    assert np.array_equal(run.velocity, velocity)
+    run = read_log(savez(tmp_path / "speed.npz", time=time, qvel=velocity)).run
+    assert np.array_equal(run.velocity, velocity)
+
+
 def test_torques_are_not_taken_for_targets(tmp_path):
     _, position, velocity = moved(500)
     path = savez(tmp_path / "log.npz", qpos=position, qvel=velocity, ctrl=-20 * velocity, dt=0.002)

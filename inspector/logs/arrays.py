@@ -218,7 +218,8 @@ def gathered(log: Log, options: ReadOptions) -> Log:
         for name, columns in groups.items()
     }
     roles, remarks = {name: meaning(name) for name in arrays}, list[str]()
-    suggested = [*_of_mujoco(arrays, {name: name for name in arrays})]
+    state = {name: name for name in (QPOS, QVEL, FORCE) if name in arrays}
+    suggested = [*_of_mujoco(arrays, state)]
     place = _source("position", options, suggested, roles)
     position = _values(arrays, place)
     suggested += _targets(
@@ -423,10 +424,12 @@ def _of_mujoco(arrays: Mapping[str, NDArray[Any]], names: Mapping[str, str]) -> 
 
     Objects that float, and what follows them, are left out.
     """
-    if QPOS not in names or arrays[names[QPOS]].ndim != 2:
+    flat = {what: arrays[name].reshape(len(arrays[name]), -1) for what, name in names.items()}
+    if QPOS not in flat:
+        if QVEL in flat:
+            yield Entry("velocity", "", names[QVEL])
         return
-    qpos, qvel = arrays[names[QPOS]], arrays.get(names.get(QVEL, ""))
-    qvel = None if qvel is None or qvel.ndim != 2 else qvel
+    qpos, qvel = flat[QPOS], flat.get(QVEL)
     width = qpos.shape[1]
     floating = _floating(qpos, 1 if qvel is None else width - qvel.shape[1])
     if qvel is None and floating != [0]:
@@ -439,8 +442,8 @@ def _of_mujoco(arrays: Mapping[str, NDArray[Any]], names: Mapping[str, str]) -> 
     if stop > first:
         yield Entry("position", "", f"{names[QPOS]}[{first}:{stop}]")
     for what, signal in ((QVEL, "velocity"), (FORCE, "effort")):
-        each = arrays.get(names.get(what, ""))
-        if each is None or each.ndim != 2 or each.shape[1] < stop - base:
+        each = flat.get(what)
+        if each is None or each.shape[1] < stop - base:
             continue
         if base and what == QVEL:
             yield Entry("base_velocity", "mujoco", f"{names[what]}[0:6]")
