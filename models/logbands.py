@@ -241,9 +241,9 @@ ANY = LogBands(
     estimator="detector",
     quick=0.02,
     speed=True,
-    rounds=150,
-    leaves=8,
-    alarm=0.79,
+    rounds=300,
+    leaves=16,
+    alarm=0.83,
 )
 """For any rate and whatever signals there are; features relative to a reference beside."""
 

@@ -271,7 +271,7 @@ class Trees(Probable):
     def _by_class(self) -> Index:
         """Trees that have leaves, and one of each class, class by class."""
         classes = len(self.prior)
-        kept = self.leaf.any(axis=1)
+        kept: Mask = np.any(self.leaf != 0.0, axis=1)
         kept[:classes] = True
         number = np.flatnonzero(kept)
         order: Index = number[np.argsort(number % classes, kind="stable")]
