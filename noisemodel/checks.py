@@ -13,6 +13,10 @@ UNIFORM = 1e-3
 """How far a time step may lie from the median step, as a share of it (run file, version 1)."""
 
 
+class NotUniformError(RunError):
+    """A run whose time is not uniform: a log, to be resampled."""
+
+
 def check_time(time: Array) -> None:
     """Refuse a time that is not finite, not rising or not uniform, naming the row."""
     if time.ndim != 1 or len(time) < 2:
@@ -31,7 +35,7 @@ def check_time(time: Array) -> None:
     uneven = np.abs(steps - step) > tolerance
     if uneven.any():
         row = int(np.argmax(uneven)) + 1
-        raise RunError(
+        raise NotUniformError(
             f"time: not uniform, the step to row {row} is {steps[row - 1]:.6g} s where the median"
             f" is {step:.6g} s; `inspector import` resamples such logs (and float32 is too coarse)"
         )

@@ -280,7 +280,7 @@ def test_blocks_move_with_their_run(tmp_path):
         ({"robot": None}, "the run after names no robot"),
         ({"robot": "hal9000"}, "the run after names 'hal9000', not known"),
         ({"position": None}, "the run after has no positions"),
-        ({"robot": "ur5"}, "panda and ur5 are two robots"),
+        ({"robot": "panda_collision"}, "panda and panda_collision are two robots"),
     ],
 )
 def test_links_of_what_is_not_one_robot_are_not_compared(tmp_path, changed, why):

@@ -4,7 +4,6 @@
 `live` print what an `Analysis` says; none of them decides again.
 """
 
-import hashlib
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -29,6 +28,7 @@ from inspector.library import (
     load_library,
 )
 from inspector.localisation.extent import extent
+from inspector.logs.opening import Opened, open_run
 from models import Event
 from noisemodel.types import Array
 
@@ -59,6 +59,7 @@ class Analysis:
         sha256: SHA-256 of the file that the run came from, empty without.
         links: Noise link by link; None unless it was asked for and the run has a robot.
         missing: What the run lacks to show the robot, and why, a sentence each.
+        assumed: What was assumed when its log was read, in a line; empty of a run file.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Analysis:
     sha256: str = ""
     links: "LinkNoise | None" = None
     missing: tuple[str, ...] = ()
+    assumed: str = ""
 
     @cached_property
     def noise(self) -> Array:
@@ -158,7 +160,8 @@ class Analysis:
         told = bool(reason) and self.audit is not None and not self.audit.observable
         seen = () if self.audit is None else summary(self.audit, classes=not told)
         links = () if self.links is None else self.links.remarks
-        return (*self.missing, *self.notes, *reason, *seen, *links)
+        read = (f"{self.assumed[0].upper()}{self.assumed[1:]}.",) if self.assumed else ()
+        return (*read, *self.missing, *self.notes, *reason, *seen, *links)
 
 
 def headline(status: Status, findings: Sequence[Event], reason: str = "") -> str:
@@ -187,13 +190,13 @@ def analyse(
     sha256: str = "",
     unknown: Unknown = Unknown.FINDING,
 ) -> Analysis:
-    """Label a run, and audit it.
+    """Label a run, and audit it; a log is opened first.
 
     The arrays of a run are read when they are needed, and only those that the models and the audit
     need: an object that reads them from its file on demand can stand in for a `noisemodel.Run`.
 
     Args:
-        run: The run, or a run file.
+        run: The run, a run file, or any log that `inspector import` reads.
         library: Models to choose from, see `inspector.load_library`; those that ship unless given.
         name: Name of the run; that of its file unless given.
         sha256: SHA-256 of the file that it came from.
@@ -203,11 +206,15 @@ def analyse(
         The analysis. A run that no model can label is no error: its status is `cannot-tell`.
 
     Raises:
-        RunFileError: If the file is no run file.
+        RunFileError: If the file is damaged, or holds a run that is wrong.
+        InspectorError: If it is a log that cannot be read.
+        UnknownJointError: If the run names a joint that its robot lacks.
     """
+    assumed = ""
     if isinstance(run, (str, Path)):
         name = name or Path(run).stem
-        run = nm.Run.load(run)
+        opened = open_run(run)
+        run, assumed = opened.run, opened.assumed
     library = load_library() if library is None else library
     run, left_out = without_placeholder(run)
     seen = audit(run, library)
@@ -220,6 +227,7 @@ def analyse(
         notes=notes,
         unknown=unknown,
         sha256=sha256,
+        assumed=assumed,
     )
     try:
         found = _labelled(empty, label_run(run, library), library)
@@ -260,7 +268,7 @@ def analyse_noise(
 
 
 def analyse_file(
-    path: Path,
+    path: str | Path | Opened,
     library: Library,
     *,
     links: bool = True,
@@ -268,10 +276,10 @@ def analyse_file(
     terms: bool = False,
     unknown: Unknown = Unknown.FINDING,
 ) -> Analysis:
-    """Read a run file and analyse it for people: with its hash, and its links.
+    """Analyse a file for people: with its hash, its links, and what was assumed of a log.
 
     Args:
-        path: A run file.
+        path: A run file, any log that `inspector import` reads, or one that is open already.
         library: Models to choose from.
         links: Whether to compute the noise link by link, if the run names a robot that is known.
         kind: Kind of the extended noise, see ``noisemodel.extended``.
@@ -282,14 +290,14 @@ def analyse_file(
         The analysis.
 
     Raises:
-        RunFileError: If the file is no run file.
+        RunFileError: If the file is damaged, or holds a run that is wrong.
         RobotError: If its robot cannot be read, or lacks one of the run's joints.
-        InspectorError: If the robot's shape cannot be had.
+        InspectorError: If the robot's shape cannot be had, or a log cannot be read.
     """
-    run = nm.Run.load(path)
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-    found = analyse(run, library, name=path.stem, sha256=digest, unknown=unknown)
+    opened = path if isinstance(path, Opened) else open_run(path)
+    name, digest = opened.source.shown.stem, opened.sha256
+    found = analyse(opened.run, library, name=name, sha256=digest, unknown=unknown)
+    found = replace(found, assumed=opened.assumed)
     return with_links(found, kind if links else "", terms=terms)
 
 

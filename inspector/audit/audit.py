@@ -14,6 +14,7 @@ from inspector.audit.placeholder import placeholder
 from inspector.audit.units import unit_warnings
 from inspector.hold import hold_length, without_hold
 from inspector.library import for_robot, signals_of
+from inspector.wrongrobot import check_joints, limit_warnings
 from noisemodel import Run
 from noisemodel.run import part
 
@@ -86,7 +87,12 @@ def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
 
     Returns:
         The audit.
+
+    Raises:
+        UnknownJointError: If the run names a joint that its robot lacks.
     """
+    check_joints(run.joint_names, run.robot)
+    check_joints(run.desired_joint_names, run.robot)
     part = excerpt(run)
     reach = bandwidth(part)
     return Audit(
@@ -96,7 +102,7 @@ def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
         jitter=_jitter(run),
         gaps=gaps_of(run),
         bandwidth=reach,
-        warnings=tuple(_warnings(part, reach)),
+        warnings=(*_warnings(part, reach), *limit_warnings(run)),
         notes=tuple(_notes(part, reach)),
         classes=observable_classes(
             reach,

@@ -9,14 +9,16 @@ from inspector.audit.audit import Audit
 from inspector.audit.observability import MASKED, ClassObservability, Observability
 
 
-def text(name: str, audit: Audit) -> str:
+def text(name: str, audit: Audit, assumed: str = "") -> str:
     """An audit as text.
 
     Args:
         name: What the run is called.
         audit: Its audit.
+        assumed: What was assumed when its log was read, in a line; empty of a run file.
     """
-    return "\n".join([f"{name}: {audit.duration:.2f} s, {audit.joints} joints", *_lines(audit)])
+    head = f"{name}: {audit.duration:.2f} s, {audit.joints} joints"
+    return "\n".join([head, *([f"  {assumed}"] if assumed else []), *_lines(audit)])
 
 
 def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
@@ -40,14 +42,19 @@ def shortcomings(audit: Audit) -> tuple[str, ...]:
     return summary(audit) if audit.warnings or limited else ()
 
 
-def as_json(found: Mapping[str, Audit], failed: Mapping[str, str]) -> str:
+def as_json(
+    found: Mapping[str, Audit], failed: Mapping[str, str], assumed: Mapping[str, str]
+) -> str:
     """Write audits as ``noise-audit/2``.
 
     Args:
         found: Audits by the name of the run.
         failed: Errors by the name of each file that cannot be read.
+        assumed: What was assumed when a log was read, by the name of the run.
     """
-    runs = [_plain(name, audit) for name, audit in found.items()]
+    runs = [
+        {**_plain(name, audit), "assumed": assumed.get(name, "")} for name, audit in found.items()
+    ]
     runs += [{"run": name, "message": message} for name, message in failed.items()]
     return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
 

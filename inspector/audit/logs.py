@@ -1,50 +1,47 @@
 """Audits of files: run files, and logs that `inspector import` reads."""
 
-import zipfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from inspector.audit.audit import Audit, audit
 from inspector.errors import InspectorError
 from inspector.library import Library
-from noisemodel import NoiseModelError, Run
+from inspector.logs.opening import Reading, left_out, open_source, sources
+from noisemodel import NoiseModelError
 
 
-def audit_all(paths: Sequence[Path], library: Library) -> tuple[dict[str, Audit], dict[str, str]]:
+class Audits(NamedTuple):
+    """Audits of many files, each by the name of its run."""
+
+    found: dict[str, Audit]
+    """Of what could be read."""
+    failed: dict[str, str]
+    """Why a file cannot be read."""
+    assumed: dict[str, str]
+    """What was assumed when a log was read, in a line; empty of a run file."""
+    others: str
+    """Which files of folders were not taken for logs; empty if there are none."""
+
+
+def audit_all(paths: Sequence[Path], library: Library, reading: Reading | None = None) -> Audits:
     """Audit all runs of many files; one bad file never stops the rest.
 
     Args:
-        paths: Run files, or logs.
+        paths: Run files, logs, and folders of them.
         library: Models that might label them.
-
-    Returns:
-        Audits by the name of the run, which is that of its file, with a number where the file
-        holds several; and the error by the name of each file that cannot be read.
+        reading: How logs are read.
     """
+    runs, others = sources(paths, reading)
     found: dict[str, Audit] = {}
     failed: dict[str, str] = {}
-    for path in paths:
+    assumed: dict[str, str] = {}
+    for source in runs:
+        name = str(source.shown)
         try:
-            audits = [audit(run, library) for run in _runs(path)]
+            opened = open_source(source, reading)
+            found[name] = audit(opened.run, library)
+            assumed[name] = opened.assumed
         except (InspectorError, NoiseModelError) as error:
-            failed[str(path)] = str(error).removeprefix(f"{path}: ")
-            continue
-        for number, each in enumerate(audits, start=1):
-            found[str(path) if len(audits) == 1 else f"{path} [{number}]"] = each
-    return found, failed
-
-
-def _runs(path: Path) -> Iterator[Run]:
-    if path.suffix == ".npz" and (not zipfile.is_zipfile(path) or _is_run(path)):
-        yield Run.load(path)
-        return
-    from inspector import read_logs
-
-    yield from (imported.run for imported in read_logs(path))
-
-
-def _is_run(path: Path) -> bool:
-    """Whether an archive has what a run file has; simulators write others."""
-    with zipfile.ZipFile(path) as archive:
-        names = set(archive.namelist())
-    return "time.npy" in names and bool(names & {"velocity.npy", "position.npy"})
+            failed[name] = str(error).removeprefix(f"{source.path}: ")
+    return Audits(found, failed, assumed, left_out(others))

@@ -1,16 +1,21 @@
 """`inspector adapt`: adapt a general model to a robot by good runs of it."""
 
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import InPart, Inputs, Output, Overwrite
+from inspector.commands.options import GoodRuns, InPart, Output, Overwrite, reads_logs
 from inspector.training.part import Part
 
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
+
+@partial(reads_logs, without={"rate"})
 def adapt(
-    inputs: Inputs,
+    inputs: GoodRuns,
     output: Output,
     alarms: Annotated[
         float, typer.Option(help="False-alarm budget, per hour of good motion.")
@@ -33,6 +38,8 @@ def adapt(
     ] = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Adapt a general model to a robot by good runs of it."""
     from inspector.training.adaptation import adapt as adapt_model
@@ -45,6 +52,8 @@ def adapt(
         rate=rate,
         part=part,
         overwrite=overwrite,
+        reading=reading,
+        remark=partial(typer.echo, err=True),
     )
     typer.echo(str(adapted))
     profile = adapted.learnt.classifier.profile

@@ -2,11 +2,14 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles
+from inspector.commands.options import ModelFiles, reads_logs
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
 
 class Format(StrEnum):
@@ -16,13 +19,16 @@ class Format(StrEnum):
     JSON = "json"
 
 
+@reads_logs
 def audit(
     logs: Annotated[
         list[Path],
-        typer.Argument(help="Run files, or logs that `import` reads.", show_default=False),
+        typer.Argument(help="Run files, or any logs; folders of them.", show_default=False),
     ],
     format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     model: ModelFiles = None,
+    *,
+    reading: "Reading",
 ) -> None:
     """Print what logs can show: rates, quantisation, failure classes.
 
@@ -38,11 +44,14 @@ def audit(
     from inspector.audit.logs import audit_all
     from inspector.library import load_library
 
-    found, failed = audit_all(logs, load_library(assets.model_files(model)))
+    library = load_library(assets.model_files(model))
+    found, failed, assumed, others = audit_all(logs, library, reading)
+    if others:
+        typer.echo(f"inspector: {others}", err=True)
     if format is Format.JSON:
-        typer.echo(as_json(found, failed))
+        typer.echo(as_json(found, failed, assumed))
     elif found:
-        typer.echo("\n\n".join(text(name, audit) for name, audit in found.items()))
+        typer.echo("\n\n".join(text(name, audit, assumed[name]) for name, audit in found.items()))
     for name, message in failed.items():
         typer.echo(f"inspector: {name}: {message}", err=True)
     observable = all(audit.observable for audit in found.values())

@@ -1,15 +1,20 @@
 """`inspector baseline`: train a baseline on good runs."""
 
-from typing import Annotated
+from functools import partial
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import InPart, Inputs, Output, Overwrite
+from inspector.commands.options import GoodRuns, InPart, Output, Overwrite, reads_logs
 from inspector.training.part import Part
 
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
+
+@partial(reads_logs, without={"rate"})
 def baseline(
-    inputs: Inputs,
+    inputs: GoodRuns,
     output: Output,
     alarms: Annotated[
         float, typer.Option(help="False-alarm budget, per hour of good motion.")
@@ -31,6 +36,8 @@ def baseline(
     ] = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Train a baseline on good runs only, to find anomalies."""
     from inspector.training.baseline import train
@@ -43,6 +50,8 @@ def baseline(
         rate=rate,
         part=part,
         overwrite=overwrite,
+        reading=reading,
+        remark=partial(typer.echo, err=True),
     )
     typer.echo(str(trained))
     typer.echo(f"{output}: written; classify --model {output} finds anomalies against these runs")

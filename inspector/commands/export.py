@@ -1,13 +1,17 @@
 """`inspector export`: noise, labels and scores for other tools."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles, Overwrite, RunFile
+from inspector.commands.options import ModelFiles, Overwrite, RunFile, opened, reads_logs
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
 
+@reads_logs
 def export(
     run: RunFile,
     output: Annotated[
@@ -18,6 +22,8 @@ def export(
     ] = "normal",
     model: ModelFiles = None,
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Write noise, labels and scores as MCAP, CSV or Parquet.
 
@@ -26,10 +32,9 @@ def export(
     from inspector import assets
     from inspector.export import export as write
     from inspector.library import load_library
-    from noisemodel import Run
 
     library = load_library(assets.model_files(model))
-    found = write(Run.load(run), output, library, kind=kind, overwrite=overwrite)
+    found = write(opened(run, reading).run, output, library, kind=kind, overwrite=overwrite)
     typer.echo(f"{run}: {found.analysis.headline}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")

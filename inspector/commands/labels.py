@@ -1,13 +1,17 @@
 """`inspector labels`: annotated blocks of a run, from and for other tools."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Overwrite, RunFile
+from inspector.commands.options import Overwrite, RunFile, opened, reads_logs
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
 
+@reads_logs
 def labels(
     run: RunFile,
     to: Annotated[
@@ -25,19 +29,20 @@ def labels(
         typer.Option("--format", help="noisytest, csv or audacity; by default from the suffix."),
     ] = "",
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Print, import or export the annotated blocks of a run."""
     from dataclasses import replace
 
     from inspector.errors import InspectorError
     from inspector.labels import read_labels, write_labels
-    from noisemodel import Run
 
     if to and from_:
         raise typer.BadParameter("name one of --to and --from")
     if bool(from_) != bool(output):
         raise typer.BadParameter("--from FILE and -o RUN go together")
-    recorded = Run.load(run)
+    recorded = opened(run, reading).run
     if from_ and output:
         recorded = replace(recorded, blocks=read_labels(from_, recorded, format_name=format))
         recorded.save(output, overwrite=overwrite)

@@ -1,17 +1,23 @@
 """`inspector listen`: the noise of runs as sound."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Overwrite
+from inspector.commands.options import Overwrite, one_at_a_time, opened, reads_logs, say_warnings
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
 
+@reads_logs
 def listen(
     runs: Annotated[
         list[Path],
-        typer.Argument(help="Run files; several are written at one gain.", show_default=False),
+        typer.Argument(
+            help="Run files or logs; several are written at one gain.", show_default=False
+        ),
     ],
     output: Annotated[
         Path, typer.Option("--output", "-o", help="WAV file; several get .a, .b ... in its name.")
@@ -32,14 +38,19 @@ def listen(
         float, typer.Option("--speed", help="Playback speed; the pitch changes by the same factor.")
     ] = 1.0,
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
     from inspector.sound import sonification
-    from noisemodel import Run
 
+    one_at_a_time(reading, len(runs))
     settings = sonification.Settings(kind, joint, link, speed)
     paths = sonification.output_paths(output, len(runs), overwrite=overwrite)
-    sounds = [sonification.sonify(Run.load(run), settings) for run in runs]
+    recorded = [opened(run, reading).run for run in runs]
+    for each in recorded:
+        say_warnings(each)
+    sounds = [sonification.sonify(each, settings) for each in recorded]
     level = sonification.common_gain(sounds) if gain is None else gain
     sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
     for run, path, sound in zip(runs, paths, sounds, strict=True):

@@ -1,13 +1,22 @@
 """Arguments and options that several commands share."""
 
+import inspect
+from collections.abc import Callable, Collection
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from inspector.training.part import Part
 
-RunFile = Annotated[Path, typer.Argument(help="A run file (run.npz).", show_default=False)]
+if TYPE_CHECKING:
+    from inspector.logs.opening import Opened, Reading
+    from noisemodel import Run
+
+RunFile = Annotated[
+    Path, typer.Argument(help="A run file, or any log: CSV, bag, ...", show_default=False)
+]
 Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.")]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
 ModelFiles = Annotated[
@@ -34,7 +43,141 @@ InPart = Annotated[
     Part,
     typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),
 ]
+GoodRuns = Annotated[
+    list[Path],
+    typer.Argument(
+        help="Run files or logs of good motion, samples, folders of them, NoisyTest folders."
+    ),
+]
 Inputs = Annotated[
     list[Path],
     typer.Argument(help="Annotated runs, samples, folders of them, or NoisyTest folders."),
 ]
+
+
+def _of_log(*names: str, **settings: Any) -> Any:
+    return typer.Option(*names, rich_help_panel="Reading logs", **settings)
+
+
+def _log_options(
+    robot: Annotated[
+        str | None,
+        _of_log("--robot", help="A name that `robots` lists, or a file; none takes no robot."),
+    ] = None,
+    rate: Annotated[
+        float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
+    ] = None,
+    map_: Annotated[
+        list[str] | None,
+        _of_log("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
+    ] = None,
+    mapping: Annotated[Path | None, _of_log("--mapping", help="A saved mapping (TOML).")] = None,
+    joints: Annotated[
+        str | None, _of_log("--joints", help="Names of the columns of arrays: a,b,c.")
+    ] = None,
+    units: Annotated[
+        str | None, _of_log("--units", help="Unit of angles: radians, degrees or normalised.")
+    ] = None,
+    degrees: Annotated[bool, _of_log("--degrees", help="Angles are in degrees.")] = False,
+    topic: Annotated[
+        list[str] | None, _of_log("--topic", help="Read this topic of a bag; repeatable.")
+    ] = None,
+    episode: Annotated[
+        list[str] | None, _of_log("--episode", help="Read this episode of a data set; repeatable.")
+    ] = None,
+    desired: Annotated[
+        Path | None,
+        _of_log("--desired", help="Another log, with the desired motion on its own clock."),
+    ] = None,
+    offset: Annotated[
+        float | None,
+        _of_log(
+            "--offset", help="Added to the time stamps of --desired, in seconds; else estimated."
+        ),
+    ] = None,
+) -> "Reading":
+    """Options by which a log is opened, the same in all commands; see `reads_logs`."""
+    from inspector.logs.opening import Reading
+    from inspector.logs.reading import read_options
+
+    options = read_options(
+        map_ or (),
+        saved=mapping,
+        robot=None if robot == "none" else robot,
+        rate=rate,
+        units="degrees" if degrees else units,
+        joints=joints.split(",") if joints else None,
+        topics=topic,
+        offset=offset,
+    )
+    return Reading(options, desired, tuple(episode or ()), without_robot=robot == "none")
+
+
+def reads_logs(
+    command: Callable[..., None], *, without: Collection[str] = ()
+) -> Callable[..., None]:
+    """Give a command the options by which logs are opened.
+
+    Args:
+        command: Takes them as ``reading``, a ``inspector.logs.opening.Reading``.
+        without: Names of options that mean something else in this command.
+
+    Returns:
+        The command with these options in place of ``reading``.
+    """
+    own = inspect.signature(command, eval_str=False)
+    added = {
+        name: option
+        for name, option in inspect.signature(_log_options).parameters.items()
+        if name not in without
+    }
+
+    @wraps(command)
+    def reading_logs(**given: Any) -> None:
+        options = {name: given.pop(name) for name in added}
+        command(**given, reading=_log_options(**options))
+
+    kept = [each for name, each in own.parameters.items() if name != "reading"]
+    every = [*kept, *added.values()]
+    signature = own.replace(
+        parameters=[each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in every]
+    )
+    reading_logs.__signature__ = signature  # type: ignore[attr-defined]
+    reading_logs.__annotations__ = {each.name: each.annotation for each in every}
+    return reading_logs
+
+
+def opened(path: Path, reading: "Reading", *, said: bool = True) -> "Opened":
+    """Open a run or a log for a command, and say on standard error what was assumed."""
+    from inspector.logs.opening import open_run
+
+    found = open_run(path, reading)
+    if said:
+        say_assumed({str(path): found.assumed})
+    return found
+
+
+def one_at_a_time(reading: "Reading", runs: int) -> None:
+    """Refuse a log with the desired motion, which belongs to one run, for several."""
+    if reading.desired and runs > 1:
+        raise typer.BadParameter(f"belongs to one log, {runs} are given", param_hint="'--desired'")
+
+
+def say_warnings(run: "Run") -> None:
+    """Print what hints at another robot than the run names on standard error."""
+    from inspector.wrongrobot import check_joints, limit_warnings
+
+    check_joints(run.joint_names, run.robot)
+    for warning in limit_warnings(run):
+        typer.echo(f"  {warning}", err=True)
+
+
+def say_assumed(lines: dict[str, str]) -> None:
+    """Print what was assumed of logs on standard error, once for those with one line."""
+    together: dict[str, list[str]] = {}
+    for name, line in lines.items():
+        if line:
+            together.setdefault(line, []).append(name)
+    for line, names in together.items():
+        others = f" and {len(names) - 1} more" if len(names) > 1 else ""
+        typer.echo(f"{names[0]}{others}: {line}", err=True)

@@ -1,22 +1,35 @@
 """`inspector report`: an HTML page about a run."""
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Kind, ModelFiles, Output, Overwrite, RunFile
+from inspector.commands.options import (
+    Kind,
+    ModelFiles,
+    Output,
+    Overwrite,
+    RunFile,
+    opened,
+    reads_logs,
+)
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
 
+@reads_logs
 def report(
     run: RunFile,
     output: Output,
     model: ModelFiles = None,
-    robot: Annotated[
-        bool,
-        typer.Option("--robot/--no-robot", help="Draw the robot, with the noise of its links."),
-    ] = True,
+    no_robot: Annotated[
+        bool, typer.Option("--no-robot", help="Do not draw the robot and the noise of its links.")
+    ] = False,
     kind: Kind = "normal",
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
     from inspector import assets
@@ -29,7 +42,7 @@ def report(
     html.require()
     refuse_existing(output, overwrite=overwrite)
     library = load_library(assets.model_files(model))
-    found = analyse_file(run, library, links=robot, kind=kind)
+    found = analyse_file(opened(run, reading), library, links=not no_robot, kind=kind)
     assert found.audit is not None
     seen = text(found.name, found.audit)
     html.write(found, output, audit=seen, overwrite=overwrite)

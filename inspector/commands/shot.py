@@ -2,16 +2,20 @@
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Kind, ModelFiles, Output, Overwrite
+from inspector.commands.options import Kind, ModelFiles, Output, Overwrite, opened, reads_logs
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
 
 
+@reads_logs
 def shot(
     run: Annotated[
-        Path, typer.Argument(help="A run file, or a recording (.rrd).", show_default=False)
+        Path, typer.Argument(help="A run file or log, or a recording (.rrd).", show_default=False)
     ],
     output: Output,
     at: Annotated[
@@ -22,6 +26,8 @@ def shot(
     model: ModelFiles = None,
     kind: Kind = "normal",
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Write a PNG of what the viewer shows, without a display.
 
@@ -41,7 +47,8 @@ def shot(
     with TemporaryDirectory() as folder:
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
-            found = analyse_file(run, load_library(assets.model_files(model)), kind=kind)
+            library = load_library(assets.model_files(model))
+            found = analyse_file(opened(run, reading), library, kind=kind)
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
             write(found, recording)

@@ -6,10 +6,18 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Kind, ModelFiles, Overwrite
+from inspector.commands.options import (
+    Kind,
+    ModelFiles,
+    Overwrite,
+    one_at_a_time,
+    opened,
+    reads_logs,
+)
 
 if TYPE_CHECKING:
     from inspector.library import Library
+    from inspector.logs.opening import Opened, Reading
 
 
 class Aligned(StrEnum):
@@ -20,9 +28,10 @@ class Aligned(StrEnum):
     NONE = "none"
 
 
+@reads_logs
 def view(
     run: Annotated[
-        Path | None, typer.Argument(help="A run file; by default the shipped demo.")
+        Path | None, typer.Argument(help="A run file, or any log; by default the shipped demo.")
     ] = None,
     after: Annotated[
         Path | None, typer.Argument(help="A second run, after a change: new, resolved, louder.")
@@ -32,10 +41,9 @@ def view(
         typer.Option("--save", help="Write the recording to this file, open no viewer."),
     ] = None,
     model: ModelFiles = None,
-    robot: Annotated[
-        bool,
-        typer.Option("--robot/--no-robot", help="Draw the robot, with the noise of its links."),
-    ] = True,
+    no_robot: Annotated[
+        bool, typer.Option("--no-robot", help="Do not draw the robot and the noise of its links.")
+    ] = False,
     kind: Kind = "normal",
     terms: Annotated[
         bool, typer.Option("--terms", help="Show the terms A, B and C of the paper separately.")
@@ -53,6 +61,8 @@ def view(
         ),
     ] = None,
     overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
 ) -> None:
     """Show a run, or two side by side, in the rerun viewer.
 
@@ -65,6 +75,7 @@ def view(
 
     if web and save:
         raise typer.BadParameter("name one of --web and --save")
+    one_at_a_time(reading, 1 if after is None else 2)
     if align and not after:
         raise typer.BadParameter("--align takes two runs")
     if terms and after:
@@ -79,11 +90,13 @@ def view(
     overwrite = overwrite or save is None
     refuse_existing(target, overwrite=overwrite)
     library = load_library(assets.model_files(model))
+    robot = not no_robot
+    run_of = opened(path, reading, said=False)  # the remarks say it
     if after is None:
-        _one(path, target, library, robot=robot, kind=kind, terms=terms, overwrite=overwrite)
+        _one(run_of, target, library, robot=robot, kind=kind, terms=terms, overwrite=overwrite)
     else:
-        how = align or Aligned.AUTO
-        _two((path, after), target, library, how, robot=robot, kind=kind, overwrite=overwrite)
+        both_runs, how = (run_of, opened(after, reading, said=False)), align or Aligned.AUTO
+        _two(both_runs, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
     if web:
         from inspector.recording import web as browser
 
@@ -99,7 +112,7 @@ def view(
 
 
 def _one(
-    path: Path,
+    run: "Opened",
     target: Path,
     library: "Library",
     *,
@@ -113,9 +126,9 @@ def _one(
     from inspector.report.markdown import sentence
     from inspector.sound.clip import of_recording
 
-    found = analyse_file(path, library, links=robot, kind=kind, terms=terms)
+    found = analyse_file(run, library, links=robot, kind=kind, terms=terms)
     write(found, target, overwrite=overwrite, sound=of_recording(found))
-    typer.echo(f"{path}: {found.headline}")
+    typer.echo(f"{run.source.shown}: {found.headline}")
     for event in found.findings:
         typer.echo(f"  {sentence(found, event)}")
     for remark in found.remarks:
@@ -123,7 +136,7 @@ def _one(
 
 
 def _two(
-    paths: tuple[Path, Path],
+    runs: tuple["Opened", "Opened"],
     target: Path,
     library: "Library",
     how: Aligned,
@@ -135,9 +148,9 @@ def _two(
     from inspector.pair import Align, changes, compare, summary
     from inspector.pair.recording import write
 
-    pair = compare(*paths, library, how=Align(how), robot=robot, kind=kind)
+    pair = compare(*runs, library, how=Align(how), robot=robot, kind=kind)
     write(pair, target, overwrite=overwrite)
-    typer.echo(f"{paths[0]} → {paths[1]}: {summary(pair)}")
+    typer.echo(f"{runs[0].source.shown} → {runs[1].source.shown}: {summary(pair)}")
     typer.echo(f"  aligned {pair.alignment}")
     for change in changes(pair):
         typer.echo(f"  {change}")

@@ -18,8 +18,9 @@ from inspector.live.errors import LiveError
 from inspector.live.sink import Sink
 from inspector.live.warnings import Warnings
 from inspector.live.worker import Worker
+from inspector.wrongrobot import LimitWatch, check_joints
 from models import Event
-from noisemodel import Robot
+from noisemodel.limits import joint_limits
 from noisemodel.types import Array
 
 BATCH = 0.05
@@ -84,7 +85,7 @@ class LiveSession:
         rate: Nominal samples per second, in [Hz].
         robot: A listed robot or the path of a URDF, to be drawn as it moves.
         joint_names: Names of the joints, in the order of their columns; by default those of the
-            robot.
+            robot, the first ones if it has more: the others are assumed stationary.
         library: Models to choose from; by default those that ship.
         save: File to write the recording to, whole when the session is closed.
         connect: Address of a viewer that runs. Unless given, and without a file, the viewer on
@@ -245,6 +246,7 @@ class LiveSession:
         """Fix signals and names by the first samples."""
         widths = widths_of(rows, self._names)
         names = _names(self._names, self._robot, widths["velocity"])
+        absent = check_joints(names, self._robot)
         size = max(1, round(BATCH * self._rate))
         worker = Worker(
             self._sink,
@@ -254,9 +256,13 @@ class LiveSession:
             widths=widths,
             library=for_robot(self._library, self._robot),
             warnings=self._warnings,
+            watch=LimitWatch(names, self._robot) if self._robot else None,
         )
         if self._robot and "position" not in widths:
             self.note("missing signals", "no positions: the robot is not drawn")
+        elif absent:
+            line = f"not in the log, assumed stationary: {', '.join(absent)}"
+            self.note("joints assumed stationary", line, len(absent))
         return SampleBuffer(size, widths, self._warnings), worker
 
     def _stamps(self, time: ArrayLike | None, samples: int) -> Array:
@@ -277,10 +283,10 @@ def _names(given: Sequence[str], robot: str | None, joints: int) -> tuple[str, .
         return tuple(given)
     if robot is None:
         return tuple(f"joint{number + 1}" for number in range(joints))
-    names = Robot.load(robot).joint_names
-    if len(names) != joints:
+    names = tuple(joint_limits(robot))
+    if len(names) < joints:
         raise LiveError(
             f"{joints} velocities, and {robot} has {len(names)} joints: {', '.join(names)};"
             " name those of the samples (--names)"
         )
-    return names
+    return names[:joints]

@@ -21,6 +21,7 @@ from inspector.live.robot import LiveRobot
 from inspector.live.sink import Sink
 from inspector.live.spectrogram import SpectrogramStream
 from inspector.live.warnings import Warnings
+from inspector.wrongrobot import LONG, LimitWatch
 from noisemodel.types import Array, Mask
 
 MAX_DELAYS = 100_000
@@ -38,6 +39,7 @@ class Worker:
         widths: Columns of each signal.
         library: Models to choose from.
         warnings: Where to count what cannot be shown.
+        watch: The limits of the robot that the samples are said to be of; None checks none.
 
     Raises:
         RobotError: If the robot cannot be read.
@@ -55,6 +57,7 @@ class Worker:
         widths: Mapping[str, int],
         library: Library,
         warnings: Warnings,
+        watch: LimitWatch | None = None,
     ) -> None:
         self.samples, self._now = 0, 0.0
         self._unconfirmed = 0  # samples since the viewer was last known to be there
@@ -67,6 +70,7 @@ class Worker:
         self.findings = Findings()
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._robot = None
+        self._watch = watch
         if robot is not None:
             floating = "base_pose" in widths
             self._robot = LiveRobot(sink.recording, robot, joint_names, floating=floating)
@@ -134,6 +138,7 @@ class Worker:
             self._drawing.changes(self._lane.expire(self._now))
             self._drawing.lines(time[valid], noise[valid], _rows(signals, valid), self._rate)
             self._move(self._now, signals)
+        self._check_limits(signals)
         self._unconfirmed += len(time)
         if self._sink.check_viewer():
             self._unconfirmed = 0
@@ -190,6 +195,15 @@ class Worker:
                 self._delays.extend(delay.tolist())
         if columns is not None and self._sink.alive:
             self._drawing.spectrogram(columns)
+
+    def _check_limits(self, signals: Mapping[str, Array]) -> None:
+        """Warn where the motion has been far beyond the limits of the robot for a second."""
+        if self._watch is not None:
+            self._watch.add(signals.get("position"), signals["velocity"])
+            for line in self._watch.warnings(LONG * self._rate):
+                self._warnings.note("joints beyond their limits", line)
+                self._watch = None
+                return
 
     def _move(self, time: float, signals: Mapping[str, Array]) -> None:
         if self._robot is None:

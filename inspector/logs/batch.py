@@ -7,8 +7,10 @@ from pathlib import Path
 from inspector.errors import InspectorError
 from inspector.logs.importing import Imported
 from inspector.logs.log import Progress, without_progress
+from inspector.logs.opening import logs_in
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import Job, jobs_of
+from inspector.wrongrobot import limit_warnings
 from noisemodel import NoiseModelError
 from noisemodel.atomic import refuse_existing, replacing
 
@@ -45,7 +47,7 @@ def import_logs(
     """Write a run file for each run of some logs.
 
     Args:
-        logs: The logs.
+        logs: The logs, and folders of them.
         output: A run file; for several logs or episodes a folder, which is created.
         options: How to read the logs.
         desired: A log with the desired motion, for a single log.
@@ -60,9 +62,10 @@ def import_logs(
         InspectorError: If the output does not fit the logs, or a single log cannot be read.
         NoiseModelError: If an output exists, or a single log makes no run.
     """
-    if desired and len(logs) > 1:
-        raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
+    logs = [log for path in logs for log in logs_in(path)[0]]
     several = len(logs) > 1
+    if desired and several:
+        raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
     jobs: list[Job] = []
     failed: list[Written] = []
     for log in logs:
@@ -121,5 +124,6 @@ def _written(imported: Imported, target: Path, *, overwrite: bool) -> Written:
             temporary.write_text(imported.urdf, encoding="utf-8")
         run = replace(run, robot=str(urdf))
         remarks.append(f"{urdf.name}: the robot, as the log describes it")
+    remarks += limit_warnings(run)
     run.save(target, overwrite=overwrite)
     return Written(target, run.duration, run.rate, tuple(remarks))

@@ -65,6 +65,14 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return reader(path, options)
 
 
+def is_one_log(folder: Path) -> bool:
+    """Whether a folder is one log: a LeRobot data set, or a bag; not a folder of logs."""
+    if (folder / "meta" / "info.json").is_file() or (folder / "metadata.yaml").is_file():
+        return True
+    files = [each for each in folder.iterdir() if not each.name.startswith(".")]
+    return len(files) == 1 and files[0].suffix in (".mcap", ".db3")
+
+
 def _of_file(path: Path) -> str:
     try:
         with path.open("rb") as stream:

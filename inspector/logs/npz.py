@@ -36,7 +36,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     """
     arrays = _arrays(path)
     run = None
-    if _is_run(arrays) and not options.entries:
+    if _is_run(arrays) and not (options.entries or options.units or options.joints):
         run = lambda: Run.load(path)  # noqa: E731
     return LogReader(
         "npz",

@@ -197,7 +197,11 @@ def _run_of_episode(
     progress: Progress,
 ) -> Imported:
     if opened.run and not desired:
-        return Imported(opened.run(), ("a run file, unchanged",), name)
+        run = opened.run()
+        if not options.robot:
+            return Imported(run, ("a run file, unchanged",), name)
+        remark = f"a run file, its robot is now {options.robot}"
+        return Imported(replace(run, robot=options.robot), (remark,), name)
     log = opened.read(episode, progress)
     remarks: tuple[str, ...] = ()
     if robot is None and log.urdf:

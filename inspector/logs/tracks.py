@@ -10,7 +10,8 @@ from inspector.logs.floatingbase import WIDTHS, not_normalised, pose_of, velocit
 from inspector.logs.log import Field, Log, Track
 from inspector.logs.options import Entry, ReadOptions
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, array_signal, column_signal, listed
-from noisemodel import Robot, UnknownJointError
+from inspector.wrongrobot import WrongRobotError
+from noisemodel import Robot
 from noisemodel.types import Real
 
 
@@ -111,10 +112,10 @@ def _of_robot(
     ]
     others = [assignment for assignment in assignments if assignment not in unknown]
     if unknown and not any(assignment.signal in JOINT_SIGNALS for assignment in others):
-        raise UnknownJointError(unknown[0].joint, robot.name, robot.joint_names)
+        raise WrongRobotError(unknown[0].joint, robot.name, robot.joint_names)
     for assignment in unknown:
         if assignment.explicit:
-            raise UnknownJointError(assignment.joint, robot.name, robot.joint_names)
+            raise WrongRobotError(assignment.joint, robot.name, robot.joint_names)
     return others, tuple(dict.fromkeys(assignment.joint for assignment in unknown))
 
 

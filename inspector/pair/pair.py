@@ -1,6 +1,5 @@
 """Two runs with what was found in each, sample beside sample."""
 
-import hashlib
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 import noisemodel as nm
 from inspector.analysis.analyse import Analysis, analyse, robot_known, with_links
 from inspector.library import Library
+from inspector.logs.opening import Opened, open_run
 from inspector.pair.alignment import Align, Alignment, align
 from inspector.pair.common import alike, together
 from noisemodel import robot as robots
@@ -70,18 +70,18 @@ class Pair:
 
 
 def compare(
-    before: Path,
-    after: Path,
+    before: Opened | Path,
+    after: Opened | Path,
     library: Library,
     *,
     how: Align = Align.AUTO,
     robot: bool = True,
     kind: str = "normal",
 ) -> Pair:
-    """Two run files, aligned and analysed.
+    """Two runs, aligned and analysed.
 
     Args:
-        before: A run file.
+        before: A run, or the path of a run file or a log.
         after: Another.
         library: Models to choose from by rate.
         how: How they are aligned.
@@ -92,17 +92,18 @@ def compare(
         The pair; both runs lie on the time axis of the first.
 
     Raises:
-        RunFileError: If a file is no run file.
+        RunFileError: If a file is damaged, or holds a run that is wrong.
         RobotError: If the robot cannot be read, or lacks one of the joints.
         InspectorError: If the robot's shape cannot be had, or the runs share no time.
     """
-    one, other, remarks = alike(nm.Run.load(before), nm.Run.load(after))
+    opened = [run if isinstance(run, Opened) else open_run(run) for run in (before, after)]
+    one, other, remarks = alike(*(each.run for each in opened))
     alignment = align(one, other, how)
     one, other, left_out = together(one, other, alignment)
     missing = _no_links(one, other) if robot else ""
     sides = [
-        _analysed(path, run, library, kind=kind if robot and not missing else "")
-        for path, run in ((before, one), (after, other))
+        _analysed(each, run, library, kind=kind if robot and not missing else "")
+        for each, run in zip(opened, (one, other), strict=True)
     ]
     remarked = dict.fromkeys(remark for side in sides for remark in side.remarks)
     both = [(remark, [remark in side.remarks for side in sides]) for remark in remarked]
@@ -123,11 +124,10 @@ def _who(before: bool, after: bool) -> str:
     return "Both" if before and after else "Before" if before else "After"
 
 
-def _analysed(path: Path, run: nm.Run, library: Library, *, kind: str) -> Analysis:
+def _analysed(opened: Opened, run: nm.Run, library: Library, *, kind: str) -> Analysis:
     """Analyse a part of a run; its links too, if a kind of noise is named."""
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    found = with_links(analyse(run, library, name=path.stem, sha256=digest), kind)
-    return replace(found, missing=())
+    found = analyse(run, library, name=opened.source.shown.stem, sha256=opened.sha256)
+    return replace(with_links(found, kind), missing=(), assumed=opened.assumed)
 
 
 def _no_links(before: nm.Run, after: nm.Run) -> str:

@@ -60,6 +60,7 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
                 for event in verdict.events
             ],
             "message": verdict.message,
+            "assumed": verdict.assumed,
         }
         for verdict in verdicts
     ]

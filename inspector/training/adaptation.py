@@ -1,6 +1,6 @@
 """General models adapted to a robot by good runs of it, from files."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -8,7 +8,8 @@ from pathlib import Path
 import models
 from inspector.errors import InspectorError
 from inspector.library import load_library
-from inspector.training.goodruns import good_runs
+from inspector.logs.opening import Reading
+from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
 from models.logbands import HIGHEST
 from models.novelty.faults import Recall, recall
@@ -42,11 +43,13 @@ def adapt(
     rate: float | None = None,
     part: Part = Part.ALL,
     overwrite: bool = False,
+    reading: Reading | None = None,
+    remark: Callable[[str], None] = without_remarks,
 ) -> Adapted:
     """Adapt a general model to a robot and write it.
 
     Args:
-        inputs: Run files of good motion, samples, folders of them, or NoisyTest folders; of
+        inputs: Run files or logs of good motion, samples, folders of them, or NoisyTest folders; of
             annotated runs, only the blocks `ok` count.
         output: The model file to write.
         alarms: False-alarm budget, per hour of good motion.
@@ -55,6 +58,8 @@ def adapt(
             the runs, which must be equal.
         part: The part of the recordings to learn from.
         overwrite: Whether a file that exists may be replaced.
+        reading: How logs are read.
+        remark: Called with a line for what was assumed of a log, or hints at another robot.
 
     Returns:
         The adapted model, and its measures on the good runs.
@@ -67,11 +72,22 @@ def adapt(
     refuse_existing(output, overwrite=overwrite)
     name, general = _general(model)
 
-    def read(task: str) -> Iterator[models.Recording]:
-        what = "an adapted model"
-        return good_runs(inputs, what, rate=rate, highest=HIGHEST, part=part, task=task)
+    def read(
+        task: str, remark: Callable[[str], None] = without_remarks
+    ) -> Iterator[models.Recording]:
+        what, highest = "an adapted model", HIGHEST
+        return good_runs(
+            inputs,
+            what,
+            rate=rate,
+            highest=highest,
+            part=part,
+            task=task,
+            reading=reading,
+            remark=remark,
+        )
 
-    found = read("read")
+    found = read("read", remark)
     first = next(found)
     bound = general.at(first.rate, models.signals.named(first.signal))
     try:

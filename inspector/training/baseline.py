@@ -1,12 +1,13 @@
 """Baselines trained on good runs only, from files."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from pathlib import Path
 
 import models
 from inspector.errors import InspectorError
-from inspector.training.goodruns import good_runs
+from inspector.logs.opening import Reading
+from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
 from models.estimators.baseline import MOTION, NOISE_ALONE
 from noisemodel.atomic import refuse_existing
@@ -24,11 +25,13 @@ def train(
     rate: float | None = None,
     part: Part = Part.ALL,
     overwrite: bool = False,
+    reading: Reading | None = None,
+    remark: Callable[[str], None] = without_remarks,
 ) -> models.Learnt:
     """Train a baseline and write it.
 
     Args:
-        inputs: Run files of good motion, samples, folders of them, or NoisyTest folders; of
+        inputs: Run files or logs of good motion, samples, folders of them, or NoisyTest folders; of
             annotated runs, only the blocks `ok` count.
         output: The model file to write.
         alarms: False-alarm budget, per hour of good motion.
@@ -37,6 +40,8 @@ def train(
             the runs, which must be equal.
         part: The part of the recordings to train on.
         overwrite: Whether a file that exists may be replaced.
+        reading: How logs are read.
+        remark: Called with a line for what was assumed of a log, or hints at another robot.
 
     Returns:
         The baseline, and its measures on the good runs.
@@ -49,7 +54,7 @@ def train(
     if profile and profile not in PROFILES:
         raise InspectorError(f"a baseline has no profile {profile!r}; expected general or scalar")
     refuse_existing(output, overwrite=overwrite)
-    found = good_runs(inputs, "a baseline", rate=rate, part=part)
+    found = good_runs(inputs, "a baseline", rate=rate, part=part, reading=reading, remark=remark)
     first = next(found)
     there = models.signals.named(first.signal)
     richest = profile or ("general" if {*MOTION.signals} <= {*there} else "scalar")

@@ -1,18 +1,20 @@
 """Good runs of one robot, from files: what baselines and adapted models learn from."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
 import models
-import noisemodel as nm
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
+from inspector.logs.opening import Reading, open_source, sources
+from inspector.logs.opening import Source as LogSource
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import in_part, of_run, of_sample
+from inspector.wrongrobot import check_joints, limit_warnings
 from scenarios.sample import Sample, is_sample
 from scenarios.signals import WHOLE
 
@@ -30,6 +32,10 @@ class Source(NamedTuple):
     """Their names; empty if there is only a noise."""
 
 
+def without_remarks(line: str) -> None:
+    """Ignore a remark."""
+
+
 def good_runs(
     inputs: Sequence[Path],
     what: str,
@@ -38,24 +44,28 @@ def good_runs(
     highest: float = inf,
     part: Part = Part.ALL,
     task: str = "read",
+    reading: Reading | None = None,
+    remark: Callable[[str], None] = without_remarks,
 ) -> Iterator[models.Recording]:
     """Recordings of good runs, all of one rate and robot, as `inspector classify` takes them.
 
     Args:
-        inputs: Run files, samples, folders of them, or NoisyTest folders.
+        inputs: Run files, logs, samples, folders of them, or NoisyTest folders.
         what: What they are for, in messages: "a baseline".
         rate: Rate to which faster runs are decimated, in [Hz]; by default their own.
         highest: Rate to which runs above it are decimated in any case, in [Hz].
         part: The part of the recordings to read.
         task: Name of the progress bar.
+        reading: How logs are read.
+        remark: Called with a line for what was assumed of a log, or hints at another robot.
 
     Raises:
         InspectorError: If runs are of different rates or robots, or there is none.
     """
-    files = list(_files(inputs))
+    files = list(_files(inputs, reading))
     first: Source | None = None
-    for path in progress(files, task, total=len(files)):
-        for source, recording in _read(path, rate, highest):
+    for file in progress(files, task, total=len(files)):
+        for source, recording in _read(file, rate, highest, reading, remark):
             if in_part(recording, part):
                 first = first or source
                 _check(source, first, what)
@@ -64,30 +74,45 @@ def good_runs(
         raise InspectorError(f"no run in {', '.join(map(str, inputs))}, expected good ones")
 
 
-def _files(inputs: Sequence[Path]) -> Iterator[Path]:
-    """Run files, samples, and folders of NoisyTest."""
+def _files(inputs: Sequence[Path], reading: Reading | None) -> Iterator[LogSource]:
+    """Runs, samples, and folders of NoisyTest."""
     for path in inputs:
-        if path.is_dir() and not any(path.glob("*.toml")):
-            yield from sorted(path.rglob("*.npz"))
+        if _is_noisytest(path):
+            yield LogSource(path)
         else:
-            yield path
+            yield from sources([path], reading)[0]
+
+
+def _is_noisytest(path: Path) -> bool:
+    return path.is_dir() and any(path.glob("*.toml"))
 
 
 def _read(
-    path: Path, rate: float | None, highest: float
+    file: LogSource,
+    rate: float | None,
+    highest: float,
+    reading: Reading | None,
+    remark: Callable[[str], None],
 ) -> Iterator[tuple[Source, models.Recording]]:
-    if path.is_dir():
+    path = file.path
+    if _is_noisytest(path):
         for each in models.noisytest.read_folder(path, rate=rate):
             yield Source(path / each.name, each.rate), each
-    elif is_sample(path):
+    elif path.suffix == ".npz" and is_sample(path):
         own = Sample.load(path, only=WHOLE)
         wanted = min(rate or own.rate, highest)
         yield Source(path, wanted, own.robot), of_sample(path, wanted)
     else:
-        run, _ = without_placeholder(nm.Run.load(path))
+        opened = open_source(file, reading)
+        check_joints(opened.run.joint_names, opened.run.robot)
+        for line in (opened.assumed, *limit_warnings(opened.run)):
+            if line:
+                remark(f"{file.shown}: {line}")
+        run, _ = without_placeholder(opened.run)
         wanted = min(rate or run.rate, highest)
-        source = Source(path, wanted, run.robot or "", frozenset(run.joint_names))
-        yield source, of_run(path, run, wanted)
+        source = Source(file.shown, wanted, run.robot or "", frozenset(run.joint_names))
+        recording = of_run(file.shown, run, wanted, sha256=opened.sha256)
+        yield source, recording
 
 
 def _check(source: Source, first: Source, what: str) -> None:

@@ -12,6 +12,7 @@ from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
 from inspector.training.part import Part
+from inspector.wrongrobot import check_joints
 from models.logbands import HIGHEST, LOWEST
 from scenarios.sample import DECIMATED, Sample, is_sample
 from scenarios.signals import WHOLE
@@ -175,13 +176,14 @@ def of_annotated_run(path: Path, rate: float) -> models.Recording:
     return found
 
 
-def of_run(path: Path, run: nm.Run, rate: float) -> models.Recording:
+def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> models.Recording:
     """Noise of a run, annotated or not.
 
     Args:
         path: The run file.
         run: Its content.
         rate: The rate to decimate it to, in [Hz].
+        sha256: SHA-256 of the file; computed unless given.
 
     Returns:
         Its norms and joints with its blocks, if it has any, named as its file; with its robot
@@ -190,7 +192,9 @@ def of_run(path: Path, run: nm.Run, rate: float) -> models.Recording:
     Raises:
         SlowRunError: If the run's rate is lower.
         InspectorError: If the events of its meta are damaged.
+        UnknownJointError: If it names a joint that its robot lacks.
     """
+    check_joints(run.joint_names, run.robot)
     known = facts(run.robot, run.meta)
     if run.rate < rate * (1 - SLOWER):
         raise SlowRunError(path, run.rate, rate, known)
@@ -202,7 +206,7 @@ def of_run(path: Path, run: nm.Run, rate: float) -> models.Recording:
         blocks=tuple(models.Block(b.start, b.stop, b.label) for b in decimated.blocks),
         start=float(decimated.time[0]),
         valid=decimated.mask,
-        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=sha256 or hashlib.sha256(path.read_bytes()).hexdigest(),
         events=faults(path, run.meta, run.blocks),
         facts=known,
     )
