@@ -58,7 +58,7 @@ def _of_file(name: str, path: Path, modified: int) -> Mapping[str, Limits]:
             if joint.get("type") in SINGLE
         }
     else:
-        found = _of_model(Robot.load(name))
+        found = of_model(Robot.load(name))
     return MappingProxyType(found)
 
 
@@ -74,7 +74,8 @@ def _of_element(joint: ET.Element) -> Limits:
     )
 
 
-def _of_model(robot: Robot) -> dict[str, Limits]:
+def of_model(robot: Robot) -> dict[str, Limits]:
+    """Limits of a robot's joints as Pinocchio has read them, by name."""
     model, found = robot.model, {}
     for joint in robot.joints:
         if joint.kind in SINGLE:

@@ -129,8 +129,8 @@ def test_only_blocks_annotated_ok_are_learnt_from(folder, tmp_path):
             "recorded at 500 Hz, .*a.npz at 250 Hz; --rate 250 decimates the faster ones",
         ),
         (
-            run_of(1, robot="ur5"),
-            "a run of ur5, but .*a.npz of panda; an adapted model is of one robot",
+            run_of(1, robot="leg"),
+            "a run of leg, but .*a.npz of arm; an adapted model is of one robot",
         ),
         (
             run_of(1, names=("hip", "knee", "wrist")),
@@ -143,7 +143,7 @@ def test_only_blocks_annotated_ok_are_learnt_from(folder, tmp_path):
     ],
 )
 def test_runs_of_different_robots_or_rates_are_refused(folder, tmp_path, odd, message):
-    run_of(0, robot="panda").save(tmp_path / "a.npz")
+    run_of(0, robot="arm").save(tmp_path / "a.npz")
     odd.save(tmp_path / "b.npz")
     output = tmp_path / "model.npz"
     status, out, err = call("adapt", tmp_path, "-o", output, "--model", folder / "small.npz")

@@ -116,7 +116,7 @@ def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
             run_of(1, rate=2000.0),
             "recorded at 2000 Hz, .*a.npz at 1000 Hz; --rate 1000 decimates the faster ones",
         ),
-        (run_of(1, robot="ur5"), "a run of ur5, but .*a.npz of panda; a baseline is of one robot"),
+        (run_of(1, robot="leg"), "a run of leg, but .*a.npz of arm; a baseline is of one robot"),
         (
             run_of(1, names=("hip", "knee", "wrist")),
             r"has other joints than .*a.npz \(elbow, hip, knee\); a baseline is of one robot",
@@ -128,7 +128,7 @@ def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
     ],
 )
 def test_runs_of_different_robots_or_rates_are_refused(tmp_path, odd, message):
-    run_of(0, robot="panda").save(tmp_path / "a.npz")
+    run_of(0, robot="arm").save(tmp_path / "a.npz")
     odd.save(tmp_path / "b.npz")
     status, out, err = call("baseline", tmp_path, "-o", tmp_path / "model.npz")
     assert (status, out) == (3, "")

@@ -301,14 +301,33 @@ def test_joints_are_named_by_the_robot_if_they_are_all_there(tmp_path, library):
     assert tuple(names) == joints[:8]
     with (
         pytest.raises(
-            LiveError, match="7 velocities, and panda has 9 joints: panda_joint1, .*--na"
+            LiveError, match="10 velocities, and panda has 9 joints: panda_joint1, .*--na"
         ),
         inspector.LiveSession(
             RATE, robot="panda", save=tmp_path / "b.rrd", library=library
         ) as session,
     ):
-        session.push(velocity=np.zeros(7))
+        session.push(velocity=np.zeros(10))
     assert not (tmp_path / "b.rrd").exists()
+
+
+def test_fingers_that_the_samples_lack_are_assumed_stationary(tmp_path, library):
+    _, warned, summary = shown(tmp_path, motion(0.2, 7), robot="panda", library=library)
+    (line,) = warned
+    assert line.startswith("taken for panda_joint1, panda_joint2")
+    assert "assumed stationary: panda_finger_joint1, panda_finger_joint2" in line
+    assert summary.warnings == {"joints assumed stationary": 2}
+
+
+def test_motion_far_beyond_the_limits_of_the_robot_is_said_once(tmp_path, library):
+    signals = motion(3.0, 7)
+    signals["velocity"] = signals["velocity"] * 0.0 + 40.0  # degrees per second
+    options = {"robot": "panda", "joint_names": PANDA, "library": library}
+    _, warned, _ = shown(tmp_path, signals, **options)
+    assert warned == [
+        "panda_joint1 reaches 40 rad/s, far beyond the 2.17 rad/s of panda (6 more joints too):"
+        " another robot or unit?"
+    ]
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import noisemodel as nm
 from inspector.analysis.analyse import Analysis, analyse, robot_known
 from inspector.analysis.level import estimate
+from inspector.audit import summary
 from inspector.library import Library
 from noisemodel.types import Array
 
@@ -60,6 +61,8 @@ def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
         raise nm.UnknownKindError(kind, tuple(nm.KINDS))
     analysis = analyse(run, library)
     run, missing, extended = analysis.run, list(analysis.notes), None
+    if analysis.audit is not None:
+        missing += summary(analysis.audit, classes=False)
     if analysis.labels is None:
         missing.append(f"No labels: {analysis.reason}.")
     if not robot_known(run) or run.position is None:

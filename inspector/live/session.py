@@ -262,7 +262,11 @@ class LiveSession:
             self.note("missing signals", "no positions: the robot is not drawn")
         elif absent:
             line = f"not in the log, assumed stationary: {', '.join(absent)}"
-            self.note("joints assumed stationary", line, len(absent))
+            if self._names:
+                worker.remark(line)
+            else:  # which columns are which joints was assumed
+                line = f"taken for {', '.join(names)}; {line} (--names says otherwise)"
+                self.note("joints assumed stationary", line, len(absent))
         return SampleBuffer(size, widths, self._warnings), worker
 
     def _stamps(self, time: ArrayLike | None, samples: int) -> Array:

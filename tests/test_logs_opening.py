@@ -1,0 +1,258 @@
+"""A run file or any log is opened by every command that takes runs."""
+
+import json
+import shutil
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from commandline import call
+from csvlogs import TIME, log, swing, write
+
+import inspector
+from inspector.assets import demo_run
+from inspector.errors import InspectorError, LogError
+from inspector.logs import formats
+from inspector.logs.opening import Reading, Source, logs_in, open_run, open_source, sources
+from inspector.logs.options import ReadOptions
+from noisemodel import Run, RunFileError, UnknownRobotError
+
+READ = "read as 1 joint (elbow): position, velocity; angles taken for radians; 100 Hz"
+
+
+@pytest.fixture
+def run(tmp_path):
+    return saved(tmp_path / "run.npz")
+
+
+def saved(path, seconds=4.0, **fields):
+    time = np.arange(round(seconds * 1000)) / 1000
+    velocity = np.cos(time)[:, None]
+    Run(**{"time": time, "velocity": velocity, "joint_names": ("elbow",)} | fields).save(path)
+    return path
+
+
+def test_a_log_is_opened_as_import_reads_it(tmp_path):
+    opened = open_run(log(tmp_path))
+    imported = inspector.read_log(tmp_path / "log.csv").run
+    assert np.array_equal(opened.run.velocity, imported.velocity)
+    assert opened.assumed == f"{READ}; no robot (--robot NAME)"
+
+
+def test_a_run_file_is_opened_as_it_is_and_nothing_is_assumed(run):
+    opened = open_run(run)
+    assert opened.assumed == ""
+    assert np.array_equal(opened.run.velocity, Run.load(run).velocity)
+
+
+def test_the_robot_of_a_run_file_can_be_replaced_or_left_out(tmp_path):
+    run = saved(tmp_path / "run.npz", robot="anything")
+    options = ReadOptions(robot="double_pendulum")
+    assert open_run(run, Reading(options)).run.robot == "double_pendulum"
+    assert open_run(run, Reading(without_robot=True)).run.robot is None
+    with pytest.raises(UnknownRobotError, match="no robot 'pandda'"):
+        open_run(run, Reading(ReadOptions(robot="pandda")))
+
+
+def test_arrays_of_a_run_file_in_degrees_are_converted_on_request(tmp_path):
+    time = np.arange(400) / 100
+    np.savez(tmp_path / "a.npz", time=time, velocity=np.rad2deg(np.cos(time))[:, None])
+    opened = open_run(tmp_path / "a.npz", Reading(ReadOptions(units="degrees")))
+    assert np.abs(opened.run.velocity).max() == pytest.approx(1.0)
+    assert "angles taken for degrees" in opened.assumed
+
+
+def test_a_run_file_whose_stamps_jitter_is_resampled(tmp_path):
+    time = TIME + np.random.default_rng(0).uniform(-0.002, 0.002, len(TIME))
+    np.savez(tmp_path / "a.npz", time=time, velocity=np.cos(time)[:, None])
+    assert "resampled to 100 Hz" in open_run(tmp_path / "a.npz").assumed
+
+
+def test_a_run_file_with_an_unknown_array_is_refused_not_read_in_part(tmp_path):
+    np.savez(tmp_path / "a.npz", time=TIME, velocity=TIME[:, None], velocity_desird=TIME[:, None])
+    with pytest.raises(RunFileError, match="did you mean 'velocity_desired'"):
+        open_run(tmp_path / "a.npz")
+
+
+def test_arrays_of_a_simulator_are_a_log(tmp_path):
+    np.savez(tmp_path / "sim.npz", time=TIME, qpos=swing(TIME)[0][:, None])
+    opened = open_run(tmp_path / "sim.npz")
+    assert opened.run.joint_names == ("joint_0",)
+    assert "differentiated from positions" in opened.assumed
+
+
+def test_a_folder_is_its_logs_however_deep_and_other_files_are_named(tmp_path, run):
+    (tmp_path / "deep" / "er").mkdir(parents=True)
+    nested = log(tmp_path / "deep" / "er", name="b.csv")
+    (tmp_path / "notes.md").write_text("notes")
+    (tmp_path / ".hidden.csv").write_text("hidden")
+    found, others = sources([tmp_path])
+    assert [each.path for each in found] == [nested, run]
+    assert [each.name for each in others] == ["notes.md"]
+
+
+def test_a_folder_that_is_a_bag_or_a_data_set_is_one_log(tmp_path):
+    for name in ("bag/metadata.yaml", "episodes/meta/info.json"):
+        (tmp_path / name).parent.mkdir(parents=True)
+        (tmp_path / name).write_text("{}")
+    assert logs_in(tmp_path)[0] == (tmp_path / "bag", tmp_path / "episodes")
+
+
+def test_a_folder_without_logs_is_refused(tmp_path):
+    with pytest.raises(LogError, match=r"a folder without logs \(\.bag, \.csv"):
+        sources([tmp_path])
+
+
+def test_a_single_run_is_not_chosen_from_several(tmp_path, run):
+    log(tmp_path)
+    with pytest.raises(LogError, match=r"holds 2 logs \(log.csv, run.npz\); name one of them"):
+        open_run(tmp_path)
+
+
+@pytest.fixture
+def episodes(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    position, velocity = swing(TIME)
+    with h5py.File(tmp_path / "data.hdf5", "w") as file:
+        for name in ("demo_0", "demo_1"):
+            group = file.create_group(f"data/{name}/obs")
+            group["joint_pos"], group["joint_vel"] = position[:, None], velocity[:, None]
+    return tmp_path / "data.hdf5"
+
+
+def test_episodes_are_runs_of_their_own(episodes):
+    reading = Reading(ReadOptions(rate=100.0))
+    found, _ = sources([episodes], reading)
+    assert found == (Source(episodes, "demo_0"), Source(episodes, "demo_1"))
+    assert open_source(found[1], reading).run.rate == 100.0
+    with pytest.raises(LogError, match=r"holds 2 episodes \(demo_0, demo_1\); .*--episode"):
+        open_run(episodes, reading)
+    with pytest.raises(LogError, match="there is no episode 'demo_7'"):
+        open_run(episodes, Reading(ReadOptions(rate=100.0), episodes=("demo_7",)))
+
+
+def test_episodes_are_classified_one_by_one(episodes, tmp_path):
+    _, out, err = call("classify", episodes, "--rate", 100, "--labels-to", tmp_path / "out")
+    assert f"{episodes}/demo_0: " in out
+    assert f"{episodes}/demo_1: " in out
+    assert err.count("read as 1 joint") == 1  # once for those that were read alike
+    assert "demo_0 and 1 more: read as" in err
+
+
+def test_a_desired_log_belongs_to_one_log(tmp_path, run):
+    measured, desired = log(tmp_path), log(tmp_path, name="desired.csv")
+    opened = open_run(measured, Reading(desired=desired))
+    assert opened.run.velocity_desired is not None
+    with pytest.raises(InspectorError, match="belongs to one log, 2 are given"):
+        sources([measured, run], Reading(desired=desired))
+    status, _, err = call("view", run, run, "--desired", desired)
+    assert (status, "belongs to one log, 2 are given" in err) == (2, True)
+
+
+def test_two_files_of_one_recording_are_two_runs_unless_one_is_named_desired(tmp_path):
+    log(tmp_path, name="measured.csv")
+    log(tmp_path, name="desired.csv")
+    assert len(sources([tmp_path])[0]) == 2
+
+
+def test_a_missing_extra_is_named_with_the_line_to_type(tmp_path, monkeypatch):
+    (tmp_path / "a.hdf5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
+    monkeypatch.setattr(formats, "find_spec", lambda name: None)
+    status, _, err = call("classify", tmp_path / "a.hdf5")
+    assert status == 3
+    assert "pip install 'noise-inspector[hdf5]'" in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_of_a_mixed_folder_the_unreadable_is_named_and_the_rest_is_done(tmp_path, jobs):
+    shutil.copy(demo_run(), tmp_path / "demo.npz")
+    log(tmp_path)
+    (tmp_path / "broken.csv").write_text("a,b\n1,2\n")
+    (tmp_path / "notes.md").write_text("notes")
+    saved(tmp_path / "short.npz", seconds=0.1)
+    status, out, err = call("classify", tmp_path, "-j", jobs, "--format", "json")
+    assert status == 3
+    runs = {Path(each["run"]).name: each for each in json.loads(out)["runs"]}
+    assert {name: each["status"] for name, each in runs.items()} == {
+        "broken.csv": "bad-input",
+        "demo.npz": "findings",
+        "log.csv": "ok",
+        "short.npz": "cannot-tell",
+    }
+    assert runs["log.csv"]["assumed"].startswith(READ)
+    assert runs["demo.npz"]["assumed"] == ""
+    assert "1 other file left out: notes.md" in err
+    assert f"inspector: {tmp_path / 'broken.csv'}: no time column" in err
+
+
+def test_a_run_too_short_for_a_frame_does_not_make_a_batch_bad_input(tmp_path):
+    for seconds in (0.002, 0.01, 0.3):
+        short = saved(tmp_path / f"{seconds}.npz", seconds=seconds)
+        assert call("classify", short)[0] == 4
+        assert call("audit", short)[0] == 4
+    lines = ["time,elbow.velocity", *(f"{n / 1000},{n % 7}" for n in range(300))]
+    (tmp_path / "short.csv").write_text("\n".join(lines))
+    status, out, _ = call("classify", tmp_path)
+    assert status == 4
+    assert out.count("is too short: a frame takes 400") == 4
+
+
+@pytest.mark.parametrize("format_", ["json", "junit", "github"])
+def test_what_was_assumed_does_not_pollute_what_programs_read(tmp_path, format_):
+    _, out, err = call("classify", log(tmp_path), "--format", format_)
+    assert err == f"{tmp_path / 'log.csv'}: {READ}; no robot (--robot NAME)\n"
+    if format_ == "json":
+        json.loads(out)
+    elif format_ == "junit":
+        ET.fromstring(out)
+    else:
+        assert not [line for line in out.splitlines() if line and not line.startswith("::")]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["noise"],
+        ["audit"],
+        ["listen", "-o", "noise.wav"],
+        ["export", "-o", "noise.csv"],
+        ["view", "--save", "log.rrd"],
+        ["report", "-o", "log.html"],
+        ["import", "-o", "run.npz"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_every_command_that_takes_a_run_takes_a_log(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(2000) / 1000
+    write(tmp_path / "log.csv", {"time": time, "my velocity": np.cos(time)})
+    name, *options = command
+    status, out, err = call(name, "log.csv", *options, "--map", "velocity.elbow=my velocity")
+    assert status == 0, err
+    if name not in ("import", "report"):
+        assert "read as 1 joint (elbow): velocity" in (out + err).replace("Read", "read")
+
+
+def test_a_baseline_is_trained_on_logs_as_on_run_files(tmp_path):
+    time = np.arange(30_000) / 1000
+    noise = np.random.default_rng(0).normal(0, 0.01, (2, len(time)))
+    for name, extra in zip(("a", "b"), noise, strict=True):
+        velocity = np.cos(time) + extra
+        write(tmp_path / f"{name}.csv", {"time": time, "elbow.velocity": velocity})
+    status, _, err = call("baseline", tmp_path, "-o", tmp_path / "model.npz")
+    assert status == 0, err
+    assert "a.csv: read as 1 joint (elbow): velocity" in err
+
+
+def test_a_log_is_analysed_from_python(tmp_path):
+    analysis = inspector.analyse(log(tmp_path))
+    assert analysis.assumed.startswith(READ)
+    assert analysis.remarks[0].startswith("Read as 1 joint")
+
+
+def test_a_csv_named_log_is_not_taken_for_noisytests(tmp_path):
+    status, _, err = call("classify", log(tmp_path, name="robot.log"))
+    assert status == 0, err
+    assert READ in err

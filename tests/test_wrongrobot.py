@@ -1,0 +1,114 @@
+"""A run of another robot than it names is noticed by every command."""
+
+import numpy as np
+import pytest
+from commandline import call
+
+import noisemodel as nm
+from inspector.wrongrobot import WrongRobotError, check_joints, limit_warnings
+from noisemodel.limits import Limits, joint_limits, of_model
+
+PANDA = tuple(f"panda_joint{number}" for number in range(1, 8))
+
+
+def panda(names=PANDA, factor=1.0, robot="panda", seconds=3.0):
+    time = np.arange(round(seconds * 1000)) / 1000
+    middle = np.array([0, 0, 0, -1.5, 0, 1.8, 0])
+    swing = 0.3 * np.sin(2 * time)[:, None] * np.ones(7)
+    return nm.Run(
+        time=time,
+        velocity=factor * 0.6 * np.cos(2 * time)[:, None] * np.ones(7),
+        position=factor * (middle + swing),
+        joint_names=names,
+        robot=robot,
+    )
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "go2", "tiago", "double_pendulum_continuous"])
+def test_limits_are_those_that_pinocchio_reads(name):
+    assert dict(joint_limits(name)) == of_model(nm.Robot.load(name))
+
+
+def test_a_joint_without_a_limit_has_none(tmp_path):
+    (tmp_path / "arm.urdf").write_text(
+        "<robot name='arm'><link name='a'/><link name='b'/><joint name='j' type='continuous'>"
+        "<parent link='a'/><child link='b'/><axis xyz='0 0 1'/></joint></robot>"
+    )
+    assert joint_limits(tmp_path / "arm.urdf") == {"j": Limits()}
+
+
+def test_joints_that_the_run_lacks_are_assumed_stationary():
+    assert check_joints(PANDA, "panda") == ("panda_finger_joint1", "panda_finger_joint2")
+    assert check_joints(("anything",), "my robot") == ()
+    assert check_joints(("anything",), None) == ()
+
+
+def test_a_joint_that_the_robot_lacks_is_refused():
+    with pytest.raises(WrongRobotError, match="no joint 'hip' in robot 'panda'; .*--robot NAME"):
+        check_joints(("hip",), "panda")
+
+
+def test_a_robot_with_its_own_motion_is_not_suspected():
+    assert list(limit_warnings(panda())) == []
+    assert list(limit_warnings(nm.Run.load("assets/runs/demo.npz"))) == []
+
+
+def test_degrees_exceed_the_limits_of_a_robot():
+    position, velocity = limit_warnings(panda(factor=180 / np.pi))
+    assert "panda_joint" in position
+    assert "rad, far beyond the" in position
+    assert "rad/s, far beyond the 2.17 rad/s of panda (6 more joints too)" in velocity
+
+
+def test_a_fault_that_exceeds_limits_for_a_moment_is_not_another_robot():
+    run = panda()
+    run.velocity[1000:1200] = 50.0
+    assert list(limit_warnings(run)) == []
+
+
+COMMANDS = [
+    ["classify"],
+    ["audit"],
+    ["noise"],
+    ["view", "--save", "run.rrd"],
+    ["view", "--no-robot", "--save", "run.rrd"],
+    ["report", "-o", "run.html"],
+    ["listen", "-o", "run.wav"],
+    ["export", "-o", "run.csv"],
+    ["baseline", "-o", "model.npz"],
+    ["adapt", "-o", "model.npz"],
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS, ids=" ".join)
+def test_every_command_refuses_a_run_whose_joints_the_robot_lacks(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    panda(robot="ur5").save(tmp_path / "run.npz")
+    name, *options = command
+    status, _, err = call(name, "run.npz", *options)
+    assert status == 3
+    assert "no joint 'panda_joint1' in robot 'ur5'; it has shoulder_pan_joint" in err
+    assert "--robot NAME" in err
+
+
+@pytest.mark.parametrize("command", COMMANDS[:-2], ids=" ".join)
+def test_every_command_remarks_limits_that_are_exceeded_by_far(tmp_path, monkeypatch, command):
+    monkeypatch.chdir(tmp_path)
+    panda(factor=180 / np.pi).save(tmp_path / "run.npz")
+    name, *options = command
+    _, out, err = call(name, "run.npz", *options)
+    page = (tmp_path / "run.html").read_text() if name == "report" else ""
+    assert "far beyond the" in out + err + page
+
+
+def test_the_robot_that_a_run_names_can_be_overruled(tmp_path):
+    panda(robot="ur5").save(tmp_path / "run.npz")
+    assert call("classify", tmp_path / "run.npz", "--robot", "panda")[0] == 0
+    assert call("classify", tmp_path / "run.npz", "--robot", "none")[0] == 0
+
+
+def test_a_robot_whose_file_is_gone_is_said_and_the_run_is_classified(tmp_path):
+    panda(robot=str(tmp_path / "gone.urdf")).save(tmp_path / "run.npz")
+    status, out, _ = call("classify", tmp_path / "run.npz")
+    assert status == 0
+    assert "the joints are not checked" in out
