@@ -6,6 +6,7 @@ moment is what a fault looks like; another robot, or another unit, exceeds it al
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,10 +41,36 @@ def check_joints(joints: Sequence[str], robot: str | None) -> tuple[str, ...]:
         WrongRobotError: If the robot lacks one of the joints, naming the first.
     """
     known = _known(robot)
-    for joint in joints if known else ():
-        if joint not in known:
+    for joint in _named(joints, known):
+        if known and joint not in known:
             raise WrongRobotError(joint, str(robot), tuple(known))
-    return tuple(name for name in known if name not in joints)
+    return tuple(name for name in known if name not in _named(joints, known))
+
+
+def named(run: Run) -> Run:
+    """Give joints that a run numbers, since its file does not name them, its robot's names.
+
+    Args:
+        run: The run.
+
+    Returns:
+        The run itself unless its joints are called joint1, joint2 and so on, and those of its robot
+        are not; else one with the first names of its robot, in the order of the robot's file.
+    """
+    names = _named(run.joint_names, _known(run.robot))
+    if names == run.joint_names or len(names) != len(run.joint_names):
+        return run
+    same = run.desired_joint_names == run.joint_names
+    desired = names if same else run.desired_joint_names
+    return replace(run, joint_names=names, desired_joint_names=desired)
+
+
+def _named(joints: Sequence[str], known: Mapping[str, Limits]) -> tuple[str, ...]:
+    """Names of joints, those of the robot in place of mere numbers if it has as many joints."""
+    numbered = all(joint == f"joint{place}" for place, joint in enumerate(joints, start=1))
+    if numbered and len(joints) <= len(known) and not set(joints) & set(known):
+        return tuple(known)[: len(joints)]
+    return tuple(joints)
 
 
 def limit_warnings(run: Run) -> Iterator[str]:

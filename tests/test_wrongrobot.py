@@ -112,3 +112,21 @@ def test_a_robot_whose_file_is_gone_is_said_and_the_run_is_classified(tmp_path):
     status, out, _ = call("classify", tmp_path / "run.npz")
     assert status == 0
     assert "the joints are not checked" in out
+
+
+def test_joints_that_a_run_file_does_not_name_are_those_of_its_robot_in_order(tmp_path):
+    run = panda()
+    np.savez(
+        tmp_path / "run.npz",
+        time=run.time,
+        velocity=run.velocity,
+        position=run.position,
+        robot="panda",
+    )
+    status, out, err = call("view", tmp_path / "run.npz", "--save", tmp_path / "run.rrd")
+    assert status == 0, err
+    assert "Joints are not named: taken for panda_joint1 to panda_joint7." in out
+    assert "assumed stationary: panda_finger_joint1, panda_finger_joint2" in out
+    np.savez(tmp_path / "ten.npz", time=run.time, velocity=np.zeros((3000, 10)), robot="panda")
+    status, _, err = call("classify", tmp_path / "ten.npz")
+    assert (status, "no joint 'joint1' in robot 'panda'" in err) == (3, True)

@@ -14,6 +14,7 @@ from inspector.logs.log import Progress, without_progress
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import jobs_of
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, listed
+from inspector.wrongrobot import named
 from noisemodel import NoiseModelError, Run, RunFileError
 from noisemodel.checks import NotUniformError
 from noisemodel.limits import joint_limits
@@ -67,7 +68,7 @@ class Opened:
     Attributes:
         run: The run.
         assumed: Joints, units, rate and robot, and all that was decided, in one line; empty for a
-            run file.
+            run file that names its joints.
         source: Where it is from.
     """
 
@@ -137,7 +138,10 @@ def open_source(
         joint_limits(robot)  # a name that a run names may be any, one that a user types may not
     if robot or reading.without_robot:
         run = replace(run, robot=robot or None)
-    return Opened(run, "", source)
+    by_robot = named(run)
+    if by_robot is run:
+        return Opened(run, "", source)
+    return Opened(by_robot, f"joints are not named: taken for {_listed(by_robot)}", source)
 
 
 def sources(
@@ -229,13 +233,17 @@ def assumed(imported: Imported, path: Path) -> str:
 
 def _joints(run: Run) -> str:
     names = run.joint_names
-    shown = ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
     signals: dict[str, Real | None] = {
         name: getattr(run, name) for name in (*JOINT_SIGNALS, *BASE_SIGNALS)
     }
     held = [name.replace("_", " ") for name, signal in signals.items() if signal is not None]
     plural = "" if len(names) == 1 else "s"
-    return f"read as {len(names)} joint{plural} ({shown}): {', '.join(held)}"
+    return f"read as {len(names)} joint{plural} ({_listed(run)}): {', '.join(held)}"
+
+
+def _listed(run: Run) -> str:
+    names = run.joint_names
+    return ", ".join(names) if len(names) <= 3 else f"{names[0]} to {names[-1]}"
 
 
 def _episodes(path: Path, reading: Reading) -> Iterator[Source]:
