@@ -226,7 +226,11 @@ def assumed(imported: Imported, path: Path) -> str:
         f"{run.rate:g} Hz",
         f"robot {run.robot}" if run.robot else "no robot (--robot NAME)",
         *(["the log describes its robot, which `import` keeps"] if imported.urdf else []),
-        *(remark.removeprefix(f"{path.name}: ") for remark in imported.remarks),
+        *(
+            remark.removeprefix(f"{path.name}: ")
+            for remark in imported.remarks
+            if not remark.startswith("time starts at 0")  # says where `import` keeps it
+        ),
     ]
     return "; ".join(" ".join(part.split()) for part in parts)
 
