@@ -39,3 +39,11 @@ def test_every_command_of_the_readme_exists():
     used = set(re.findall(r"^(?:\.venv/bin/)?inspector (\w+)", README, flags=re.MULTILINE))
     assert used <= known
     assert {"view", "classify", "import", "simulate", "train", "evaluate"} <= used
+
+
+def test_pictures_of_the_first_log_are_small_and_fetch_nothing():
+    pictures = sorted((Path(__file__).parents[1] / "assets" / "pictures").glob("first-log-*"))
+    assert len(pictures) == 2
+    assert all(picture.stat().st_size < 200_000 for picture in pictures)
+    (svg,) = (picture.read_text() for picture in pictures if picture.suffix == ".svg")
+    assert not re.search(r"url\((?!#)", svg)
