@@ -1,4 +1,4 @@
-"""The robots that can be loaded by name: those of example-robot-data."""
+"""The robots that can be loaded by name: those of example-robot-data and of MuJoCo Menagerie."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -6,7 +6,13 @@ from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from types import MappingProxyType
 
-from noisemodel.errors import RobotError
+from noisemodel.errors import RobotError, UnknownRobotError
+
+MENAGERIE = "menagerie/"
+"""What the names of MuJoCo Menagerie's robots begin with: menagerie/unitree_go2."""
+
+SUFFIXES = (".urdf", ".xml", ".mjcf")
+"""How the names of files that describe robots end."""
 
 
 @dataclass(frozen=True)
@@ -134,3 +140,41 @@ def urdf_path(name: str) -> Path:
         RobotError: If example-robot-data is not installed.
     """
     return package_roots()[-1] / ROBOTS[name].urdf
+
+
+def is_name(name: str) -> bool:
+    """Whether a text is a listed robot, or names one of MuJoCo Menagerie."""
+    return name in ROBOTS or name.startswith(MENAGERIE)
+
+
+def is_file_name(name: str) -> bool:
+    """Whether a text is the path of a URDF or an MJCF, by its end."""
+    return name.lower().endswith(SUFFIXES)
+
+
+def menagerie_path(name: str) -> Path:
+    """Find the MJCF of a robot of MuJoCo Menagerie; the package downloads it at its first use.
+
+    Args:
+        name: ``menagerie/NAME`` for the robot alone, or ``menagerie/NAME/ENTRY`` for one of the
+            other files that its folder has, such as ``scene``.
+
+    Raises:
+        RobotError: If mujoco-menagerie is not installed, or the robot cannot be downloaded.
+        UnknownRobotError: If there is no such robot.
+    """
+    try:
+        import mujoco_menagerie
+    except ImportError as error:
+        raise RobotError(
+            f"{name}: the robots of MuJoCo Menagerie need its package;"
+            " `pip install 'noise-inspector[menagerie]'`"
+        ) from error
+    folder, _, entry = name.removeprefix(MENAGERIE).partition("/")
+    if folder not in mujoco_menagerie.names():
+        raise UnknownRobotError(name, [*ROBOTS, *(MENAGERIE + n for n in mujoco_menagerie.names())])
+    robot = mujoco_menagerie.get(folder)
+    try:
+        return Path(robot.xml(entry or robot.default_model))
+    except (mujoco_menagerie.MenagerieError, OSError) as error:
+        raise RobotError(f"{name}: {' '.join(str(error).split())}") from error

@@ -81,7 +81,7 @@ def compare(
     reason.
 
     Args:
-        robots: One or many: a ``Robot``, a listed name, or the path of a URDF (``*.urdf``); or a
+        robots: One or many: a ``Robot``, a name, or the path of a URDF or an MJCF; or a
             ``Run``, or the path of a run file (a ``Path``, or text that ends in ``.npz``), for the
             robot that it names and the motion that it holds. Of a run with gaps the longest stretch
             without one is compared.

@@ -113,7 +113,7 @@ class MissingMeshError(MeshError):
 
 
 class UnknownRobotError(RobotError):
-    """A name that is no listed robot, and no URDF file either.
+    """A name that is no listed robot, and no file of one either.
 
     Args:
         name: The name that was given.
@@ -123,7 +123,7 @@ class UnknownRobotError(RobotError):
     def __init__(self, name: str, known: Iterable[str]) -> None:
         self.name, self.known = name, tuple(known)
         super().__init__(
-            f"no robot {name!r}: neither a URDF file nor a listed name{hint(name, self.known)};"
+            f"no robot {name!r}: neither a URDF or MJCF file nor a listed name{hint(name, self.known)};"
             " `inspector robots` lists the names"
         )
 

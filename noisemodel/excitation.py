@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from noisemodel.block import Block
-from noisemodel.catalog import ROBOTS
+from noisemodel.catalog import is_name
 from noisemodel.errors import NoiseModelError
 from noisemodel.robot import Robot
 from noisemodel.run import Run
@@ -108,14 +108,14 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
         position=bounds.centre + np.cumsum(velocity, axis=0) / rate - scale * (low + high) / 2,
         base_velocity=base,
         joint_names=robot.joint_names,
-        robot=robot.name if robot.name in ROBOTS else str(robot.path),
+        robot=robot.name if is_name(robot.name) else str(robot.path),
         blocks=tuple(blocks),
         meta={"scenario": "excitation", "seed": seed},
     )
 
 
 def limits(robot: Robot) -> Limits:
-    """Limits in the URDF of each joint that does not mimic another one.
+    """Limits in the URDF or MJCF of each joint that does not mimic another one.
 
     Args:
         robot: The robot.

@@ -1,7 +1,7 @@
 """The surface of every link of a robot, as triangles."""
 
 from collections import defaultdict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
@@ -25,7 +25,7 @@ GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "auto": ("visual", "collision"),
     }
 )
-"""The geometries, and the shapes in the URDF that each takes: the first that a link has."""
+"""The geometries, and the shapes of the URDF or MJCF that each takes: the first that a link has."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +73,7 @@ def triangles(
 
     Args:
         robot: The robot.
-        geometry: "visual" or "collision", as the URDF has them; "hull", the convex hull of every
+        geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of every
             visual by itself; or "auto", the visual or, of a link that has none, the collision.
         missing: What to do about a mesh that is not there: "error", or "skip" it with a warning.
 
@@ -91,12 +91,7 @@ def triangles(
         if word not in known:
             raise GeometryError(f"{name} {word!r} is not known, expected one of {', '.join(known)}")
     places, names = _links(robot)
-    reader = meshfile.hull if geometry == "hull" else meshfile.read
-
-    @cache  # left and right often share a mesh
-    def mesh(address: str) -> Array:
-        return reader(meshpath.find(address, robot.path, robot.package_roots))
-
+    mesh = _reader(robot, hull=geometry == "hull")
     surfaces = [np.empty((0, 3, 3))] * len(names)
     kinds = ["none"] * len(names)
     absent: list[str] = []
@@ -104,7 +99,7 @@ def triangles(
         if "none" not in kinds:
             break
         pieces: dict[int, list[Array]] = defaultdict(list)
-        for shape in linkshapes.read(robot.path, use):
+        for shape in shapes_of(robot, use):
             joint, rotation, translation = places[shape.link]
             if joint == 0 or kinds[joint - 1] != "none":
                 continue
@@ -128,8 +123,51 @@ def triangles(
     )
 
 
+def shapes_of(robot: Robot, use: str) -> Sequence[LinkShape]:
+    """The geometry of all links of a robot, as its URDF or MJCF has it.
+
+    Args:
+        robot: The robot.
+        use: "visual" or "collision".
+
+    Raises:
+        GeometryError: If a shape of the URDF is wrong.
+    """
+    if robot.mjcf is None:
+        return linkshapes.read(robot.path, use)
+    return robot.mjcf.visual if use == "visual" else robot.mjcf.collision
+
+
+def link_names(robot: Robot) -> tuple[str, ...]:
+    """The child link of each joint, in the joints' order."""
+    return _links(robot)[1]
+
+
+def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
+    """Draw the visual geometry of a robot piece by piece, what is fixed to the world included.
+
+    Yields:
+        Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
+        has it; and its triangles in the joint's axes, shape (triangles, 3 corners, 3), in [m].
+
+    Raises:
+        GeometryError: As `triangles`.
+    """
+    places, _ = _links(robot)
+    mesh = _reader(robot, hull=False)
+    for shape in shapes_of(robot, "visual"):
+        joint, rotation, translation = places[shape.link]
+        yield joint, shape, _placed(shape, mesh, rotation, translation)
+
+
+def _reader(robot: Robot, *, hull: bool) -> Callable[[str], Array]:
+    """Reads meshes by their addresses, each once: left and right often share one."""
+    read = meshfile.hull if hull else meshfile.read
+    return cache(lambda address: read(meshpath.find(address, robot.path, robot.package_roots)))
+
+
 def _links(robot: Robot) -> tuple[dict[str, tuple[int, Array, Array]], tuple[str, ...]]:
-    """Joint that moves each link of the URDF, the link's pose there, and the links' names."""
+    """Joint that moves each link of the robot, the link's pose there, and the links' names."""
     from pinocchio import FrameType
 
     bodies = [frame for frame in robot.model.frames if frame.type == FrameType.BODY]

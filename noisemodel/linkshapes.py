@@ -25,12 +25,14 @@ class LinkShape:
         translation: The geometry's origin in the link's axes, shape (3,), in [m].
         body: The address of a mesh, or the triangles of a simple shape, shape (triangles,
             3 corners, 3), in [m].
+        colour: Red, green, blue and opacity, from 0 to 1; empty unless it was read.
     """
 
     link: str
     matrix: Array
     translation: Array
     body: str | Array
+    colour: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from noisemodel.block import Block
+from noisemodel.catalog import is_file_name
 from noisemodel.differentiate import stretches
 from noisemodel.errors import NoiseModelError, RobotError, RunError, UnknownMotionError
 from noisemodel.excitation import RATE, excitation
@@ -22,7 +23,7 @@ MOTIONS: Mapping[str, Callable[..., Run]] = MappingProxyType({EXCITATION: excita
 """The built-in motions: each takes a robot, a seed and a rate in [Hz], and returns a run."""
 
 Source: TypeAlias = Robot | Run | Path | str
-"""A robot, its listed name or the path of its URDF; or a run, or the path of a run file."""
+"""A robot, its listed name or the path of its URDF or MJCF; or a run, or the path of a run file."""
 
 Motion: TypeAlias = Run | tuple[Real, Real] | str
 """A run, a pair of q and v, or the name of a built-in motion."""
@@ -183,7 +184,7 @@ def _is_pair(motion: object) -> bool:
 def _is_run(source: Source) -> bool:
     """Whether a source is a run or a run file."""
     if isinstance(source, Path):
-        return source.suffix.lower() != ".urdf"
+        return not is_file_name(source.name)
     return isinstance(source, Run) or (isinstance(source, str) and source.endswith(".npz"))
 
 

@@ -11,9 +11,10 @@ from typing import Any, Self
 
 import numpy as np
 
-from noisemodel import catalog, urdf
+from noisemodel import catalog, mjcf, urdf
 from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRobotError
 from noisemodel.joints import Joint, table_of
+from noisemodel.mjcf import Mjcf
 from noisemodel.run import Run
 from noisemodel.types import Array, Real
 from noisemodel.urdf import Mimic
@@ -27,8 +28,8 @@ class Robot:
     """A robot with its kinematics.
 
     Attributes:
-        name: Its name in the list, or that of its URDF file.
-        path: The URDF that it was read from.
+        name: Its name in the list, or that of its file.
+        path: The URDF or MJCF that it was read from.
         package_roots: Folders that ``package://`` addresses are searched in.
         model: Pinocchio's model; mimic joints are joints of their own in it.
         joints: All joints after the universe, in Pinocchio's order.
@@ -36,6 +37,7 @@ class Robot:
         nv: Length of a velocity.
         floating_base: Whether the base moves freely.
         mimics: The joints that follow another one; empty where they are independent.
+        mjcf: What an MJCF describes; None if the robot is from a URDF.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Robot:
     nv: int
     floating_base: bool
     mimics: Mapping[str, Mimic]
+    mjcf: Mjcf | None = None
 
     @classmethod
     def load(
@@ -55,9 +58,11 @@ class Robot:
         """Read a robot.
 
         Args:
-            name: A listed name (see ``noisemodel.ROBOTS``), or the path of a URDF.
-            floating_base: Whether the base moves freely; unless given, as listed, and
-                False for a URDF of one's own.
+            name: A listed name (see ``noisemodel.ROBOTS``), ``menagerie/NAME`` or
+                ``menagerie/NAME/ENTRY`` for a robot of MuJoCo Menagerie, or the path of a URDF
+                (``*.urdf``) or of an MJCF (``*.xml``).
+            floating_base: Whether the base moves freely; unless given, as listed, False for a URDF
+                of one's own, and as an MJCF has it.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
 
         Returns:
@@ -65,29 +70,35 @@ class Robot:
 
         Raises:
             UnknownRobotError: If there is neither such a name nor such a file.
-            RobotError: If the URDF cannot be read.
+            RobotError: If the URDF or MJCF cannot be read.
         """
         listed = catalog.ROBOTS.get(str(name))
         path = locate(name)
-        if floating_base is None:
-            floating_base = listed is not None and listed.floating_base
-        description = urdf.read(path)
-        model = _model(path, floating_base)
+        description: urdf.Urdf | Mjcf
+        if mjcf.is_mjcf(path):
+            description = mjcf.read(path, package_roots(path), floating_base)
+            model, floating_base = description.model, description.floating_base
+        else:
+            if floating_base is None:
+                floating_base = listed is not None and listed.floating_base
+            description = urdf.read(path)
+            model = _model(path, floating_base)
         table = table_of(model)
         mimics = description.mimics if mimic else {}
         if mimic:
             table = _coupled(table, mimics, path)
         independent = [joint for joint in table if joint.name not in mimics]
         return cls(
-            name=str(name) if listed else path.stem,
+            name=str(name) if catalog.is_name(str(name)) else path.stem,
             path=path,
-            package_roots=package_roots(name),
+            package_roots=package_roots(name if listed else path),
             model=model,
             joints=table,
             nq=sum(joint.nq for joint in independent),
             nv=sum(joint.nv for joint in independent),
             floating_base=floating_base,
             mimics=mimics,
+            mjcf=description if isinstance(description, Mjcf) else None,
         )
 
     @property
@@ -192,18 +203,22 @@ class Robot:
 
 
 def locate(name: str | Path) -> Path:
-    """Find the URDF of a listed robot, or of one given by its path.
+    """Find the URDF or MJCF of a robot that is given by its name or its path.
 
     Raises:
         UnknownRobotError: If there is neither such a name nor such a file.
+        RobotError: If a robot of MuJoCo Menagerie cannot be had.
     """
     if str(name) in catalog.ROBOTS:
         return catalog.urdf_path(str(name))
     path = Path(name)
-    if path.suffix.lower() == ".urdf" or path.is_file():
-        if not path.is_file():
-            raise RobotError(f"{path}: there is no such URDF file")
+    if path.is_file():
         return path
+    if catalog.is_name(str(name)):
+        return catalog.menagerie_path(str(name))
+    if catalog.is_file_name(str(name)):
+        kind = "URDF" if path.suffix.lower() == ".urdf" else "MJCF"
+        raise RobotError(f"{path}: there is no such {kind} file")
     raise UnknownRobotError(str(name), catalog.ROBOTS)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from noisemodel import checks, differentiate, runfile
 from noisemodel.block import Block
+from noisemodel.catalog import is_file_name
 from noisemodel.errors import RunError, RunFileError
 from noisemodel.types import Array, Mask, Real
 
@@ -50,7 +51,7 @@ class Run:
         base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (samples, 7).
         base_velocity: Linear, then angular velocity of the base in its own axes,
             shape (samples, 6), in [m/s] and [rad/s].
-        robot: Name of a listed robot, or path of a URDF.
+        robot: Name of a listed robot or of one of MuJoCo Menagerie, or path of a URDF or an MJCF.
         blocks: Annotated stretches, sorted, not overlapping.
         meta: What else is known: scenario, seed, software version, source…
 
@@ -193,7 +194,7 @@ class Run:
         """Read a run file; velocities that are missing are differentiated from positions.
 
         Args:
-            path: A ``run.npz``, version 1. A robot that it names by a relative URDF path is
+            path: A ``run.npz``, version 1. A robot that it names by a relative path is
                 looked for beside the file.
 
         Returns:
@@ -303,17 +304,13 @@ def _names(arrays: Mapping[str, NDArray[Any]], name: str, default: list[str]) ->
 
 def _robot(arrays: Mapping[str, NDArray[Any]], folder: Path) -> str | None:
     robot = str(arrays.get("robot", ""))
-    return str(folder / robot) if _is_urdf(robot) else robot or None
+    return str(folder / robot) if is_file_name(robot) else robot or None
 
 
 def _robot_from(folder: Path, robot: str) -> str:
-    """Path of a URDF relative to the folder of the run file."""
-    moves = _is_urdf(robot) and not Path(robot).is_absolute()
+    """Path of a URDF or an MJCF relative to the folder of the run file."""
+    moves = is_file_name(robot) and not Path(robot).is_absolute()
     return os.path.relpath(robot, folder) if moves else robot
-
-
-def _is_urdf(robot: str) -> bool:
-    return robot.lower().endswith(".urdf")
 
 
 def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:

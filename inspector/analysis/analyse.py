@@ -30,6 +30,7 @@ from inspector.library import (
 from inspector.localisation.extent import extent
 from inspector.logs.opening import Opened, open_run
 from models import Event
+from noisemodel.catalog import is_file_name, is_name
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
@@ -329,8 +330,8 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
 
 
 def robot_known(run: nm.Run) -> bool:
-    """Whether a run names a listed robot, or a URDF."""
-    return run.robot is not None and (run.robot in nm.ROBOTS or run.robot.endswith(".urdf"))
+    """Whether a run names a robot that can be read by its name, or a URDF or an MJCF."""
+    return run.robot is not None and (is_name(run.robot) or is_file_name(run.robot))
 
 
 def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis:
@@ -397,7 +398,7 @@ def _missing(run: nm.Run) -> Iterator[str]:
     if run.robot is None:
         yield "No 3D robot: the run names none."
     elif not robot_known(run):
-        yield f"No 3D robot: {run.robot!r} is neither a listed robot nor a URDF file."
+        yield f"No 3D robot: {run.robot!r} is neither a listed robot nor a URDF or MJCF file."
     elif run.position is None:
         yield "No 3D robot: the run has no positions."
     elif run.base_pose is None and run.robot in nm.ROBOTS and nm.ROBOTS[run.robot].floating_base:

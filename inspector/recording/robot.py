@@ -1,8 +1,8 @@
-"""The robot in a recording, from its URDF, and its motion."""
+"""The robot in a recording, from its URDF or MJCF, and its motion."""
 
 import hashlib
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -10,12 +10,16 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
+from scipy.spatial.transform import Rotation
 
 import noisemodel
 from inspector.errors import InspectorError
 from inspector.recording import series, unstable
 from noisemodel import meshfile, meshpath, robot, urdf
 from noisemodel.errors import UnknownJointError
+from noisemodel.geometry import link_names, pieces
+from noisemodel.mjcf import is_mjcf
+from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.types import Array
 
@@ -36,7 +40,7 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
     """Read the robot that a run names, for drawing.
 
     Args:
-        name: A listed robot, or the path of a URDF.
+        name: A robot's name, or the path of a URDF or an MJCF.
         folder: Takes what rerun reads in place of the robot's own files, as late as when the tree
             is logged: it has to stay until then.
         joint_names: Joints that the robot has to have.
@@ -45,15 +49,18 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
         Rerun's tree of its links and joints.
 
     Raises:
-        RobotError: If there is no such robot, or its URDF cannot be read.
+        RobotError: If there is no such robot, or it cannot be read.
         MeshError: If one of its meshes cannot be read.
         UnknownJointError: If the robot lacks one of the joints, naming the first.
     """
     path = robot.locate(name)
-    urdf.read(path)
-    roots = robot.package_roots(name)
-    copy = folder / path.name
-    copy.write_text(drawable(path, roots, folder), encoding="utf-8")
+    copy = folder / path.with_suffix(".urdf").name
+    if is_mjcf(path):
+        text = drawable_mjcf(Robot.load(path), folder)
+    else:
+        urdf.read(path)
+        text = drawable(path, robot.package_roots(name), folder)
+    copy.write_text(text, encoding="utf-8")
     tree = UrdfTree.from_file_path(
         copy, entity_path_prefix="robot", static_transform_entity_path="/robot/fixed"
     )
@@ -251,6 +258,83 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     return ET.tostring(tree, encoding="unicode")
 
 
+def drawable_mjcf(moved: Robot, folder: Path) -> str:
+    """Write the URDF of a robot that was read from an MJCF, for drawing.
+
+    Links are what moves with one joint, in that joint's axes. What is fixed to the world is the
+    root, which a robot with a floating base does not have.
+
+    Args:
+        moved: The robot.
+        folder: Takes the links' shapes as STL files, one for each colour.
+
+    Returns:
+        The URDF.
+
+    Raises:
+        MeshError: If a mesh is missing, lies elsewhere, or cannot be read.
+    """
+    assert moved.mjcf is not None
+    names = [_unlike(link_names(moved), "base"), *link_names(moved)]
+    shapes: dict[tuple[int, tuple[float, ...]], list[Array]] = {}
+    try:
+        for joint, shape, triangles in pieces(moved):
+            if joint == 0 and not shapes:
+                names[0] = shape.link  # the foot of an arm
+            shapes.setdefault((joint, shape.colour), []).append(triangles)
+    except noisemodel.MeshError as error:
+        raise MeshError(error.mesh, error.problem) from error
+    tree = ET.Element("robot", name=moved.name)
+    links = {
+        joint: ET.SubElement(tree, "link", name=name)
+        for joint, name in enumerate(names)
+        if joint or not moved.floating_base
+    }
+    for number, ((joint, colour), parts) in enumerate(shapes.items()):
+        if joint not in links:
+            continue
+        visual = ET.SubElement(links[joint], "visual")
+        file = _write_stl(np.concatenate(parts), folder / f"{number}.stl")
+        ET.SubElement(ET.SubElement(visual, "geometry"), "mesh", filename=f"file://{file}")
+        material = ET.SubElement(visual, "material", name=f"colour{number}")
+        ET.SubElement(material, "color", rgba=_numbers(colour))
+    for index, joint in enumerate(moved.joints, start=1):
+        if joint.kind == "floating":
+            continue
+        kind = "prismatic" if joint.kind == "prismatic" else "continuous"
+        element = ET.SubElement(tree, "joint", name=joint.name, type=kind)
+        ET.SubElement(element, "parent", link=names[joint.parent])
+        ET.SubElement(element, "child", link=names[index])
+        place = moved.model.jointPlacements[index]
+        roll_pitch_yaw = Rotation.from_matrix(place.rotation).as_euler("xyz")
+        ET.SubElement(
+            element, "origin", xyz=_numbers(place.translation), rpy=_numbers(roll_pitch_yaw)
+        )
+        axis = np.eye(3)[joint.axis] if joint.turn is None else joint.turn[joint.axis]
+        ET.SubElement(element, "axis", xyz=_numbers(axis))
+        ET.SubElement(element, "limit", lower="-1e3", upper="1e3", effort="0", velocity="0")
+        if joint.name in moved.mjcf.mimics:
+            mimic = moved.mjcf.mimics[joint.name]
+            ET.SubElement(
+                element,
+                "mimic",
+                joint=mimic.joint,
+                multiplier=str(mimic.multiplier),
+                offset=str(mimic.offset),
+            )
+    return ET.tostring(tree, encoding="unicode")
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)
+
+
+def _unlike(known: Sequence[str], name: str) -> str:
+    while name in known:
+        name += "_"
+    return name
+
+
 def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> Path:
     try:
         path = meshpath.find(address, urdf, roots)
@@ -277,15 +361,18 @@ def _read_by_rerun(path: Path) -> bool:
 
 
 def _as_stl(path: Path, folder: Path) -> Path:
-    """Write the triangles of a mesh, as the noise model reads them, as a binary STL file."""
+    """Write the triangles of a mesh, as the noise model reads them, as an STL file."""
     copy = folder / f"{hashlib.sha256(bytes(path)).hexdigest()[:16]}.stl"
-    if not copy.exists():
-        triangles = meshfile.read(path)
-        facets = np.zeros(len(triangles), FACET)
-        facets["corners"] = triangles
-        edges = np.diff(triangles, axis=1)
-        across = np.cross(edges[:, 0], edges[:, 1])
-        length = np.linalg.norm(across, axis=1, keepdims=True)
-        facets["normal"] = across / np.where(length > 0.0, length, 1.0)
-        copy.write_bytes(bytes(80) + len(facets).to_bytes(4, "little") + facets.tobytes())
-    return copy
+    return copy if copy.exists() else _write_stl(meshfile.read(path), copy)
+
+
+def _write_stl(triangles: Array, file: Path) -> Path:
+    """Write triangles, shape (triangles, 3 corners, 3), as a binary STL file."""
+    facets = np.zeros(len(triangles), FACET)
+    facets["corners"] = triangles
+    edges = np.diff(triangles, axis=1)
+    across = np.cross(edges[:, 0], edges[:, 1])
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    facets["normal"] = across / np.where(length > 0.0, length, 1.0)
+    file.write_bytes(bytes(80) + len(facets).to_bytes(4, "little") + facets.tobytes())
+    return file
