@@ -144,12 +144,21 @@ def urdf_path(name: str) -> Path:
 
 def is_name(name: str) -> bool:
     """Whether a text is a listed robot, or names one of MuJoCo Menagerie."""
-    return name in ROBOTS or name.startswith(MENAGERIE)
+    return name in ROBOTS or (name.startswith(MENAGERIE) and not is_file_name(name))
 
 
 def is_file_name(name: str) -> bool:
     """Whether a text is the path of a URDF or an MJCF, by its end."""
     return name.lower().endswith(SUFFIXES)
+
+
+def menagerie_names() -> dict[str, str]:
+    """The robots of MuJoCo Menagerie, each with what it is; none without the package."""
+    try:
+        import mujoco_menagerie
+    except ImportError:
+        return {}
+    return {MENAGERIE + robot.name: robot.category for robot in mujoco_menagerie.robots()}
 
 
 def menagerie_path(name: str) -> Path:
@@ -171,8 +180,8 @@ def menagerie_path(name: str) -> Path:
             " `pip install 'noise-inspector[menagerie]'`"
         ) from error
     folder, _, entry = name.removeprefix(MENAGERIE).partition("/")
-    if folder not in mujoco_menagerie.names():
-        raise UnknownRobotError(name, [*ROBOTS, *(MENAGERIE + n for n in mujoco_menagerie.names())])
+    if MENAGERIE + folder not in menagerie_names():
+        raise UnknownRobotError(name, menagerie_names())
     robot = mujoco_menagerie.get(folder)
     try:
         return Path(robot.xml(entry or robot.default_model))

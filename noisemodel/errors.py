@@ -123,8 +123,8 @@ class UnknownRobotError(RobotError):
     def __init__(self, name: str, known: Iterable[str]) -> None:
         self.name, self.known = name, tuple(known)
         super().__init__(
-            f"no robot {name!r}: neither a URDF or MJCF file nor a listed name{hint(name, self.known)};"
-            " `inspector robots` lists the names"
+            f"no robot {name!r}: neither a URDF or MJCF file nor a listed name"
+            f"{hint(name, self.known)}; `inspector robots` lists the names"
         )
 
 

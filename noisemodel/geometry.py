@@ -73,8 +73,9 @@ def triangles(
 
     Args:
         robot: The robot.
-        geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of every
-            visual by itself; or "auto", the visual or, of a link that has none, the collision.
+        geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of
+            every visual by itself; or "auto", the visual or, of a link that has none, the
+            collision.
         missing: What to do about a mesh that is not there: "error", or "skip" it with a warning.
 
     Returns:

@@ -35,6 +35,9 @@ UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
 MAX_INCLUDED = 200
 """Most files that one MJCF may consist of."""
 
+MAX_COPIES = 10_000
+"""Most copies that nested ``<replicate>`` may make of an element."""
+
 
 @dataclass(frozen=True, eq=False)
 class Mjcf:
@@ -129,6 +132,8 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
         root = _parsed(part)
         if part == path and root.tag != "mujoco":
             raise RobotError(f"{path}: not an MJCF, its root is <{root.tag}>, expected <mujoco>")
+        if _copies(root) > MAX_COPIES:
+            raise RobotError(f"{part}: replicates an element more than {MAX_COPIES} times")
         for compiler in root.iter("compiler"):
             below |= {compiler.get("assetdir", ""), compiler.get("meshdir", "")}
         for element in root.iter():
@@ -171,6 +176,19 @@ def _parsed(path: Path) -> ET.Element:
         return ET.fromstring(text)  # noqa: S314
     except ET.ParseError as error:
         raise RobotError(f"{path}: not XML ({error})") from error
+
+
+def _copies(root: ET.Element) -> int:
+    """How often the most replicated element of a file is there."""
+    waiting, most = [(root, 1)], 1
+    while waiting:
+        element, copies = waiting.pop()
+        count = element.get("count", "")
+        if element.tag == "replicate" and count.isdecimal():
+            copies *= int(count)
+        most = max(most, copies)
+        waiting += [(child, copies) for child in element]
+    return most
 
 
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:
@@ -253,6 +271,7 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
     base = 0
     if floating and not free:
         base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint")
+        model.addFrame(pin.Frame("world", base, pin.SE3.Identity(), pin.FrameType.BODY), False)
     carrier = {0: (base, pin.SE3.Identity())}  # of each body: the joint, and its pose there
     for body in range(1, compiled.nbody):
         name = _body_name(compiled, body)
@@ -261,8 +280,9 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
         first = int(compiled.body_jntadr[body])
         count = int(compiled.body_jntnum[body])
         for index in range(first, first + count):
-            title = compiled.joint(index).name or f"{name}Joint_{index - first}"
             kind = compiled.jnt_type[index]
+            unnamed = "_free" if kind == mjtJoint.mjJNT_FREE else f"Joint_{index - first}"
+            title = compiled.joint(index).name or name + unnamed  # as Pinocchio names them
             if kind == mjtJoint.mjJNT_BALL:
                 raise RobotError(f"{path}: joint {title!r} is a ball joint, which is not supported")
             if kind == mjtJoint.mjJNT_FREE:
@@ -330,15 +350,14 @@ def _mimics(compiled: Any) -> Iterator[tuple[str, Mimic]]:
         yield names[0], Mimic(names[1], linear, offset)
 
 
-def _shape(
-    compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None
-) -> LinkShape | None:
+def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> LinkShape | None:
     """A geom in its body's axes; None for planes, height fields and what is fixed to the world."""
     from mujoco import mjtGeom
 
     body = int(compiled.geom_bodyid[geom])
     x, y, z = compiled.geom_size[geom].tolist()
-    matrix, shift, drawn = np.eye(3), np.zeros(3), None
+    matrix, shift = np.eye(3), np.zeros(3)
+    drawn: str | Array | None = None
     kind = compiled.geom_type[geom]
     if mesh is not None:
         drawn, matrix, shift = mesh

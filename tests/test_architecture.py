@@ -15,7 +15,7 @@ ALLOWED = {
 }
 """Which of our packages each may import."""
 
-HOMES = {"rerun": {"inspector"}, "typer": {"inspector"}, "mujoco": {"scenarios"}}
+HOMES = {"rerun": {"inspector"}, "typer": {"inspector"}, "mujoco": {"noisemodel", "scenarios"}}
 """The only packages of ours that may import a library."""
 
 SLOW = ["rerun", "typer", "sklearn", "mujoco", "pinocchio", "scipy.signal"]

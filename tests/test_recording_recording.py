@@ -320,7 +320,7 @@ def test_an_unknown_robot_is_remarked_on_and_the_rest_is_shown(tmp_path):
     path = tmp_path / "out.rrd"
     write(inspected(panda_run(robot="hal9000"), tmp_path), path)
     _, (text,) = read(path, "/report", "TextDocument:text")
-    assert "'hal9000' is neither a listed robot nor a URDF file" in text[0]
+    assert "'hal9000' is neither a listed robot nor a URDF or MJCF file" in text[0]
     assert "/noise/simplified" in entities(path)
 
 

@@ -13,7 +13,10 @@ def live(
         float, typer.Option(min=1.0, help="Sampling rate in [Hz].", show_default=False)
     ],
     robot: Annotated[
-        str | None, typer.Option(help="A name that `robots` lists, or a URDF, to draw.")
+        str | None,
+        typer.Option(
+            help="The robot to draw: a name that `robots` lists, a URDF or an MJCF (robot.xml)."
+        ),
     ] = None,
     names: Annotated[
         str, typer.Option(help="Joints in the order of the columns: elbow,wrist,...")

@@ -20,7 +20,7 @@ class LiveRobot:
 
     Args:
         recording: Where to.
-        robot: A listed robot, or the path of a URDF.
+        robot: A robot's name, or the path of a URDF or an MJCF.
         joint_names: The joints that have positions.
         floating: Whether the base moves.
 
@@ -29,7 +29,7 @@ class LiveRobot:
         children: Links that move, in the order of `transforms`; the base, if it moves, is last.
 
     Raises:
-        RobotError: If there is no such robot, or its URDF cannot be read.
+        RobotError: If there is no such robot, or it cannot be read.
         MeshError: If one of its meshes cannot be read.
         UnknownJointError: If the robot lacks a joint.
     """

@@ -83,7 +83,7 @@ class LiveSession:
 
     Args:
         rate: Nominal samples per second, in [Hz].
-        robot: A listed robot or the path of a URDF, to be drawn as it moves.
+        robot: A robot's name, or the path of a URDF or an MJCF, to be drawn as it moves.
         joint_names: Names of the joints, in the order of their columns; by default those of the
             robot, the first ones if it has more: the others are assumed stationary.
         library: Models to choose from; by default those that ship.

@@ -62,7 +62,7 @@ class ReadOptions:
     """Options of reading a log; what is not specified is taken from the log.
 
     Attributes:
-        robot: Listed name or URDF of the robot; joints are checked against it, and numbered
+        robot: Name, URDF or MJCF of the robot; joints are checked against it, and numbered
             columns get its joints in order.
         rate: The log's rate, if known, in [Hz].
         units: "radians", "degrees" or "normalised" (-100 to 100 of each joint's range, 0 to 100

@@ -10,7 +10,6 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
-from scipy.spatial.transform import Rotation
 
 import noisemodel
 from inspector.errors import InspectorError
@@ -262,7 +261,7 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
     """Write the URDF of a robot that was read from an MJCF, for drawing.
 
     Links are what moves with one joint, in that joint's axes. What is fixed to the world is the
-    root, which a robot with a floating base does not have.
+    root; where the base floats, the base is, and the rest of the world is left out.
 
     Args:
         moved: The robot.
@@ -285,11 +284,12 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
     except noisemodel.MeshError as error:
         raise MeshError(error.mesh, error.problem) from error
     tree = ET.Element("robot", name=moved.name)
-    links = {
-        joint: ET.SubElement(tree, "link", name=name)
-        for joint, name in enumerate(names)
-        if joint or not moved.floating_base
-    }
+    base = 1 if moved.floating_base else 0
+    links = {base: ET.SubElement(tree, "link", name=names[base])}
+    for index, moving in enumerate(moved.joints, start=1):
+        if moving.kind != "floating" and moving.parent in links:
+            links[index] = ET.SubElement(tree, "link", name=names[index])
+            tree.append(_joint(moved, index, names[moving.parent], names[index]))
     for number, ((joint, colour), parts) in enumerate(shapes.items()):
         if joint not in links:
             continue
@@ -298,31 +298,29 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
         ET.SubElement(ET.SubElement(visual, "geometry"), "mesh", filename=f"file://{file}")
         material = ET.SubElement(visual, "material", name=f"colour{number}")
         ET.SubElement(material, "color", rgba=_numbers(colour))
-    for index, joint in enumerate(moved.joints, start=1):
-        if joint.kind == "floating":
-            continue
-        kind = "prismatic" if joint.kind == "prismatic" else "continuous"
-        element = ET.SubElement(tree, "joint", name=joint.name, type=kind)
-        ET.SubElement(element, "parent", link=names[joint.parent])
-        ET.SubElement(element, "child", link=names[index])
-        place = moved.model.jointPlacements[index]
-        roll_pitch_yaw = Rotation.from_matrix(place.rotation).as_euler("xyz")
-        ET.SubElement(
-            element, "origin", xyz=_numbers(place.translation), rpy=_numbers(roll_pitch_yaw)
-        )
-        axis = np.eye(3)[joint.axis] if joint.turn is None else joint.turn[joint.axis]
-        ET.SubElement(element, "axis", xyz=_numbers(axis))
-        ET.SubElement(element, "limit", lower="-1e3", upper="1e3", effort="0", velocity="0")
-        if joint.name in moved.mjcf.mimics:
-            mimic = moved.mjcf.mimics[joint.name]
-            ET.SubElement(
-                element,
-                "mimic",
-                joint=mimic.joint,
-                multiplier=str(mimic.multiplier),
-                offset=str(mimic.offset),
-            )
     return ET.tostring(tree, encoding="unicode")
+
+
+def _joint(moved: Robot, index: int, parent: str, child: str) -> ET.Element:
+    """Write a joint of a robot that was read from an MJCF as a URDF has it."""
+    from pinocchio.rpy import matrixToRpy
+
+    assert moved.mjcf is not None
+    joint, place = moved.joints[index - 1], moved.model.jointPlacements[index]
+    kind = "prismatic" if joint.kind == "prismatic" else "continuous"
+    element = ET.Element("joint", name=joint.name, type=kind)
+    ET.SubElement(element, "parent", link=parent)
+    ET.SubElement(element, "child", link=child)
+    turn = _numbers(matrixToRpy(place.rotation))
+    ET.SubElement(element, "origin", xyz=_numbers(place.translation), rpy=turn)
+    axis = (np.eye(3) if joint.turn is None else joint.turn)[joint.axis]
+    ET.SubElement(element, "axis", xyz=_numbers(axis))
+    ET.SubElement(element, "limit", lower="-1e3", upper="1e3", effort="0", velocity="0")
+    if joint.name in moved.mjcf.mimics:
+        mimic = moved.mjcf.mimics[joint.name]
+        ratio = {"multiplier": repr(mimic.multiplier), "offset": repr(mimic.offset)}
+        ET.SubElement(element, "mimic", {"joint": mimic.joint, **ratio})
+    return element
 
 
 def _numbers(values: Iterable[float]) -> str:
