@@ -1,0 +1,405 @@
+import os
+import sys
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pinocchio
+import pytest
+
+import noisemodel as nm
+from noisemodel import MissingMeshError, Robot, RobotError, Run, UnknownRobotError
+from noisemodel.excitation import excitation, limits
+from noisemodel.geometry import triangles
+from noisemodel.links import link_noise
+from noisemodel.shapes import capsule
+from noisemodel.urdf import Mimic
+
+BALL = '<geom type="sphere" size="0.1"/>'
+ARM = f"""<mujoco model="arm">
+  <compiler angle="degree" eulerseq="zyx"/>
+  <default><default class="slider"><joint type="slide" axis="0 1 0"/></default></default>
+  <worldbody>
+    <geom type="plane" size="1 1 1"/>
+    <body name="foot" pos="0 0 0.3" euler="30 0 20">{BALL}
+      <body name="upper" pos="0.1 0.2 0.3" quat="0.8 0.2 0.1 0.5">
+        <joint name="lift" class="slider" ref="0.2"/>
+        <joint name="turn" axis="1 2 3" pos="0.05 0 0.1" ref="40" range="-90 100"/>{BALL}
+        <body pos="0 0.4 0">{BALL}
+          <joint axis="0 0 -1" pos="0 0 0.2"/>
+          <body name="tip" pos="0.3 0 0"><joint name="wrist" axis="1 0 0"/>{BALL}</body>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>"""
+LEGS = f"""<mujoco><worldbody><body name="trunk" pos="0 0 1"><freejoint/>{BALL}
+  <body name="left" pos="0 0.1 0"><joint name="hip" axis="0 1 0" range="-60 60"/>{BALL}
+    <body name="shin" pos="0 0 -0.3"><joint name="knee" axis="0 1 0" pos="0 0 0.05"/>{BALL}</body>
+  </body></body></worldbody></mujoco>"""
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+
+
+def written(folder, text, name="robot.xml"):
+    path = folder / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return path
+
+
+def one_body(geom, *, head="", joint='<joint name="turn" axis="0 0 1"/>'):
+    return (
+        f'<mujoco>{head}<worldbody><body name="b" pos="0 0 1">{joint}{geom}</body></worldbody>'
+        "</mujoco>"
+    )
+
+
+def state_in_mujoco(model, seed=0):
+    """A random state, and what it is in Pinocchio's order: q and v of all joints but free ones."""
+    data, random = mujoco.MjData(model), np.random.default_rng(seed)
+    mujoco.mj_integratePos(model, data.qpos, random.normal(size=model.nv), 1.0)
+    data.qvel[:] = random.normal(size=model.nv)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_comVel(model, data)
+    q, v = data.qpos.copy(), data.qvel.copy()
+    if model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE:
+        q[3:7] = data.qpos[[4, 5, 6, 3]]
+        v[:3] = data.xmat[1].reshape(3, 3).T @ v[:3]  # MuJoCo has it in the world's axes
+    return data, q, v
+
+
+@pytest.mark.parametrize("text", [ARM, LEGS])
+def test_bodies_move_as_in_mujoco(tmp_path, text):
+    path = written(tmp_path, text)
+    robot, model = Robot.load(path), mujoco.MjModel.from_xml_path(str(path))
+    data, q, v = state_in_mujoco(model)
+    assert (robot.nq, robot.nv) == (model.nq, model.nv)
+    twists = nm.link_twists(robot, q[None], v[None])[0]
+    frames = robot.model.createData()
+    pinocchio.framesForwardKinematics(robot.model, frames, q)
+    for body in range(1, model.nbody):
+        index = robot.model.getFrameId(model.body(body).name or f"body{body}")
+        frame, pose = robot.model.frames[index], frames.oMf[index]
+        np.testing.assert_allclose(pose.translation, data.xpos[body], atol=1e-12)
+        np.testing.assert_allclose(pose.rotation, data.xmat[body].reshape(3, 3), atol=1e-12)
+        expected = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, body, expected, 1)
+        twist = frame.placement.inverse() * pinocchio.Motion(twists[frame.parentJoint])
+        np.testing.assert_allclose(twist.vector, np.roll(expected, 3), atol=1e-12)
+
+
+def test_joints_are_those_that_pinocchio_reads_itself(tmp_path):
+    path = written(tmp_path, LEGS)
+    ours, theirs = Robot.load(path).model, pinocchio.buildModelFromMJCF(str(path))
+    assert list(ours.names) == list(theirs.names)
+    np.testing.assert_array_equal(ours.lowerPositionLimit[7], theirs.lowerPositionLimit[7])
+    _, q, v = state_in_mujoco(mujoco.MjModel.from_xml_path(str(path)))
+    found = []
+    for model in (ours, theirs):
+        data = model.createData()
+        pinocchio.forwardKinematics(model, data, q, v)
+        found.append([data.v[joint].vector for joint in range(model.njoints)])
+    np.testing.assert_allclose(*found, atol=1e-12)
+
+
+def test_joints_without_a_name_are_named_after_their_body(tmp_path):
+    robot = Robot.load(written(tmp_path, ARM))
+    assert robot.joint_names == ("lift", "turn", "body3Joint_0", "wrist")
+    assert Robot.load(written(tmp_path, LEGS)).joints[0].name == "trunk_free"
+
+
+def test_limits_are_those_of_the_file(tmp_path):
+    found = limits(Robot.load(written(tmp_path, ARM)))
+    np.testing.assert_allclose(found.range, [np.inf, np.radians(190), np.inf, np.inf])
+    assert found.centre[1] == pytest.approx(np.radians(5))
+
+
+def test_a_free_joint_that_comes_first_makes_the_base_float(tmp_path):
+    path = written(tmp_path, LEGS)
+    assert Robot.load(path).floating_base
+    assert Robot.load(path, floating_base=False).nv == 2
+    arm = Robot.load(written(tmp_path, ARM, "arm.xml"), floating_base=True)
+    assert (arm.floating_base, arm.nv) == (True, 10)
+    assert triangles(arm).names[0] == "world"
+
+
+def test_objects_that_move_freely_stay_where_the_file_puts_them(tmp_path):
+    text = ARM.replace(
+        "</worldbody>", '<body name="cup"><freejoint/><geom size="1"/></body></worldbody>'
+    )
+    robot = Robot.load(written(tmp_path, text))
+    assert not robot.floating_base
+    assert robot.nv == 4
+
+
+def test_included_files_belong_to_the_robot(tmp_path):
+    written(tmp_path, ARM, "parts/arm.xml")
+    scene = written(tmp_path, '<mujoco><include file="parts/arm.xml"/></mujoco>', "scene.xml")
+    assert Robot.load(scene).joint_names == Robot.load(tmp_path / "parts" / "arm.xml").joint_names
+
+
+def test_joints_that_an_equality_ties_together_are_coupled_if_asked(tmp_path):
+    text = LEGS.replace(
+        "</mujoco>",
+        '<equality><joint joint1="knee" joint2="hip" polycoef="0.1 -2 0 0 0"/></equality></mujoco>',
+    )
+    path = written(tmp_path, text)
+    assert Robot.load(path).joint_names == ("hip", "knee")
+    coupled = Robot.load(path, mimic=True)
+    assert coupled.joint_names == ("hip",)
+    assert coupled.mimics["knee"] == Mimic("hip", -2.0, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("geom", "area"),
+    [
+        ('type="sphere" size="0.5"', np.pi),
+        ('type="box" size="0.5 1 1.5"', 22.0),
+        ('type="cylinder" size="0.5 1"', 2.5 * np.pi),
+        ('type="capsule" size="0.5 1"', 3 * np.pi),
+        ('type="capsule" fromto="0 0 0 0 2 0" size="0.5"', 3 * np.pi),
+        ('type="ellipsoid" size="0.5 0.5 0.5"', np.pi),
+    ],
+)
+def test_a_primitive_has_its_area(tmp_path, geom, area):
+    surface = nm.Surface.of(Robot.load(written(tmp_path, one_body(f"<geom {geom}/>"))))
+    assert surface.area[0] == pytest.approx(area, rel=2.5e-3)
+
+
+def test_planes_and_what_is_fixed_to_the_world_have_no_surface(tmp_path):
+    path = written(tmp_path, ARM)
+    assert [shape.link for shape in Robot.load(path).mjcf.visual] == [
+        "foot",
+        "upper",
+        "body3",
+        "tip",
+    ]
+    assert triangles(Robot.load(path)).names == ("upper:lift", "upper", "body3", "tip")
+
+
+STL = np.random.default_rng(0).normal(size=(20, 3, 3)).astype("<f4")
+
+
+def write_stl(path):
+    facets = np.zeros(len(STL), [("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
+    facets["c"] = STL
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(bytes(80) + len(STL).to_bytes(4, "little") + facets.tobytes())
+
+
+def test_a_mesh_is_scaled_and_placed_as_mujoco_does(tmp_path):
+    write_stl(tmp_path / "meshes" / "part.stl")
+    head = (
+        '<compiler meshdir="meshes"/><asset><mesh name="m" file="part.stl" scale="2 3 -1"'
+        ' refpos="0.1 0.2 0.3" refquat="0.8 0.3 0.4 0.2"/></asset>'
+    )
+    geom = '<geom type="mesh" mesh="m" pos="1 2 3" quat="0.5 0.1 0.2 0.7"/>'
+    path = written(tmp_path, one_body(geom, head=head))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, model.geom_quat[0])
+    expected = model.mesh_vert @ turn.reshape(3, 3).T + model.geom_pos[0]
+    found = triangles(Robot.load(path)).triangles[0].reshape(-1, 3)
+    distance = np.linalg.norm(found[:, None] - expected, axis=2).min(axis=1)
+    assert distance.max() < 1e-5  # MuJoCo has single precision
+
+
+def test_a_mesh_that_the_file_itself_holds_is_read(tmp_path):
+    head = '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'
+    path = written(tmp_path, one_body('<geom type="mesh" mesh="m"/>', head=head))
+    assert nm.Surface.of(Robot.load(path)).area[0] == pytest.approx(1.5 + np.sqrt(3) / 2)
+
+
+URDF = """<robot name="r"><link name="base"/>
+  <link name="a">
+    <visual><origin xyz="0.1 0.2 0.3" rpy="0.3 -0.2 0.5"/>
+      <geometry><box size="0.2 0.3 0.4"/></geometry></visual>
+    <visual><origin xyz="0 0 0.4"/><geometry><mesh filename="part.stl" scale="0.1 0.2 0.1"/>
+      </geometry></visual></link>
+  <link name="b">
+    <visual><geometry><cylinder radius="0.05" length="0.6"/></geometry></visual>
+    <visual><origin xyz="0.2 0 0"/><geometry><sphere radius="0.1"/></geometry></visual></link>
+  <joint name="one" type="revolute"><parent link="base"/><child link="a"/>
+    <origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="9"/>
+  </joint>
+  <joint name="two" type="prismatic"><parent link="a"/><child link="b"/>
+    <origin xyz="0.3 0 0.2"/><axis xyz="0.6 0.8 0"/>
+    <limit lower="-2" upper="2" effort="1" velocity="9"/></joint>
+</robot>"""
+MJCF = """<mujoco><compiler angle="radian" eulerseq="XYZ"/>
+  <asset><mesh name="part" file="part.stl" scale="0.1 0.2 0.1"/></asset>
+  <worldbody><body name="a" pos="0 0 1"><joint name="one" axis="0 0 1" range="-2 2"/>
+    <geom type="box" size="0.1 0.15 0.2" pos="0.1 0.2 0.3" euler="0.3 -0.2 0.5"/>
+    <geom type="mesh" mesh="part" pos="0 0 0.4"/>
+    <body name="b" pos="0.3 0 0.2">
+      <joint name="two" type="slide" axis="0.6 0.8 0" range="-2 2"/>
+      <geom type="cylinder" size="0.05 0.3"/><geom size="0.1" pos="0.2 0 0"/></body>
+  </body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("kind", nm.KINDS)
+def test_the_same_robot_as_urdf_and_as_mjcf_is_equally_loud(tmp_path, kind):
+    write_stl(tmp_path / "part.stl")
+    run = excitation(Robot.load(written(tmp_path, URDF, "r.urdf")), rate=500.0)
+    paths = [tmp_path / "r.urdf", written(tmp_path, MJCF, "r.xml")]
+    twists, noise = [], []
+    for path in paths:
+        robot = Robot.load(path)
+        q, v = robot.configuration(run)
+        twists.append(nm.link_twists(robot, q, v))
+        noise.append(nm.extended(robot, nm.Surface.of(robot), q, v, kind).power)
+    np.testing.assert_allclose(*twists, atol=1e-9)
+    np.testing.assert_allclose(*noise, rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("geoms", "visual", "collision"),
+    [
+        # MuJoCo Menagerie: what is drawn is in group 2 and never collides, what collides in 3
+        ([("box", 2, 0), ("capsule", 3, 1)], ["box"], ["capsule"]),
+        # robosuite: what collides is in group 0, what is drawn in 1
+        ([("capsule", 0, 1), ("box", 1, 0)], ["box"], ["capsule"]),
+        # Gymnasium, dm_control: one set for both
+        ([("box", 0, 1), ("capsule", 0, 1)], ["box", "capsule"], ["box", "capsule"]),
+        # a decoration beside it
+        ([("box", 0, 1), ("capsule", 0, 0)], ["box", "capsule"], ["box"]),
+    ],
+)
+def test_visual_geoms_are_those_that_are_drawn(tmp_path, geoms, visual, collision):
+    text = "".join(
+        f'<geom name="{kind}" type="{kind}" size="1 1 1" group="{group}" contype="{collides}"'
+        f' conaffinity="{collides}"/>'
+        for kind, group, collides in geoms
+    )
+    mjcf = Robot.load(written(tmp_path, one_body(text))).mjcf
+    count = {"box": 12, "capsule": len(capsule(1.0, 2.0))}
+    for shapes, expected in ((mjcf.visual, visual), (mjcf.collision, collision)):
+        assert [len(shape.body) for shape in shapes] == [count[kind] for kind in expected]
+
+
+def test_invisible_geoms_are_not_drawn(tmp_path):
+    geom = '<geom type="box" size="1 1 1" rgba="1 0 0 0"/>'
+    robot = Robot.load(written(tmp_path, one_body(geom)))
+    assert triangles(robot, "visual").kind == ("none",)
+    assert triangles(robot, "auto").kind == ("collision",)
+
+
+def test_without_its_meshes_a_robot_has_joints_and_no_surface(tmp_path):
+    head = '<asset><mesh name="m" file="gone.stl"/></asset>'
+    geom = '<geom type="mesh" mesh="m"/>'
+    robot = Robot.load(written(tmp_path, one_body(geom, head=head)))
+    assert robot.joint_names == ("turn",)
+    with pytest.raises(MissingMeshError, match=r"mesh gone\.stl: not found in .*missing='skip'"):
+        triangles(robot)
+    assert triangles(robot, missing="skip").missing == ("gone.stl",)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("", "the MJCF is empty"),
+        ("hello", "not XML"),
+        ("<sdf/>", "not an MJCF, its root is <sdf>, expected <mujoco>"),
+        ("<!DOCTYPE a [<!ENTITY b 'c'>]><mujoco/>", "no document type or entities"),
+        (one_body("<gem/>"), r"MuJoCo cannot read the MJCF \(XML Error: .*gem"),
+        (
+            one_body(BALL, joint='<joint name="hip" type="ball"/>'),
+            "'hip' is a ball joint, which is",
+        ),
+        ('<mujoco><include file="gone.xml"/></mujoco>', "includes 'gone.xml', which is missing"),
+        ("<mujoco><include/></mujoco>", "includes '', which is missing"),
+        (
+            f'<mujoco><worldbody><replicate count="999"><replicate count="999">{BALL}</replicate>'
+            "</replicate></worldbody></mujoco>",
+            "replicates an element more than 10000 times",
+        ),
+        ("<a>" * 5000 + "</a>" * 5000, "not an MJCF"),
+    ],
+)
+def test_a_file_that_is_no_robot_is_refused_in_one_line(tmp_path, text, problem):
+    with pytest.raises(RobotError, match=problem) as caught:
+        Robot.load(written(tmp_path, text))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_file_that_does_not_exist_is_named(tmp_path):
+    with pytest.raises(RobotError, match=r"gone\.xml: there is no such MJCF file"):
+        Robot.load(tmp_path / "gone.xml")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '<mujoco><include file="../../../secret.xml"/></mujoco>',
+        '<mujoco><compiler meshdir="../../.."/><asset><mesh file="secret.xml"/></asset></mujoco>',
+        '<mujoco><asset><mesh file="{folder}/secret.xml"/></asset></mujoco>',
+        '<mujoco><asset><hfield name="h" file="{folder}/secret.xml"/></asset></mujoco>',
+        '<mujoco><asset><model name="h" file="{folder}/secret.xml"/></asset></mujoco>',
+    ],
+)
+def test_no_file_is_opened_outside_of_the_robots_folders(tmp_path, text):
+    written(tmp_path, ARM, "secret.xml")
+    path = written(tmp_path, text.format(folder=tmp_path), "a/b/c/robot.xml")
+    with pytest.raises(RobotError, match="secret.xml', which lies outside of"):
+        Robot.load(path)
+
+
+def test_textures_are_not_opened(tmp_path):
+    head = (
+        '<asset><texture name="t" type="2d" file="gone.png"/><material name="m" texture="t"'
+        ' rgba="1 0 0 1"/></asset>'
+    )
+    robot = Robot.load(written(tmp_path, one_body('<geom size="1" material="m"/>', head=head)))
+    assert robot.mjcf.visual[0].colour == (1.0, 0.0, 0.0, 1.0)
+
+
+def test_a_urdf_may_be_called_xml(tmp_path):
+    write_stl(tmp_path / "part.stl")
+    robot = Robot.load(written(tmp_path, f"<!-- <mujoco> -->{URDF}", "urdf.xml"))
+    assert robot.mjcf is None
+    assert robot.joint_names == ("one", "two")
+
+
+def test_a_run_names_an_mjcf_relative_to_its_own_folder(tmp_path):
+    path = written(tmp_path, LEGS, "models/legs.xml")
+    run = excitation(Robot.load(path), rate=500.0)
+    replace(run, robot=os.path.relpath(path)).save(tmp_path / "run.npz")
+    with np.load(tmp_path / "run.npz") as arrays:
+        assert str(arrays["robot"]) == "models/legs.xml"
+    noise = link_noise(Run.load(tmp_path / "run.npz"))
+    assert noise.links == ("trunk", "left", "shin")
+    assert noise.power.max() > 0
+
+
+def test_without_mujoco_the_error_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    with pytest.raises(RobotError, match=r"needs MuJoCo; `pip install 'noise-inspector\[sim\]'`"):
+        Robot.load(written(tmp_path, ARM))
+
+
+def test_without_its_package_the_menagerie_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco_menagerie", None)
+    with pytest.raises(RobotError, match=r"pip install 'noise-inspector\[menagerie\]'"):
+        Robot.load("menagerie/unitree_go2")
+
+
+def test_a_robot_of_the_menagerie_is_loaded_by_its_name(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco_menagerie")
+    written(tmp_path, LEGS, "unitree_go2/go2.xml")
+    written(tmp_path, '<mujoco><include file="go2.xml"/></mujoco>', "unitree_go2/scene.xml")
+    monkeypatch.setenv("MENAGERIE_ROOT", str(tmp_path))
+    for name in ("menagerie/unitree_go2", "menagerie/unitree_go2/scene"):
+        robot = Robot.load(name)
+        assert (robot.name, robot.joint_names) == (name, ("hip", "knee"))
+        assert excitation(robot).robot == name
+    with pytest.raises(UnknownRobotError, match="did you mean 'menagerie/unitree_go2'"):
+        Robot.load("menagerie/unitree_go3")
+    with pytest.raises(RobotError, match="no entry point 'scen'"):
+        Robot.load("menagerie/unitree_go2/scen")
+    with pytest.raises(RobotError, match="'unitree_g1' not found under MENAGERIE_ROOT"):
+        Robot.load("menagerie/unitree_g1")
