@@ -145,7 +145,9 @@ def link_names(robot: Robot) -> tuple[str, ...]:
 
 
 def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
-    """Draw the visual geometry of a robot piece by piece, what is fixed to the world included.
+    """Draw a robot piece by piece, what is fixed to the world included.
+
+    Of a link without visual geometry the collision geometry is drawn.
 
     Yields:
         Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
@@ -156,9 +158,13 @@ def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
     """
     places, _ = _links(robot)
     mesh = _reader(robot, hull=False)
-    for shape in shapes_of(robot, "visual"):
-        joint, rotation, translation = places[shape.link]
-        yield joint, shape, _placed(shape, mesh, rotation, translation)
+    drawn: set[int] = set()
+    for use in GEOMETRIES["auto"]:
+        parts = [(*places[shape.link], shape) for shape in shapes_of(robot, use)]
+        parts = [part for part in parts if part[0] not in drawn]
+        for joint, rotation, translation, shape in parts:
+            yield joint, shape, _placed(shape, mesh, rotation, translation)
+        drawn |= {part[0] for part in parts}
 
 
 def _reader(robot: Robot, *, hull: bool) -> Callable[[str], Array]:

@@ -93,7 +93,8 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
             f"{path}: an MJCF needs MuJoCo; `pip install 'noise-inspector[sim]'`"
         ) from error
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
+        # An absolute path: files that an included file names get its folder before their names.
+        spec = mujoco.MjSpec.from_file(str(path.absolute()))
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         meshes = _without_files(spec, path, folders)
         with warnings.catch_warnings(action="ignore"):  # such as attributes that are deprecated
@@ -152,7 +153,7 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
         if len(known) > MAX_INCLUDED:
             raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
     folders = list(dict.fromkeys(folders))
-    for file in named:
+    for file in sorted(named):
         for folder in (folder / each for folder in folders for each in below):
             if (folder / file).exists():
                 _inside(path, file, folder / file, roots)
@@ -240,7 +241,7 @@ def _address(spec: Any, mesh: Any, path: Path, folders: Sequence[Path]) -> str:
     file = Path(mesh.file).name if spec.strippath else mesh.file
     places = [folder / mesh.compiler.meshdir / file for folder in folders]
     found = next((place for place in places if place.is_file()), places[0])
-    return os.path.relpath(found, path.parent)
+    return os.path.relpath(found.absolute(), path.absolute().parent)
 
 
 def _rotation(quaternion: Array) -> Array:

@@ -143,6 +143,20 @@ def test_included_files_belong_to_the_robot(tmp_path):
     assert Robot.load(scene).joint_names == Robot.load(tmp_path / "parts" / "arm.xml").joint_names
 
 
+def test_an_included_file_names_its_meshes_from_its_own_folder(tmp_path, monkeypatch):
+    write_stl(tmp_path / "robots" / "arm" / "part.stl")
+    head = '<compiler meshdir="."/><asset><mesh name="m" file="arm/part.stl"/></asset>'
+    part = one_body('<geom type="mesh" mesh="m"/>', head=head)
+    written(tmp_path, part, "robots/arm.xml")
+    written(tmp_path, '<mujoco><include file="arm.xml"/></mujoco>', "robots/scene.xml")
+    monkeypatch.chdir(tmp_path)
+    areas = [
+        nm.Surface.of(Robot.load(path)).area[0]
+        for path in ("robots/scene.xml", tmp_path / "robots" / "scene.xml", "robots/arm.xml")
+    ]
+    assert areas[0] == areas[1] == areas[2] > 0
+
+
 def test_joints_that_an_equality_ties_together_are_coupled_if_asked(tmp_path):
     text = LEGS.replace(
         "</mujoco>",

@@ -67,6 +67,16 @@ def test_what_is_drawn_moves_as_the_robot(tmp_path, text):
             np.testing.assert_allclose(*axes, atol=1e-12)
 
 
+def test_a_link_without_visual_geometry_is_drawn_as_it_collides(tmp_path):
+    body = '<body name="tip" pos="0.3 0 0"><joint name="wrist" axis="1 0 0"/><geom group="3"'
+    text = ARM.replace(
+        '<body name="tip" pos="0.3 0 0"><joint name="wrist" axis="1 0 0"/><geom', body
+    )
+    assert text != ARM
+    tree = scene.load(str(written(tmp_path, text)), tmp_path)
+    assert set(scene.entities(tree)) == {"foot", "upper", "body3", "tip"}
+
+
 def test_a_missing_mesh_is_named_with_the_way_out(tmp_path):
     head = '<asset><mesh name="m" file="gone.stl"/></asset>'
     path = written(tmp_path, one_body('<geom type="mesh" mesh="m"/>', head=head))

@@ -278,7 +278,7 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
     shapes: dict[tuple[int, tuple[float, ...]], list[Array]] = {}
     try:
         for joint, shape, triangles in pieces(moved):
-            if joint == 0 and not shapes:
+            if joint == 0 and all(known for known, _ in shapes):
                 names[0] = shape.link  # the foot of an arm
             shapes.setdefault((joint, shape.colour), []).append(triangles)
     except noisemodel.MeshError as error:
