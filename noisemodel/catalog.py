@@ -185,5 +185,10 @@ def menagerie_path(name: str) -> Path:
     robot = mujoco_menagerie.get(folder)
     try:
         return Path(robot.xml(entry or robot.default_model))
+    except mujoco_menagerie.DownloadError as error:
+        raise RobotError(
+            f"{name}: cannot be downloaded ({' '.join(str(error).split())});"
+            " MENAGERIE_ROOT=path names a checkout to use instead"
+        ) from error
     except (mujoco_menagerie.MenagerieError, OSError) as error:
         raise RobotError(f"{name}: {' '.join(str(error).split())}") from error

@@ -417,3 +417,15 @@ def test_a_robot_of_the_menagerie_is_loaded_by_its_name(tmp_path, monkeypatch):
         Robot.load("menagerie/unitree_go2/scen")
     with pytest.raises(RobotError, match="'unitree_g1' not found under MENAGERIE_ROOT"):
         Robot.load("menagerie/unitree_g1")
+
+
+def test_a_robot_that_cannot_be_downloaded_says_what_to_do(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco_menagerie")
+    monkeypatch.setenv("MENAGERIE_BASE_URL", (tmp_path / "nowhere").as_uri())
+    monkeypatch.setenv("MENAGERIE_CACHE_DIR", str(tmp_path / "cache"))
+    monkeypatch.delenv("MENAGERIE_ROOT", raising=False)
+    with pytest.raises(
+        RobotError, match=r"cannot be downloaded \(.*MENAGERIE_ROOT=path names"
+    ) as e:
+        Robot.load("menagerie/unitree_go2")
+    assert "\n" not in str(e.value)
