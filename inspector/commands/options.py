@@ -62,7 +62,7 @@ def _of_log(*names: str, **settings: Any) -> Any:
 def _log_options(
     robot: Annotated[
         str | None,
-        _of_log("--robot", help="A name that `robots` lists, a URDF or an MJCF; none takes no robot."),
+        _of_log("--robot", help="A name that `robots` lists, URDF or MJCF; none takes no robot."),
     ] = None,
     rate: Annotated[
         float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
