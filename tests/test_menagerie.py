@@ -8,9 +8,6 @@ from noisemodel import Robot
 FAST = ("franka_emika_panda", "universal_robots_ur5e", "robotiq_2f85", "unitree_go2", "unitree_g1")
 """One of each kind: an arm with fingers, one of OBJ meshes, coupled joints, legs, a humanoid."""
 
-UNSUPPORTED = {"agility_cassie": "ball joint"}
-"""Robots that are refused, and the reason."""
-
 
 def at_hand(name):
     """Whether a robot can be read without a download."""
