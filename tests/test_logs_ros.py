@@ -335,7 +335,7 @@ def test_a_bag_without_motion_is_an_error_of_one_line(tmp_path, topics, message)
     assert "\n" not in str(caught.value)
 
 
-def test_one_nan_is_named_but_columns_of_nan_are_left_out(tmp_path):
+def test_one_nan_is_a_gap_but_columns_of_nan_are_left_out(tmp_path):
     never = np.full_like(EFFORT, np.nan)
     topics = {
         "/joint_states": joint_states(TALK, position=POSITION, velocity=VELOCITY, effort=never)
@@ -346,11 +346,17 @@ def test_one_nan_is_named_but_columns_of_nan_are_left_out(tmp_path):
     broken = VELOCITY.copy()
     broken[123, 1] = np.nan
     topics = {"/joint_states": joint_states(TALK, position=POSITION, velocity=broken)}
+    imported = read_log(bag(tmp_path, topics, name="broken"))
+    assert np.flatnonzero(~imported.run.mask).tolist() == [123]
+    text = "1 sample without a number, marked as not valid: /joint_states/velocity of elbow"
+    assert any(text in remark for remark in imported.remarks)
+    broken[123, 1] = np.inf
+    topics = {"/joint_states": joint_states(TALK, position=POSITION, velocity=broken)}
     message = (
-        r"column '/joint_states/velocity of elbow' holds nan \(sample 124, 1.23 s into the log\)"
+        r"column '/joint_states/velocity of elbow' holds inf \(sample 124, 1.23 s into the log\)"
     )
     with pytest.raises(LogError, match=message):
-        read_log(bag(tmp_path, topics, name="broken"))
+        read_log(bag(tmp_path, topics, name="infinite"))
 
 
 def test_an_imported_bag_is_saved_and_loaded(tmp_path):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.options import Entry
 from noisemodel import Run
-from noisemodel.types import Array, Real
+from noisemodel.types import Array, Mask, Real
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,6 +112,8 @@ class Track:
         labels: Names of the columns in the log.
         stamps: Its timestamps.
         values: Shape (samples, columns).
+        missing: Samples without a number in a column, where values are interpolated, shape
+            (samples,); None if there are none.
     """
 
     signal: str
@@ -119,6 +121,7 @@ class Track:
     labels: tuple[str, ...]
     stamps: Stamps
     values: Real
+    missing: Mask | None = None
 
     @property
     def is_desired(self) -> bool:

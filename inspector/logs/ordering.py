@@ -69,7 +69,9 @@ def _ordered(
         if keep.all():
             yield track
         else:
-            yield replace(track, stamps=kept[id(track.stamps)], values=track.values[keep])
+            missing = None if track.missing is None else track.missing[keep]
+            stamps = kept[id(track.stamps)]
+            yield replace(track, stamps=stamps, values=track.values[keep], missing=missing)
 
 
 def _is_increasing(stamps: Stamps) -> Mask:

@@ -15,6 +15,7 @@ from inspector.logs.ordering import UnorderedStamps, ordered
 from inspector.logs.signals import listed
 from inspector.logs.tracks import tracks_of
 from noisemodel import Robot
+from noisemodel.types import Mask
 
 NO_RANGE = "normalised to 0 to 100 of its range, left out since no robot is specified"
 
@@ -48,7 +49,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog
     """Tracks of a log, checked and converted.
 
     Raises:
-        LogError: If it holds no motion, a value that is not finite, an angle in an unknown unit,
+        LogError: If it holds no motion, an infinite value, an angle in an unknown unit,
             or stamps that do not increase.
         RobotError: If the robot lacks the joints that the log names.
     """
@@ -117,30 +118,50 @@ def _with_two_samples(
 
 
 def _finite_only(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tuple[str, ...]]:
-    """Tracks without columns that are nan throughout; other values that are not finite raise."""
+    """Tracks without columns that are nan throughout, and with gaps where others are nan."""
     remarks: list[str] = []
     return tuple(_finite(path, tracks, remarks)), tuple(remarks)
 
 
 def _finite(path: Path, tracks: Sequence[Track], remarks: list[str]) -> Iterator[Track]:
     for track in tracks:
-        finite = np.isfinite(track.values)
-        if finite.all():
+        if np.isfinite(track.values).all():
             yield track
             continue
-        empty = np.atleast_1d(np.isnan(track.values).all(axis=0))
-        wrong = np.argwhere(~finite & ~empty)
-        if len(wrong):
-            sample, column = map(int, wrong[0])
+        lacking = np.isnan(track.values)
+        infinite = np.argwhere(np.isinf(track.values))
+        if len(infinite):
+            sample, column = map(int, infinite[0])
             value = track.values[sample, column]
             raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
-        names = [label for label, is_nan in zip(track.labels, empty, strict=True) if is_nan]
-        remarks.append(f"all nan, left out: {listed(names)}")
-        kept = np.flatnonzero(~empty)
-        if len(kept) and track.joints:
-            yield replace(
+        empty = np.atleast_1d(lacking.all(axis=0))
+        if empty.any():
+            names = [label for label, is_nan in zip(track.labels, empty, strict=True) if is_nan]
+            remarks.append(f"all nan, left out: {listed(names)}")
+            kept = np.flatnonzero(~empty)
+            if not len(kept) or not track.joints:
+                continue
+            track = replace(
                 track,
                 joints=tuple(track.joints[place] for place in kept),
                 labels=tuple(track.labels[place] for place in kept),
                 values=track.values[:, kept],
             )
+            lacking = lacking[:, kept]
+        yield _with_gaps(track, lacking, remarks) if lacking.any() else track
+
+
+def _with_gaps(track: Track, lacking: Mask, remarks: list[str]) -> Track:
+    """Track whose samples with nan are missing, and interpolated lest they spoil others."""
+    missing: Mask = np.asarray(lacking.any(axis=1))
+    some = np.atleast_1d(lacking.any(axis=0)).tolist()
+    labels = [label for label, any_ in zip(track.labels, some, strict=True) if any_]
+    first = track.stamps.time[np.argmax(missing)] - track.stamps.time[0]
+    remarks.append(
+        f"{missing.sum()} sample{'' if missing.sum() == 1 else 's'} without a number, marked as"
+        f" not valid: {listed(list(dict.fromkeys(labels)))}, the first at {first:.6g} s"
+    )
+    places, values = np.arange(len(missing)), np.array(track.values)
+    for column, nan in zip(values.T, lacking.T, strict=True):
+        column[nan] = np.interp(places[nan], places[~nan], column[~nan])
+    return replace(track, values=values, missing=missing)

@@ -118,6 +118,9 @@ def common_time(tracks: Sequence[TimedTrack], main: TimedTrack) -> tuple[Array, 
     valid = np.ones(len(time), dtype=bool)
     for track in {id(track.track.stamps): track for track in tracks}.values():
         valid &= _covered(time, track, slack)
+    for track in tracks:
+        if track.track.missing is not None:
+            valid &= ~_beside(time, track, track.track.missing, slack)
     return time, valid
 
 
@@ -188,6 +191,13 @@ def _covered(instants: Array, track: TimedTrack, slack: float) -> Mask:
     for part, _ in _parts(instants, track, slack):
         reached[part] = True
     return reached
+
+
+def _beside(instants: Array, track: TimedTrack, missing: Mask, slack: float) -> Mask:
+    """Whether a missing sample is at an instant, or next to one between samples."""
+    after = np.searchsorted(track.time, instants - slack).clip(max=len(track.time) - 1)
+    between = np.abs(track.time[after] - instants) > slack
+    return np.asarray(missing[after] | (between & missing[np.maximum(after - 1, 0)]))
 
 
 def _interpolated(instants: Array, track: TimedTrack, values: Real, slack: float) -> Array:
