@@ -62,7 +62,10 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
     [
         ("rate = 3", 'not a mapping; expected format = "noise-mapping/1"'),
         ("rate = ", "not a mapping in TOML"),
-        ('format = "noise-mapping/1"\nspeed = 3', "unknown setting 'speed'; there are joints, off"),
+        (
+            'format = "noise-mapping/1"\nspeed = 3',
+            "unknown setting 'speed'; there are columns, joints, off",
+        ),
         ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another type"),
         ('format = "noise-mapping/1"\nrate = -1', "the rate is -1 Hz; expected a number above 0"),
         ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another type"),

@@ -75,6 +75,10 @@ def _log_options(
     joints: Annotated[
         str | None, _of_log("--joints", help="Names of the columns of arrays: a,b,c.")
     ] = None,
+    columns: Annotated[
+        str | None,
+        _of_log("--columns", help="Names of a CSV's columns, without a header: time,q1,q2."),
+    ] = None,
     units: Annotated[
         str | None, _of_log("--units", help="Unit of angles: radians, degrees or normalised.")
     ] = None,
@@ -107,6 +111,7 @@ def _log_options(
         rate=rate,
         units="degrees" if degrees else units,
         joints=joints.split(",") if joints else None,
+        columns=columns.split(",") if columns else None,
         topics=topic,
         offset=offset,
     )

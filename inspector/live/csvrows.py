@@ -9,7 +9,16 @@ import numpy as np
 from inspector.live.buffer import SIGNALS
 from inspector.live.errors import LiveError
 from inspector.live.rows import Note, Rows
-from inspector.logs.signals import TIMES, column_signal, listed
+from inspector.logs.signals import (
+    TIME_UNITS,
+    Naming,
+    column_signal,
+    factor_of,
+    listed,
+    time_column,
+    without_unit,
+)
+from inspector.logs.timestamps import UNITS
 from noisemodel.types import Array
 
 UNKNOWN = ["", "nan", "NaN", "NAN", "null"]
@@ -32,10 +41,12 @@ class CsvReader:
         self._delimiter = next((mark for mark in ",;\t" if mark in text), ",")
         self._header = [cell.strip() for cell in text.split(self._delimiter)]
         found: dict[str, dict[str, int]] = {}
+        naming = Naming.of(self._header)
         for place, column in enumerate(self._header):
-            if (meaning := column_signal(column)) is not None and meaning[0] in SIGNALS:
+            meaning = column_signal(column, naming)
+            if meaning is not None and meaning[0] in SIGNALS and factor_of(column) == 1.0:
                 joint = meaning[1]
-                known = joint if isinstance(joint, str) else _numbered(joint, names)
+                known = joint if isinstance(joint, str) else _numbered(joint - naming.first, names)
                 found.setdefault(meaning[0], {})[known] = place
         if "velocity" not in found:
             raise LiveError(
@@ -49,8 +60,9 @@ class CsvReader:
         self._places = {
             signal: _run([places[name] for name in self.names]) for signal, places in found.items()
         }
-        lower = [column.lower() for column in self._header]
-        self._time = next((lower.index(name) for name in TIMES if name in lower), None)
+        time = time_column(self._header)
+        self._time = self._header.index(time) if time else None
+        self._second = float(UNITS[TIME_UNITS.get(without_unit(time)[1], "seconds")])
         self._options = self._arrow_options()
 
     def read(self, lines: bytes, first: int, note: Note) -> Iterator[Rows]:
@@ -71,7 +83,7 @@ class CsvReader:
             table = self._read_lines(lines, first, note)
         if len(table):
             signals = {name: table[:, places] for name, places in self._places.items()}
-            yield Rows(signals, None if self._time is None else table[:, self._time])
+            yield Rows(signals, None if self._time is None else table[:, self._time] * self._second)
 
     def _read_numbers(self, lines: bytes) -> Array | None:
         """Read rows of plain numbers, in half of the time; None if a cell is anything else.

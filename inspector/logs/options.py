@@ -70,6 +70,8 @@ class ReadOptions:
         joints: Names of the columns of arrays, in order.
         topics: The topics to read, all unless given.
         offset: Offset added to the desired motion's stamps, in [s]; estimated unless given.
+        columns: Names of the columns of a CSV log, in order, in place of its header; "" for one
+            that is not read.
         entries: The mapping of columns and arrays.
     """
 
@@ -79,6 +81,7 @@ class ReadOptions:
     joints: tuple[str, ...] = ()
     topics: tuple[str, ...] = ()
     offset: float | None = None
+    columns: tuple[str, ...] = ()
     entries: tuple[Entry, ...] = ()
 
     def __post_init__(self) -> None:
@@ -184,7 +187,7 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
 
 def _setting(name: str, value: Any) -> Any:
     """Setting of a saved mapping, its type checked."""
-    if name in ("joints", "topics"):
+    if name in ("joints", "topics", "columns"):
         correct = isinstance(value, list) and all(isinstance(each, str) for each in value)
         value = tuple(value) if correct else value
     elif name in ("rate", "offset"):

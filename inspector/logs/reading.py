@@ -48,8 +48,8 @@ def read_log(
         episode: Which episode to read, where the log holds several.
         mapping: Signals of columns and arrays that are not known by their names:
             ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN``.
-        **options: ``robot``, ``rate``, ``units``, ``joints``, ``topics`` and ``offset``, as
-            ``inspector.logs.options.ReadOptions`` has them.
+        **options: ``robot``, ``rate``, ``units``, ``joints``, ``topics``, ``offset`` and
+            ``columns``, as ``inspector.logs.options.ReadOptions`` has them.
 
     Returns:
         The run, and what was decided during the import.
@@ -157,7 +157,7 @@ def read_options(
     """
     before = ReadOptions.load(Path(saved)) if saved else ReadOptions()
     given = {name: value for name, value in options.items() if value is not None}
-    for name in {"joints", "topics"} & set(given):
+    for name in {"joints", "topics", "columns"} & set(given):
         given[name] = tuple(given[name])
     if "robot" in given:
         given["robot"] = str(given["robot"])

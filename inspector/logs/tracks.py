@@ -9,7 +9,15 @@ from inspector.errors import LogError
 from inspector.logs.floatingbase import WIDTHS, not_normalised, pose_of, velocity_of
 from inspector.logs.log import Field, Log, Track
 from inspector.logs.options import Entry, ReadOptions
-from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, array_signal, column_signal, listed
+from inspector.logs.signals import (
+    BASE_SIGNALS,
+    JOINT_SIGNALS,
+    Naming,
+    array_signal,
+    column_signal,
+    listed,
+    number_of,
+)
 from inspector.wrongrobot import WrongRobotError
 from noisemodel import Robot
 from noisemodel.types import Real
@@ -91,12 +99,37 @@ def tracks_of(log: Log, options: ReadOptions, robot: Robot | None) -> LogTracks:
         )
     read = {id(assignment.field) for assignment in kept}
     not_read = tuple(field.name for field in log.fields if id(field) not in read)
-    remarks = (
-        (f"left out, not joints of {robot.name!r}: {listed(unknown)}",)
-        if (unknown and robot)
-        else ()
-    )
-    return LogTracks(tuple(_tracks(log, kept)), (*log.not_read, *not_read), remarks)
+    remarks = [*_naming_remarks(log, kept, options, robot)]
+    if unknown and robot:
+        remarks.append(f"left out, not joints of {robot.name!r}: {listed(unknown)}")
+    return LogTracks(tuple(_tracks(log, kept)), (*log.not_read, *not_read), tuple(remarks))
+
+
+def _naming_remarks(
+    log: Log, kept: Sequence[Assignment], options: ReadOptions, robot: Robot | None
+) -> Iterator[str]:
+    """What was decided about names that leave it open, a sentence each."""
+    naming = _naming(log)
+    joints = options.joints or (robot.joint_names if robot else ())
+    if naming.first and any(_is_number(each.field, each.joint, naming) for each in kept) and joints:
+        yield f"columns count joints from {naming.first}: {naming.first} is {joints[0]}"
+    if naming.qd_is_desired:
+        yield "qd is the desired position, since dq is the velocity (else --map)"
+
+
+def _naming(log: Log) -> Naming:
+    return Naming.of(field.name for field in log.fields if _is_column(field))
+
+
+def _is_column(field: Field) -> bool:
+    """Whether it is a column, which may name its joint."""
+    return field.values.shape[1] == 1 and not field.signal
+
+
+def _is_number(field: Field, joint: str, naming: Naming) -> bool:
+    """Whether a column tells its joint by a number, which a name was found for."""
+    known = column_signal(field.name, naming) if _is_column(field) else None
+    return known is not None and number_of(known[1]) is not None and known[1] != joint
 
 
 def _of_robot(
@@ -255,20 +288,39 @@ def assignments_of(log: Log, options: ReadOptions, robot: Robot | None) -> Itera
         if found := part_of(log, entry):
             mapped.add(id(found[0]))
             yield from _by_mapping(log, *found, entry, options, robot)
+    naming = _naming(log)
+    numbered = _names_by_number(log, naming)
     for field in log.fields:
         if id(field) not in mapped and field.name != options.time:
-            yield from _by_name(log, field, options, robot)
+            yield from _by_name(log, field, naming, numbered, options, robot)
+
+
+def _names_by_number(log: Log, naming: Naming) -> dict[int, str]:
+    """Names of joints that are numbers too, such as ``joint1``."""
+    known = [column_signal(field.name, naming) for field in log.fields if _is_column(field)]
+    joints = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
+    found = ((number_of(joint), joint) for joint in reversed(joints))
+    return {number: joint for number, joint in found if number is not None}
 
 
 def _by_name(
-    log: Log, field: Field, options: ReadOptions, robot: Robot | None
+    log: Log,
+    field: Field,
+    naming: Naming,
+    numbered: Mapping[int, str],
+    options: ReadOptions,
+    robot: Robot | None,
 ) -> Iterator[Assignment]:
     """Assignments by the format or by the field's name."""
     whole = slice(0, field.values.shape[1])
-    if known := column_signal(field.name) if whole.stop == 1 and not field.signal else None:
+    if known := column_signal(field.name, naming) if _is_column(field) else None:
         signal, joint = known
-        if isinstance(joint, int):
-            joint = _numbered(log, field, joint, options, robot)
+        number = number_of(joint)
+        names = options.joints or (robot.joint_names if robot else ())
+        if number is not None and names and joint not in names:
+            joint = _numbered(log, field, number, naming.first, names)
+        elif isinstance(joint, int):
+            joint = numbered.get(joint, f"joint_{joint}")
         yield Assignment(field, whole, signal, joint)
     elif signal := field.signal or array_signal(field.name) or "":
         if signal in BASE_SIGNALS:
@@ -334,16 +386,11 @@ def _array(
         yield Assignment(field, slice(column, column + 1), signal, joint, explicit)
 
 
-def _numbered(
-    log: Log, field: Field, number: int, options: ReadOptions, robot: Robot | None
-) -> str:
-    joints = options.joints or (robot.joint_names if robot else ())
-    if not joints:
-        return f"joint_{number}"
-    if number >= len(joints):
+def _numbered(log: Log, field: Field, number: int, first: int, joints: Sequence[str]) -> str:
+    if not first <= number < first + len(joints):
         raise LogError(
             log.path,
-            f"column {field.name!r} has number {number}, the robot's joints are 0 to"
-            f" {len(joints) - 1} ({', '.join(joints)}); map it with --map",
+            f"column {field.name!r} has number {number}, the robot's joints are {first} to"
+            f" {len(joints) - 1 + first} ({', '.join(joints)}); map it with --map",
         )
-    return joints[number]
+    return joints[number - first]
