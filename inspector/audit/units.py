@@ -61,8 +61,9 @@ def _angles(run: Run, reach: Array) -> Iterator[str]:
         yield f"positions look normalised: several joints stop at {largest:g}"
         return
     moving = np.ptp(run.velocity[run.mask], axis=0) > 0
-    far = reach > TURNS
-    if 2 * np.sum(far & moving) >= max(1, np.sum(moving)):
+    far = (reach > TURNS / 2) & moving
+    enough = np.sum(far) > 1 or (reach[far] > TURNS).any()
+    if enough and 2 * np.sum(far) >= max(1, np.sum(moving)):
         other = " or normalised" if largest <= max(ROUND_ENDS) else ""
         joint = run.joint_names[int(np.argmax(reach))]
         yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"

@@ -13,6 +13,27 @@ from noisemodel import Robot
 LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
 """Values above which an angle is taken for degrees, in [rad] and [rad/s]."""
 
+TURN = 2 * np.pi
+"""Positions beyond a turn, of half of the joints that move, are in degrees, in [rad]."""
+
+FARTHEST = 720.0
+"""Largest position of an arm's joint, in [deg]; wheels turn farther."""
+
+NORMALISED = 100.0
+"""Largest position that may be normalised as well."""
+
+STRAIGHT = 0.9
+"""Largest share of a joint's way that it is away from its start: wheels go on in one direction."""
+
+MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
+"""What is in degrees, by the ratio of logged velocities to the slope of positions."""
+
+NEAR = 0.1
+"""Largest relative deviation from such a ratio."""
+
+STRETCHES = 50
+"""Stretches of a log whose ways are compared."""
+
 TURNING = ("revolute", "continuous")
 
 HINT = (
@@ -56,6 +77,86 @@ def in_radians(
         for track in tracks:
             _refuse_degrees(path, track, robot)
     return tuple(tracks)
+
+
+def from_degrees(
+    tracks: Sequence[Track], robot: Robot | None
+) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+    """Tracks in radians, where positions and velocities tell that they are in degrees.
+
+    Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
+    they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
+
+    Args:
+        tracks: Tracks of a log whose unit is not specified.
+        robot: The robot, if known: continuous joints may turn.
+
+    Returns:
+        The tracks, and "position" and "velocity" if these were in degrees.
+    """
+    found = _in_degrees(tracks, robot)
+    return (
+        tuple(
+            _to_radians(track, robot) if track.signal.removesuffix("_desired") in found else track
+            for track in tracks
+        ),
+        found,
+    )
+
+
+def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]:
+    by_signal = {track.signal: track for track in reversed(tracks)}
+    for suffix in ("", "_desired"):
+        position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
+        if position is None:
+            continue
+        reach = _reach_to_and_fro(position, robot)
+        if velocity is None:
+            return ("position", "velocity") if reach > NORMALISED else ()
+        ratio = _ratio(position, velocity)
+        for known, quantities in MATCHES.items():
+            if abs(ratio / known - 1) <= NEAR and (reach or "position" not in quantities):
+                return quantities
+        return ()
+    return ()
+
+
+def _reach_to_and_fro(track: Track, robot: Robot | None) -> float:
+    """Largest position, if half of the joints that move go beyond a turn, and back; else 0."""
+    kinds = _kinds(robot)
+    turns = [kinds.get(joint) == "continuous" for joint in track.joints]
+    angular = np.array(is_angular(track, robot)) & ~np.array(turns)
+    values = np.unwrap(track.values.astype(np.float64), axis=0, period=360.0)  # if in degrees
+    reach = np.abs(track.values).max(axis=0)
+    way = np.abs(np.diff(values, axis=0)).sum(axis=0)
+    moving = angular & (way > 0)
+    far = moving & (reach > TURN)
+    back = np.ptp(values, axis=0) < STRAIGHT * way
+    largest = float(reach.max(where=far, initial=0.0))
+    enough = 2 * far.sum() >= moving.sum() and (far.sum() > 1 or largest > LARGEST["position"])
+    return largest if enough and (far & back).any() and largest <= FARTHEST else 0.0
+
+
+def _ratio(position: Track, velocity: Track) -> float:
+    """Median over joints of velocities by the slope of positions; 0 if it is not known."""
+    if position.stamps is not velocity.stamps:
+        return 0.0
+    shared = [joint for joint in position.joints if joint in velocity.joints]
+    angle, speed = (
+        track.values[:, [track.joints.index(joint) for joint in shared]].astype(np.float64)
+        for track in (position, velocity)
+    )
+    steps = np.diff(position.stamps.time)[:, None]
+    summed = np.vstack((np.zeros(len(shared)), np.cumsum((speed[1:] + speed[:-1]) / 2 * steps, 0)))
+    places = np.unique(np.linspace(0, len(angle) - 1, STRETCHES + 1).astype(int))
+    ways, expected = np.diff(angle[places], axis=0), np.diff(summed[places], axis=0)
+    jumps = np.maximum.reduceat(np.abs(np.diff(angle, axis=0)), places[:-1], axis=0)
+    ways[jumps > np.ptp(angle, axis=0) / 2] = 0.0  # a wrapped angle, of whatever unit
+    square = np.square(ways).sum(axis=0)
+    known = square > 0
+    if not known.any():
+        return 0.0
+    return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
 
 
 def grippers(track: Track) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from inspector.errors import LogError
-from inspector.logs.angles import grippers, in_radians
+from inspector.logs.angles import from_degrees, grippers, in_radians
 from inspector.logs.log import Log, Track
 from inspector.logs.options import ReadOptions
 from inspector.logs.ordering import UnorderedStamps, ordered
@@ -33,6 +33,7 @@ class PreparedLog:
         remarks: What was decided, a sentence each.
         urdf: Text of the URDF in the log, may be empty.
         meta: Metadata of the log.
+        in_degrees: "position" and "velocity" if these were found to be in degrees.
     """
 
     path: Path
@@ -43,6 +44,7 @@ class PreparedLog:
     remarks: tuple[str, ...]
     urdf: str = ""
     meta: Mapping[str, Any] = field(default_factory=dict)
+    in_degrees: tuple[str, ...] = ()
 
 
 def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog:
@@ -61,6 +63,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog
     if log.units and options.units == "degrees" and not robot:
         left_out = dict.fromkeys(joint for track in tracks for joint in grippers(track))
         all_nan += (f"{NO_RANGE}: {listed(list(left_out))}",) if left_out else ()
+    tracks, in_degrees = (tracks, ()) if options.units else from_degrees(tracks, robot)
     tracks = in_radians(log.path, tracks, robot, options.units, normalised_grippers=bool(log.units))
     tracks, unordered = ordered(log.path, tracks)
     return PreparedLog(
@@ -69,10 +72,18 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog
         names=(*(each.name for each in log.fields), *log.not_read),
         not_read=found.not_read,
         unordered=unordered,
-        remarks=(*log.remarks, *found.remarks, *too_short, *all_nan),
+        remarks=(*log.remarks, *found.remarks, *too_short, *all_nan, *_degrees(in_degrees)),
         urdf=log.urdf,
         meta={**log.meta, **({"units": options.units} if options.units else {})},
+        in_degrees=in_degrees,
     )
+
+
+def _degrees(quantities: Sequence[str]) -> Iterator[str]:
+    """What was found to be in degrees, if anything, in a sentence."""
+    plural = {"position": "positions", "velocity": "velocities"}
+    if names := " and ".join(plural[each] for each in quantities):
+        yield f"{names} look like degrees: converted to radians (if they are not, --units radians)"
 
 
 def check_mapping(logs: Sequence[PreparedLog], options: ReadOptions) -> None:

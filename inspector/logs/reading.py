@@ -210,6 +210,8 @@ def _run_of_episode(
     del log  # its tracks remain, and are freed one by one as they are resampled
     if desired:
         same_episode = episode if episode in desired.episodes else desired.episodes[0]
+        if len(logs[0].in_degrees) == 2:  # of one robot, in one unit
+            options = replace(options, units="degrees")
         logs.append(prepared(desired.read(same_episode, progress), options, robot))
     imported = run_of(logs, options, robot, name)
     return replace(imported, remarks=(*imported.remarks, *remarks))
