@@ -9,7 +9,7 @@ import noisemodel as nm
 from inspector import assets
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
-from models.profile import TOLERANCE
+from models.profile import NOMINAL
 from noisemodel.types import Array, Real
 
 Library = Mapping[str, models.Model]
@@ -100,7 +100,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         held = "" if slower is run else "measured values are held: "
         raise CannotTellError(f"{held}{error}") from error
     rate, remark = classifier.rate, ""
-    if slower is not run and rate > slower.rate * (1 + TOLERANCE):
+    if slower is not run and rate > slower.rate * (1 + NOMINAL):
         signals = signals_of(run)
     elif slower is not run:
         run, remark = slower, f"Labelled at {slower.rate:g} Hz, the rate of its values."
@@ -108,7 +108,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
         run = nm.decimated(run, rate)
         signals = signals_of(run)
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
-    labels = classifier.classify(signals, rate, start=float(run.time[0]), valid=run.mask)
+    labels = classifier.classify(signals, run.rate, start=float(run.time[0]), valid=run.mask)
     if not len(labels):
         raise CannotTellError(
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
@@ -196,9 +196,9 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
             f"a noise of {rate:g} Hz cannot be decimated to the {classifier.rate:g} Hz of"
             f" model {name} without joint velocities"
         )
-    labels = classifier.classify(noise, classifier.rate, start=float(time[0]))
+    labels = classifier.classify(noise, rate, start=float(time[0]))
     return _counted(Labelled(labels, name))
 
 
 def _close(rate: float, other: float) -> bool:
-    return abs(rate / other - 1) < TOLERANCE
+    return abs(rate / other - 1) < NOMINAL

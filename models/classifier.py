@@ -17,7 +17,7 @@ from models.examples import CHUNK, Examples
 from models.features import features, standard
 from models.framefeatures import frame_features
 from models.labels import UNKNOWN, Labels
-from models.profile import TOLERANCE, Profile
+from models.profile import NOMINAL, Profile
 from models.reference import Reference, reference_of
 from models.signals import Signals, feeds
 from models.types import Array, Index, Mask, Real, Words
@@ -112,7 +112,7 @@ class Classifier:
         if not feeds(signals, self.profile.signals):
             lacking = [name for name in self.profile.signals if name not in signals]
             raise MissingSignalError(lacking, signals)
-        if self.rate > rate * (1.0 + TOLERANCE):
+        if self.rate > rate * (1.0 + NOMINAL):
             raise RateError(rate, [self.rate], "too low for any; log faster")
         return self
 
@@ -172,7 +172,7 @@ class Classifier:
 
         Args:
             signal: The noise estimate, shape (samples,), or signals by name, each of that shape.
-            rate: Its sample rate, in [Hz], which must be the model's.
+            rate: Its sample rate, in [Hz], which must be the model's, up to ``profile.NOMINAL``.
             start: Time of its first sample, in [s].
             valid: False in gaps, shape (samples,); frames that touch a gap are left out.
 
@@ -184,7 +184,7 @@ class Classifier:
             SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
                 model needs another one.
         """
-        if not abs(rate / self.rate - 1.0) <= TOLERANCE:
+        if not abs(rate / self.rate - 1.0) <= NOMINAL:
             raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
         starts, plain = frame_features(signal, self.profile, valid, self.reference)
         return self.labels(self.decide(plain), starts, rate, start=start)

@@ -12,7 +12,7 @@ import numpy as np
 from models.errors import DatasetError, NoFrameError, RateError, RecordingError, UnknownLabelError
 from models.framing import frame, pad_end
 from models.noisytest import read_folder
-from models.profile import TOLERANCE, Profile
+from models.profile import NOMINAL, Profile
 from models.recording import Block, Recording
 from models.signals import stacked
 from models.types import Mask, Real, Words
@@ -99,7 +99,7 @@ class Dataset:
 
 
 def _check(recording: Recording, profile: Profile, hashes: Mapping[str, str]) -> None:
-    if abs(recording.rate / profile.rate - 1.0) > TOLERANCE:
+    if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
         raise RateError(
             recording.rate,
             [profile.rate],

@@ -19,6 +19,10 @@ MOST_LEAVES = 16
 TOLERANCE = 1e-3
 """Two sample rates are the same if they differ by less than this share."""
 
+NOMINAL = 0.02
+"""Two nominal rates, such as those of jittering stamps, are the same up to this share; what is
+computed of the spectrum is off by as much."""
+
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
 EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "detector", "baseline"]

@@ -6,7 +6,7 @@ from models.classifier import Classifier
 from models.errors import RateError
 from models.framefeatures import FrameFeatures, Frames
 from models.labels import Labels
-from models.profile import TOLERANCE
+from models.profile import NOMINAL
 from models.signals import Signals, stacked
 from models.types import Mask
 
@@ -42,7 +42,7 @@ class Stream:
         self.classifier = classifier
         self.rate = classifier.rate if rate is None else rate
         self.start = start
-        if not abs(self.rate / classifier.rate - 1.0) <= TOLERANCE:
+        if not abs(self.rate / classifier.rate - 1.0) <= NOMINAL:
             raise RateError(
                 self.rate, [classifier.rate], "lower the motion's rate, or take another model"
             )

@@ -80,7 +80,7 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
                     " anything else belongs into meta",
                 )
         with np.load(path, allow_pickle=False) as arrays:
-            found = {name: _plain(path, name, arrays[name]) for name in names}
+            found = {name: _plain(path, name, _loaded(path, name, arrays)) for name in names}
     except RunFileError:
         raise
     except OSError as error:
@@ -134,6 +134,21 @@ def _shrinks(array: Any) -> bool:
     starts = np.linspace(0, max(0, len(data) - STRETCH), STRETCHES).astype(int)
     tried = b"".join(data[start : start + STRETCH].tobytes() for start in starts.tolist())
     return len(zlib.compress(tried, 1)) < COMPRESSIBLE * len(tried)
+
+
+def _loaded(path: Path, name: str, arrays: Any) -> Any:
+    try:
+        return arrays[name]
+    except ValueError as error:
+        if "allow_pickle" not in str(error):
+            raise
+        raise RunFileError(
+            path, f"{name} holds a Python object, such as None; leave it out, or save {_kind(name)}"
+        ) from error
+
+
+def _kind(name: str) -> str:
+    return KIND_WORDS[ARRAYS.get(name, STAGE_ARRAY)[0]]
 
 
 def _plain(path: Path, name: str, array: Any) -> NDArray[Any]:

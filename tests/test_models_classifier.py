@@ -176,7 +176,7 @@ def test_validity_of_another_length_is_refused(ours):
         ours.classify(np.zeros(500), RATE, valid=np.ones(3, bool))
 
 
-@pytest.mark.parametrize("rate", [990.0, 10_000.0, 0.0, float("nan")])
+@pytest.mark.parametrize("rate", [970.0, 10_000.0, 0.0, float("nan")])
 def test_a_signal_of_another_rate_is_refused(ours, rate):
     with pytest.raises(models.RateError, match="rates are 1000 Hz: lower the signal's rate"):
         ours.classify(np.zeros(500), rate)

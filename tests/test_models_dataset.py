@@ -118,8 +118,8 @@ def test_a_class_of_ones_own_needs_only_its_name():
 
 
 def test_a_recording_of_another_rate_is_refused():
-    with pytest.raises(models.RateError, match=r"rate of 990 Hz; .* 1000 Hz: recording 'walk'"):
-        models.Dataset.of([recording(Block(0.0, 1.0, "ok"), rate=990.0)], PROFILE)
+    with pytest.raises(models.RateError, match=r"rate of 970 Hz; .* 1000 Hz: recording 'walk'"):
+        models.Dataset.of([recording(Block(0.0, 1.0, "ok"), rate=970.0)], PROFILE)
 
 
 def test_two_recordings_of_one_name_are_refused():

@@ -279,7 +279,7 @@ def test_every_transform_is_computed_once(monkeypatch):
     assert sum(transformed) == 1 + 1 + (5000 - OURS.window) // OURS.stride  # one for its shape
 
 
-@pytest.mark.parametrize("rate", [10_000.0, 990.0, 0.0, float("nan")])
+@pytest.mark.parametrize("rate", [10_000.0, 970.0, 0.0, float("nan")])
 def test_a_signal_of_another_rate_is_refused(rate):
     with pytest.raises(models.RateError, match="rates are 1000 Hz: lower the motion's rate"):
         models.Stream(classifier("ours"), rate=rate)

@@ -9,7 +9,7 @@ import models
 import noisemodel as nm
 from inspector.library import Library
 from inspector.live.decimator import Decimator
-from models.profile import TOLERANCE
+from models.profile import NOMINAL, TOLERANCE
 from models.signals import EFFORT, JOINTS, MOTION, NOISE
 from noisemodel.decimation import EDGE
 from noisemodel.types import Array, Mask
@@ -96,7 +96,7 @@ class Labeller:
         if rate > chosen.rate and isinstance(model := library[self.model], models.General):
             ratio = ceil(rate / chosen.rate * (1.0 - TOLERANCE))
             chosen = model.at(rate / ratio, self._signals.names)
-        if abs(rate / ratio / chosen.rate - 1.0) > TOLERANCE:
+        if abs(rate / ratio / chosen.rate - 1.0) > NOMINAL:
             self.remark = (
                 f"No labels: {rate:g} Hz is no multiple of the {chosen.rate:g} Hz of the nearest"
                 " model, as is needed while samples come in."

@@ -120,7 +120,7 @@ def _noise(axes: "Axes", analysis: Analysis) -> None:
 def _spectrogram(figure: "Figure", axes: "Axes", analysis: Analysis) -> None:
     run = analysis.run
     shown = spectrogram(analysis.noise, run.rate, start=float(run.time[0]), valid=run.mask)
-    kept = shown.frequency <= TOP_HZ
+    kept = shown.frequency <= max(TOP_HZ, shown.frequency[0])  # of a few samples there is one
     image = axes.pcolormesh(
         shown.time, shown.frequency[kept], shown.level[kept], cmap="inferno", shading="nearest"
     )

@@ -47,7 +47,7 @@ def good_runs(
     reading: Reading | None = None,
     remark: Callable[[str], None] = without_remarks,
 ) -> Iterator[models.Recording]:
-    """Recordings of good runs, all of one rate and robot, as `inspector classify` takes them.
+    """Recordings of good runs of one nominal rate and robot, as `inspector classify` takes them.
 
     Args:
         inputs: Run files, logs, samples, folders of them, or NoisyTest folders.
@@ -117,7 +117,7 @@ def _read(
 
 def _check(source: Source, first: Source, what: str) -> None:
     """Refuse a recording of another rate or robot than the first."""
-    if abs(source.rate / first.rate - 1) > models.profile.TOLERANCE:
+    if abs(source.rate / first.rate - 1) > models.profile.NOMINAL:
         lower = min(source.rate, first.rate)
         raise InspectorError(
             f"{source.path}: recorded at {source.rate:g} Hz, {first.path} at {first.rate:g} Hz;"

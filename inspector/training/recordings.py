@@ -14,11 +14,12 @@ from inspector.hold import without_hold
 from inspector.training.part import Part
 from inspector.wrongrobot import check_joints
 from models.logbands import HIGHEST, LOWEST
+from models.profile import NOMINAL
 from scenarios.sample import DECIMATED, Sample, is_sample
 from scenarios.signals import WHOLE
 
 SLOWER = 1e-3
-"""Relative difference below which a rate is not lower."""
+"""Relative difference below which the rate of a sample is not lower."""
 
 
 class SlowRunError(InspectorError):
@@ -127,7 +128,7 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
         if rate is None:
             found = of_run(path, slower, min(max(slower.rate, LOWEST), HIGHEST))
         else:
-            found = of_run(path, run if slower.rate < rate * (1 - SLOWER) else slower, rate)
+            found = of_run(path, run if slower.rate < rate * (1 - NOMINAL) else slower, rate)
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {error.wanted:g} Hz"
         return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
@@ -196,8 +197,9 @@ def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> models.
     """
     check_joints(run.joint_names, run.robot)
     known = facts(run.robot, run.meta)
-    if run.rate < rate * (1 - SLOWER):
+    if run.rate < rate * (1 - NOMINAL):
         raise SlowRunError(path, run.rate, rate, known)
+    rate = min(rate, run.rate)
     decimated = nm.decimated(run, rate)
     return models.Recording(
         name=_name(path, run.robot),

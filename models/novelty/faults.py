@@ -114,7 +114,7 @@ def recall(
     that are drawn. One is found if a finding overlaps it.
 
     Args:
-        classifiers: By name, all of the rate of the recordings.
+        classifiers: By name, all of the nominal rate of the recordings.
         recordings: Those that the good motion is of, read one after the other.
         good: Where their motion is good.
         seed: Random seed.
@@ -141,7 +141,7 @@ def recall(
             faulty = [with_fault(signals, joint, level * shape) for level in (0.0, *LEVELS)]
             for name, model in classifiers.items():
                 for row, each in enumerate(faulty):
-                    labels = model.classify(each, model.rate, start=part.start, valid=part.valid)
+                    labels = model.classify(each, part.rate, start=part.start, valid=part.valid)
                     counts[name][row] += any(
                         event.start < stop and event.stop > start for event in labels.events()
                     )

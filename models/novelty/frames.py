@@ -10,7 +10,7 @@ import numpy as np
 from models.errors import DatasetError, MissingSignalError, RateError, RecordingError
 from models.features import feature_count
 from models.framefeatures import frame_features
-from models.profile import TOLERANCE, Profile
+from models.profile import NOMINAL, Profile
 from models.recording import Recording
 from models.splitting import folds, group_of
 from models.types import Array, Index, Mask, Words
@@ -127,7 +127,7 @@ def parts(good: GoodMotion) -> list[tuple[Index, Index]]:
 
 def _frames(recording: Recording, profile: Profile) -> tuple[Array, Array, Array]:
     """Features, start and stop of each good frame of a recording."""
-    if abs(recording.rate / profile.rate - 1.0) > TOLERANCE:
+    if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
         raise RateError(
             recording.rate,
             [profile.rate],
