@@ -143,7 +143,9 @@ def _loaded(path: Path, name: str, arrays: Any) -> Any:
         if "allow_pickle" not in str(error):
             raise
         raise RunFileError(
-            path, f"{name} holds a Python object, such as None; leave it out, or save {_kind(name)}"
+            path,
+            f"not a run file: {name} holds a Python object, such as None; leave it out, or save"
+            f" {_kind(name)}",
         ) from error
 
 

@@ -121,6 +121,17 @@ def test_only_blocks_annotated_ok_are_learnt_from(folder, tmp_path):
     assert "of 4 runs with annotations, the part annotated `ok` alone" in out
 
 
+def test_good_runs_of_one_nominal_rate_adapt_a_model_together(folder, tmp_path):
+    run_of(30, rate=249.0, seconds=20.0).save(tmp_path / "a.npz")
+    run_of(31, rate=252.0, seconds=20.0).save(tmp_path / "b.npz")
+    adapted = ("adapt", tmp_path, "-o", tmp_path / "robot.npz", "--model", folder / "small.npz")
+    status, out, err = call(*adapted)
+    assert (status, err) == (0, "")
+    assert "good motion in 2 runs" in out
+    status, out, _ = call("classify", tmp_path / "b.npz", "--model", tmp_path / "robot.npz")
+    assert status in (0, 1)
+
+
 @pytest.mark.parametrize(
     ("odd", "message"),
     [

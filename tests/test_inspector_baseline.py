@@ -9,6 +9,8 @@ import pytest
 from commandline import call
 
 import models
+from inspector.errors import InspectorError
+from inspector.library import label_run, load_library
 from inspector.training.baseline import train
 from noisemodel import Block, Run
 
@@ -107,6 +109,23 @@ def test_faster_runs_are_decimated_to_a_given_rate(tmp_path):
     run_of(1, rate=2000.0).save(tmp_path / "fast.npz")
     trained = train([tmp_path], tmp_path / "model.npz", rate=1000.0)
     assert (trained.classifier.rate, trained.runs) == (1000.0, 2)
+
+
+def test_runs_of_one_nominal_rate_are_learnt_together_and_labelled_at_their_own(tmp_path):
+    run_of(0, rate=90.9).save(tmp_path / "a.npz")
+    run_of(1, rate=91.4).save(tmp_path / "b.npz")
+    for first, second in (("a.npz", "b.npz"), ("b.npz", "a.npz")):
+        trained = train([tmp_path / first, tmp_path / second], tmp_path / f"of-{first}")
+        assert trained.runs == 2
+        library = load_library([tmp_path / f"of-{first}"])
+        for name, rate in (("a.npz", 90.9), ("b.npz", 91.4)):
+            labelled = label_run(Run.load(tmp_path / name), library)
+            length = labelled.labels.stop[0] - labelled.labels.start[0]
+            assert length * rate == pytest.approx(round(length * rate))
+            assert "decimated" not in labelled.remark
+    run_of(2, rate=93.5).save(tmp_path / "c.npz")
+    with pytest.raises(InspectorError, match=r"c.npz: recorded at 93.5 Hz, .* --rate 90.9"):
+        train([tmp_path / "a.npz", tmp_path / "c.npz"], tmp_path / "none.npz")
 
 
 @pytest.mark.parametrize(

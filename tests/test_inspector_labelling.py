@@ -2,6 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from commandline import call
 from generalmodel import fixed
 
 from inspector.assets import model_files
@@ -129,3 +130,17 @@ def test_a_model_whose_runs_name_no_robot_classifies_the_joints_of_any():
     own = replace(FIXED["joints"], runs={"monday": "", "tuesday": ""})
     library = {"norms": FIXED["norms"], "own": own}
     assert for_robot(library, "xarm7") == library
+
+
+@pytest.mark.parametrize("rate", [91.0, 1000.0, 5000.0])
+@pytest.mark.parametrize("samples", [2, 0.3])
+def test_a_run_too_short_for_a_frame_is_no_bad_input(tmp_path, rate, samples):
+    velocity = np.ones((samples if samples == 2 else int(samples * rate), 2))
+    run_of(velocity, rate).save(tmp_path / "short.npz")
+    run_of(np.zeros((5000, 2)), 1000.0).save(tmp_path / "standing.npz")
+    status, out, err = call("classify", tmp_path / "short.npz", tmp_path / "standing.npz")
+    assert (status, err) == (4, "")
+    assert "short.npz: cannot-tell: " in out
+    assert "too short" in out
+    status, _, err = call("report", tmp_path / "short.npz", "-o", tmp_path / "report.html")
+    assert (status, err) == (0, "")

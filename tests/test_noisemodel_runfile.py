@@ -190,6 +190,12 @@ def test_a_file_with_wrong_arrays_is_refused_in_one_line(tmp_path, arrays, messa
     assert caught.value.path == path
 
 
+def test_a_robot_that_is_none_is_named(tmp_path):
+    np.savez(tmp_path / "run.npz", **BASE, robot=None)
+    with pytest.raises(RunFileError, match="robot holds a Python object, such as None; .* text"):
+        Run.load(tmp_path / "run.npz")
+
+
 def test_object_arrays_are_never_unpickled(tmp_path):
     ran = []
 
@@ -199,7 +205,9 @@ def test_object_arrays_are_never_unpickled(tmp_path):
 
     velocity = np.array([Trap()], dtype=object)
     np.savez(tmp_path / "run.npz", time=TIME, velocity=velocity)
-    with pytest.raises(RunFileError, match="not a run file: Object arrays cannot be loaded"):
+    with pytest.raises(
+        RunFileError, match="not a run file: velocity holds a Python object, .* save numbers"
+    ):
         Run.load(tmp_path / "run.npz")
     assert ran == []
 

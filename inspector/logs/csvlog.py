@@ -17,6 +17,7 @@ from inspector.logs.arrays import CELLS, gathered
 from inspector.logs.log import Field, Log, LogReader, Progress, Stamps
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import (
+    JOINT_SIGNALS,
     TIME_UNITS,
     TIMES,
     array_signal,
@@ -129,7 +130,12 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
         place
         for place, name in enumerate(header)
         if place != time
-        and (name in mapped or column_signal(name) or array_signal(name) or CELLS.fullmatch(name))
+        and (
+            name in mapped
+            or column_signal(name)
+            or array_signal(name) in JOINT_SIGNALS
+            or CELLS.fullmatch(name)
+        )
     ]
     not_read = tuple(
         name
@@ -284,10 +290,9 @@ def _split(line: str, delimiter: str) -> list[str]:
 
 def _clean(cells: Sequence[str]) -> tuple[str, ...]:
     """Names of a header; NumPy writes "# time", rostopic "%time"."""
-    return tuple(
-        name.strip().lstrip("#% ") if place == 0 else name.strip()
-        for place, name in enumerate(cells)
-    )
+    first = cells[0].strip().lstrip("#% ")
+    marked_alone = cells[0].strip() and not first  # as in "# time q"
+    return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
 
 
 def _is_comment(cells: Sequence[str]) -> bool:
@@ -343,7 +348,7 @@ def _check_header(path: Path, layout: Layout) -> None:
 
 def _time_column(path: Path, header: Sequence[str], options: ReadOptions) -> int | None:
     """Place of the column with the stamps; None if the rate takes their place."""
-    if options.time in header:
+    if options.time and options.time in header:
         return header.index(options.time)
     mapped = {entry.source for entry in options.entries}
     if found := time_column([name for name in header if name not in mapped]):

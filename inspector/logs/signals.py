@@ -148,18 +148,14 @@ class Naming:
     @classmethod
     def of(cls, columns: Iterable[str]) -> "Naming":
         """Naming of some columns: joints count from 1 if none has number 0 and one has 1."""
-        names = [without_unit(column)[0] for column in columns]
-        numbers = {
-            number
-            for name in names
-            if not name.endswith("]") and (known := column_signal(name))
-            if (number := number_of(known[1])) is not None
-        }
-        words = {
-            match["quantity"].lower()
-            for name in names
-            if (match := _match(name)) and not any(_sides(match.groupdict()))
-        }
+        numbers, words = set[int](), set[str]()
+        for column in columns:
+            name = without_unit(column)[0]
+            known, match = column_signal(column), _match(name)
+            if known and (number := number_of(known[1])) is not None and not name.endswith("]"):
+                numbers.add(number)
+            if match and not any(_sides(match.groupdict())):
+                words.add(match["quantity"].lower())
         return cls(first=int(min(numbers, default=0) == 1), qd_is_desired={"dq", "qd"} <= words)
 
 

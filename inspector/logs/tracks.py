@@ -110,9 +110,15 @@ def _naming_remarks(
 ) -> Iterator[str]:
     """What was decided about names that leave it open, a sentence each."""
     naming = _naming(log)
-    joints = options.joints or (robot.joint_names if robot else ())
-    if naming.first and any(_is_number(each.field, each.joint, naming) for each in kept) and joints:
-        yield f"columns count joints from {naming.first}: {naming.first} is {joints[0]}"
+    numbered = {
+        known[1]: each.joint
+        for each in kept
+        if (known := _column_signal(each.field, naming)) and known[1] != each.joint
+    }
+    found = {number_of(joint): name for joint, name in numbered.items()}
+    lowest = min((number for number in found if number is not None), default=0)
+    if lowest and (options.joints or robot):
+        yield f"columns count joints from {naming.first}: {lowest} is {found[lowest]}"
     if naming.qd_is_desired:
         yield "qd is the desired position, since dq is the velocity (else --map)"
 
@@ -126,10 +132,8 @@ def _is_column(field: Field) -> bool:
     return field.values.shape[1] == 1 and not field.signal
 
 
-def _is_number(field: Field, joint: str, naming: Naming) -> bool:
-    """Whether a column tells its joint by a number, which a name was found for."""
-    known = column_signal(field.name, naming) if _is_column(field) else None
-    return known is not None and number_of(known[1]) is not None and known[1] != joint
+def _column_signal(field: Field, naming: Naming) -> tuple[str, str | int] | None:
+    return column_signal(field.name, naming) if _is_column(field) else None
 
 
 def _of_robot(
@@ -297,7 +301,7 @@ def assignments_of(log: Log, options: ReadOptions, robot: Robot | None) -> Itera
 
 def _names_by_number(log: Log, naming: Naming) -> dict[int, str]:
     """Names of joints that are numbers too, such as ``joint1``."""
-    known = [column_signal(field.name, naming) for field in log.fields if _is_column(field)]
+    known = [_column_signal(field, naming) for field in log.fields]
     joints = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
     found = ((number_of(joint), joint) for joint in reversed(joints))
     return {number: joint for number, joint in found if number is not None}
@@ -313,7 +317,7 @@ def _by_name(
 ) -> Iterator[Assignment]:
     """Assignments by the format or by the field's name."""
     whole = slice(0, field.values.shape[1])
-    if known := column_signal(field.name, naming) if _is_column(field) else None:
+    if known := _column_signal(field, naming):
         signal, joint = known
         number = number_of(joint)
         names = options.joints or (robot.joint_names if robot else ())

@@ -1,0 +1,648 @@
+"""Logs as robots and tools write them, each of which is imported untouched.
+
+``FORMATS`` is the table of docs/logs.md: `python tests/test_logs_formats_of_others.py` prints it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from commandline import call
+
+import models
+from inspector import read_log
+from inspector.errors import LogError
+from inspector.logs.angles import FARTHEST, NORMALISED
+from inspector.logs.signals import DESIRED, MEASURED, QUANTITIES
+from inspector.logs.timestamps import RATES, SLOWEST_SECONDS
+from noisemodel import Run
+
+PAGE = Path(__file__).parents[1] / "docs" / "logs.md"
+
+TIME = np.arange(21) / 100
+EPOCH = 1_700_000_000
+"""Where absolute stamps start, in [s] since 1970."""
+
+METHOD = "differentiated from positions (Savitzky-Golay, window 7, order 3)"
+FOUND = "look like degrees: converted to radians (if they are not, --units radians)"
+
+
+def motion(time=TIME):
+    """Signals of two joints that swing, by name, each of shape (samples, 2)."""
+    phase = 2 * np.pi * time[:, None] * [5.0, 4.0] + [0.0, 1.0]
+    position = [0.8, 0.5] * np.sin(phase)
+    velocity = [0.8, 0.5] * np.cos(phase) * 2 * np.pi * [5.0, 4.0]
+    signals = {"position": position, "velocity": velocity, "effort": 10 * position}
+    desired = {f"{name}_desired": 0.9 * signals[name] for name in ("position", "velocity")}
+    return signals | desired
+
+
+MOTION = motion()
+P, V, PD, VD, E = "position", "velocity", "position_desired", "velocity_desired", "effort"
+
+
+@dataclass(frozen=True)
+class Format:
+    """A log that others write, and the run that it becomes.
+
+    Attributes:
+        title: What writes it, or what is peculiar to it.
+        shown: Its header.
+        text: The file.
+        signals: Signals of the run, which are those of the motion.
+        joints: Names of the joints.
+        said: The remarks, without the name of the file.
+        typed: What has to be typed beside the name of the file.
+        options: The same for ``read_log``.
+        gaps: Samples in gaps.
+    """
+
+    title: str
+    shown: str
+    text: str
+    signals: tuple[str, ...]
+    joints: tuple[str, ...] = ("joint_1", "joint_2")
+    said: tuple[str, ...] = ()
+    typed: str = ""
+    options: dict[str, Any] = field(default_factory=dict)
+    gaps: tuple[int, ...] = ()
+
+    @property
+    def row(self) -> str:
+        """Its line in the table of the page."""
+        said = "; ".join(self.said).replace("|", "\\|") or "nothing"
+        joints = ", ".join(self.joints)
+        return (
+            f"| {self.title} | `{self.shown}` | {f'`{self.typed}`' if self.typed else 'nothing'}"
+            f" | {said} | {', '.join(self.signals)} of {joints} |"
+        )
+
+
+def table(
+    header: str,
+    signals: Sequence[str],
+    *,
+    mark: str = ",",
+    stamp: Callable[[float], object] | None = repr,
+    scale: dict[str, float] | None = None,
+    cells: Sequence[str] = (),
+    end: str = "",
+    number: Callable[[float], str] = repr,
+) -> str:
+    """A header, and a row per sample: its stamp, other cells, both joints of each signal."""
+    values = np.hstack([(scale or {}).get(each, 1.0) * MOTION[each] for each in signals])
+    rows = [header] if header else []
+    for time, sample in zip(TIME.tolist(), values.tolist(), strict=True):
+        stamped = [] if stamp is None else [str(stamp(time))]
+        rows.append(mark.join([*stamped, *cells, *map(number, sample)]) + end)
+    return "\n".join(rows) + "\n"
+
+
+def names(pattern: str, first: int = 1) -> str:
+    """A column's name for both joints, such as "q1,q2"."""
+    return ",".join(pattern.replace("#", str(number)) for number in (first, first + 1))
+
+
+def comma(number: float) -> str:
+    """A number with a decimal comma."""
+    return repr(number).replace(".", ",")
+
+
+def ticks(unit: float, since: int = EPOCH) -> Callable[[float], str]:
+    """Stamps in whole units of so many to the second."""
+    return lambda time: str(since * round(unit) + round(time * unit))
+
+
+def damaged(text: str) -> str:
+    """The same with a cell that is nan in line 7, and one that is empty in line 12."""
+    lines = text.split("\n")
+    for line, cell in ((6, "nan"), (11, "")):
+        lines[line] = ",".join([*lines[line].split(",")[:-1], cell])
+    return "\n".join(lines)
+
+
+DEG = 180 / np.pi
+QDQ = names("q#") + "," + names("dq#")
+START = f"time starts at 0; the first stamp, {EPOCH} s, is in meta"
+ROSTOPIC = (
+    "%time,field.header.seq,field.header.stamp,field.header.frame_id,field.name0,field.name1,"
+    + ",".join(names(f"field.{each}#", 0) for each in (P, V, E))
+)
+FRANKA = "time, success_rate, " + ", ".join(
+    names(each, 0)
+    for each in ("state.q[#]", "state.q_d[#]", "state.dq[#]", "state.dq_d[#]", "state.tau_J[#]")
+)
+UNREAD = "{} not read: {}"
+
+FORMATS = (
+    Format(
+        "names as in run files",
+        "time,elbow.velocity,elbow.velocity_desired",
+        table(
+            "time,shoulder.position,elbow.position,shoulder.velocity,elbow.velocity,"
+            "shoulder.velocity_desired,elbow.velocity_desired",
+            (P, V, VD),
+        ),
+        (P, V, VD),
+        ("shoulder", "elbow"),
+    ),
+    Format(
+        "PlotJuggler, a JointState",
+        "__time,/joint_states/elbow/velocity",
+        table(
+            "__time,/joint_states/shoulder/position,/joint_states/elbow/position,"
+            "/joint_states/shoulder/velocity,/joint_states/elbow/velocity",
+            (P, V),
+            stamp=lambda time: f"{EPOCH + time:.2f}",
+        ),
+        (P, V),
+        ("shoulder", "elbow"),
+        (START,),
+    ),
+    Format(
+        "PlotJuggler, a controller's state",
+        "__time,/arm/state/feedback/velocities[0],/arm/state/reference/velocities[0]",
+        table(
+            "__time,"
+            + names("/arm/state/feedback/velocities[#]", 0)
+            + ","
+            + names("/arm/state/reference/velocities[#]", 0),
+            (V, VD),
+        ),
+        (V, VD),
+        ("joint_0", "joint_1"),
+    ),
+    Format(
+        "UR RTDE, record.py",
+        "timestamp actual_q_0 actual_qd_0 target_qd_0",
+        table(
+            "timestamp "
+            + " ".join(
+                names(each, 0).replace(",", " ")
+                for each in ("actual_q_#", "actual_qd_#", "target_qd_#", "actual_TCP_speed_#")
+            ),
+            (P, V, VD, E),
+            mark=" ",
+        ),
+        (P, V, VD),
+        ("joint_0", "joint_1"),
+        (UNREAD.format("2 columns", "actual_TCP_speed_0, actual_TCP_speed_1"),),
+    ),
+    Format(
+        "ur_rtde, startFileRecording",
+        "timestamp,target_q_0,target_qd_0,target_moment_0,actual_q_0,actual_qd_0",
+        table(
+            "timestamp,"
+            + ",".join(
+                names(each, 0)
+                for each in (
+                    "target_q_#",
+                    "target_qd_#",
+                    "target_moment_#",
+                    "actual_q_#",
+                    "actual_qd_#",
+                )
+            ),
+            (PD, VD, E, P, V),
+        ),
+        (P, V, PD, VD),
+        ("joint_0", "joint_1"),
+        (UNREAD.format("2 columns", "target_moment_0, target_moment_1"),),
+    ),
+    Format(
+        "ROS 1, rostopic echo -p",
+        "%time,field.header.seq,…,field.name0,field.velocity0",
+        table(
+            ROSTOPIC,
+            (P, V, E),
+            stamp=ticks(1e9),
+            cells=("1", f"{EPOCH}000000000", "base", "shoulder", "elbow"),
+        ),
+        (P, V, E),
+        ("shoulder", "elbow"),
+        (
+            "stamps are in nanoseconds",
+            UNREAD.format(
+                "3 columns", "field.header.seq, field.header.stamp, field.header.frame_id"
+            ),
+            START,
+        ),
+    ),
+    Format(
+        "libfranka, logToCSV",
+        "time, success_rate, state.q[0], state.dq[0], state.dq_d[0], cmd.q_d[0]",
+        table(
+            FRANKA + ", " + names("cmd.q_d[#]", 0),
+            (P, PD, V, VD, E, E),
+            stamp=ticks(1e3, 42),
+            cells=("1.0",),
+        ),
+        (P, V, PD, VD, E),
+        ("joint_0", "joint_1"),
+        (
+            "stamps are in milliseconds",
+            UNREAD.format("3 columns", "success_rate, cmd.q_d[0], cmd.q_d[1]"),
+            "time starts at 0; the first stamp, 42 s, is in meta",
+        ),
+    ),
+    Format(
+        "symbols, numbered from 1",
+        "time_s,q1,dq1,dq_d1",
+        table(f"time_s,{QDQ},{names('dq_d#')}", (P, V, VD)),
+        (P, V, VD),
+    ),
+    Format(
+        "symbols, the desired position as qd",
+        "t,q1,dq1,qd1",
+        table(f"t,{QDQ},{names('qd#')}", (P, V, PD)),
+        (P, V, PD),
+        said=(
+            "qd is the desired position, since dq is the velocity (else --map)",
+            f"velocity_desired: {METHOD}",
+        ),
+    ),
+    Format(
+        "words, numbered",
+        "timestamp,joint_velocity_1,target_velocity_1",
+        table(f"timestamp,{names('joint_velocity_#')},{names('target_velocity_#')}", (V, VD)),
+        (V, VD),
+    ),
+    Format(
+        "a joint's name, then words; a comma ends each line",
+        "time,arm_1_joint_velocity,",
+        table(
+            f"time,{names('arm_#_joint_position')},{names('arm_#_joint_velocity')},",
+            (P, V),
+            end=",",
+        ),
+        (P, V),
+        ("arm_1_joint", "arm_2_joint"),
+    ),
+    Format(
+        "short words",
+        "time,joint1_pos,joint1_vel,joint1_cmd_vel,joint1_eff,joint1_target",
+        table(
+            "time,"
+            + ",".join(
+                names(f"joint#_{each}") for each in ("pos", "vel", "cmd_vel", "eff", "target")
+            ),
+            (P, V, VD, E, P),
+        ),
+        (P, V, VD, E),
+        ("joint1", "joint2"),
+        (UNREAD.format("2 columns", "joint1_target, joint2_target"),),
+    ),
+    Format(
+        "capitals",
+        "Timestamp,actualJointPosition1,actualJointVelocity1,desiredJointVelocity1",
+        table(
+            "Timestamp,"
+            + ",".join(
+                map(
+                    names, ("actualJointPosition#", "actualJointVelocity#", "desiredJointVelocity#")
+                )
+            ),
+            (P, V, VD),
+        ),
+        (P, V, VD),
+    ),
+    Format(
+        "two arms",
+        "time,left_q_1,left_dq_1,right_q_1,right_dq_1",
+        table("time,left_q_1,right_q_1,left_dq_1,right_dq_1", (P, V)),
+        (P, V),
+        ("left_1", "right_1"),
+    ),
+    Format(
+        "a legged robot's joints",
+        "t,LF_HAA_q,LF_HAA_dq,LF_HAA_tau",
+        table("t,LF_HAA_q,LF_HFE_q,LF_HAA_dq,LF_HFE_dq,LF_HAA_tau,LF_HFE_tau", (P, V, E)),
+        (P, V, E),
+        ("LF_HAA", "LF_HFE"),
+    ),
+    Format(
+        "semicolons, units in brackets",
+        "Time [sec]; Joint1 Velocity [rad/s]",
+        table(
+            "Time [sec]; Joint1 Position [rad]; Joint2 Position [rad]; Joint1 Velocity [rad/s];"
+            " Joint2 Velocity [rad/s]",
+            (P, V),
+            mark="; ",
+        ),
+        (P, V),
+        ("Joint1", "Joint2"),
+    ),
+    Format(
+        "decimal commas, degrees in the header",
+        "Time (ms);Joint 1 speed (deg/s)",
+        table(
+            "Time (ms);Joint 1 speed (deg/s);Joint 2 speed (deg/s)",
+            (V,),
+            mark=";",
+            stamp=lambda time: comma(1e3 * time),
+            scale={V: DEG},
+            number=comma,
+        ),
+        (V,),
+        ("Joint 1", "Joint 2"),
+        (
+            "stamps are in milliseconds",
+            "Joint 1 speed (deg/s), Joint 2 speed (deg/s): converted from deg/s, as the header"
+            " says",
+        ),
+    ),
+    Format(
+        "a spreadsheet: tabs, units in a row of their own",
+        "Time\\tJ1\\tJ2",
+        table("Time\tJ1\tJ2\n[s]\t[deg]\t[deg]", (P,), mark="\t", scale={P: DEG}),
+        (P,),
+        ("J1", "J2"),
+        (
+            "J1 [deg], J2 [deg]: converted from deg, as the header says",
+            f"velocity: {METHOD}",
+        ),
+    ),
+    Format(
+        "turns per minute",
+        "time,motor1_speed_rpm",
+        table(f"time,{names('motor#_speed_rpm')}", (V,), scale={V: 30 / np.pi}),
+        (V,),
+        ("motor1", "motor2"),
+        ("motor1_speed_rpm, motor2_speed_rpm: converted from rpm, as the header says",),
+    ),
+    Format(
+        "the stamps' unit in their name",
+        "timestamp_ms,q1,dq1",
+        table(f"timestamp_ms,{QDQ}", (P, V), stamp=ticks(1e3, 0)),
+        (P, V),
+        said=("stamps are in milliseconds",),
+    ),
+    *(
+        Format(
+            f"stamps in {unit}, since {when}",
+            "timestamp,q1,dq1",
+            table(f"timestamp,{QDQ}", (P, V), stamp=ticks(size, since)),
+            (P, V),
+            said=(f"stamps are in {unit}", *((START,) if since else ())),
+        )
+        for unit, size in (("milliseconds", 1e3), ("microseconds", 1e6), ("nanoseconds", 1e9))
+        for since, when in ((0, "the start"), (EPOCH, "1970"))
+    ),
+    Format(
+        "dates",
+        "time,q1,dq1",
+        table(
+            f"time,{QDQ}",
+            (P, V),
+            stamp=lambda time: np.datetime64(EPOCH * 1000 + round(1000 * time), "ms"),
+        ),
+        (P, V),
+        said=(START,),
+    ),
+    Format(
+        "a separator at the end of each row alone",
+        "time,q1,dq1",
+        table(f"time,{QDQ}", (P, V), end=","),
+        (P, V),
+    ),
+    Format(
+        "NumPy, savetxt with a header",
+        "# time q1 dq1",
+        table(f"# time {QDQ}".replace(",", " "), (P, V), mark=" "),
+        (P, V),
+    ),
+    Format(
+        "lines before the header, and comments",
+        "# robot: arm 7, tool: none",
+        "# robot: arm 7, tool: none\nStation 4\n\n" + table(f"time,{QDQ}", (P, V)) + "# end\n",
+        (P, V),
+        said=("2 lines before the rows not read",),
+    ),
+    Format(
+        "a byte order mark, quotes, DOS line ends",
+        '"time","q1","dq1"',
+        "\ufeff"
+        + table(",".join(f'"{name}"' for name in f"time,{QDQ}".split(",")), (P, V)).replace(
+            "\n", "\r\n"
+        ),
+        (P, V),
+    ),
+    Format(
+        "pandas, with an index",
+        ",time,q1,dq1",
+        table(f",time,{QDQ}", (P, V), stamp=lambda time: f"{round(100 * time)},{time!r}"),
+        (P, V),
+    ),
+    Format(
+        "no header",
+        "0.0,0.0,0.42,25.1,6.79",
+        table("", (P, V)),
+        (P, V),
+        said=(),
+        typed="--columns time,q1,q2,dq1,dq2",
+        options={"columns": ("time", "q1", "q2", "dq1", "dq2")},
+    ),
+    Format(
+        "no stamps",
+        "q1,q2,dq1,dq2",
+        table(QDQ, (P, V), stamp=None),
+        (P, V),
+        said=("no stamps: 21 samples at 100 Hz, as --rate says",),
+        typed="--rate 100",
+        options={"rate": 100.0},
+    ),
+    Format(
+        "cells that are nan or empty",
+        "time,q1,dq1",
+        damaged(table(f"time,{QDQ}", (P, V))),
+        (P, V),
+        said=("2 samples without a number, marked as not valid: dq2, the first at 0.05 s",),
+        gaps=(5, 10),
+    ),
+    Format(
+        "degrees that nothing tells",
+        "time,q1,dq1,dq_d1",
+        table(f"time,{QDQ},{names('dq_d#')}", (P, V, VD), scale=dict.fromkeys((P, V, VD), DEG)),
+        (P, V, VD),
+        said=(f"positions and velocities {FOUND}",),
+    ),
+    Format(
+        "degrees beside radians per second",
+        "time,q1,dq1",
+        table(f"time,{QDQ}", (P, V), scale={P: DEG}),
+        (P, V),
+        said=(f"positions {FOUND}",),
+    ),
+    Format(
+        "desired positions alone",
+        "time,q1,dq1,q_d1",
+        table(f"time,{QDQ},{names('q_d#')}", (P, V, PD)),
+        (P, V, PD),
+        said=(f"velocity_desired: {METHOD}",),
+    ),
+    Format(
+        "one joint",
+        "time,position,velocity,target_velocity,temperature",
+        "time,position,velocity,target_velocity,temperature\n"
+        + "".join(
+            f"{time!r},{p!r},{v!r},{d!r},40\n"
+            for time, p, v, d in zip(
+                TIME.tolist(), *(MOTION[each][:, 0].tolist() for each in (P, V, VD)), strict=True
+            )
+        ),
+        (P, V, VD),
+        ("joint_0",),
+        (UNREAD.format("1 column", "temperature"),),
+    ),
+)
+
+
+def shown(each: Format) -> str:
+    """Name of a test."""
+    return each.title
+
+
+@pytest.mark.parametrize("each", FORMATS, ids=shown)
+def test_a_log_of_others_is_imported_untouched_and_says_what_was_assumed(tmp_path, each):
+    path = tmp_path / "log.csv"
+    path.write_bytes(each.text.encode())
+    imported = read_log(path, **each.options)
+    run = imported.run
+    remarks = tuple(remark.removeprefix("log.csv: ") for remark in imported.remarks)
+    assert (remarks, run.joint_names, run.rate) == (each.said, each.joints, 100.0)
+    assert np.allclose(run.time, TIME, rtol=0, atol=1e-9)
+    assert tuple(np.flatnonzero(~run.mask)) == each.gaps
+    for signal, values in MOTION.items():
+        found = getattr(run, signal)
+        if signal in each.signals:
+            wanted = values[run.mask, : len(each.joints)]
+            assert np.allclose(found[run.mask], wanted, rtol=0, atol=1e-9), signal
+        elif f"{signal}: {METHOD}" in each.said:
+            error = np.abs(found - values)[3:-3]
+            assert error.max() < 0.05 * np.abs(values).max()
+        else:
+            assert found is None, signal
+
+
+def test_there_are_enough_formats_of_different_names():
+    assert len(FORMATS) >= 20
+    assert len({each.title for each in FORMATS}) == len(FORMATS)
+
+
+def test_the_page_has_exactly_the_formats_that_are_tested():
+    page = PAGE.read_text(encoding="utf-8").split("## Formats\n")[1].split("\n## ")[0]
+    rows = [line for line in page.splitlines() if line.startswith("| ")][1:]
+    assert rows == [each.row for each in FORMATS]
+
+
+def test_the_page_states_the_limits_of_the_rules():
+    page = PAGE.read_text(encoding="utf-8")
+    for words in (
+        f"from {RATES[0]:g} Hz to {RATES[1] / 1e3:g} kHz",
+        f"up to {SLOWEST_SECONDS:g} s",
+        f"goes beyond {FARTHEST:g}°",
+        f"beyond {NORMALISED:g}",
+        f"within {100 * models.profile.NOMINAL:g} %",
+    ):
+        assert words in page, words
+    for words in (*QUANTITIES.values(), DESIRED, MEASURED):
+        for word in words.split("|"):
+            plain = word.replace("?", "").replace("(:", "").replace(")", "").replace("_j", "_J")
+            assert f"`{plain}`" in page, plain
+
+
+def test_what_is_typed_on_the_page_is_what_the_command_takes(tmp_path):
+    for number, each in enumerate(each for each in FORMATS if each.typed):
+        path = tmp_path / f"log{number}.csv"
+        path.write_text(each.text)
+        status, _, err = call("import", path, *each.typed.split(), "-o", tmp_path / f"{number}.npz")
+        assert (status, err) == (0, "")
+        assert Run.load(tmp_path / f"{number}.npz").joint_names == each.joints
+
+
+def test_a_log_without_a_header_shows_the_line_to_type(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table("", (P, V)))
+    status, _, err = call("import", path, "-o", tmp_path / "run.npz")
+    assert status == 3
+    assert "row 1: there is no header; the first row has 5 numbers." in err
+    assert "such as --columns time,q1,q2,dq1,dq2 (without stamps: no time, and --rate 1000)" in err
+
+
+def test_a_log_without_stamps_shows_the_option_to_type(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table(QDQ, (P, V), stamp=None))
+    with pytest.raises(LogError, match="a log without stamps needs its rate, such as --rate 1000"):
+        read_log(path)
+
+
+def test_columns_take_the_place_of_a_header_and_leave_columns_out(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(table("a,b,c,d,e", (P, V)))
+    imported = read_log(path, columns=("time", "", "", "elbow.velocity", "wrist.velocity"))
+    assert imported.run.joint_names == ("elbow", "wrist")
+    assert imported.remarks == ("log.csv: 1 line before the rows not read",)
+    with pytest.raises(LogError, match="5 cells where --columns names 3 columns"):
+        read_log(path, columns=("time", "q1", "q2"))
+
+
+@pytest.mark.parametrize(
+    ("stamp", "message"),
+    [
+        (lambda time: round(100 * time), "median step is 1; .* they may count .* --rate 1000"),
+        (ticks(1e4, 0), "median step is 100; .* that is milliseconds or microseconds; .* --rate"),
+    ],
+)
+def test_stamps_whose_unit_is_open_are_refused_with_the_option_to_type(tmp_path, stamp, message):
+    path = tmp_path / "log.csv"
+    path.write_text(table(f"time,{QDQ}", (P, V), stamp=stamp))
+    with pytest.raises(LogError, match=message):
+        read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("columns", "said", "joints"),
+    [
+        ("q0,q1", "", (1, 2)),
+        ("q1,q2", "columns count joints from 1: 1 is panda_joint1", (1, 2)),
+        ("joint1_pos,joint2_pos", "columns count joints from 1: 1 is panda_joint1", (1, 2)),
+        ("J1 [rad],J2 [rad]", "columns count joints from 1: 1 is panda_joint1", (1, 2)),
+        ("q5,q6", "columns count joints from 0: 5 is panda_joint6", (6, 7)),
+        ("position[1],position[2]", "columns count joints from 0: 1 is panda_joint2", (2, 3)),
+    ],
+)
+def test_numbered_columns_are_the_robots_joints_in_order(tmp_path, columns, said, joints):
+    path = tmp_path / "log.csv"
+    path.write_text(table(f"time,{columns}", (P,)))
+    imported = read_log(path, robot="panda")
+    assert imported.run.joint_names == tuple(f"panda_joint{number}" for number in joints)
+    found = [each for each in imported.remarks if "count joints" in each]
+    assert found == ([f"log.csv: {said}"] if said else [])
+
+
+def test_the_desired_log_of_one_in_degrees_is_in_degrees(tmp_path):
+    degrees = dict.fromkeys((P, V), DEG)
+    measured, desired = tmp_path / "measured.csv", tmp_path / "desired.csv"
+    measured.write_text(table(f"time,{QDQ}", (P, V), scale=degrees))
+    desired.write_text(table(f"time,{names('dq#')}", (V,), scale=degrees))
+    run = read_log(measured, desired=desired).run
+    assert np.allclose(run.velocity_desired, MOTION[V], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "column",
+    ["actual_TCP_speed_0", "base_velocity", "x_velocity", "ee_pos_0", "q_current_0", "ddq1",
+     "joint_acc_1", "field.position_covariance0", "speed_scaling", "joint1_target"],
+)  # fmt: skip
+def test_what_is_no_joints_motion_is_not_read(tmp_path, column):
+    path = tmp_path / "log.csv"
+    path.write_text(table(f"time,elbow.velocity,{column}", (V,)))
+    assert read_log(path).remarks == (f"log.csv: 1 column not read: {column}",)
+
+
+if __name__ == "__main__":
+    print("| log | header | typed | said | imported |\n|---|---|---|---|---|")
+    print("\n".join(each.row for each in FORMATS))
