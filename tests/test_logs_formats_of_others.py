@@ -579,6 +579,21 @@ def test_a_log_without_stamps_shows_the_option_to_type(tmp_path):
         read_log(path)
 
 
+def test_a_listing_tells_what_each_column_is_taken_for(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("Time [ms];q1;elbow_vel [deg/s];qd;velocity;temperature;\n0;1;2;3;4;5;\n")
+    _, out, _ = call("import", path, "--list")
+    assert [line.strip() for line in out.splitlines()[1:]] == [
+        "1 rows",
+        "Time [ms]  stamps",
+        "q1  position of joint 1",
+        "elbow_vel [deg/s]  velocity of elbow",
+        "qd  velocity of the only joint",
+        "velocity  velocity of the only joint",
+        "temperature  not known",
+    ]
+
+
 def test_columns_take_the_place_of_a_header_and_leave_columns_out(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(table("a,b,c,d,e", (P, V)))

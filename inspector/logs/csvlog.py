@@ -20,6 +20,7 @@ from inspector.logs.signals import (
     JOINT_SIGNALS,
     TIME_UNITS,
     TIMES,
+    Naming,
     array_signal,
     column_signal,
     factor_of,
@@ -111,12 +112,24 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
         layout = _layout(path, stream, options)
         stream.seek(0)
         rows = sum(1 for _ in islice(stream, layout.skip, None))
-    return (f"{rows} rows", *(f"{name}  {_meaning(name)}" for name in layout.header))
+    time = options.time or time_column(layout.header)
+    naming = Naming.of(layout.header)
+    return (
+        f"{rows} rows",
+        *(
+            f"{name}  {'stamps' if name == time else _meaning(name, naming)}"
+            for name in layout.header
+            if name
+        ),
+    )
 
 
-def _meaning(name: str) -> str:
-    known = column_signal(name)
-    return "not known" if known is None else f"{known[0]} of {known[1]}"
+def _meaning(name: str, naming: Naming) -> str:
+    if known := column_signal(name, naming):
+        joint = f"joint {known[1]}" if isinstance(known[1], int) else known[1]
+        return f"{known[0]} of {joint}"
+    signal = array_signal(name)
+    return f"{signal} of the only joint" if signal in JOINT_SIGNALS else "not known"
 
 
 def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) -> Log:
