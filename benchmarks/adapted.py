@@ -74,7 +74,8 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     for folder in options.folders:
         runs = recordings(folder, options.rate)
-        model = general.at(options.rate, models.signals.named(runs[0].signal))
+        common = set.intersection(*(set(models.signals.named(run.signal)) for run in runs))
+        model = general.at(options.rate, common)
         faulty = [run for run in runs if run.events or {b.label for b in run.blocks} - {"ok"}]
         good = [run for run in runs if run not in faulty]
         parts = [good[first::PARTS] for first in range(min(PARTS, len(good)))]

@@ -143,6 +143,16 @@ def test_a_robot_that_is_louder_as_a_whole_is_adapted_to_alike(general):
     assert alarms(model, [faulty(300, "tone", 5.0, scale=5.0)]) == 1
 
 
+def test_runs_that_differ_widely_are_no_reference_for_each_other(general, adapted):
+    assert adapted.reference is not None
+    noises = (0.003, 0.003, 0.3, 0.003, 0.003, 0.003)
+    recordings = [good(seed, noise=noise) for seed, noise in enumerate(noises)]
+    motion = models.GoodMotion.read(recordings, general.profile)
+    found = models.adapt(general, motion, alarms=20.0).classifier
+    assert found.reference is None
+    assert found.metrics["adapted"]["reference"] == "the signal itself"
+
+
 def test_good_motion_is_in_distribution_after_adapting(general, adapted):
     fresh = good(201, **ROBOT).signal
     assert general.classify(fresh, RATE).novel.mean() > 0.05

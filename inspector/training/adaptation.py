@@ -15,6 +15,11 @@ from models.logbands import HIGHEST
 from models.novelty.faults import Recall, recall
 from noisemodel.atomic import refuse_existing
 
+ITSELF = (
+    "features stay relative to the run itself: the good runs differ too much to be each other's"
+    " reference"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Adapted:
@@ -30,8 +35,9 @@ class Adapted:
     recall: Recall | None
 
     def __str__(self) -> str:
+        itself = "" if self.learnt.classifier.reference else f"{ITSELF}\n"
         without = "the runs have no joints to put faults into: recall was not measured"
-        return f"{self.learnt}\n{self.recall or without}"
+        return f"{self.learnt}\n{itself}{self.recall or without}"
 
 
 def adapt(

@@ -1,6 +1,7 @@
 """Adaptation of a general model to a robot, by good runs of it alone.
 
-Classes and trees stay. Features become relative to the good motion, in place of the signal itself.
+Classes and trees stay. Features become relative to the good motion, in place of the signal itself,
+unless that has the lower limit: of runs that differ widely, none is a reference for the others.
 The logit of `ok` is shifted, which changes the odds of all failures alike, as another prior would
 (M. Saerens et al., *Adjusting the Outputs of a Classifier to New a Priori Probabilities*, 2002):
 at the alarm threshold, alarms in the good motion keep to a budget. The bounds beyond which a frame
@@ -22,7 +23,7 @@ from models.estimators.probabilistic import NOVELTY_LIMIT
 from models.estimators.trees import TAIL, Trees
 from models.general import UNBOUNDED
 from models.novelty.frames import GoodMotion, parts
-from models.novelty.limit import HOUR, alarm_peaks, counted, limit
+from models.novelty.limit import HOUR, Limit, alarm_peaks, counted, limit
 from models.novelty.training import Learnt, check
 from models.reference import Reference
 from models.types import Array, Index, Mask
@@ -60,16 +61,30 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
     if not (isinstance(trees, Trees) and general.profile.reference):
         raise ProfileError("only a general model, whose features take a reference, can be adapted")
     check(good, alarms, LEAST)
-    failing, novel = _unseen(general, good, trees.known < UNBOUNDED)
-    unit, half = "log odds of a failure", alarms / 2
+    by_others, novel = _unseen(general, good, trees.known < UNBOUNDED)
+    by_itself = _confirmed(_failing(general, good.features), good)
+    half = alarms / 2
     allowed = int(half * good.seconds / HOUR)
-    least = max(counted(failing, good, allowed), _log_odds(LEAST_PROBABILITY))
-    odds = limit(failing, good, half, least=least, fitted=FITTED, expected=EXCESS, unit=unit)
+
+    def limit_of(failing: Array) -> Limit:
+        least = max(counted(failing, good, allowed), _log_odds(LEAST_PROBABILITY))
+        unit = "log odds of a failure"
+        return limit(failing, good, half, least=least, fitted=FITTED, expected=EXCESS, unit=unit)
+
+    limits = [(limit_of(each), each) for each in (by_others, by_itself)]
+    itself = limits[1][0].distance < limits[0][0].distance
+    odds, failing = limits[itself]
     far = limit(novel, good, half, least=max(counted(novel, good, allowed), NOVELTY_LIMIT))
     beyond = np.maximum(failing - odds.distance, novel - far.distance)
     found = replace(odds, budget=alarms, alarms=len(alarm_peaks(beyond, good, 0.0)))
     groups = len(set(good.groups.tolist()))
-    facts = {**asdict(found), "novelty": far.distance, "groups": groups, "runs": len(good.hashes)}
+    facts = {
+        **asdict(found),
+        "novelty": far.distance,
+        "groups": groups,
+        "runs": len(good.hashes),
+        "reference": "the signal itself" if itself else "good runs",
+    }
 
     everything = np.arange(len(good))
     plain = _plain(good, everything)
@@ -81,7 +96,7 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
     classifier = replace(
         general,
         estimator=replace(trees, known=known, calibration=calibration),
-        reference=Reference.of(plain),
+        reference=None if itself else Reference.of(plain),
         runs={**general.runs, **good.hashes},
         metrics={**general.metrics, "adapted": facts},
     )
@@ -104,11 +119,17 @@ def _unseen(general: Classifier, good: GoodMotion, bounded: Mask) -> tuple[Array
     for train, test in parts(good):
         others, plain = _plain(good, train), _plain(good, test)
         relative = Reference.of(others).relative(plain)
-        ok = general.decide(np.concatenate((plain, relative), axis=1))[:, 0]
-        odds[test] = np.log1p(-np.exp(ok)) - ok
+        odds[test] = _failing(general, np.concatenate((plain, relative), axis=1))
         above = (plain - _highest(others)) / general.scale[: plain.shape[1]]
         novelty[test] = above[:, bounded[: plain.shape[1]]].max(axis=1)
     return _confirmed(odds, good), _confirmed(novelty, good)
+
+
+def _failing(general: Classifier, features: Array) -> Array:
+    """Log odds of any failure, shape (frames,)."""
+    ok = general.decide(features)[:, 0]
+    odds: Array = np.log1p(-np.exp(ok)) - ok
+    return odds
 
 
 def _plain(good: GoodMotion, frames: Index) -> Array:
