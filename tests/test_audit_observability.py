@@ -49,7 +49,7 @@ def test_what_lies_outside_of_the_models_bands_is_not_observable(rate):
 @pytest.mark.parametrize(
     ("rate", "library", "lowest"),
     [
-        *((rate, FIXED, 1000.0) for rate in (30.0, 100.0, 500.0, 990.0)),
+        *((rate, FIXED, 1000.0) for rate in (30.0, 100.0, 500.0, 970.0)),
         *((rate, LIBRARY, 80.0) for rate in (30.0, 79.0)),
     ],
 )

@@ -18,6 +18,7 @@ from models.evaluation.predictions import predict
 from models.logbands import ANY
 from models.pooling import columns
 from noisemodel import Block, Run
+from noisemodel.limits import joint_limits
 from scenarios.robots import TARGETS, WIDE
 
 with pytest.MonkeyPatch.context() as patch:
@@ -107,6 +108,11 @@ def test_no_line_of_robots_is_on_both_sides_and_families_are_spread():
     assert leftout.line_of("ur10") == leftout.line_of("ur5") == "ur"
 
 
+def joints_of(robot, count):
+    """The first joints of a robot."""
+    return tuple(joint_limits(robot))[:count]
+
+
 @pytest.mark.parametrize(
     ("robot", "meta", "what"),
     [
@@ -123,7 +129,7 @@ def test_runs_of_target_domains_are_refused(tmp_path, robot, meta, what):
     motion = np.sin(time)[:, None]
     Run(
         time=time,
-        joint_names=("a",),
+        joint_names=joints_of(robot, 1),
         velocity=motion,
         velocity_desired=motion + 1e-3,
         robot=robot,
@@ -259,7 +265,7 @@ def files(folder, robots, *, rate, desired=True):
             path.parent.mkdir(parents=True, exist_ok=True)
             Run(
                 time=one.time,
-                joint_names=("a", "b"),
+                joint_names=joints_of(robot, 2),
                 velocity=one.signal["measured_joints"].T,
                 velocity_desired=one.signal["desired_joints"].T if desired else None,
                 robot=robot,
