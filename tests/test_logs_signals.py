@@ -58,6 +58,22 @@ def test_columns_without_a_known_signal_are_listed(tmp_path):
     assert read_log(path).remarks == (text,)
 
 
+def test_errors_and_outputs_of_a_controller_are_no_motion(tmp_path):
+    ones = np.ones(len(TIME))
+    state = "/arm/controller_state"
+    columns = {
+        f"{state}/{part}/velocities[0]": size * ones
+        for size, part in enumerate(("feedback", "reference", "error", "output"), start=1)
+    }
+    imported = read_log(write(tmp_path / "log.csv", {"time": TIME, **columns, "j0_err_vel": ones}))
+    assert np.array_equal(imported.run.velocity, ones[:, None])
+    assert np.array_equal(imported.run.velocity_desired, 2 * ones[:, None])
+    assert imported.remarks == (
+        f"log.csv: 3 columns not read: {state}/error/velocities[0], {state}/output/velocities[0],"
+        " j0_err_vel",
+    )
+
+
 def test_a_mapping_gives_the_signal_of_other_columns(tmp_path):
     columns = {"clock": TIME, "dq2": TIME, "cmd = 2": -TIME}
     run = read_log(

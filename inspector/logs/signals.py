@@ -123,6 +123,11 @@ NOT_JOINTS = re.compile(
 )
 """Things before a quantity that are no joints."""
 
+NOT_MOTION = re.compile(
+    r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*", re.IGNORECASE
+)
+"""Names of what a controller computes: ``/state/error/positions[0]``, ``joint1_error_pos``."""
+
 GENERIC = re.compile(rf"(?:{JOINT_WORD}|j|a)[ _]?(?P<number>\d+)", re.IGNORECASE)
 """``joint1``, ``J1``, ``axis 1``: names that number the joints."""
 
@@ -242,6 +247,8 @@ def listed(names: Sequence[str]) -> str:
 
 
 def _match(name: str) -> re.Match[str] | None:
+    if NOT_MOTION.fullmatch(name):
+        return None
     found = next((match for each in PATTERNS.values() if (match := each.fullmatch(name))), None)
     if found is None or found.re is next(iter(PATTERNS.values())):
         return found
