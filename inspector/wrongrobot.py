@@ -143,8 +143,11 @@ class LimitWatch:
     def _note(self, name: str, values: Real, beyond: Mask) -> None:
         self._counts[name] += np.count_nonzero(beyond, axis=0)
         if beyond.any():
-            largest = np.abs(np.where(beyond, values, 0.0)).max(axis=0)
-            self._farthest[name] = np.maximum(self._farthest[name], largest)
+            outside = np.where(beyond, values, 0.0)
+            farthest = self._farthest[name]
+            for each in (outside.max(axis=0), outside.min(axis=0)):
+                farthest = np.where(np.abs(each) > np.abs(farthest), each, farthest)
+            self._farthest[name] = np.abs(farthest) if name == "velocity" else farthest
 
 
 def _known(robot: str | None) -> Mapping[str, Limits]:
