@@ -40,6 +40,13 @@ def test_a_log_is_opened_as_import_reads_it(tmp_path):
     assert opened.assumed == f"{READ}; no robot (--robot NAME)"
 
 
+def test_only_angles_without_a_unit_in_the_header_are_said_to_be_taken_for_radians(tmp_path):
+    path = write(tmp_path / "log.csv", {"time": TIME, "elbow_vel [deg/s]": np.cos(TIME)})
+    assumed = open_run(path).assumed
+    assert "; other angles taken for radians; " in assumed
+    assert "elbow_vel [deg/s]: converted from deg/s, as the header says" in assumed
+
+
 def test_a_run_file_is_opened_as_it_is_and_nothing_is_assumed(run):
     opened = open_run(run)
     assert opened.assumed == ""

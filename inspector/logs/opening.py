@@ -220,9 +220,10 @@ def assumed(imported: Imported, path: Path) -> str:
     run = imported.run
     units = str(run.meta.get("units") or "radians")
     decided = any("degrees" in remark for remark in imported.remarks)
+    others = "other " if any(": converted from" in each for each in imported.remarks) else ""
     parts = [
         _joints(run),
-        *([] if decided else [f"angles taken for {units}"]),
+        *([] if decided else [f"{others}angles taken for {units}"]),
         f"{run.rate:g} Hz",
         f"robot {run.robot}" if run.robot else "no robot (--robot NAME)",
         *(["the log describes its robot, which `import` keeps"] if imported.urdf else []),
