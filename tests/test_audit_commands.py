@@ -71,7 +71,7 @@ def test_a_csv_log_is_audited_as_it_is_imported(tmp_path):
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header=header, comments="")
     status, out, err = call("audit", tmp_path / "log.csv")
     assert (status, err) == (0, "")
-    assert "1000 Hz" in out
+    assert "rate: 1000 Hz, stamps are uniform" in out
 
 
 def test_view_prints_a_summary_of_the_audit(episode, tmp_path):

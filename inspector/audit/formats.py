@@ -8,6 +8,9 @@ from typing import Any
 from inspector.audit.audit import Audit
 from inspector.audit.observability import MASKED, ClassObservability, Observability
 
+ROUNDING = 1e-9
+"""Deviation of a stamp that is rounding, in [s]: stamps have nanoseconds at best."""
+
 
 def text(name: str, audit: Audit, assumed: str = "") -> str:
     """An audit as text.
@@ -61,7 +64,7 @@ def as_json(
 
 def _lines(audit: Audit) -> Iterator[str]:
     off = "stamps are uniform"
-    if audit.jitter:
+    if audit.jitter and audit.jitter[1] >= ROUNDING:
         rms, largest = (1e3 * value for value in audit.jitter)
         off = f"stamps were off by {rms:.3g} ms rms, {largest:.3g} ms at most"
     yield f"  rate: {audit.rate:g} Hz, {off}"
