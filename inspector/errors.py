@@ -19,3 +19,8 @@ class LogError(InspectorError):
     def __init__(self, path: Path, problem: str, row: int | None = None) -> None:
         self.path, self.problem, self.row = path, problem, row
         super().__init__(f"{path}{'' if row is None else f', row {row}'}: {problem}")
+
+
+def without_path(error: Exception, path: Path) -> str:
+    """Text of an error without the name of the file, for lines that begin with it."""
+    return str(error).removeprefix(f"{path}: ").removeprefix(f"{path}, ")

@@ -74,6 +74,16 @@ def test_a_csv_log_is_audited_as_it_is_imported(tmp_path):
     assert "rate: 1000 Hz, stamps are uniform" in out
 
 
+@pytest.mark.parametrize("command", ["classify", "audit", "smoothness"])
+def test_a_row_that_cannot_be_read_is_named_with_its_file_once(tmp_path, command):
+    path = tmp_path / "log.csv"
+    path.write_text("time,q1,dq1\n0,0,0\n0.01,0,none of it\n")
+    status, _, err = call(command, path)
+    assert status == 3
+    assert f"{path}: row 3: column 'dq1'" in err
+    assert err.count(str(path)) == 1
+
+
 def test_view_prints_a_summary_of_the_audit(episode, tmp_path):
     status, out, _ = call("view", episode, "--save", tmp_path / "run.rrd")
     assert status == 0

@@ -12,7 +12,7 @@ import models
 import noisemodel as nm
 from inspector.analysis.analyse import Analysis, analyse, analyse_noise
 from inspector.analysis.status import EXIT, Status, Unknown
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.opening import Reading, Source, open_source
 from models import Event
@@ -109,7 +109,7 @@ def classify_file(
             analysis = replace(analysis, assumed=opened.assumed)
         return Verdict.of(source.shown, analysis, localise=localise)
     except EXPECTED as error:
-        message = str(error).removeprefix(f"{source.path}: ")
+        message = without_path(error, source.path)
         return Verdict(source.shown, Status.BAD_INPUT, message=message, unknown=unknown)
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from inspector.audit.audit import Audit, audit
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.opening import Reading, left_out, open_source, sources
 from noisemodel import NoiseModelError
@@ -43,5 +43,5 @@ def audit_all(paths: Sequence[Path], library: Library, reading: Reading | None =
             found[name] = audit(opened.run, library)
             assumed[name] = opened.assumed
         except (InspectorError, NoiseModelError) as error:
-            failed[name] = str(error).removeprefix(f"{source.path}: ")
+            failed[name] = without_path(error, source.path)
     return Audits(found, failed, assumed, left_out(others))

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from inspector.analysis.verdict import EXPECTED
+from inspector.errors import without_path
 from inspector.library import Library
 from inspector.logs.importing import Imported
 from inspector.logs.options import ReadOptions
@@ -67,7 +68,7 @@ def episodes_of(
             try:
                 jobs = jobs_of(log, options)
             except EXPECTED as error:
-                failed.append(Failed(str(log), str(error).removeprefix(f"{log}: ")))
+                failed.append(Failed(str(log), without_path(error, Path(log))))
                 continue
             found += [Unread(str(log), job.episode, str(source), job.read) for job in jobs]
     return tuple(found), tuple(failed)
@@ -93,7 +94,7 @@ def scored_episodes(
             )
         except EXPECTED as error:
             name = f"{episode.log} episode {episode.episode}" if episode.episode else episode.log
-            yield Failed(name, str(error).removeprefix(f"{episode.log}: "))
+            yield Failed(name, without_path(error, Path(episode.log)))
 
 
 def _logs_in(path: Path) -> Iterator[Path]:
