@@ -661,3 +661,21 @@ def test_what_is_no_joints_motion_is_not_read(tmp_path, column):
 if __name__ == "__main__":
     print("| log | header | typed | said | imported |\n|---|---|---|---|---|")
     print("\n".join(each.row for each in FORMATS))
+
+
+def test_a_log_without_header_and_stamps_gets_a_line_that_works(tmp_path):
+    rows = "\n".join(f"{1.0 - 0.01 * n},{0.01 * n},{-0.01},{0.01}" for n in range(22))
+    (tmp_path / "log.csv").write_text(rows)
+    with pytest.raises(LogError, match="such as --columns q1,q2,dq1,dq2 --rate 1000$"):
+        read_log(tmp_path / "log.csv")
+    run = read_log(tmp_path / "log.csv", columns=("q1", "q2", "dq1", "dq2"), rate=1000.0).run
+    assert run.joint_names == ("joint_1", "joint_2")
+
+
+def test_columns_that_no_name_tells_get_a_line_that_works(tmp_path):
+    rows = "\n".join(f"{0.01 * n},{0.01 * n},{0.02 * n}" for n in range(22))
+    (tmp_path / "log.csv").write_text(f"time,a,b\n{rows}")
+    with pytest.raises(LogError, match="such as --columns time,q1,q2; columns are time, a, b"):
+        read_log(tmp_path / "log.csv")
+    run = read_log(tmp_path / "log.csv", columns=("time", "q1", "q2")).run
+    assert run.position is not None

@@ -159,7 +159,8 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
         raise LogError(
             path,
             "no position or velocity of a joint; name columns JOINT.velocity or JOINT.position, or"
-            " map them with --map velocity.JOINT=COLUMN or --map velocity=ARRAY; columns"
+            " map them with --map velocity.JOINT=COLUMN or --map velocity=ARRAY, or name all in"
+            f" their order, such as --columns {_all_positions(len(header), time)}; columns"
             f" are {listed([name for name in header if name])}",
         )
     rows, stamps, numbers, joints = array("q"), list[str](), array("d"), set[tuple[str, ...]]()
@@ -264,7 +265,8 @@ def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout
     plain = [each for each in fitting if not each[1][0].startswith(COMMENTS)]
     candidates = plain or fitting or [each for each in before if _names_motion(each[1])]
     if not candidates:
-        raise _no_header(path, _split(lines[first], delimiter), before)
+        cells = [_split(line, delimiter) for line in lines[first : first + 2]]
+        raise _no_header(path, cells, before)
     row = candidates[-1][0]
     rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
     header: list[str] = next(rows)  # with an open quotation mark, it takes more lines
@@ -332,18 +334,33 @@ def _skipped(before: Sequence[tuple[int, list[str]]], used: Sequence[int]) -> tu
 
 
 def _no_header(
-    path: Path, cells: Sequence[str], before: Sequence[tuple[int, list[str]]]
+    path: Path, rows: Sequence[list[str]], before: Sequence[tuple[int, list[str]]]
 ) -> LogError:
-    width = len(cells) - (not cells[-1].strip())
-    joints = (width - 1) // 2 if width % 2 else width - 1
-    quantities = ("q", "dq") if width % 2 else ("q",)
-    names = ["time", *(f"{each}{number}" for each in quantities for number in range(1, joints + 1))]
+    width = len(rows[0]) - (not rows[0][-1].strip())
+    first = [float(row[0]) for row in rows if _is_number(row[0])]
+    stamped = len(first) < 2 or first[1] > first[0]
+    how = " (without stamps: no time, and --rate 1000)" if stamped else " --rate 1000"
     return LogError(
         path,
         f"there is no header; the first row has {width} numbers. Name the columns in their order,"
-        f" such as --columns {','.join(names)} (without stamps: no time, and --rate 1000)",
+        f" such as --columns {_suggested(width, stamped=stamped)}{how}",
         before[-1][0] + 1 if before else 1,
     )
+
+
+def _suggested(width: int, *, stamped: bool = True) -> str:
+    """Names of so many columns: stamps, if there are any, positions, and as many velocities."""
+    left = width - stamped
+    quantities = ("q", "dq") if left % 2 == 0 else ("q",)
+    joints = range(1, left // len(quantities) + 1)
+    names = (f"{each}{number}" for each in quantities for number in joints)
+    return ",".join((*(("time",) if stamped else ()), *names))
+
+
+def _all_positions(width: int, time: int | None) -> str:
+    """Names of the columns of a log that has positions beside its stamps."""
+    joints = iter(range(1, width + 1))
+    return ",".join("time" if place == time else f"q{next(joints)}" for place in range(width))
 
 
 def _check_header(path: Path, layout: Layout) -> None:
