@@ -2,8 +2,9 @@
 
 import os
 import sys
+import traceback
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 
@@ -13,6 +14,7 @@ from inspector.commands.baseline import baseline
 from inspector.commands.classify import classify
 from inspector.commands.compare import compare
 from inspector.commands.evaluate import evaluate
+from inspector.commands.expect import expect
 from inspector.commands.export import export
 from inspector.commands.import_ import import_
 from inspector.commands.labels import labels
@@ -73,6 +75,7 @@ _add("Look", report, "inspector report run.npz -o run.html")
 _add("Look", compare, "inspector compare --robots panda,go2 --csv comparison.csv")
 _add("Look", robots, "inspector robots")
 _add("Judge", classify, "inspector classify run.npz --format junit")
+_add("Judge", expect, "inspector expect runs/ && inspector classify runs/")
 _add("Judge", audit, "inspector audit run.npz")
 _add("Judge", smoothness, "inspector smoothness episodes/ --picture smoothness.png")
 _add("Import and export", import_, "inspector import log.csv -o run.npz", name="import")
@@ -87,7 +90,7 @@ app.add_typer(simulate, name="simulate", rich_help_panel="Simulate")
 
 
 def main() -> None:
-    """Run the command line; expected errors become one line and exit status 3."""
+    """Run the command line; expected errors become a line and exit status 3, bugs have 70."""
     # Matrices are small here: more threads mostly wait, and waiting takes processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
@@ -97,6 +100,14 @@ def main() -> None:
         from scenarios import ScenarioError
 
         if not isinstance(error, (*EXPECTED, ScenarioError)):
-            raise
+            _end_by_bug()
         typer.echo(f"inspector: {error}", err=True)
         sys.exit(3)
+    except Exception:  # Python's own exit status would be that of a finding
+        _end_by_bug()
+
+
+def _end_by_bug() -> NoReturn:
+    """Print the traceback of a bug and end."""
+    traceback.print_exc()
+    sys.exit(70)

@@ -1,15 +1,23 @@
 """`inspector classify`: the verdicts on runs."""
 
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from datetime import date
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from inspector.analysis.status import Unknown
+from inspector.analysis.status import OUTPUT_LOST, Status, Unknown, worst
 from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
 
 if TYPE_CHECKING:
+    from inspector.analysis.verdict import Verdict
+    from inspector.expectations.expectations import Expectations
+    from inspector.library import Library
     from inspector.logs.opening import Reading
 
 
@@ -20,6 +28,23 @@ class Format(StrEnum):
     JSON = "json"
     JUNIT = "junit"
     GITHUB = "github"
+    SARIF = "sarif"
+    MARKDOWN = "markdown"
+
+
+class BadInput(StrEnum):
+    """What becomes of files that cannot be read."""
+
+    FAIL = "fail"
+    IGNORE = "ignore"
+
+
+def _of_gate(*names: str, **settings: Any) -> Any:
+    return typer.Option(*names, rich_help_panel="What fails a run", **settings)
+
+
+def _of_output(*names: str, **settings: Any) -> Any:
+    return typer.Option(*names, rich_help_panel="Output", **settings)
 
 
 @reads_logs
@@ -31,39 +56,74 @@ def classify(
             show_default=False,
         ),
     ],
-    format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
+    format: Annotated[Format, _of_output("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
     model: ModelFiles = None,
     labels_to: Annotated[
-        Path | None, typer.Option(help="Write the findings to this folder, one file per run.")
+        Path | None, _of_output(help="Write the findings to this folder, one file per run.")
     ] = None,
     labels_format: Annotated[
-        str, typer.Option(help="Format of these files: noisytest, csv or audacity.")
+        str, _of_output(help="Format of these files: noisytest, csv or audacity.")
     ] = "audacity",
     localise: Annotated[
         bool,
-        typer.Option("--localise", help="Add the localisation of each finding to the JSON."),
+        _of_output("--localise", help="Add the localisation of each finding to the JSON."),
     ] = False,
+    write: Annotated[
+        list[str] | None,
+        _of_output("--write", help="FORMAT=FILE: write another format as well; repeatable."),
+    ] = None,
+    report: Annotated[
+        Path | None,
+        _of_output("--report", help="Write index.html with a picture of each run to this folder."),
+    ] = None,
+    report_url: Annotated[
+        str,
+        _of_output("--report-url", help="Where this folder is published, for links to pictures."),
+    ] = "",
+    overwrite: Overwrite = False,
     unknown: Annotated[
         Unknown,
-        typer.Option(help="Frames out of distribution, two or more: a finding, or ignored."),
+        _of_gate(help="Frames out of distribution, two or more: a finding, or ignored."),
     ] = Unknown.FINDING,
-    overwrite: Overwrite = False,
+    expect: Annotated[
+        Path | None,
+        _of_gate("--expect", help="Expectations (TOML); by default the nearest expect.toml."),
+    ] = None,
+    no_expect: Annotated[bool, _of_gate("--no-expect", help="Apply no expectations.")] = False,
+    fail_on_class: Annotated[
+        list[str] | None,
+        _of_gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
+    ] = None,
+    min_score: Annotated[
+        float, _of_gate("--min-score", min=0.0, max=1.0, help="Only findings of this score.")
+    ] = 0.0,
+    min_duration: Annotated[
+        float, _of_gate("--min-duration", min=0.0, help="Only findings that last so long, in [s].")
+    ] = 0.0,
+    on_bad_input: Annotated[
+        BadInput, _of_gate("--on-bad-input", help="A file that cannot be read: fails, or ignored.")
+    ] = BadInput.FAIL,
     *,
     reading: "Reading",
 ) -> None:
     """Classify runs and print verdicts; the exit status is the worst.
 
-    Exit status:
+    Exit status, of several the first in this list:
 
-      0  ok: no run has a finding
-      1  findings: at least one run has one
-      2  wrong usage
+     70  internal error: a bug; its traceback is on standard error
+      5  output lost: an output could not be written
       3  bad input: a file cannot be read
+      1  findings: at least one run has one that counts, or lacks one that is required
       4  cannot tell: say, the rate is too low for every model
+      0  ok: no run has a finding that counts
+
+      2  wrong usage: nothing was classified
     """
     from inspector import assets
     from inspector.analysis.verdict import classify_files, exit_status
+    from inspector.expectations.expectations import NAME
+    from inspector.expectations.judge import Gate, judge
     from inspector.library import load_library
     from inspector.logs.opening import left_out, sources
     from inspector.progress import progress
@@ -71,29 +131,147 @@ def classify(
 
     if localise and format is not Format.JSON:
         raise typer.BadParameter("--localise takes --format json")
+    if expect is not None and no_expect:
+        raise typer.BadParameter("--expect and --no-expect exclude each other")
+    files = _files(write or [], overwrite=overwrite)
     library = load_library(assets.model_files(model))
+    gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     found, others = sources(runs, reading)
+    shown = [each.shown for each in found]
+    expected = {} if no_expect else _expected(shown, expect, library)
+    today = date.today()
     targets = {}
     if labels_to:
-        from inspector.labels.findings import label_paths, write_findings
+        from inspector.labels.findings import label_paths
 
-        targets = label_paths(
-            [each.shown for each in found],
-            labels_to,
-            format_name=labels_format,
-            overwrite=overwrite,
-        )
+        targets = label_paths(shown, labels_to, format_name=labels_format, overwrite=overwrite)
+    draw = None
+    if report is not None:
+        from inspector.report import html, index
+
+        html.require()
+        index.prepare(report, overwrite=overwrite)
+        draw = partial(index.draw, folder=report)
     classified = classify_files(
-        found, library, reading=reading, unknown=unknown, localise=localise, jobs=jobs
+        found,
+        library,
+        reading=reading,
+        unknown=unknown,
+        localise=localise or any(each.by_joint for each in expected.values()),
+        draw=draw,
+        jobs=jobs,
     )
-    verdicts = list(progress(classified, "classify", total=len(found)))
-    if others:
-        typer.echo(f"inspector: {left_out(others)}", err=True)
+    verdicts = [
+        replace(
+            judge(each, expected.get(each.path), gate=gate, today=today),
+            ignored=each.status is Status.BAD_INPUT and on_bad_input is BadInput.IGNORE,
+            picture_url=_url(each, report_url),
+        )
+        for each in progress(classified, "classify", total=len(found))
+    ]
+    if unread := [path for path in others if path.name != NAME]:
+        typer.echo(f"inspector: {left_out(unread)}", err=True)
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
-    typer.echo(FORMATS[format](verdicts))
+    for expectations in {each.path: each for each in expected.values()}.values():
+        for remark in expectations.remarks(today):
+            typer.echo(f"inspector: {remark}", err=True)
+    lost = [line for verdict in verdicts for line in verdict.lost]
+    lost += _tried(lambda: _print(FORMATS[format](verdicts)), "standard output")
+    for path, name in files.items():
+        lost += _tried(partial(_write, path, FORMATS[name], verdicts), str(path))
     if targets:
-        write_findings(verdicts, targets, format_name=labels_format, overwrite=overwrite)
+        from inspector.labels.findings import write_findings
+
+        save = partial(
+            write_findings, verdicts, targets, format_name=labels_format, overwrite=overwrite
+        )
+        lost += _tried(save, str(labels_to))
+    if report is not None:
+        lost += _tried(lambda: index.write(verdicts, report), str(report))
     for bad in verdicts:
-        if bad.status == "bad-input":
-            typer.echo(f"inspector: {bad.path}: {bad.message}", err=True)
-    raise typer.Exit(exit_status(verdicts))
+        if bad.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+            typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.message}", err=True)
+    for line in lost:
+        typer.echo(f"inspector: output lost: {line}", err=True)
+    raise typer.Exit(worst([exit_status(verdicts), *([OUTPUT_LOST] if lost else [])]))
+
+
+def _files(given: Sequence[str], *, overwrite: bool) -> dict[Path, str]:
+    """The files that are written beside standard output, with the format of each."""
+    from noisemodel.atomic import refuse_existing
+
+    files = {}
+    for each in given:
+        name, equals, path = each.partition("=")
+        if name not in list(Format) or not equals or not path:
+            raise typer.BadParameter(
+                f"{each!r}: expected FORMAT=FILE, with one of {', '.join(Format)}",
+                param_hint="'--write'",
+            )
+        refuse_existing(path, overwrite=overwrite)
+        files[Path(path)] = name
+    return files
+
+
+def _classes(given: Sequence[str], library: "Library") -> tuple[str, ...]:
+    """The classes that fail a run."""
+    from inspector.expectations.expectations import classes_found
+
+    known = classes_found(library)
+    names = [name for each in given for name in each.split(",")]
+    for name in names:
+        if name not in known:
+            raise typer.BadParameter(
+                f"{name!r} is none of {', '.join(known)}", param_hint="'--fail-on-class'"
+            )
+    return tuple(names)
+
+
+def _expected(
+    runs: Sequence[Path], chosen: Path | None, library: "Library"
+) -> "dict[Path, Expectations]":
+    """The expectations of each run that has some."""
+    from inspector.expectations.expectations import found_for, read
+
+    if chosen is None:
+        expected = found_for(runs)
+    else:
+        only = read(chosen)
+        expected = dict.fromkeys(runs, only)
+    for expectations in expected.values():
+        expectations.check_classes(library)
+    return expected
+
+
+def _url(verdict: "Verdict", folder: str) -> str:
+    """Where the picture of a run will be published; empty if that is not known."""
+    from urllib.parse import quote
+
+    if verdict.picture is None or not folder:
+        return ""
+    return f"{folder.rstrip('/')}/{verdict.picture.parent.name}/{quote(verdict.picture.name)}"
+
+
+def _print(text: str) -> None:
+    typer.echo(text)
+    sys.stdout.flush()
+
+
+def _write(path: Path, written: "Callable[[Sequence[Verdict]], str]", verdicts: Any) -> None:
+    from noisemodel.atomic import replacing
+
+    with replacing(path, overwrite=True) as temporary:
+        temporary.write_text(f"{written(verdicts)}\n", encoding="utf-8")
+
+
+def _tried(output: Callable[[], object], name: str) -> list[str]:
+    """Write an output; a sentence if it is lost."""
+    from noisemodel import OutputError
+
+    try:
+        output()
+    except OutputError as error:
+        return [str(error)]
+    except OSError as error:
+        return [f"{name}: cannot be written ({error.strerror or error})"]
+    return []

@@ -87,15 +87,15 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
     ET.SubElement(head, "meta", charset="utf-8")
     ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": POLICY})
     ET.SubElement(head, "meta", name="viewport", content="width=device-width")
-    _text(head, "title", f"{analysis.name}: {analysis.headline}")
-    _text(head, "style", STYLE)
+    add_text(head, "title", f"{analysis.name}: {analysis.headline}")
+    add_text(head, "style", STYLE)
     body = ET.SubElement(html, "body")
-    _text(body, "h1", analysis.name)
-    _text(body, "p", analysis.headline, "verdict")
+    add_text(body, "h1", analysis.name)
+    add_text(body, "p", analysis.headline, "verdict")
     _add_table(body, facts(analysis))
     for table in found(analysis):
         _add_table(body, table)
-    _text(body, "h2", "Over time")
+    add_text(body, "h2", "Over time")
     image = f"data:image/png;base64,{_encoded(picture(analysis))}"
     ET.SubElement(body, "img", src=image, alt=_described(analysis))
     _add_sound(body, analysis)
@@ -103,7 +103,7 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
         _add_table(body, table)
     _add_list(body, "What the log can show", audit.splitlines())
     _add_list(body, "Remarks", analysis.remarks)
-    _text(
+    add_text(
         body,
         "p",
         f"Made by noise-inspector of an input with SHA-256 {analysis.sha256}. The noise is an"
@@ -115,14 +115,14 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
 
 def _add_sound(body: ET.Element, analysis: Analysis) -> None:
     sound = clip(analysis.run, around=worst_time(analysis))
-    _text(body, "h2", "Sound")
+    add_text(body, "h2", "Sound")
     if sound is None:
-        _text(body, "p", "The log's rate is too low for audible frequencies.", "note")
+        add_text(body, "p", "The log's rate is too low for audible frequencies.", "note")
         return
     source = f"data:audio/wav;base64,{_encoded(sound.data)}"
     ET.SubElement(body, "audio", controls="controls", src=source)
     span = f"From {sound.start:.2f} s to {sound.stop:.2f} s: {sound.description}."
-    _text(body, "p", f"{span} {AUDIBLE}", "note")
+    add_text(body, "p", f"{span} {AUDIBLE}", "note")
 
 
 @dataclass(frozen=True)
@@ -146,30 +146,38 @@ class Table:
 
 def _add_table(body: ET.Element, table: Table) -> None:
     if table.title:
-        _text(body, "h2", table.title)
+        add_text(body, "h2", table.title)
     frame = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
     if any(table.head):
         row = ET.SubElement(ET.SubElement(frame, "thead"), "tr")
         for place, name in enumerate(table.head):
-            _text(row, "th", name, "number" if place in table.numbers else "")
+            add_text(row, "th", name, "number" if place in table.numbers else "")
     rows = ET.SubElement(frame, "tbody")
     for cells in table.rows:
         row = ET.SubElement(rows, "tr")
         for place, cell in enumerate(cells):
-            _text(row, "td", cell, "number" if place in table.numbers else "")
+            add_text(row, "td", cell, "number" if place in table.numbers else "")
     if table.note:
-        _text(body, "p", table.note, "note")
+        add_text(body, "p", table.note, "note")
 
 
 def _add_list(body: ET.Element, title: str, lines: tuple[str, ...] | list[str]) -> None:
     if lines:
-        _text(body, "h2", title)
+        add_text(body, "h2", title)
         items = ET.SubElement(body, "ul")
         for line in lines:
-            _text(items, "li", line.strip())
+            add_text(items, "li", line.strip())
 
 
-def _text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
+def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
+    """Add an element with a text to another one.
+
+    Args:
+        parent: The other one.
+        tag: Its name.
+        text: Its text; what HTML cannot write is replaced.
+        kind: Its class in the style, empty without.
+    """
     element = ET.SubElement(parent, tag, {"class": kind} if kind else {})
     # HTML has no way to write these characters.
     element.text = re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufffe\uffff]", "\ufffd", text)

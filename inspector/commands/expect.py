@@ -1,0 +1,70 @@
+"""`inspector expect`: a first file of expectations."""
+
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from inspector.analysis.status import Status
+from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
+
+if TYPE_CHECKING:
+    from inspector.logs.opening import Reading
+
+
+@reads_logs
+def expect(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(help="Run files or logs; folders of them.", show_default=False),
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The file to write; expect.toml beside the runs."),
+    ] = None,
+    required: Annotated[
+        bool, typer.Option("--required", help="Require what was found; else it is allowed.")
+    ] = False,
+    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    model: ModelFiles = None,
+    overwrite: Overwrite = False,
+    *,
+    reading: "Reading",
+) -> None:
+    """Write a first expect.toml, by which what was found in runs is expected.
+
+    `classify` applies the nearest expect.toml: beside a run, or in a folder above it. Edit it:
+    allow, require, forbid, waive until a date, or set a budget (docs/expectations.md).
+
+    The exit status is 3 if a run cannot be read; the others are written.
+    """
+    from inspector import assets
+    from inspector.analysis.verdict import classify_files
+    from inspector.expectations.first import first, path_for
+    from inspector.library import load_library
+    from inspector.logs.opening import sources
+    from inspector.progress import progress
+    from noisemodel.atomic import refuse_existing, replacing
+
+    path = path_for(runs, output)
+    refuse_existing(path, overwrite=overwrite)
+    library = load_library(assets.model_files(model))
+    found, _ = sources(runs, reading)
+    classified = classify_files(found, library, reading=reading, localise=True, jobs=jobs)
+    verdicts = list(progress(classified, "classify", total=len(found)))
+    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
+    bad = [each for each in verdicts if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)]
+    for each in bad:
+        typer.echo(f"{each.trace}inspector: {each.path}: {each.message}", err=True)
+    content = first(verdicts, path.parent, required=required, today=date.today())
+    with replacing(path, overwrite=overwrite) as temporary:
+        temporary.write_text(content, encoding="utf-8")
+    number = sum(len(each.events) for each in verdicts)
+    findings = "1 finding" if number == 1 else f"{number} findings"
+    of = "1 run" if len(verdicts) == 1 else f"{len(verdicts)} runs"
+    became = "required" if required else "allowed"
+    typer.echo(f"{path}: {findings} of {of} {became}; edit it, then")
+    typer.echo(f"  inspector classify {' '.join(map(str, runs))}")
+    if bad:
+        raise typer.Exit(3)

@@ -1,0 +1,1 @@
+"""What is expected of runs, and what becomes of their findings by it."""
