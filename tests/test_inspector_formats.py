@@ -1,4 +1,5 @@
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -6,9 +7,20 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from inspector.analysis.status import Status, Unknown
-from inspector.analysis.verdict import Verdict, exit_status
+from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict, exit_status
 from inspector.localisation.localise import Localisation
-from inspector.report.formats import ANNOTATIONS, FORMATS, as_json, github, junit, text
+from inspector.report.formats import (
+    ANNOTATIONS,
+    COMMENT,
+    FORMATS,
+    MARKER,
+    as_json,
+    github,
+    junit,
+    markdown,
+    sarif,
+    text,
+)
 from models import Event
 
 BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
@@ -22,6 +34,25 @@ LOUD = Verdict(
 )
 SLOW = Verdict(Path("slow.npz"), Status.CANNOT_TELL, message="30 Hz is below every model")
 BROKEN = Verdict(Path("broken,1.npz"), Status.BAD_INPUT, message="not a run file: 100%\nbad")
+BUG = Verdict(
+    Path("odd.npz"), Status.INTERNAL_ERROR, message="KeyError: 7", trace="Traceback:\nKeyError: 7\n"
+)
+EXPECTED = replace(
+    LOUD,
+    path=Path("expected.npz"),
+    status=Status.OK,
+    rulings={BLOW: Ruled(Ruling.ALLOWED, "the pick"), RATTLE: Ruled(Ruling.WAIVED, "ticket 1")},
+    expectations="expect.toml",
+)
+LACKING = Verdict(
+    Path("lacking.npz"),
+    Status.FINDINGS,
+    "general",
+    missing=(Missing("impact", 1.1, 1.3, "the pick"),),
+    expectations="expect.toml",
+)
+ALL = [QUIET, LOUD, SLOW, BROKEN, BUG, EXPECTED, LACKING]
+SCHEMA = Path(__file__).parents[1] / "docs" / "noise-verdict-3.schema.json"
 
 
 @pytest.mark.parametrize(
@@ -32,6 +63,12 @@ BROKEN = Verdict(Path("broken,1.npz"), Status.BAD_INPUT, message="not a run file
         ([QUIET, SLOW], 4),
         ([QUIET, SLOW, LOUD], 1),
         ([QUIET, SLOW, LOUD, BROKEN], 3),
+        ([QUIET, SLOW, LOUD, BROKEN, BUG], 70),
+        ([QUIET, LACKING], 1),
+        ([EXPECTED], 0),
+        ([QUIET, replace(BROKEN, ignored=True)], 0),
+        ([LOUD, replace(BROKEN, ignored=True)], 1),
+        ([replace(BROKEN, ignored=True)], 3),  # nothing was tested
     ],
 )
 def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
@@ -45,19 +82,64 @@ def test_text_states_what_was_found_and_when():
     assert lines[3] == "  oscillations from 2.00 s to 3.00 s, out of distribution"
 
 
-def test_json_is_noise_verdict_2():
+def test_text_states_what_was_expected_and_what_is_missing():
+    assert text([EXPECTED]).splitlines() == [
+        "expected.npz: ok [general], by expect.toml",
+        "  impact from 1.00 s to 1.50 s (allowed: the pick)",
+        "  oscillations from 2.00 s to 3.00 s, out of distribution (waived: ticket 1)",
+    ]
+    missing = "  missing: impact from 1.10 s to 1.30 s (required: the pick)"
+    assert text([LACKING]).splitlines()[1] == missing
+
+
+def test_text_ends_with_the_counts_of_several_runs():
+    assert text(ALL).splitlines()[-1] == (
+        "7 runs: 1 internal error, 1 bad input, 2 with findings, 1 cannot tell, 2 ok;"
+        " findings: 2 failing, 1 missing, 1 allowed, 1 waived"
+    )
+
+
+def test_json_is_noise_verdict_3():
     verdicts = json.loads(as_json([LOUD, SLOW]))
-    assert verdicts["format"] == "noise-verdict/2"
+    assert verdicts["format"] == "noise-verdict/3"
+    assert verdicts["exit_status"] == 1
+    assert verdicts["counts"]["runs"]["findings"] == 1
     loud, slow = verdicts["runs"]
     assert loud["events"][1] == {
         "label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8, "novel": True,
-        "order": None,
+        "order": None, "fails": True, "ruling": "found", "reason": "",
     }  # fmt: skip
     assert loud["events"][0]["novel"] is False
     assert (loud["run"], loud["status"], loud["unknown"]) == ("loud.npz", "findings", "finding")
     assert (loud["model"], loud["model_sha256"]) == ("general", "1f2e")
     assert (slow["status"], slow["events"]) == ("cannot-tell", [])
     assert slow["message"] == "30 Hz is below every model"
+
+
+def test_json_fits_its_published_schema():
+    jsonschema = pytest.importorskip("jsonschema", reason="needs jsonschema")
+    schema = json.loads(SCHEMA.read_text())
+    jsonschema.Draft202012Validator.check_schema(schema)
+    joints = (("knee", 0.75), ("hip", 0.25))
+    known = {BLOW: Localisation("desired", "measured", 0.002, joints=joints, band=(85.0, 130.0))}
+    localised = replace(LOUD, localisations=known, picture=Path("report/pictures/loud.png"))
+    written = json.loads(as_json([*ALL, localised, replace(BROKEN, ignored=True)]))
+    jsonschema.Draft202012Validator(schema).validate(written)
+    assert set(schema["$defs"]["run"]["required"]) == set(written["runs"][0])
+    assert set(schema["$defs"]["event"]["required"]) == set(written["runs"][1]["events"][0])
+    written["runs"][1]["events"][0]["ruling"] = "forgiven"
+    with pytest.raises(jsonschema.ValidationError, match="'forgiven' is not one of"):
+        jsonschema.Draft202012Validator(schema).validate(written)
+
+
+def test_json_has_what_became_of_each_finding_and_what_is_missing():
+    expected, lacking = json.loads(as_json([EXPECTED, LACKING]))["runs"]
+    blow = expected["events"][0]
+    assert (blow["fails"], blow["ruling"], blow["reason"]) == (False, "allowed", "the pick")
+    assert lacking["expectations"] == "expect.toml"
+    assert lacking["missing"] == [
+        {"label": "impact", "start": 1.1, "stop": 1.3, "reason": "the pick"}
+    ]
 
 
 def test_json_has_the_localisation_of_findings_that_were_localised():
@@ -87,7 +169,9 @@ def test_junit_counts_runs_and_states_reasons():
         "skipped": "1",
     }
     failure = suite.find("testcase[@name='loud.npz']/failure")
-    assert failure.get("message") == "impact from 1.00 s to 1.50 s"
+    both = "impact from 1.00 s to 1.50 s; oscillations from 2.00 s to 3.00 s, out of distribution"
+    assert failure.get("message") == both
+    assert failure.get("type") == "impact"  # of the best score
     assert "oscillations from 2.00 s to 3.00 s, out of distribution" in failure.text
 
 
@@ -110,6 +194,37 @@ def test_ignored_unknown_frames_are_stated_in_every_format(write, verdict):
     assert "ignore" not in write([verdict])
 
 
+def test_junit_has_one_case_with_time_type_and_picture_for_each_run():
+    slow = replace(SLOW, seconds=0.25, picture=Path("report/pictures/slow.png"))
+    suite = ET.fromstring(junit([slow, BUG, EXPECTED, LACKING])).find("testsuite")
+    cases = {case.get("name"): case for case in suite.iter("testcase")}
+    assert cases["slow.npz"].get("time") == "0.250"
+    lines = cases["slow.npz"].find("system-out").text.splitlines()
+    assert "[[ATTACHMENT|report/pictures/slow.png]]" in lines
+    assert cases["odd.npz"].find("error").get("type") == "internal-error"
+    assert "Traceback" in cases["odd.npz"].find("error").text
+    assert cases["lacking.npz"].find("failure").get("type") == "missing"
+    assert cases["expected.npz"].find("failure") is None
+    assert "allowed: the pick" in cases["expected.npz"].find("system-out").text
+    numbers = {each.get("name"): each.get("value") for each in suite.iter("property")}
+    assert (numbers["runs.internal-error"], numbers["findings.waived"]) == ("1", "1")
+
+
+def test_junit_names_each_case_once():
+    names = [case.get("name") for case in ET.fromstring(junit([LOUD, LOUD])).iter("testcase")]
+    assert names == ["loud.npz", "loud.npz (2)"]
+
+
+def test_ignored_bad_input_is_skipped_and_a_warning():
+    ignored = replace(BROKEN, ignored=True)
+    assert (
+        ET.fromstring(junit([ignored])).find(".//skipped").get("message")
+        == "not a run file: 100%\nbad"
+    )
+    assert github([ignored]).startswith("::warning file=broken")
+    assert "1 of the bad input ignored" in text([ignored, QUIET])
+
+
 def test_junit_drops_control_characters_that_xml_forbids():
     odd = Verdict(Path("a\x00b\x1b.npz"), Status.BAD_INPUT, message="x\x07y")
     assert ET.fromstring(junit([odd])).find(".//testcase").get("name") == "ab.npz"
@@ -120,12 +235,92 @@ def test_github_annotations_escape_what_would_end_them():
     assert line == "::error file=broken%2C1.npz::bad-input: not a run file: 100%25%0Abad"
 
 
-def test_github_gets_ten_annotations_of_a_kind_at_most():
-    lines = github([LOUD] * 25 + [SLOW]).splitlines()
+def test_github_gets_the_ten_worst_and_then_a_summary():
+    worst = replace(LOUD, path=Path("worst.npz"), missing=LACKING.missing)
+    lines = github([LACKING] * 5 + [LOUD] * 19 + [worst, SLOW]).splitlines()
     errors = [line for line in lines if line.startswith("::error")]
     assert len(errors) == ANNOTATIONS
-    assert errors[-1] == "::error::16 more runs are not shown here"
+    assert errors[0].startswith("::error file=worst.npz")
+    assert all("loud.npz" in error for error in errors[1:])
     assert sum(line.startswith("::warning") for line in lines) == 1
+    assert lines[-1].startswith("::notice title=noise-inspector::26 runs: 25 with findings")
+    assert lines[-1].endswith("; 15 more are not shown here")
+
+
+def test_bad_input_hides_no_finding_from_github():
+    errors = [line for line in github([BROKEN] * 20 + [LOUD] * 20).splitlines() if "error" in line]
+    assert sum("broken" in line for line in errors) == ANNOTATIONS // 2
+    assert sum("loud" in line for line in errors) == ANNOTATIONS // 2
+
+
+def test_sarif_has_a_result_for_each_finding_that_fails_its_run():
+    log = json.loads(sarif(ALL))
+    assert log["version"] == "2.1.0"
+    (run,) = log["runs"]
+    results = run["results"]
+    assert [each["ruleId"] for each in results] == ["impact", "oscillations", "missing-impact"]
+    assert [rule["id"] for rule in run["tool"]["driver"]["rules"]] == [
+        "impact", "oscillations", "missing-impact",
+    ]  # fmt: skip
+    for result in results:
+        assert result["message"]["text"]
+        (location,) = result["locations"]
+        assert location["physicalLocation"]["artifactLocation"]["uri"] in (
+            "loud.npz",
+            "lacking.npz",
+        )
+        assert location["physicalLocation"]["region"]["startLine"] == 1
+    prints = {each["partialFingerprints"]["primaryLocationLineHash"] for each in results}
+    assert len(prints) == len(results)
+    (invocation,) = run["invocations"]
+    assert (invocation["executionSuccessful"], invocation["exitCode"]) == (False, 70)
+    notes = [each["message"]["text"] for each in invocation["toolExecutionNotifications"]]
+    assert [note.split(":")[0] for note in notes] == ["internal-error", "bad-input", "cannot-tell"]
+    assert run["properties"]["counts"]["findings"]["allowed"] == 1
+
+
+def test_sarif_names_files_by_addresses():
+    odd = replace(LOUD, path=Path("a folder/50%.npz"))
+    far = replace(LOUD, path=Path("/elsewhere/run.npz"))
+    results = json.loads(sarif([odd, far]))["runs"][0]["results"]
+    places = [each["locations"][0]["physicalLocation"]["artifactLocation"] for each in results]
+    assert {place["uri"] for place in places} == {
+        "a%20folder/50%25.npz", "file:///elsewhere/run.npz",
+    }  # fmt: skip
+
+
+def test_a_fingerprint_stays_when_a_finding_moves():
+    moved = replace(LOUD, events=(replace(BLOW, start=1.01), RATTLE))
+    first, second = (json.loads(sarif([each]))["runs"][0]["results"][0] for each in (LOUD, moved))
+    assert first["partialFingerprints"] == second["partialFingerprints"]
+
+
+def test_markdown_is_a_table_with_the_worst_first_and_one_picture():
+    drawn = replace(LOUD, picture=Path("r/pictures/loud.png"), picture_url="https://x.org/loud.png")
+    lines = markdown([QUIET, LACKING, drawn, EXPECTED]).splitlines()
+    assert lines[0] == MARKER
+    assert lines[1].startswith("### Noise: 4 runs: 2 with findings, 2 ok")
+    rows = [line for line in lines if line.startswith("| `")]
+    assert [row.split("`")[1] for row in rows] == ["loud.npz", "lacking.npz"]
+    assert sum(line.startswith("![") for line in lines) == 1
+    assert "![loud.npz over time](https://x.org/loud.png)" in lines
+    assert any("(allowed: the pick)" in line for line in lines)
+    assert "Picture of `loud.npz`: `r/pictures/loud.png`." in markdown(
+        [replace(drawn, picture_url="")]
+    )
+
+
+def test_markdown_fits_into_a_comment():
+    many = [replace(LOUD, path=Path(f"{'deep/' * 20}{place}.npz")) for place in range(2000)]
+    written = markdown(many + [replace(EXPECTED, path=each.path) for each in many])
+    assert len(written) < COMMENT
+    assert re.search(r"^\d+ more are left out here\.$", written, re.MULTILINE)
+
+
+def test_markdown_keeps_what_a_run_is_named_in_its_cell():
+    odd = replace(LACKING, path=Path("a|b`c<i>.npz"), missing=(Missing("x|y<b>"),))
+    row = next(line for line in markdown([odd]).splitlines() if line.startswith("| `"))
+    assert row == "| `a\\|b'c<i>.npz` | with findings | missing: x\\|y&lt;b> |"
 
 
 def test_an_empty_list_of_verdicts_is_valid_in_every_format():

@@ -166,11 +166,10 @@ class Expectations:
             today: The day that counts.
         """
         return tuple(
-            f"{self.path}: {entry.name} expired on {entry.until}"
-            f" ({(today - entry.until).days} days ago: {entry.reason}); its findings count again:"
-            " fix them, or move `until`"
+            f"{self.path}: {entry.name} expired on {entry.until} ({entry.reason}); its findings"
+            " count again: fix them, or move `until`"
             for entry in self.entries
-            if entry.until is not None and entry.expired(today)
+            if entry.expired(today)
         )
 
     def check_classes(self, library: Library) -> None:

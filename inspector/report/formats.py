@@ -100,8 +100,8 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
             "missing": [
                 {
                     "label": missing.label,
-                    "start": missing.start,
-                    "stop": missing.stop,
+                    "start": missing.start and round(missing.start, 6),
+                    "stop": missing.stop and round(missing.stop, 6),
                     "reason": missing.reason,
                 }
                 for missing in verdict.missing
@@ -112,7 +112,7 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
             "scenario": verdict.scenario,
             "duration": round(verdict.duration, 6),
             "seconds": round(verdict.seconds, 3),
-            "ignored": verdict.ignored,
+            "counted": not verdict.ignored,
             "picture": None if verdict.picture is None else str(verdict.picture),
         }
         for verdict in verdicts
@@ -175,7 +175,7 @@ def junit(verdicts: Sequence[Verdict]) -> str:
 
 
 def github(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts as GitHub workflow commands: the ten worst, and a summary as a notice.
+    """Write verdicts as GitHub workflow commands: the ten worst, and the counts of several runs.
 
     Of ten errors, bad input takes five at most where there are findings, so that it hides none.
     Runs that cannot be told, and bad input that is ignored, are warnings.
@@ -187,11 +187,11 @@ def github(verdicts: Sequence[Verdict]) -> str:
     quiet = [v for v in ranked if _tag(v) == "skipped"][:ANNOTATIONS]
     lines = [_annotation("error", each) for each in shown]
     lines += [_annotation("warning", each) for each in quiet]
-    ignored = any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
-    lines += [f"::notice::{IGNORED}"] if ignored else []
+    lines += [f"::notice::{IGNORED}"] if _ignoring(verdicts) else []
     left = len(bad) + len(found) - len(shown)
     more = f"; {left} more are not shown here" if left else ""
-    lines += [f"::notice title=noise-inspector::{_escaped(summary(verdicts))}{more}"]
+    if len(verdicts) > 1:
+        lines += [f"::notice title=noise-inspector::{_escaped(summary(verdicts))}{more}"]
     return "\n".join(lines)
 
 
@@ -237,7 +237,10 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
             }
         ],
         "results": results[:RESULTS],
-        "properties": {"counts": counts(verdicts)},
+        "properties": {
+            "counts": counts(verdicts),
+            **({"remark": IGNORED} if _ignoring(verdicts) else {}),
+        },
     }
     return json.dumps({"$schema": SARIF_SCHEMA, "version": "2.1.0", "runs": [run]}, indent=2)
 
@@ -249,25 +252,24 @@ def markdown(verdicts: Sequence[Verdict]) -> str:
     known, and else its file is named.
     """
     ranked = sorted(verdicts, key=lambda verdict: verdict.severity)
-    number = counts(verdicts)["findings"]
     failed = [each for each in ranked if each.status is not Status.OK]
     head = [MARKER, f"### Noise: {summary(verdicts)}", ""]
-    tail = [""]
+    tail = ["", f"{IGNORED.capitalize()}.", ""] if _ignoring(verdicts) else [""]
     worst = next((each for each in ranked if each.picture is not None), None)
     if worst is not None and failed:
         told = f"Picture of {_code(worst.path)}: {_code(worst.picture)}."
         drawn = f"![{_cell(worst.path)} over time]({worst.picture_url})"
         tail += [drawn if worst.picture_url else told]
     rows = [f"| {_code(v.path)} | {WORDS[v.status]} | {_cell(_told(v))} |" for v in failed]
-    excused = [f"- {_code(v.path)}: {_cell(each)}" for v in ranked for each in excused(v)]
+    ruled = [f"- {_code(v.path)}: {_cell(each)}" for v in ranked for each in excused(v)]
     parts = [*head]
     if rows:
         parts += _cut(["| run | status | findings |", "|---|---|---|"], rows, COMMENT * 2 // 3)
     parts += tail
-    if excused:
-        one = sum(number.values()) - number["failing"] - number["missing"]
-        opened = ["", f"<details><summary>{one} findings do not count</summary>", ""]
-        parts += [*_cut(opened, excused, COMMENT // 4), "", "</details>"]
+    if ruled:
+        title = f"Findings that do not count: {len(ruled)}"
+        opened = ["", f"<details><summary>{title}</summary>", ""]
+        parts += [*_cut(opened, ruled, COMMENT // 4), "", "</details>"]
     return "\n".join(parts).rstrip()
 
 
@@ -279,6 +281,10 @@ FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
     "sarif": sarif,
     "markdown": markdown,
 }
+
+
+def _ignoring(verdicts: Sequence[Verdict]) -> bool:
+    return any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
 
 
 def _tag(verdict: Verdict) -> str:
@@ -355,7 +361,11 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
     number: Counter[str] = Counter()
     results = []
     facts = [
-        (event.label, _sentence(verdict, event), {"start": event.start, "stop": event.stop})
+        (
+            event.label,
+            _sentence(verdict, event),
+            {"start": round(event.start, 6), "stop": round(event.stop, 6)},
+        )
         for event in verdict.failing
     ]
     facts += [
