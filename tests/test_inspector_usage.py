@@ -114,7 +114,9 @@ def test_no_help_holds_brackets_that_would_be_taken_for_markup():
 
 def test_the_help_of_classify_lists_the_exit_statuses(help_of):
     lines = help_of("classify")
-    meanings = ("ok", "findings", "wrong usage", "bad input", "cannot tell")
+    meanings = ("ok", "findings", "wrong usage", "bad input", "cannot tell", "output lost")
     listed = lines[lines.index("Exit status:") + 2 :]
     for status, (line, meaning) in enumerate(zip(listed, meanings, strict=False)):
         assert line.startswith(f"{status}  {meaning}")
+    assert listed[len(meanings)].startswith("70  internal error")
+    assert listed[len(meanings) + 2] == "Of several, the worst: 70, 5, 3, 1, 4, 0."

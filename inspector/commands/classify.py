@@ -96,10 +96,11 @@ def classify(
         _of_gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
     ] = None,
     min_score: Annotated[
-        float, _of_gate("--min-score", min=0.0, max=1.0, help="Only findings of this score.")
+        float,
+        _of_gate("--min-score", min=0.0, max=1.0, help="Only findings of this score or more."),
     ] = 0.0,
     min_duration: Annotated[
-        float, _of_gate("--min-duration", min=0.0, help="Only findings that last so long, in [s].")
+        float, _of_gate("--min-duration", min=0.0, help="Only findings of so many seconds or more.")
     ] = 0.0,
     on_bad_input: Annotated[
         BadInput, _of_gate("--on-bad-input", help="A file that cannot be read: fails, or ignored.")
@@ -109,16 +110,17 @@ def classify(
 ) -> None:
     """Classify runs and print verdicts; the exit status is the worst.
 
-    Exit status, of several the first in this list:
+    Exit status:
 
-     70  internal error: a bug; its traceback is on standard error
-      5  output lost: an output could not be written
-      3  bad input: a file cannot be read
-      1  findings: at least one run has one that counts, or lacks one that is required
-      4  cannot tell: say, the rate is too low for every model
       0  ok: no run has a finding that counts
+      1  findings: at least one run has one, or lacks one that is required
+      2  wrong usage
+      3  bad input: a file cannot be read
+      4  cannot tell: say, the rate is too low for every model
+      5  output lost: an output could not be written
+     70  internal error: a bug, with its traceback on standard error
 
-      2  wrong usage: nothing was classified
+    Of several, the worst: 70, 5, 3, 1, 4, 0.
     """
     from inspector import assets
     from inspector.analysis.verdict import classify_files, exit_status

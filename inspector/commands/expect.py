@@ -32,7 +32,7 @@ def expect(
     *,
     reading: "Reading",
 ) -> None:
-    """Write a first expect.toml, by which what was found in runs is expected.
+    """Write a first expect.toml, which allows what is found in runs.
 
     `classify` applies the nearest expect.toml: beside a run, or in a folder above it. Edit it:
     allow, require, forbid, waive until a date, or set a budget (docs/expectations.md).

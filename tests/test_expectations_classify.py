@@ -1,0 +1,251 @@
+"""Expectations, formats and exit statuses of `classify`, as a job runs it."""
+
+import errno
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+from commandline import call
+
+from inspector.analysis import verdict as verdicts
+from inspector.analysis.status import worst
+from inspector.assets import demo_run
+from inspector.report.formats import FORMATS
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """A folder with the demo run, which has an impact, a run that is too slow, and a bad file."""
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    shutil.copy(demo_run(), folder / "demo.npz")
+    time = np.arange(300) / 30
+    np.savez(folder / "slow.npz", time=time, velocity=np.cos(time)[:, None])
+    (folder / "broken.npz").write_text("not an archive")
+    return folder
+
+
+def test_what_expect_writes_makes_classify_pass(runs):
+    demo = runs / "demo.npz"
+    assert call("classify", demo)[0] == 1
+    status, out, _ = call("expect", demo)
+    assert status == 0
+    assert out.splitlines() == [
+        f"{runs}/expect.toml: 1 finding of 1 run allowed; edit it, then",
+        f"  inspector classify {demo}",
+    ]
+    assert '# joints = "panda_joint' in (runs / "expect.toml").read_text()
+    status, out, _ = call("classify", demo)
+    assert status == 0
+    assert out.startswith(f"{demo}: ok [general], by {runs}/expect.toml\n  impact from 1.78 s")
+    assert call("classify", demo, "--no-expect")[0] == 1
+    status, _, err = call("expect", demo)
+    assert status == 3
+    assert "exists already" in err
+
+
+def test_expect_names_a_bad_file_and_writes_the_others(runs):
+    status, out, err = call("expect", runs, "--required")
+    assert status == 3
+    assert f"{runs}/broken.npz: not a run file" in err
+    assert "1 finding of 3 runs required" in out
+    assert '[[require]]\nruns = "demo.npz"' in (runs / "expect.toml").read_text()
+
+
+def test_expect_asks_for_a_file_if_runs_lie_in_several_folders(runs, tmp_path):
+    other = tmp_path / "other"
+    other.mkdir()
+    status, _, err = call("expect", runs / "demo.npz", shutil.copy(demo_run(), other))
+    assert status == 3
+    assert "2 folders" in err
+    assert "-o expect.toml" in err
+
+
+def test_a_required_finding_that_is_missing_has_exit_status_1(runs, tmp_path):
+    late = tmp_path / "late.toml"
+    late.write_text('others = "allow"\n[[require]]\nclass = "impact"\nat = 3.0')
+    status, out, _ = call("classify", runs / "demo.npz", "--expect", late)
+    assert status == 1
+    assert "  missing: impact from 2.80 s to 3.20 s" in out.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ('[[allow]]\nclass = "crash"', "[[allow]] 1: no model has the class 'crash'; there are"),
+        ("[[allow]]\nwhen = 3", "[[allow]] 1: no 'when'"),
+        ("allow", "no TOML"),
+    ],
+)
+def test_wrong_expectations_are_one_line_and_exit_status_3(runs, text, problem):
+    (runs / "expect.toml").write_text(text)
+    status, out, err = call("classify", runs / "demo.npz")
+    assert (status, out, err.count("\n")) == (3, "", 1)
+    assert f"{runs}/expect.toml: {problem}" in err
+
+
+def test_an_expired_waiver_is_one_line_and_its_finding_counts(runs):
+    waiver = '[[waive]]\nclass = "impact"\nreason = "ticket 1"\nuntil = {}'
+    (runs / "expect.toml").write_text(waiver.format("2099-01-31"))
+    assert call("classify", runs / "demo.npz")[0] == 0
+    (runs / "expect.toml").write_text(waiver.format("2020-01-31"))
+    status, out, err = call("classify", runs / "demo.npz")
+    assert status == 1
+    assert "(waiver expired: 2020-01-31, ticket 1)" in out
+    assert err.count("\n") == 1
+    assert "[[waive]] 1 expired on 2020-01-31 (ticket 1)" in err
+
+
+def test_entries_that_name_joints_are_applied(runs):
+    (runs / "expect.toml").write_text('[[allow]]\njoints = "panda_joint2"')
+    assert call("classify", runs / "demo.npz")[0] == 0
+    (runs / "expect.toml").write_text('[[allow]]\njoints = "panda_joint7"')
+    assert call("classify", runs / "demo.npz")[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("options", "status"),
+    [
+        (["--fail-on-class", "oscillations"], 0),
+        (["--fail-on-class", "oscillations,impact"], 1),
+        (["--fail-on-class", "oscillations", "--fail-on-class", "impact"], 1),
+        (["--min-score", "0.99"], 0),
+        (["--min-duration", "0.5"], 0),
+        (["--min-duration", "0.05"], 1),
+        (["--fail-on-class", "crash"], 2),
+        (["--expect", "x.toml", "--no-expect"], 2),
+        (["--write", "excel=x"], 2),
+        (["--write", "junit"], 2),
+    ],
+)
+def test_options_name_the_findings_that_fail_a_run(runs, options, status):
+    assert call("classify", runs / "demo.npz", *options)[0] == status
+
+
+def test_bad_input_is_ignored_on_request_unless_there_is_nothing_else(runs):
+    ignore = ("--on-bad-input", "ignore")
+    assert call("classify", runs)[0] == 3
+    status, out, err = call("classify", runs, *ignore)
+    assert status == 1
+    assert "1 bad input" in out
+    assert "broken.npz: not a run file" in err
+    assert call("classify", runs / "broken.npz", runs / "slow.npz", *ignore)[0] == 4
+    assert call("classify", runs / "broken.npz", *ignore)[0] == 3
+
+
+@pytest.mark.parametrize("format_", FORMATS)
+def test_every_format_has_the_counts_of_several_runs(runs, format_):
+    _, out, _ = call("classify", runs, "--format", format_)
+    if format_ == "json":
+        assert json.loads(out)["counts"]["runs"] == {
+            "internal-error": 0, "bad-input": 1, "findings": 1, "cannot-tell": 1, "ok": 0,
+        }  # fmt: skip
+    elif format_ == "sarif":
+        assert json.loads(out)["runs"][0]["properties"]["counts"]["runs"]["bad-input"] == 1
+    elif format_ == "junit":
+        suite = ET.fromstring(out).find("testsuite")
+        assert [suite.get(each) for each in ("failures", "errors", "skipped")] == ["1"] * 3
+    else:
+        assert "3 runs: 1 bad input, 1 with findings, 1 cannot tell" in out
+
+
+def test_one_pass_writes_several_formats_and_a_page_of_all_runs(runs, tmp_path):
+    report = tmp_path / "report"
+    files = {name: tmp_path / f"out.{name}" for name in FORMATS}
+    options = [option for name, path in files.items() for option in ("--write", f"{name}={path}")]
+    everything = (*options, "--report", report, "--report-url", "https://ci.example/7/")
+    status, _, _ = call("classify", runs, *everything)
+    assert status == 3
+    pictures = sorted((report / "pictures").glob("*.png"))
+    assert [each.name.rpartition("-")[0] for each in pictures] == ["demo", "slow"]
+    page = (report / "index.html").read_text()
+    places = [page.index(f"{name}.npz") for name in ("broken", "demo", "slow")]
+    assert places == sorted(places)
+    for each in pictures:
+        assert f'src="pictures/{each.name}"' in page
+    assert "3 runs: 1 bad input, 1 with findings, 1 cannot tell" in page
+    assert f"[[ATTACHMENT|{pictures[0]}]]" in files["junit"].read_text()
+    address = f"(https://ci.example/7/pictures/{pictures[0].name})"
+    assert address in files["markdown"].read_text()
+    status, _, err = call("classify", runs, *everything)
+    assert status == 3
+    assert "exists already" in err
+    assert call("classify", runs, *everything, "--overwrite")[0] == 3
+
+
+def test_pictures_of_runs_of_one_name_are_two(runs, tmp_path):
+    other = tmp_path / "runs" / "again"
+    other.mkdir()
+    shutil.copy(demo_run(), other)
+    call("classify", runs / "demo.npz", other, "--report", tmp_path / "report", "-j", 2)
+    assert len(list((tmp_path / "report" / "pictures").glob("demo-*.png"))) == 2
+
+
+def test_names_of_runs_are_text_in_the_page(runs, tmp_path):
+    odd = (runs / "demo.npz").rename(runs / "<b>&amp;.npz")
+    call("classify", odd, "--report", tmp_path / "report")
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert "<b>" not in page
+    assert "&lt;b&gt;&amp;amp;.npz" in page
+
+
+def test_a_bug_that_one_run_shows_has_exit_status_70_and_hides_no_finding(runs, monkeypatch):
+    right = verdicts.open_source
+
+    def wrong(source, reading):
+        return right(source, reading) if source.path.stem == "demo" else {}[source.path.stem]
+
+    monkeypatch.setattr(verdicts, "open_source", wrong)
+    status, out, err = call("classify", runs)
+    assert status == 70
+    assert "impact from 1.78 s" in out
+    assert "3 runs: 2 internal error, 1 with findings" in out
+    assert "Traceback" in err
+    assert f"inspector: {runs}/slow.npz: KeyError: 'slow'" in err
+
+
+def test_a_bug_of_a_command_has_exit_status_70(monkeypatch):
+    def wrong(*_):
+        raise KeyError("bug")
+
+    monkeypatch.setattr("inspector.library.load_library", wrong)
+    status, _, err = call("classify", demo_run())
+    assert status == 70
+    assert "Traceback" in err
+
+
+def test_an_output_that_is_lost_has_exit_status_5(runs, tmp_path, monkeypatch):
+    def full(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("inspector.report.index.write", full)
+    report = tmp_path / "report"
+    status, out, err = call("classify", runs, "--report", report)
+    assert status == 5  # worse than the bad input
+    assert "impact from 1.78 s" in out
+    assert f"inspector: output lost: {report}: cannot be written (No space left on device)" in err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_behind_standard_output_has_exit_status_5():
+    command = [sys.executable, "-m", "inspector", "classify", demo_run()]
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(command, cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True)
+    assert done.returncode == 5
+    assert done.stderr.splitlines()[0] == (
+        "inspector: output lost: standard output: cannot be written (No space left on device)"
+    )
+
+
+def test_the_worst_of_exit_statuses_is_in_a_fixed_order():
+    order = [70, 5, 3, 1, 4, 0]
+    for place, status in enumerate(order):
+        assert worst(reversed(order[place:])) == status
+    assert worst([]) == 0
