@@ -1,0 +1,149 @@
+"""What teams copy into their jobs, run as far as it can be without the hosts."""
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pytest
+
+from inspector.assets import demo_run
+
+ROOT = Path(__file__).parents[1]
+yaml = pytest.importorskip("ruamel.yaml", reason="needs ruamel.yaml, which rosbags brings")
+
+
+def read(path):
+    return yaml.YAML(typ="safe").load((ROOT / path).read_text())
+
+
+@pytest.fixture
+def job(tmp_path):
+    """A folder of a job with the demo run in `logs`; runs a script in it, with `inspector`."""
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "bin").mkdir()
+    shutil.copy(demo_run(), tmp_path / "logs")
+    tool(tmp_path, "inspector", f'exec {shlex.quote(sys.executable)} -m inspector "$@"')
+
+    def run(*command, **variables):
+        path = f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}"
+        env = os.environ | {"PATH": path, "PYTHONPATH": str(ROOT)} | variables
+        return subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
+
+    run.folder = tmp_path
+    return run
+
+
+def tool(folder, name, line):
+    path = folder / "bin" / name
+    path.write_text(f"#!/bin/sh\n{line}\n")
+    path.chmod(0o755)
+
+
+def allow(job):
+    (job.folder / "logs" / "expect.toml").write_text('[[allow]]\nclass = "impact"\n')
+
+
+def steps():
+    return {step["name"]: step for step in read("action.yml")["runs"]["steps"]}
+
+
+def bash(script):
+    """How GitHub runs a step with `shell: bash`."""
+    return "bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script
+
+
+def classify(job, **inputs):
+    """Run the step of the action that classifies."""
+    (job.folder / "temp").mkdir(exist_ok=True)
+    variables = {"RUNS": "logs", "OPTIONS": "", "REPORT": "noise-report"} | inputs
+    files = {"RUNNER_TEMP": "temp", "GITHUB_STEP_SUMMARY": "summary.md"}
+    return job(*bash(steps()["Classify"]["run"]), **variables, **files)
+
+
+def test_the_action_annotates_summarises_and_keeps_a_page(job):
+    (job.folder / "summary.md").write_text("before\n")
+    done = classify(job)
+    assert done.returncode == 1, done.stderr
+    assert "::error file=logs/demo.npz::findings: impact from 1.78 s" in done.stdout
+    assert "logs/demo.npz: findings [general]" in done.stdout.splitlines()
+    summary = (job.folder / "summary.md").read_text()
+    assert summary.startswith("before\n<!-- noise-inspector -->\n### Noise: 1 run: 1 with findings")
+    assert (job.folder / "noise-report" / "index.html").exists()
+
+
+def test_the_action_passes_when_all_is_expected_and_takes_options(job):
+    allow(job)
+    done = classify(job)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert classify(job, OPTIONS="--no-expect --min-score 0.1").returncode == 1
+
+
+def test_the_action_gives_each_input_to_a_step_and_installs_what_it_is_part_of():
+    action = read("action.yml")
+    text = (ROOT / "action.yml").read_text()
+    used = set(re.findall(r"inputs\.(\w+)", text))
+    assert used == set(action["inputs"])
+    assert '"$GITHUB_ACTION_PATH[report]"' in steps()["Install"]["run"]
+    # What users type reaches scripts as variables only.
+    assert not [step for step in steps().values() if "${{" in step.get("run", "")]
+
+
+@pytest.mark.parametrize(
+    ("known", "method"),
+    [("", "POST repos/o/r/issues/7/comments"), ("42", "PATCH repos/o/r/issues/comments/42")],
+)
+def test_the_comment_of_the_action_is_made_once_and_then_replaced(job, known, method):
+    tool(job.folder, "gh", f'echo "$@" >> calls; [ "$2" = --paginate ] && echo "{known}"; exit 0')
+    places = {"COMMENTS": "repos/o/r/issues/7/comments", "COMMENT": "repos/o/r/issues/comments"}
+    done = job(*bash(steps()["Comment"]["run"]), RUNNER_TEMP="temp", **places)
+    assert done.returncode == 0, done.stderr
+    asked, sent = (job.folder / "calls").read_text().splitlines()
+    assert "<!-- noise-inspector -->" in asked
+    assert sent == f"api --method {method} --field body=@temp/noise.md --silent"
+
+
+def test_the_workflow_uses_inputs_that_the_action_has():
+    (used,) = [
+        step for step in read("examples/ci/github.yml")["jobs"]["noise"]["steps"] if "with" in step
+    ]
+    assert set(used["with"]) <= set(read("action.yml")["inputs"])
+    assert len((ROOT / "examples/ci/github.yml").read_text().splitlines()) <= 15
+
+
+def test_the_job_for_gitlab_writes_what_it_keeps(job):
+    noise = read("examples/ci/gitlab.yml")["noise"]
+    install, command = noise["script"]
+    assert install == 'pip install --quiet "noise-inspector[report]"'
+    assert job(*bash(command)).returncode == 1
+    (kept,) = noise["artifacts"]["paths"]
+    assert (job.folder / kept / "index.html").exists()
+    case = ET.parse(job.folder / noise["artifacts"]["reports"]["junit"]).find(".//testcase")
+    (line,) = case.find("system-out").text.splitlines()
+    picture = re.fullmatch(r"\[\[ATTACHMENT\|(.*)\]\]", line)[1]
+    assert (job.folder / picture).read_bytes().startswith(b"\x89PNG")
+    allow(job)
+    assert job(*bash(f"{command} --overwrite")).returncode == 0
+
+
+def test_the_pre_merge_script_says_what_to_do(job):
+    script = ROOT / "examples" / "ci" / "pre-merge.sh"
+    done = job(script, "logs")
+    assert done.returncode == 1
+    page = re.search(r"noise: findings, see (\S+/index.html);", done.stdout)[1]
+    assert Path(page).exists()
+    allow(job)
+    done = job(script, "logs")
+    assert done.returncode == 0
+    assert done.stdout.splitlines()[-1] == "noise: nothing new"
+    time = np.arange(300) / 30
+    np.savez(job.folder / "slow.npz", time=time, velocity=np.cos(time)[:, None])
+    assert job(script, "slow.npz").returncode == 0
+    done = job(script, "gone.npz")
+    assert done.returncode == 3
+    assert done.stdout.splitlines()[-1] == "noise: not checked, exit status 3"
