@@ -287,6 +287,15 @@ def test_patterns_of_runs_are_relative_to_the_folder_of_the_file(tmp_path):
     assert found.of(tmp_path / "leg" / "a.npz", "") == ()
 
 
+def test_a_run_that_is_a_link_has_the_name_of_the_link(tmp_path):
+    (tmp_path / "elsewhere.npz").touch()
+    (tmp_path / "runs").mkdir()
+    link = tmp_path / "runs" / "pick.npz"
+    link.symlink_to(tmp_path / "elsewhere.npz")
+    found = read(written(tmp_path / "runs" / "expect.toml", '[[allow]]\nruns = "pick.npz"'))
+    assert len(found.of(link, "")) == 1
+
+
 def test_a_first_file_makes_its_own_runs_pass(tmp_path):
     odd = replace(RUN, path=tmp_path / 'a "b" [c].npz')
     for required in (False, True):

@@ -76,6 +76,22 @@ def test_a_required_finding_that_is_missing_has_exit_status_1(runs, tmp_path):
     assert "  missing: impact from 2.80 s to 3.20 s" in out.splitlines()
 
 
+def test_a_log_that_is_missing_from_a_folder_lacks_its_required_finding(runs):
+    (runs / "broken.npz").unlink()
+    text = 'others = "allow"\n[[require]]\nruns = "{}.npz"\nclass = "impact"'
+    (runs / "expect.toml").write_text(text.format("demo"))
+    assert call("classify", runs)[0] == 4  # the slow one
+    (runs / "expect.toml").write_text(text.format("grasp"))
+    status, out, _ = call("classify", runs)
+    assert status == 1
+    lines = out.splitlines()
+    place = next(i for i, line in enumerate(lines) if line.startswith(f"{runs}/expect.toml: find"))
+    assert lines[place + 1] == "  missing: impact (required: [[require]] 1: no run is grasp.npz)"
+    assert call("classify", runs, "--labels-to", runs / "labels")[0] == 1
+    assert {each.name for each in (runs / "labels").iterdir()} == {"demo.txt"}
+    assert call("classify", runs / "demo.npz")[0] == 0  # not the whole folder
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [

@@ -1,7 +1,7 @@
 """`inspector classify`: the verdicts on runs."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import date
 from enum import StrEnum
@@ -125,7 +125,7 @@ def classify(
     from inspector import assets
     from inspector.analysis.verdict import classify_files, exit_status
     from inspector.expectations.expectations import NAME
-    from inspector.expectations.judge import Gate, judge
+    from inspector.expectations.judge import Gate, judge, without_run
     from inspector.library import load_library
     from inspector.logs.opening import left_out, sources
     from inspector.progress import progress
@@ -171,6 +171,9 @@ def classify(
         )
         for each in progress(classified, "classify", total=len(found))
     ]
+    for expectations in _whole(runs, expected.values()) if expect is None else ():
+        if (absent := without_run(verdicts, expectations)) is not None:
+            verdicts.append(absent)
     if unread := [path for path in others if path.name != NAME]:
         typer.echo(f"inspector: {left_out(unread)}", err=True)
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
@@ -185,7 +188,11 @@ def classify(
         from inspector.labels.findings import write_findings
 
         save = partial(
-            write_findings, verdicts, targets, format_name=labels_format, overwrite=overwrite
+            write_findings,
+            [verdict for verdict in verdicts if verdict.path in targets],
+            targets,
+            format_name=labels_format,
+            overwrite=overwrite,
         )
         lost += _tried(save, str(labels_to))
     if report is not None:
@@ -243,6 +250,14 @@ def _expected(
     for expectations in expected.values():
         expectations.check_classes(library)
     return expected
+
+
+def _whole(given: Sequence[Path], expected: "Iterable[Expectations]") -> "Iterator[Expectations]":
+    """The expectations all of whose runs are given: their folder is, or lies in one that is."""
+    folders = [path.resolve() for path in given if path.is_dir()]
+    for each in {each.path: each for each in expected}.values():
+        if any(each.path.resolve().is_relative_to(folder) for folder in folders):
+            yield each
 
 
 def _url(verdict: "Verdict", folder: str) -> str:

@@ -155,9 +155,8 @@ class Expectations:
 
     def of(self, run: Path, scenario: str) -> tuple[Entry, ...]:
         """List the entries about a run."""
-        folder, full = self.path.resolve().parent, run.resolve()
-        relative = full.relative_to(folder) if full.is_relative_to(folder) else Path(run.name)
-        return tuple(entry for entry in self.entries if entry.covers(relative, scenario))
+        name = relative(run, self.path.parent)
+        return tuple(entry for entry in self.entries if entry.covers(name, scenario))
 
     def remarks(self, today: date) -> tuple[str, ...]:
         """List waivers that have expired, a sentence each.
@@ -190,6 +189,15 @@ class Expectations:
                         f"{entry.name}: no model has the class {name!r}; there are"
                         f" {', '.join(possible)}",
                     )
+
+
+def relative(run: Path, folder: Path) -> Path:
+    """Give the path of a run relative to a folder; its name alone if it lies elsewhere.
+
+    A run that is a link has the name of the link.
+    """
+    full, top = run.parent.resolve() / run.name, folder.resolve()
+    return full.relative_to(top) if full.is_relative_to(top) else Path(run.name)
 
 
 def classes_found(library: Library) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError
-from inspector.expectations.expectations import FORMAT, NAME, TOLERANCE
+from inspector.expectations.expectations import FORMAT, NAME, TOLERANCE, relative
 
 HEAD = f"""\
 # Which findings `inspector classify` expects of the runs in this folder, and below it.
@@ -76,9 +76,7 @@ def first(verdicts: Sequence[Verdict], folder: Path, *, required: bool, today: d
     """
     parts = [HEAD]
     for verdict in verdicts:
-        full = verdict.path.resolve()
-        below = full.is_relative_to(folder.resolve())
-        name = full.relative_to(folder.resolve()).as_posix() if below else verdict.path.name
+        name = relative(verdict.path, folder).as_posix()
         for event in verdict.events:
             known = verdict.localisations.get(event)
             joints = known.joints[:1] if known is not None else ()

@@ -88,6 +88,28 @@ def judge(
     return judged
 
 
+def without_run(verdicts: Sequence[Verdict], expectations: Expectations) -> Verdict | None:
+    """Give the verdict on required findings of runs that there are none of: a log is missing.
+
+    Args:
+        verdicts: Those on all runs below the folder of the expectations.
+        expectations: What is expected of them.
+
+    Returns:
+        A verdict on the file of expectations, with what is missing; None if nothing is.
+    """
+    covered = {entry for each in verdicts for entry in expectations.of(each.path, each.scenario)}
+    missing = tuple(
+        _lacking(entry, f"{entry.name}: no run is {' or '.join(entry.runs or entry.scenario)}")
+        for entry in expectations.entries
+        if entry.kind == "require" and entry not in covered
+    )
+    if not missing:
+        return None
+    path = expectations.path
+    return Verdict(path, Status.FINDINGS, missing=missing, expectations=str(path))
+
+
 def _rulings(
     verdict: Verdict, entries: Sequence[Entry], *, fail_others: bool, today: date
 ) -> dict[Event, Ruled]:
@@ -132,9 +154,13 @@ def _missing(verdict: Verdict, entries: Sequence[Entry]) -> list[Missing]:
     for entry in entries:
         found = any(_matches(entry, event, verdict) for event in verdict.events)
         if entry.kind == "require" and not found:
-            earliest, latest = entry.onset or (None, None)
-            missing.append(Missing(" or ".join(entry.classes), earliest, latest, entry.reason))
+            missing.append(_lacking(entry, entry.reason))
     return missing
+
+
+def _lacking(entry: Entry, reason: str) -> Missing:
+    earliest, latest = entry.onset or (None, None)
+    return Missing(" or ".join(entry.classes), earliest, latest, reason)
 
 
 def _matches(entry: Entry, event: Event, verdict: Verdict) -> bool:
