@@ -203,6 +203,11 @@ def test_a_gate_names_the_findings_that_fail_a_run(gate, fails):
     assert judged.status is (Status.FINDINGS if fails else Status.OK)
 
 
+def test_a_gate_without_a_score_lets_negative_scores_fail_a_run():
+    run = replace(RUN, events=(replace(BLOW, score=-0.5),))
+    assert judge(run, gate=Gate(), today=TODAY).status is Status.FINDINGS
+
+
 def test_a_gate_says_why_a_finding_does_not_fail():
     judged = judge(RUN, gate=Gate(min_score=0.8), today=TODAY)
     ruled = judged.ruled(RATTLE)

@@ -96,9 +96,8 @@ def classify(
         _of_gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
     ] = None,
     min_score: Annotated[
-        float,
-        _of_gate("--min-score", min=0.0, max=1.0, help="Only findings of this score or more."),
-    ] = 0.0,
+        float | None, _of_gate("--min-score", help="Only findings of this score or more.")
+    ] = None,
     min_duration: Annotated[
         float, _of_gate("--min-duration", min=0.0, help="Only findings of so many seconds or more.")
     ] = 0.0,

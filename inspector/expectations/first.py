@@ -86,7 +86,10 @@ def first(verdicts: Sequence[Verdict], folder: Path, *, required: bool, today: d
                 f"class = {_text(event.label)}",
                 f"at = {event.start:.3f}",
                 f"tolerance = {TOLERANCE:g}",
-                *(f"# joints = {_text(joint)}    # {share:.0%} of it" for joint, share in joints),
+                *(
+                    f"# joints = {_text(joint)}    # {share:.0%} of the finding"
+                    for joint, share in joints
+                ),
                 f'reason = "found on {today}, score {event.score:.2f}"',
             ]
             parts.append("\n".join(lines) + "\n")

@@ -24,19 +24,19 @@ class Gate:
 
     Attributes:
         classes: Those of these classes, of all unless given.
-        min_score: Those of at least this score.
+        min_score: Those of at least this score, if given; some models have negative ones.
         min_duration: Those that last at least so long, in [s].
     """
 
     classes: tuple[str, ...] = ()
-    min_score: float = 0.0
+    min_score: float | None = None
     min_duration: float = 0.0
 
     def reason(self, event: Event) -> str:
         """Say why a finding does not fail a run; empty if it does."""
         if self.classes and event.label not in self.classes:
             return f"not of {', '.join(self.classes)} (--fail-on-class)"
-        if event.score < self.min_score:
+        if self.min_score is not None and event.score < self.min_score:
             return f"score {event.score:.2f} below {self.min_score:g} (--min-score)"
         duration = event.stop - event.start
         if duration < self.min_duration:
