@@ -13,6 +13,7 @@ from inspector.commands.audit import audit
 from inspector.commands.baseline import baseline
 from inspector.commands.classify import classify
 from inspector.commands.compare import compare
+from inspector.commands.diff import diff
 from inspector.commands.evaluate import evaluate
 from inspector.commands.expect import expect
 from inspector.commands.export import export
@@ -76,6 +77,7 @@ _add("Look", compare, "inspector compare --robots panda,go2 --csv comparison.csv
 _add("Look", robots, "inspector robots")
 _add("Judge", classify, "inspector classify run.npz --format junit")
 _add("Judge", expect, "inspector expect runs/")
+_add("Judge", diff, "inspector diff reference/ candidate/ --report changes/")
 _add("Judge", audit, "inspector audit run.npz")
 _add("Judge", smoothness, "inspector smoothness episodes/ --picture smoothness.png")
 _add("Import and export", import_, "inspector import log.csv -o run.npz", name="import")
