@@ -17,12 +17,12 @@ from inspector.regression.pairing import Pairing, Scenario
 from inspector.regression.statistic import (
     ALPHA,
     CONFIDENCE,
+    PValues,
     Sample,
     Shift,
-    Tested,
     attainable,
+    p_values,
     shift,
-    tested,
 )
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
@@ -241,7 +241,7 @@ def difference(
     if not prepared:
         return Difference(pairing, (), None, tuple(failed), margin)
     prepared, common = _with_shared(prepared)
-    found, over_all = tested([each.sample for each in prepared])
+    found, over_all = p_values([each.sample for each in prepared])
     compared = [_compared(each, p, margin=margin) for each, p in zip(prepared, found, strict=True)]
     together = None
     if common:
@@ -458,7 +458,7 @@ def _with_shared(prepared: list[_Prepared]) -> tuple[list[_Prepared], tuple[_Qua
     return marked, common
 
 
-def _compared(each: _Prepared, p: Tested, *, margin: float) -> Compared:
+def _compared(each: _Prepared, p: PValues, *, margin: float) -> Compared:
     scenario, moved = each.scenario, shift(each.sample)
     runs = (*scenario.reference, *scenario.candidate)
     changes = _changes(each.quantities, moved, p)
@@ -484,7 +484,7 @@ def _compared(each: _Prepared, p: Tested, *, margin: float) -> Compared:
     )
 
 
-def _together(prepared: Sequence[_Prepared], common: Sequence[_Quantity], p: Tested) -> Compared:
+def _together(prepared: Sequence[_Prepared], common: Sequence[_Quantity], p: PValues) -> Compared:
     """What the scenarios of one robot have in common: the mean of their changes."""
     means = np.mean(
         [shift(each.sample).change[list(each.sample.shared)] for each in prepared], axis=0
@@ -553,7 +553,7 @@ def _equal(
     return Verdict.INCONCLUSIVE, "; ".join(reasons) or "no change is significant"
 
 
-def _changes(quantities: Sequence[_Quantity], moved: Shift, p: Tested) -> tuple[Change, ...]:
+def _changes(quantities: Sequence[_Quantity], moved: Shift, p: PValues) -> tuple[Change, ...]:
     found = [
         Change(
             kind=quantity.kind.name,

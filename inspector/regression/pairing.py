@@ -103,6 +103,19 @@ def paired(
     return found
 
 
+def repetitions(
+    name: str, reference: Sequence[Measured], candidate: Sequence[Measured]
+) -> Scenario:
+    """Take all runs of both sides as one scenario; pairs if each side has the same seeds once."""
+    before, after = ({run.seed: run for run in side} for side in (reference, candidate))
+    seeds = sorted(seed for seed in before if seed is not None)
+    twins = before.keys() == after.keys() == set(seeds)
+    if twins and len(seeds) == len(reference) == len(candidate):
+        ours, others = (tuple(side[seed] for seed in seeds) for side in (before, after))
+        return Scenario(name, ours, others, paired=True)
+    return Scenario(name, tuple(reference), tuple(candidate), paired=False)
+
+
 def _key(run: Measured) -> tuple[str, str]:
     robot = Path(run.robot).stem
     return f"{robot} {run.scenario}".strip(), f"{run.seed:09d}"

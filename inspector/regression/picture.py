@@ -22,13 +22,18 @@ LIMIT_DB = 12.0
 """Change with the strongest colour, in [dB]."""
 
 
+def drawable() -> bool:
+    """Whether matplotlib is installed."""
+    return find_spec("matplotlib") is not None
+
+
 def require() -> None:
     """Refuse a picture before long work is done for it.
 
     Raises:
         InspectorError: If matplotlib is not installed.
     """
-    if find_spec("matplotlib") is None:
+    if not drawable():
         raise InspectorError('a picture needs matplotlib; `pip install "noise-inspector[report]"`')
 
 

@@ -72,7 +72,7 @@ class Sample:
 
 
 @dataclass(frozen=True, eq=False)
-class Tested:
+class PValues:
     """Adjusted p-values of the quantities of a scenario.
 
     Attributes:
@@ -84,7 +84,7 @@ class Tested:
     quieter: Array
 
 
-def tested(samples: Sequence[Sample]) -> tuple[tuple[Tested, ...], Tested]:
+def p_values(samples: Sequence[Sample]) -> tuple[tuple[PValues, ...], PValues]:
     """Test all quantities of all scenarios at once.
 
     Args:
@@ -115,8 +115,8 @@ def tested(samples: Sequence[Sample]) -> tuple[tuple[Tested, ...], Tested]:
         lowest = np.minimum(lowest, statistic.min(axis=1))
     highest, lowest = np.sort(highest), np.sort(-lowest)
 
-    def adjusted(observed: Array) -> Tested:
-        return Tested(_share(highest, observed), _share(lowest, -observed))
+    def adjusted(observed: Array) -> PValues:
+        return PValues(_share(highest, observed), _share(lowest, -observed))
 
     return tuple(map(adjusted, own)), adjusted(together)
 

@@ -1,0 +1,155 @@
+"""The plugin, in a pytest of its own."""
+
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+RUNS = """
+import numpy as np
+import pytest
+from noisemodel import Run
+
+def run(seed, tone=0.0):
+    random = np.random.default_rng(seed)
+    time = np.arange(4000) / 1000
+    slow = np.exp(-(((time - 1.5) / 0.4) ** 2)) + 0.5 * np.exp(-((time - 3.0) ** 2))
+    velocity = slow[:, None] + 0.002 * random.normal(size=(4000, 2))
+    velocity[:, 1] += tone * np.sin(2 * np.pi * 80 * time) * ((time > 1) & (time < 3))
+    return Run(time=time, velocity=velocity, joint_names=("elbow", "wrist"))
+"""
+
+
+@pytest.fixture
+def project(tmp_path):
+    """Run pytest on a test file below a folder of its own: exit status and output."""
+
+    def call(tests, *options):
+        (tmp_path / "test_robot.py").write_text(RUNS + tests)
+        command = [sys.executable, "-m", "pytest", "-q", "-p", "inspector.pytest_plugin"]
+        command += ["-p", "no:cacheprovider", "--rootdir", tmp_path, "-c", "/dev/null"]
+        done = subprocess.run(
+            [*map(str, command), *map(str, options), str(tmp_path / "test_robot.py")],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        return done.returncode, done.stdout + done.stderr
+
+    return call
+
+
+QUIET = """
+def test_quiet(noise):
+    assert not noise.assert_quiet(run(0)).findings
+
+def test_loud(noise):
+    noise.assert_quiet(run(0, tone=0.5))
+
+@pytest.mark.parametrize("place", ["oscillations", ("oscillations", 0.8, 3.2)])
+def test_allowed(noise, place):
+    assert noise.assert_quiet(run(0, tone=0.5), allow=[place, "impact"]).findings
+
+def test_allowed_elsewhere(noise):
+    noise.assert_quiet(run(0, tone=0.5), allow=[("oscillations", 0.0, 0.5), "impact"])
+"""
+
+
+@pytest.mark.parametrize("processes", [(), ("-p", "xdist", "-n", "2")])
+def test_a_finding_fails_with_its_name_a_recording_and_a_picture(project, tmp_path, processes):
+    status, out = project(QUIET, *processes, "--junitxml", tmp_path / "junit.xml")
+    assert status == 1
+    assert "2 failed, 3 passed" in out
+    assert "in the run, by model general" in out
+    assert "oscillations from 1." in out
+    left = sorted(path.name for path in (tmp_path / "noise-artefacts").iterdir())
+    assert left == [
+        f"test_robot-test_{name}.{kind}"
+        for name in ("allowed_elsewhere", "loud")
+        for kind in ("png", "rrd")
+    ]
+    named = {
+        p.get("name"): p.get("value") for p in ET.parse(tmp_path / "junit.xml").iter("property")
+    }
+    assert Path(named["noise_recording"]).exists()
+    assert Path(named["noise_picture"]).exists()
+
+
+WORSE = """
+TONE = {tone}
+
+def test_one(noise):
+    noise.assert_no_worse(run(1, TONE))
+
+def test_repetitions(noise):
+    runs = [run(seed, TONE / 10) for seed in range({first}, {first} + 5)]
+    noise.assert_no_worse(runs, name="reach")
+"""
+
+
+@pytest.mark.parametrize("processes", [(), ("-p", "xdist", "-n", "2")])
+def test_runs_are_compared_with_stored_ones(project, tmp_path, processes):
+    status, out = project(WORSE.format(tone=0.0, first=0), *processes)
+    assert status == 1
+    assert out.count("`pytest --noise-update` stores this run as one") >= 2
+    assert project(WORSE.format(tone=0.0, first=0), "--noise-update", *processes)[0] == 0
+    stored = sorted(path.name for path in (tmp_path / "noise-reference" / "reach").iterdir())
+    assert stored == [f"run-{number}.npz" for number in range(1, 6)]
+    assert project(WORSE.format(tone=0.0, first=5), *processes)[0] == 0
+    status, out = project(WORSE.format(tone=0.5, first=5), *processes)
+    assert status == 1
+    assert "2 failed" in out
+    assert "new: oscillations" in out
+    assert "worse, wrist, 45 to 91 Hz +" in out
+    left = {path.name for path in (tmp_path / "noise-artefacts").iterdir()}
+    assert {"reach.rrd", "reach.png", "reach-run-1.npz", "test_robot-test_one.rrd"} <= left
+    assert project(WORSE.format(tone=0.5, first=5), "--noise-update", *processes)[0] == 0
+    assert project(WORSE.format(tone=0.5, first=5), *processes)[0] == 0
+
+
+def test_a_run_that_cannot_be_classified_is_not_quiet(project):
+    tests = """
+def slow():
+    time = np.arange(400) / 50
+    return Run(time=time, velocity=np.cos(time)[:, None], joint_names=("elbow",))
+
+def test_slow(noise):
+    noise.assert_quiet(slow())
+
+def test_allowed(noise):
+    noise.assert_quiet(slow(), allow=["cannot-tell"])
+"""
+    status, out = project(tests)
+    assert status == 1
+    assert "1 failed, 1 passed" in out
+    assert "cannot tell whether the run is quiet: " in out
+
+
+def test_a_reference_of_other_joints_fails_in_one_line(project):
+    tests = """
+from dataclasses import replace
+
+def test_joints(noise):
+    noise.assert_no_worse(replace(run(0), joint_names={names}, desired_joint_names={names}))
+"""
+    assert project(tests.format(names=("hip", "knee")), "--noise-update")[0] == 0
+    status, out = project(tests.format(names=("elbow", "wrist")))
+    assert status == 1
+    assert "has none of the joints of" in out
+
+
+def test_the_plugin_is_registered_and_imports_nothing_slow():
+    import tomllib
+
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    assert project["entry-points"]["pytest11"] == {"noise": "inspector.pytest_plugin"}
+    slow = ["rerun", "numpy", "scipy", "typer", "noisemodel", "models"]
+    script = f"import sys, inspector.pytest_plugin; print([n for n in {slow} if n in sys.modules])"
+    loaded = subprocess.run(
+        [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert loaded.stdout.strip() == "[]"
