@@ -1,5 +1,6 @@
 """The plugin, in a pytest of its own."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -34,6 +35,7 @@ def project(tmp_path):
         done = subprocess.run(
             [*map(str, command), *map(str, options), str(tmp_path / "test_robot.py")],
             cwd=ROOT,
+            env=os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"},  # it may be installed too
             capture_output=True,
             text=True,
             check=False,

@@ -130,6 +130,11 @@ def test_runs_are_paired_by_scenario_and_seed_whatever_their_names(tmp_path):
     assert [each.seed for each in scenario.candidate] == [3, 4]
 
 
+def test_one_file_is_compared_with_the_repetitions_of_its_name(sides):
+    _, out, _ = diff(sides / "reference", sides / "worse" / "walk-3.npz")
+    assert "walk      5 + 1  inconclusive" in out
+
+
 def test_scenarios_of_one_side_are_named_and_left_out(sides, tmp_path):
     after = folder(tmp_path / "after", range(20, 25))
     run(3).save(after / "climb.npz")

@@ -108,6 +108,10 @@ def test_interval_covers_the_true_change_as_often_as_it_says():
     assert np.mean(covered) == pytest.approx(moved.confidence, abs=0.05)
 
 
+def test_three_and_three_repetitions_have_an_interval_of_ninety_percent():
+    assert shift(drawn(0, count=3)).confidence == 0.9
+
+
 def test_one_and_one_repetitions_have_no_interval():
     moved = shift(sample([[1.0]], [[3.0]]))
     assert moved.change[0] == 2.0

@@ -61,7 +61,7 @@ def diff(
     ] = Unknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:
-    """Compare runs with a reference: findings and levels, with intervals.
+    """Compare runs with a reference: better, same or worse.
 
     Runs are paired by scenario and seed of their meta, or by file name; names that differ in a
     number at the end (walk-1, walk-2) are repetitions. "Worse" needs 5 and 5 of a scenario.

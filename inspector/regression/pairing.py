@@ -73,7 +73,7 @@ def paired(
 
     By scenario and seed of their meta if all runs have both, none twice on one side, and the sides
     share a scenario; otherwise by the path below the folder, files that differ in a number at the
-    end being repetitions.
+    end being repetitions. Two files that are named themselves are a pair.
 
     Args:
         reference: The runs before the change.
@@ -93,6 +93,9 @@ def paired(
         unique = all(len(key) == len(side) for key, side in zip(keys, sides, strict=True))
         if unique and shared:
             return _pairing("scenario and seed", keys[0], keys[1], seeds=True)
+    if all(len(side) == 1 for side in sides) and (reference[0].path, candidate[0].path) == roots:
+        alone = Scenario(candidate[0].path.stem, tuple(reference), tuple(candidate), paired=False)
+        return Pairing("file name", (alone,), ())  # as they were named
     named = [_by_name(side, root) for side, root in zip(sides, roots, strict=True)]
     found = _pairing("file name", named[0], named[1], seeds=False)
     if not found.scenarios:
@@ -123,11 +126,10 @@ def _key(run: Measured) -> tuple[str, str]:
 
 def _by_name(runs: Sequence[Measured], root: Path) -> dict[tuple[str, str], Measured]:
     """Runs by the name of their scenario and their repetition."""
-    if len(runs) == 1 and runs[0].path == root:  # two files that were named one by one
-        return {("the run", ""): runs[0]}
     found: dict[tuple[str, str], Measured] = {}
     for run in runs:
-        name = run.path.relative_to(root).with_suffix("").as_posix()
+        inside = run.path.relative_to(root) if run.path != root else Path(root.name)
+        name = inside.with_suffix("").as_posix()
         match = REPETITION.fullmatch(name)
         key = (match["name"], match["number"]) if match else (name, "")
         if key in found:
