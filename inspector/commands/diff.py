@@ -63,8 +63,8 @@ def diff(
 ) -> None:
     """Compare runs with a reference: better, same or worse.
 
-    Runs are paired by scenario and seed of their meta, or by file name; names that differ in a
-    number at the end (walk-1, walk-2) are repetitions. "Worse" needs 5 and 5 of a scenario.
+    Runs are paired by scenario and seed of their meta, or by file name:
+    walk-1 and walk-2 are repetitions. "Worse" takes 5 and 5 of a scenario.
 
     Exit status:
 
@@ -72,7 +72,7 @@ def diff(
       1  worse, or new findings
       2  wrong usage
       3  bad input: a file cannot be read, or nothing can be paired
-      4  cannot tell: too few repetitions of every scenario to show that it is worse
+      4  cannot tell: too few repetitions of every scenario
     """
     from inspector import assets
     from inspector.library import load_library

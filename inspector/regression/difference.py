@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from inspector.pair.changes import NEW
-from inspector.regression.findings import LOUDER, ChangedFinding, aligned, changed_findings
+from inspector.regression.findings import LOUDER, ChangedFinding, aligned, changed_findings, lag
 from inspector.regression.levels import Levels, edges
 from inspector.regression.measure import Measured, Unreadable
 from inspector.regression.pairing import Pairing, Scenario
@@ -264,7 +264,7 @@ def worst(found: Difference) -> Compared:
     )
 
 
-def worst_runs(row: Compared) -> tuple[Path, Path]:
+def worst_runs(row: Compared) -> tuple[Measured, Measured]:
     """A run of the reference and one of the candidate that show what changed.
 
     Of the candidate, that with most new findings, or where the clearest change is largest; of the
@@ -279,9 +279,9 @@ def worst_runs(row: Compared) -> tuple[Path, Path]:
     place = max(range(len(counts)), key=lambda index: (counts[index], loudness[index]))
     after = row.candidate[place]
     if row.paired:
-        return row.reference[place].path, after.path
+        return row.reference[place], after
     likeness = [aligned(before, after).correlation for before in row.reference]
-    return row.reference[int(np.argmax(likeness))].path, after.path
+    return row.reference[int(np.argmax(likeness))], after
 
 
 def _loudness(run: Measured, change: Change | None) -> float:
@@ -401,16 +401,15 @@ def _overlap(runs: Sequence[Measured]) -> list[tuple[float, float]] | None:
     """Start and stop of what all cover, in [s] from the start of each; None if motions differ."""
     lags = [0.0]
     for run in runs[1:]:
-        alignment = aligned(runs[0], run)
-        if alignment.refused:
+        if (later := lag(runs[0], run)) is None:
             return None
-        lags.append(alignment.seconds)
+        lags.append(later)
     start = max(lags)
-    stop = min(lag + run.duration for lag, run in zip(lags, runs, strict=True))
+    stop = min(later + run.duration for later, run in zip(lags, runs, strict=True))
     shortest = min(run.duration for run in runs)
     if stop - start < shortest / 2:
         return None
-    return [(start - lag, stop - lag) for lag in lags]
+    return [(start - later, stop - later) for later in lags]
 
 
 def _findings_comparable(runs: Sequence[Measured]) -> bool:

@@ -15,6 +15,10 @@ from noisemodel import decimated
 LOUDER = "louder"
 LOUDER_DB = 3.0
 """A finding this much above the loudest of the reference at the same time is louder."""
+ALIKE = 0.9
+"""Correlation of envelopes from which two runs are of one motion: less is a motion like it."""
+COVERED = 0.8
+"""Share of the shorter run that has to lie within the other: parts of motions are often alike."""
 SLACK = 0.1
 """Time by which findings may miss each other: most onsets and ends are that exact, in [s]."""
 
@@ -66,14 +70,11 @@ def changed_findings(
         The changes, run by run, the new ones first.
     """
     lags = {
-        (before.path, after.path): alignment.seconds
-        for before in reference
-        for after in candidate
-        if not (alignment := aligned(before, after)).refused
+        (before.path, after.path): lag(before, after) for before in reference for after in candidate
     }
     found = []
     for after in candidate:
-        offsets = [(r, lags.get((r.path, after.path))) for r in reference]
+        offsets = [(r, lags[r.path, after.path]) for r in reference]
         for finding in after.findings:
             twins = _twins(finding, after, offsets, direction=1)
             if not twins:
@@ -81,7 +82,7 @@ def changed_findings(
             elif (change := finding.level - max(t.level for t in twins)) >= LOUDER_DB:
                 found.append(_changed(LOUDER, after, finding, change))
     for before in reference:
-        offsets = [(c, lags.get((before.path, c.path))) for c in candidate]
+        offsets = [(c, lags[before.path, c.path]) for c in candidate]
         found += [
             _changed(RESOLVED, before, finding)
             for finding in before.findings
@@ -101,6 +102,16 @@ def aligned(before: Measured, after: Measured) -> Alignment:
     return align(one, other)
 
 
+def lag(before: Measured, after: Measured) -> float | None:
+    """Time by which a run starts later than another of one motion, in [s]; None of another one."""
+    alignment = aligned(before, after)
+    seconds = alignment.seconds
+    both = min(before.duration, seconds + after.duration) - max(0.0, seconds)
+    covered = both >= COVERED * min(before.duration, after.duration)
+    alike = not alignment.refused and alignment.correlation >= ALIKE
+    return seconds if alike and covered else None
+
+
 def _twins(
     finding: Finding,
     run: Measured,
@@ -109,14 +120,14 @@ def _twins(
     direction: int,
 ) -> list[Finding]:
     """Findings of one class at one time in the runs of the other side."""
-    timed = any(lag is not None for _, lag in others)
+    timed = any(seconds is not None for _, seconds in others)
     found = []
-    for other, lag in others:
-        if timed and lag is None:
+    for other, seconds in others:
+        if timed and seconds is None:
             continue
         same = [each for each in other.findings if each.event.label == finding.event.label]
-        if timed and lag is not None:
-            begin = float(other.clock[0] - run.clock[0]) + direction * lag
+        if seconds is not None:
+            begin = float(other.clock[0] - run.clock[0]) + direction * seconds
             same = [
                 each
                 for each in same

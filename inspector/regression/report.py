@@ -4,9 +4,10 @@ from pathlib import Path
 
 from inspector.errors import InspectorError
 from inspector.library import Library
-from inspector.pair import compare
+from inspector.pair import Align, compare
 from inspector.regression import picture
 from inspector.regression.difference import Compared, Difference, worst, worst_runs
+from inspector.regression.findings import lag
 from inspector.regression.output import as_json
 from noisemodel.atomic import refuse_existing, replacing
 
@@ -89,9 +90,11 @@ def write_pair(
     from inspector.pair.recording import write as write_recording
 
     before, after = worst_runs(row)
-    pair = compare(before, after, library, robot=robot)
+    # Runs of different motion begin together: nothing is cut off to lay one beside the other.
+    how = Align.START if lag(before, after) is None else Align.AUTO
+    pair = compare(before.path, after.path, library, how=how, robot=robot)
     write_recording(pair, recording, overwrite=overwrite)
     if drawn:
         with replacing(drawn, overwrite=overwrite) as temporary:
             temporary.write_bytes(picture.picture(row, pair))
-    return before, after
+    return before.path, after.path
