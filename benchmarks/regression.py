@@ -2,6 +2,7 @@
 
     python -m benchmarks.regression freeze --runs build/regression
     python -m benchmarks.regression measure --runs build/regression
+    python -m benchmarks.regression twins --runs build/regression
 
 Runs are simulated by `scenarios` at 10 kHz with fresh seeds, which draw motion, robot and noise,
 and decimated to 1 kHz. A defect is the response of the same seed to a fault, the difference of the
@@ -12,7 +13,8 @@ the least factors at which a finding touches the annotated failures, on seeds of
 `FROZEN`, committed before anything was measured with them. `measure` prints how often the verdict
 is "worse": for reference and candidate of the same code, drawn from the good runs without any run
 twice; and for candidates with each defect, at several multiples of the frozen factor, of other
-seeds than those of the reference.
+seeds than those of the reference. `twins` prints the latter for candidates of the same seeds, which
+without a defect are the same runs.
 """
 
 import argparse
@@ -37,6 +39,7 @@ from inspector.library import Library, load_library  # noqa: E402
 from inspector.regression.difference import Verdict, difference  # noqa: E402
 from inspector.regression.measure import Measured, measure  # noqa: E402
 from inspector.regression.pairing import Pairing, Scenario  # noqa: E402
+from inspector.regression.statistic import FEWEST_PAIRS  # noqa: E402
 
 RATE = 1000.0
 ROBOTS = ("panda", "go2")
@@ -55,8 +58,9 @@ FROZEN: dict[tuple[str, str], float] = {
 SIZES = (0.5, 1.0, 2.0, 4.0)
 """Multiples of the frozen factor."""
 REPETITIONS = (5, 8)
-NULLS, POWERS = 1000, 100
-"""Comparisons of the same code for each number of repetitions, and of each defect and size."""
+NULLS, POWERS, TWINS = 1000, 100, 20
+"""Comparisons of the same code for each number of repetitions; of each defect and size; the same
+of pairs."""
 TAPER = 0.02
 """Time in which a defect fades in and out around an annotated failure, in [s]."""
 LEAST_DB, MOST_DB = -60.0, 40.0
@@ -133,9 +137,11 @@ def freeze(folder: Path) -> None:
             )
 
 
-def compared(reference: Sequence[Measured], candidate: Sequence[Measured]) -> Verdict:
-    """The verdict of `inspector diff` on one scenario of unpaired runs."""
-    scenario = Scenario("runs", tuple(reference), tuple(candidate), paired=False)
+def compared(
+    reference: Sequence[Measured], candidate: Sequence[Measured], *, paired: bool = False
+) -> Verdict:
+    """The verdict of `inspector diff` on one scenario."""
+    scenario = Scenario("runs", tuple(reference), tuple(candidate), paired=paired)
     return difference(Pairing("seed", (scenario,), ())).verdict
 
 
@@ -216,6 +222,25 @@ def measured(folder: Path) -> None:
     print(f"{time.process_time():.0f} s of processor time")
 
 
+def twins(folder: Path) -> None:
+    """Print how often a defect is seen if both sides have the same seeds."""
+    library = load_library()
+    for robot in ROBOTS:
+        runs = pools(folder, robot, library)
+        random = np.random.default_rng([9, ROBOTS.index(robot)])
+        for defect in DEFECTS:
+            for size in SIZES:
+                seen = Counter[str]()
+                for _ in range(TWINS):
+                    chosen = random.permutation(len(runs[defect, size]))[:FEWEST_PAIRS]
+                    after = [runs[defect, size][place] for place in chosen]
+                    own = {seed_of(run): run for run in runs["", 0.0]}
+                    before = [own[seed_of(run)] for run in after]
+                    seen[compared(before, after, paired=True)] += 1
+                told = interval(seen[Verdict.WORSE], TWINS)
+                print(f"{FEWEST_PAIRS} twins, {robot}, {defect}, {size:g} times: worse {told}")
+
+
 def _listed(verdicts: Counter[str]) -> str:
     return ", ".join(f"{verdicts[each]} {each}" for each in Verdict if verdicts[each])
 
@@ -223,10 +248,10 @@ def _listed(verdicts: Counter[str]) -> str:
 def main() -> None:
     """Freeze the defects, or measure."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("what", choices=("freeze", "measure"))
+    parser.add_argument("what", choices=("freeze", "measure", "twins"))
     parser.add_argument("--runs", type=Path, default=Path("build/regression"))
     options = parser.parse_args()
-    (freeze if options.what == "freeze" else measured)(options.runs)
+    {"freeze": freeze, "measure": measured, "twins": twins}[options.what](options.runs)
 
 
 if __name__ == "__main__":
