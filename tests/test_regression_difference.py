@@ -101,6 +101,8 @@ def test_new_findings_fail_from_one_run_on_if_they_are_to(tmp_path):
     status, out, _ = diff(tmp_path / "before.npz", tmp_path / "after.npz", "--fail-on", "new")
     assert status == 1
     assert "new: oscillations" in out
+    shown = f"inspector view {tmp_path / 'before.npz'} {tmp_path / 'after.npz'}"
+    assert out.endswith(f"The worst pair: {shown}\n")
     status, out, _ = diff(tmp_path / "after.npz", tmp_path / "before.npz", "--fail-on", "new")
     assert status == 0
     assert "resolved: oscillations" in out

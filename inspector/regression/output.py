@@ -8,7 +8,14 @@ from typing import Any
 import numpy as np
 
 from inspector.pair.changes import NEW, RESOLVED
-from inspector.regression.difference import Change, Compared, Difference, Verdict
+from inspector.regression.difference import (
+    Change,
+    Compared,
+    Difference,
+    Verdict,
+    worst,
+    worst_runs,
+)
 from inspector.regression.findings import LOUDER, ChangedFinding
 from inspector.regression.statistic import ALPHA, CONFIDENCE
 
@@ -67,6 +74,9 @@ def _lines(found: Difference) -> Iterator[str]:
         f"worse and better: p ≤ {ALPHA:g} for all quantities of all scenarios together;"
         f" same: no change by {found.margin:g} dB within intervals of {CONFIDENCE:.0%}"
     )
+    if found.new or found.verdict is Verdict.WORSE:
+        before, after = worst_runs(worst(found))
+        yield f"The worst pair: inspector view {before.path} {after.path}"
 
 
 def _cells(row: Compared) -> tuple[str, ...]:
