@@ -10,6 +10,7 @@ from inspector.regression.difference import Verdict, difference
 from inspector.regression.measure import Measured, measure_file
 from inspector.regression.pairing import Pairing, PairingError, Scenario, files_in, paired
 from noisemodel import Run
+from noisemodel.limits import joint_limits
 
 RATE, SECONDS = 1000.0, 4.0
 JOINTS = ("elbow", "wrist")
@@ -187,15 +188,14 @@ def test_a_signal_that_one_side_lacks_keeps_findings_from_being_compared(tmp_pat
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"robot": "ur5"}, "is of ur5"),
+        ({"robot": "ur5", "joints": tuple(joint_limits("ur5"))[:2]}, "is of ur5"),
         ({"joints": ("hip", "knee")}, "has none of the joints of"),
         ({"rate": 40.0}, "has 40 Hz; levels from 11 Hz on require 46 Hz"),
     ],
 )
 def test_what_cannot_be_compared_is_one_line_and_exit_status_3(tmp_path, changes, message):
-    before = folder(
-        tmp_path / "before", range(2), **({"robot": "panda"} if "robot" in changes else {})
-    )
+    panda = {"robot": "panda", "joints": tuple(joint_limits("panda"))[:2]}
+    before = folder(tmp_path / "before", range(2), **(panda if "robot" in changes else {}))
     after = folder(tmp_path / "after", range(2), **changes)
     status, _, err = diff(before, after, "--no-robot")
     assert status == 3
@@ -207,7 +207,9 @@ def test_what_cannot_be_compared_is_one_line_and_exit_status_3(tmp_path, changes
 def test_bad_input_is_one_line(tmp_path):
     good, empty = folder(tmp_path / "good", [1]), tmp_path / "empty"
     empty.mkdir()
-    assert diff(good, empty)[::2] == (3, f"inspector: {empty}: holds no run file (*.npz)\n")
+    status, _, err = diff(good, empty)
+    assert status == 3
+    assert err.startswith(f"inspector: {empty}: a folder without logs (.bag, .csv, ")
     missing = tmp_path / "missing"
     assert diff(missing, good)[::2] == (3, f"inspector: {missing}: no such file or folder\n")
     other = folder(tmp_path / "other", [1], name="climb")

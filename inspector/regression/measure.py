@@ -11,6 +11,7 @@ from inspector.analysis.analyse import Analysis, analyse, with_links
 from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import EXPECTED
 from inspector.library import Library
+from inspector.logs.opening import open_run
 from inspector.pair.alignment import envelope
 from inspector.regression.levels import STEP, Levels, levels
 from models import Event
@@ -132,7 +133,7 @@ def measure_file(
 ) -> Measured | Unreadable:
     """Measure one file; expected errors become part of the result."""
     try:
-        return measure(Run.load(path), path, library, links=links, unknown=unknown)
+        return measure(open_run(path).run, path, library, links=links, unknown=unknown)
     except EXPECTED as error:
         return Unreadable(path, str(error).removeprefix(f"{path}: "))
 

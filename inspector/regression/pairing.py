@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from inspector.errors import InspectorError
+from inspector.logs.opening import logs_in
 from inspector.regression.measure import Measured
 
 REPETITION = re.compile(r"(?P<name>.+?)[-_.](?:run|rep|take|seed)?[-_.]?(?P<number>\d+)")
@@ -50,20 +51,15 @@ class Pairing:
 
 
 def files_in(path: Path) -> tuple[Path, ...]:
-    """List the run files of a folder, however deep, in order; a file is itself.
+    """List the runs and logs of a folder, however deep, in order; a file is itself.
 
     Raises:
-        PairingError: If there is no such path, or the folder holds no run file.
+        PairingError: If there is no such path.
+        LogError: If the folder holds no log.
     """
-    if not path.is_dir():
-        if not path.exists():
-            raise PairingError(f"{path}: no such file or folder")
-        return (path,)
-    inside = path.rglob("*.npz")
-    found = sorted(f for f in inside if not f.name.startswith(".") and f.is_file())
-    if not found:
-        raise PairingError(f"{path}: holds no run file (*.npz)")
-    return tuple(found)
+    if not path.exists():
+        raise PairingError(f"{path}: no such file or folder")
+    return logs_in(path)[0]
 
 
 def paired(
