@@ -374,6 +374,19 @@ FORMATS = (
         ("motor1_speed_rpm, motor2_speed_rpm: converted from rpm, as the header says",),
     ),
     Format(
+        "ROS 2, seconds and nanoseconds",
+        "header.stamp.sec,header.stamp.nanosec,position[0],velocity[0]",
+        table(
+            f"header.stamp.sec,header.stamp.nanosec,{names('position[#]', 0)},"
+            + names("velocity[#]", 0),
+            (P, V),
+            stamp=lambda time: f"{EPOCH},{round(time * 1e9)}",
+        ),
+        (P, V),
+        joints=("joint_0", "joint_1"),
+        said=(f"time starts at 0; the first stamp, {EPOCH} s, is in meta",),
+    ),
+    Format(
         "the stamps' unit in their name",
         "timestamp_ms,q1,dq1",
         table(f"timestamp_ms,{QDQ}", (P, V), stamp=ticks(1e3, 0)),
@@ -658,11 +671,6 @@ def test_what_is_no_joints_motion_is_not_read(tmp_path, column):
     assert read_log(path).remarks == (f"log.csv: 1 column not read: {column}",)
 
 
-if __name__ == "__main__":
-    print("| log | header | typed | said | imported |\n|---|---|---|---|---|")
-    print("\n".join(each.row for each in FORMATS))
-
-
 def test_a_log_without_header_and_stamps_gets_a_line_that_works(tmp_path):
     rows = "\n".join(f"{1.0 - 0.01 * n},{0.01 * n},{-0.01},{0.01}" for n in range(22))
     (tmp_path / "log.csv").write_text(rows)
@@ -679,3 +687,8 @@ def test_columns_that_no_name_tells_get_a_line_that_works(tmp_path):
         read_log(tmp_path / "log.csv")
     run = read_log(tmp_path / "log.csv", columns=("time", "q1", "q2")).run
     assert run.position is not None
+
+
+if __name__ == "__main__":
+    print("| log | header | typed | said | imported |\n|---|---|---|---|---|")
+    print("\n".join(each.row for each in FORMATS))

@@ -1,6 +1,7 @@
 """CSV logs with a row per sample, as robots, tools and spreadsheets write them."""
 
 import csv
+import re
 from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -49,6 +50,10 @@ HEAD = 200
 
 SPARSE = 0.5
 """Share of rows without a number from which a column has another clock."""
+
+SECONDS = re.compile(r"(?P<record>.*?)secs?(?:onds)?", re.IGNORECASE)
+NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
+"""Endings of the two columns of a stamp in whole seconds, and nanoseconds since."""
 
 NAME = "field.name"
 """Beginning of rostopic's columns with the joints' names, which end with a number."""
@@ -137,12 +142,13 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
     header = layout.header
     _check_header(path, layout)
     time = _time_column(path, header, options)
+    rest = _nanoseconds(header, time)
     mapped = {entry.source for entry in options.entries}
     named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
     wanted = [
         place
         for place, name in enumerate(header)
-        if place != time
+        if place not in (time, rest)
         and (
             name in mapped
             or column_signal(name)
@@ -153,7 +159,7 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
     not_read = tuple(
         name
         for place, name in enumerate(header)
-        if name and place not in (time, *wanted) and place not in named
+        if name and place not in (time, rest, *wanted) and place not in named
     )
     if not wanted:
         raise LogError(
@@ -174,7 +180,8 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
         numbers.extend(found)
         rows.append(row)
         if time is not None:
-            stamps.append(cells[time])
+            part = "" if rest is None else f".{cells[rest].strip():0>9}"
+            stamps.append(cells[time].strip() + part)
         if named:
             joints.add(tuple(cells[place] for place in named))
     if len(rows) < 2:
@@ -390,6 +397,15 @@ def _time_column(path: Path, header: Sequence[str], options: ReadOptions) -> int
         f"no time column is named; expected one of {', '.join(TIMES)}, or --map time=COLUMN;"
         f" a log without stamps needs its rate, such as --rate 1000; columns are {listed(header)}",
     )
+
+
+def _nanoseconds(header: Sequence[str], time: int | None) -> int | None:
+    """Place of the nanoseconds beside stamps in whole seconds, as ROS has them; None without."""
+    if time is None or not (seconds := SECONDS.fullmatch(header[time])):
+        return None
+    whole = {name.lower(): place for place, name in enumerate(header)}
+    names = (f"{seconds['record']}{word}".lower() for word in NANOSECONDS)
+    return next((whole[name] for name in names if name in whole), None)
 
 
 def _stamps(
