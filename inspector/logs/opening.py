@@ -14,7 +14,7 @@ from inspector.logs.log import Progress, without_progress
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import jobs_of
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, listed
-from inspector.wrongrobot import named
+from inspector.wrongrobot import check_joints, named
 from noisemodel import NoiseModelError, Run, RunFileError
 from noisemodel.checks import NotUniformError
 from noisemodel.limits import joint_limits
@@ -220,12 +220,14 @@ def assumed(imported: Imported, path: Path) -> str:
     run = imported.run
     units = str(run.meta.get("units") or "radians")
     decided = any("degrees" in remark for remark in imported.remarks)
+    lacking = check_joints(run.joint_names, run.robot)
     others = "other " if any(": converted from" in each for each in imported.remarks) else ""
     parts = [
         _joints(run),
         *([] if decided else [f"{others}angles taken for {units}"]),
         f"{run.rate:g} Hz",
         f"robot {run.robot}" if run.robot else "no robot (--robot NAME)",
+        *([f"not in the log, assumed stationary: {listed(lacking)}"] if lacking else []),
         *(["the log describes its robot, which `import` keeps"] if imported.urdf else []),
         *(
             remark.removeprefix(f"{path.name}: ")
