@@ -21,6 +21,7 @@ import numpy as np
 from noisemodel import shapes
 from noisemodel.errors import RobotError
 from noisemodel.linkshapes import LinkShape
+from noisemodel.meshpath import HINT
 from noisemodel.types import Array
 from noisemodel.urdf import MAX_BYTES, MAX_JOINTS, Mimic
 
@@ -195,7 +196,7 @@ def _copies(root: ET.Element) -> int:
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:
     if not any(file.resolve().is_relative_to(root.resolve()) for root in roots):
         allowed = ", ".join(map(str, roots))
-        raise RobotError(f"{path}: names {named!r}, which lies outside of {allowed}")
+        raise RobotError(f"{path}: names {named!r}, which lies outside of {allowed}; {HINT}")
 
 
 def _without_files(

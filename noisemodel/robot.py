@@ -22,6 +22,15 @@ from noisemodel.urdf import Mimic
 ROOT = "root_joint"
 """Pinocchio's name for the joint that makes a base float."""
 
+PACKAGE_ROOT = "NOISE_PACKAGE_ROOT"
+"""Environment variable with a folder that meshes may lie in besides the robot's own."""
+
+PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")
+"""The package in the address of a mesh."""
+
+BESIDE = ("meshes", "visual", "collision", "assets")
+"""Folders beside that of a URDF or an MJCF that belong to it where no package says so."""
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -53,7 +62,12 @@ class Robot:
 
     @classmethod
     def load(
-        cls, name: str | Path, *, floating_base: bool | None = None, mimic: bool = False
+        cls,
+        name: str | Path,
+        *,
+        floating_base: bool | None = None,
+        mimic: bool = False,
+        package_root: str | Path | None = None,
     ) -> Self:
         """Read a robot.
 
@@ -64,19 +78,21 @@ class Robot:
             floating_base: Whether the base moves freely; unless given, as listed, False for a URDF
                 of one's own, and as an MJCF has it.
             mimic: Whether joints that mimic another one follow it, and have no entry in q and v.
+            package_root: A folder that meshes may lie in besides those of `package_roots`.
 
         Returns:
             The robot.
 
         Raises:
             UnknownRobotError: If there is neither such a name nor such a file.
-            RobotError: If the URDF or MJCF cannot be read.
+            RobotError: If the URDF or MJCF cannot be read, or ``package_root`` is no folder.
         """
         listed = catalog.ROBOTS.get(str(name))
         path = locate(name)
+        roots = package_roots(name if listed else path, package_root)
         description: urdf.Urdf | Mjcf
         if mjcf.is_mjcf(path):
-            description = mjcf.read(path, package_roots(path), floating_base)
+            description = mjcf.read(path, roots, floating_base)
             model, floating_base = description.model, description.floating_base
         else:
             if floating_base is None:
@@ -91,7 +107,7 @@ class Robot:
         return cls(
             name=str(name) if catalog.is_name(str(name)) else path.stem,
             path=path,
-            package_roots=package_roots(name if listed else path),
+            package_roots=roots,
             model=model,
             joints=table,
             nq=sum(joint.nq for joint in independent),
@@ -222,21 +238,62 @@ def locate(name: str | Path) -> Path:
     raise UnknownRobotError(str(name), catalog.ROBOTS)
 
 
-def package_roots(name: str | Path) -> tuple[Path, ...]:
+def package_roots(name: str | Path, package_root: str | Path | None = None) -> tuple[Path, ...]:
     """Folders that a robot's meshes are searched in, and outside of which none may lie.
 
+    Of a file that is the nearest folder above it that a ``package://`` address in it names; else
+    the nearest one with a package.xml; else the file's own folder and those of ``BESIDE``. The
+    root of the disk, a home, and what contains a home are never among them.
+
     Args:
-        name: A listed name, or the path of a URDF: then its folder and the two above it, or
-            those of the listed robots where the URDF lies among them.
+        name: A listed name, or the path of a URDF or an MJCF: where it lies among the listed
+            robots, their folders are taken.
+        package_root: A further folder; unless given, that of the environment variable
+            ``NOISE_PACKAGE_ROOT``, if any.
+
+    Raises:
+        RobotError: If ``package_root`` is no folder, or the file cannot be read.
     """
+    named = package_root or os.environ.get(PACKAGE_ROOT)
+    further = () if not named else (Path(named).resolve(),)
+    if further and not further[0].is_dir():
+        raise RobotError(f"package root {named}: there is no such folder")
     if str(name) in catalog.ROBOTS:
-        return catalog.package_roots()
-    folder = Path(name).resolve().parent
+        return (*further, *catalog.package_roots())
+    path = Path(name).resolve()
     with suppress(RobotError):
         listed = catalog.package_roots()
-        if folder.is_relative_to(listed[-1].resolve()):
-            return listed
-    return (folder, *folder.parents[:2])
+        if path.is_relative_to(listed[-1].resolve()):
+            return (*further, *listed)
+    return (*further, *_own_roots(path))
+
+
+def _own_roots(path: Path) -> tuple[Path, ...]:
+    try:
+        packages = set(PACKAGE.findall(path.read_bytes()[: urdf.MAX_BYTES]))
+    except OSError as error:
+        raise RobotError(f"{path}: cannot be read ({error.strerror})") from error
+    above = [folder for folder in path.parents if not _is_wide(folder)]
+    with_xml = [folder for folder in above if (folder / "package.xml").is_file()]
+    # /usr and the like have no name that a file may choose
+    named = [folder for folder in above if len(folder.parts) > 2 or folder in with_xml]
+    nearest = (next((f for f in named if os.fsencode(f.name) == each), None) for each in packages)
+    if found := sorted({folder for folder in nearest if folder is not None}):
+        return tuple(found)
+    if with_xml:
+        return (with_xml[0],)
+    own = path.parent
+    beside = [folder / each for folder in (own.parent, own) for each in BESIDE]
+    return (*(() if _is_wide(own) else (own,)), *(each for each in beside if each.is_dir()))
+
+
+def _is_wide(folder: Path) -> bool:
+    """Whether a folder is the root of a disk, a home, or contains one."""
+    homes = [Path("/root"), Path("/home/x"), Path("/Users/x")]
+    with suppress(RuntimeError):  # the user has no home
+        homes.append(Path.home().resolve())
+    a_home = folder.parent in (Path("/home"), Path("/Users"))
+    return a_home or any(home.is_relative_to(folder) for home in homes)
 
 
 def _model(path: Path, floating_base: bool) -> Any:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import Overwrite
+from inspector.commands.options import Overwrite, PackageRoot
 
 
 def compare(
@@ -16,6 +16,7 @@ def compare(
     robots: Annotated[
         str, typer.Option(help="Robots to move by a generated motion: talos,go2 or all.")
     ] = "",
+    package_root: PackageRoot = None,
     kinds: Annotated[
         str, typer.Option(help="Some of simplified, paper, A, B, C, mean, rms, normal.")
     ] = "simplified,C,paper,mean,rms,normal",
@@ -37,6 +38,7 @@ def compare(
     from inspector.comparison.output import Outputs
     from inspector.progress import progress
 
+    del package_root  # has been allowed
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
     if not sources:

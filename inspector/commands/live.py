@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles, Overwrite
+from inspector.commands.options import ModelFiles, Overwrite, PackageRoot
 
 
 def live(
@@ -18,6 +18,7 @@ def live(
             help="The robot to draw: a name that `robots` lists, a URDF or an MJCF (robot.xml)."
         ),
     ] = None,
+    package_root: PackageRoot = None,
     names: Annotated[
         str, typer.Option(help="Joints in the order of the columns: elbow,wrist,...")
     ] = "",
@@ -46,6 +47,7 @@ def live(
     from inspector.live import LiveError, LiveSession
     from inspector.live.feeding import follow
 
+    del package_root  # has been allowed
     if sys.stdin.isatty():
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"

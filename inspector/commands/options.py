@@ -1,6 +1,7 @@
 """Arguments and options that several commands share."""
 
 import inspect
+import os
 from collections.abc import Callable, Collection
 from functools import wraps
 from pathlib import Path
@@ -59,11 +60,28 @@ def _of_log(*names: str, **settings: Any) -> Any:
     return typer.Option(*names, rich_help_panel="Reading logs", **settings)
 
 
+def _allow(folder: Path | None) -> Path | None:
+    if folder is not None:
+        os.environ["NOISE_PACKAGE_ROOT"] = str(folder)  # for the workers of this process too
+    return folder
+
+
+PackageRoot = Annotated[
+    Path | None,
+    typer.Option(
+        "--package-root",
+        callback=_allow,
+        help="A further folder of packages, for the meshes of a robot.",
+    ),
+]
+
+
 def _log_options(
     robot: Annotated[
         str | None,
         _of_log("--robot", help="A name that `robots` lists, URDF or MJCF; none takes no robot."),
     ] = None,
+    package_root: PackageRoot = None,
     rate: Annotated[
         float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
     ] = None,
@@ -104,6 +122,7 @@ def _log_options(
     from inspector.logs.opening import Reading
     from inspector.logs.reading import read_options
 
+    del package_root  # has been allowed
     options = read_options(
         map_ or (),
         saved=mapping,
