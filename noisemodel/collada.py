@@ -6,15 +6,19 @@ Assimp, units and upward axes turn and scale what URDF readers take as it is wri
 
 from collections.abc import Iterator, Mapping
 from typing import TypeAlias
-from xml.etree import ElementTree as ET  # Expat opens no external entities; DOCTYPE is refused
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel.polygons import fans
+from noisemodel import xmltext
+from noisemodel.polygons import MAX_TRIANGLES, fans
 from noisemodel.types import Array, Indices, Mesh
 
 Named: TypeAlias = Mapping[str, ET.Element]
 """Elements by the address that others call them: # and their id."""
+
+MAX_NODES = 10_000
+"""Nodes that a scene may have, instances of instances counted each: they double with each level."""
 
 WITHOUT_SURFACE = {"source", "vertices", "lines", "linestrips", "extra"}
 
@@ -31,35 +35,41 @@ def read(data: bytes) -> Mesh:
 
     Raises:
         ValueError: If the content is no whole COLLADA file, or has a kind of geometry that is not
-            supported (skins, polygons with holes).
-        SyntaxError: If it is not XML.
+            supported (skins, polygons with holes), or instances of more nodes or triangles than
+            are read.
         RecursionError: If its nodes contain themselves.
     """
-    if b"<!DOCTYPE" in data or b"<!ENTITY" in data:
-        raise ValueError("it has a document type or entities, which no mesh needs")
-    root = ET.fromstring(data)  # noqa: S314
+    root = xmltext.parsed(data)
     named = {
         f"#{element.attrib['id']}": element for element in root.iter() if "id" in element.attrib
     }
     scene = _target(named, _child(root, "scene/{*}instance_visual_scene"))
     points, faces = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int64)]
     count = 0
-    for placed, corners in _instances(named, scene, np.eye(4)):
+    triangles = 0
+    for placed, corners in _instances(named, scene, np.eye(4), iter(range(MAX_NODES))):
         points.append(placed)
         faces.append(corners + count)
         count += len(placed)
+        triangles += len(corners)
+        if max(triangles, count) > MAX_TRIANGLES:
+            raise ValueError(f"it has more than {MAX_TRIANGLES} triangles or points")
     return np.concatenate(points), np.concatenate(faces)
 
 
-def _instances(named: Named, node: ET.Element, placement: Array) -> Iterator[Mesh]:
-    """Walk down from a node; what a node contains moves with it."""
+def _instances(
+    named: Named, node: ET.Element, placement: Array, left: Iterator[int]
+) -> Iterator[Mesh]:
+    """Walk down from a node, one of those that are left; what a node contains moves with it."""
+    if next(left, None) is None:
+        raise ValueError(f"it has more than {MAX_NODES} nodes with their instances")
     placement = placement @ _transform(node)
     for child in node:
         match _word(child):
             case "node":
-                yield from _instances(named, child, placement)
+                yield from _instances(named, child, placement, left)
             case "instance_node":
-                yield from _instances(named, _target(named, child), placement)
+                yield from _instances(named, _target(named, child), placement, left)
             case "instance_geometry":
                 for points, faces in _geometry(named, _target(named, child)):
                     yield points @ placement[:3, :3].T + placement[:3, 3], faces

@@ -17,6 +17,9 @@ ALL: Rows = np.zeros(1, dtype=np.intp)
 FINENESS = 2.0
 """Panels of the fine points go this many times into the surface's thickness."""
 
+MOST = 1_000_000
+"""Fine points of a surface; more are placed only where there are many triangles."""
+
 SLENDEREST = 1e-3
 """Thinner than this share of its length, a surface counts as that thin."""
 
@@ -53,7 +56,9 @@ def fine(triangles: Array) -> Cloud:
     step = max(thickness / FINENESS, SLENDEREST * length)
     step = min(step, 0.05 * np.sqrt(areas.sum()))  # enough points for any number of cells
     edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
-    panels = np.ceil(np.stack((edges.max(axis=1), edges.min(axis=1)), axis=1) / step)
+    sides = np.stack((edges.max(axis=1), edges.min(axis=1)), axis=1)
+    while 4 * (panels := np.ceil(sides / step)).prod(axis=1).sum() > max(MOST, 8 * len(triangles)):
+        step *= 2.0  # fans of a thousand slender triangles, such as no link has
     tip = (edges.argmin(axis=1) + 2) % 3  # the corner opposite to the shortest edge
     order = (tip[:, None] + np.arange(3)) % 3
     triangles = np.take_along_axis(triangles, order[:, :, None], axis=1)

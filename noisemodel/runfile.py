@@ -1,7 +1,5 @@
 """The run file, version 1: which arrays it has, and how they are read, checked and written."""
 
-import lzma
-import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -11,13 +9,12 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from noisemodel import archive
 from noisemodel.atomic import replacing
 from noisemodel.errors import OutputError, RunFileError, hint
 
 FORMAT = "noise-run/1"
 STAGE = "stage_"
-MAX_BYTES = 16 * 2**30
-"""An archive that would unpack to more than this is refused."""
 
 ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time": ("f", ("samples",)),
@@ -39,9 +36,6 @@ ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "meta": ("U", ()),
 }
 """The arrays of a run file: the kind of number or text that each holds, and its axes."""
-
-DAMAGE = (EOFError, MemoryError, RuntimeError, struct.error, zlib.error, lzma.LZMAError)
-"""What zipfile and NumPy raise on archives that are broken, encrypted or state a wrong size."""
 
 COMPRESSIBLE = 0.8
 """Arrays are compressed if that leaves less than this share of their size."""
@@ -66,11 +60,7 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
             unknown array, holds another kind of array, or is of another version.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
-            if unpacked > MAX_BYTES:
-                raise RunFileError(path, f"unpacks to {unpacked} bytes; the limit is {MAX_BYTES}")
-            names = [member.removesuffix(".npy") for member in archive.namelist()]
+        names = archive.names_in(path)
         for name in names:
             if name not in ARRAYS and not name.startswith(STAGE):
                 raise RunFileError(
@@ -79,17 +69,18 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
                     f" or position, and of {', '.join(ARRAYS)} and {STAGE}<name> what there is;"
                     " anything else belongs into meta",
                 )
-        with np.load(path, allow_pickle=False) as arrays:
-            found = {name: _plain(path, name, _loaded(path, name, arrays)) for name in names}
-    except RunFileError:
-        raise
+        found = {name: _plain(path, name, each) for name, each in archive.read(path).items()}
+    except archive.ObjectArrayError as error:
+        raise RunFileError(
+            path,
+            f"not a run file: {error.name} holds a Python object, such as None; leave it out, or"
+            f" save {_kind(error.name)}",
+        ) from error
     except OSError as error:
         raise RunFileError(path, f"cannot be read ({error.strerror or error})") from error
-    except (ValueError, zipfile.BadZipFile, KeyError) as error:
+    except archive.ArchiveError as error:
         csv = "; `inspector import` makes a run of a CSV log" if path.suffix == ".csv" else ""
-        raise RunFileError(path, f"not a run file: {_one_line(error)}{csv}") from error
-    except DAMAGE as error:
-        raise RunFileError(path, f"damaged: {_one_line(error)}") from error
+        raise RunFileError(path, f"not a run file: {error}{csv}") from error
     version = str(found.get("format", FORMAT))
     if version != FORMAT:
         raise RunFileError(path, f"format {version!r}, expected {FORMAT!r}")
@@ -112,7 +103,7 @@ def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
             with temporary.open("wb") as stream:
                 _pack(stream, arrays)
         except ValueError as error:
-            raise OutputError(f"{path}: cannot be written ({_one_line(error)})") from error
+            raise OutputError(f"{path}: cannot be written ({archive.one_line(error)})") from error
 
 
 def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
@@ -121,10 +112,10 @@ def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
     Compression hardly makes the noise of a log smaller, and to undo it takes most of the time of
     loading: what it would not make smaller by a fifth is left as it is, and the quickest will do.
     """
-    with zipfile.ZipFile(stream, "w", compresslevel=1) as archive:
+    with zipfile.ZipFile(stream, "w", compresslevel=1) as packed:
         for name, array in arrays.items():
-            archive.compression = zipfile.ZIP_DEFLATED if _shrinks(array) else zipfile.ZIP_STORED
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
+            packed.compression = zipfile.ZIP_DEFLATED if _shrinks(array) else zipfile.ZIP_STORED
+            with packed.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
                 np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
 
 
@@ -136,27 +127,12 @@ def _shrinks(array: Any) -> bool:
     return len(zlib.compress(tried, 1)) < COMPRESSIBLE * len(tried)
 
 
-def _loaded(path: Path, name: str, arrays: Any) -> Any:
-    try:
-        return arrays[name]
-    except ValueError as error:
-        if "allow_pickle" not in str(error):
-            raise
-        raise RunFileError(
-            path,
-            f"not a run file: {name} holds a Python object, such as None; leave it out, or save"
-            f" {_kind(name)}",
-        ) from error
-
-
 def _kind(name: str) -> str:
     return KIND_WORDS[ARRAYS.get(name, STAGE_ARRAY)[0]]
 
 
-def _plain(path: Path, name: str, array: Any) -> NDArray[Any]:
+def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
     wanted, axes = ARRAYS.get(name, STAGE_ARRAY)
-    if not isinstance(array, np.ndarray):  # np.load hands out the bytes of what is no array
-        raise RunFileError(path, f"not a run file: {name} is no array")
     if array.ndim != len(axes):
         raise RunFileError(
             path, f"{name} has shape {array.shape}, expected ({', '.join(axes) or 'a single text'})"
@@ -168,7 +144,3 @@ def _plain(path: Path, name: str, array: Any) -> NDArray[Any]:
     if array.dtype.kind != wanted:
         raise RunFileError(path, f"{name} holds {array.dtype}, expected {KIND_WORDS[wanted]}")
     return array
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

@@ -25,7 +25,7 @@ def read(data: bytes) -> Mesh:
         ValueError: If a facet has not three corners of three numbers each.
     """
     if is_text(data):
-        rows = re.findall(rb"^\s*vertex\s+(.*)$", data, flags=re.MULTILINE | re.IGNORECASE)
+        rows = re.findall(rb"^[ \t]*vertex[ \t]+(.*)$", data, flags=re.MULTILINE | re.IGNORECASE)
         points = np.array([row.split() for row in rows], dtype=np.float64).reshape(-1, 3)
         if len(points) != 3 * data.lower().count(b"endfacet"):
             raise ValueError("a facet has not three corners")

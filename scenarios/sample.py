@@ -21,6 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import Block, Run, decimated, runfile
+from noisemodel.archive import DAMAGE as DAMAGED
+from noisemodel.archive import names_in
 from scenarios.errors import SampleError, ScenarioError
 from scenarios.signals import WHOLE, Signals, joints, norms, signals, with_error
 
@@ -37,7 +39,8 @@ DAMAGE = (
     TypeError,
     AttributeError,
     zipfile.BadZipFile,
-    *runfile.DAMAGE,
+    RecursionError,
+    *DAMAGED,
 )
 """Errors that reading raises if a file is damaged or of another kind."""
 RECIPE = frozenset(("scenario", "seed", "duration", "sha256"))
@@ -159,6 +162,7 @@ class Sample:
         if not zipfile.is_zipfile(path):
             raise SampleError(path, "not a sample, or truncated: not a complete archive")
         try:
+            names_in(path)  # within the limits of sizes
             with np.load(path, allow_pickle=False) as archive:
                 return cls(**_fields(path, archive, only))
         except SampleError:
@@ -172,6 +176,7 @@ def is_sample(path: str | Path) -> bool:
     if not zipfile.is_zipfile(path):
         return False
     try:
+        names_in(Path(path))
         with np.load(path, allow_pickle=False) as archive:
             return str(archive["format"]).startswith("noise-sample/")
     except DAMAGE:

@@ -332,7 +332,7 @@ def test_without_its_meshes_a_robot_has_joints_and_no_surface(tmp_path):
             "</replicate></worldbody></mujoco>",
             "replicates an element more than 10000 times",
         ),
-        ("<a>" * 5000 + "</a>" * 5000, "not an MJCF"),
+        ("<a>" * 5000 + "</a>" * 5000, "elements are nested more than 500 deep"),
     ],
 )
 def test_a_file_that_is_no_robot_is_refused_in_one_line(tmp_path, text, problem):

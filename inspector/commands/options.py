@@ -66,6 +66,12 @@ def _allow(folder: Path | None) -> Path | None:
     return folder
 
 
+def _raise_limit(gigabytes: float | None) -> float | None:
+    if gigabytes is not None:
+        os.environ["NOISE_MAX_UNPACKED"] = str(int(gigabytes * 1e9))
+    return gigabytes
+
+
 PackageRoot = Annotated[
     Path | None,
     typer.Option(
@@ -82,6 +88,15 @@ def _log_options(
         _of_log("--robot", help="A name that `robots` lists, URDF or MJCF; none takes no robot."),
     ] = None,
     package_root: PackageRoot = None,
+    max_unpacked: Annotated[
+        float | None,
+        _of_log(
+            "--max-unpacked",
+            callback=_raise_limit,
+            help="Most that a compressed file may unpack to, in GB; by default 0.5, or 20 times"
+            " its size.",
+        ),
+    ] = None,
     rate: Annotated[
         float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
     ] = None,
@@ -122,7 +137,7 @@ def _log_options(
     from inspector.logs.opening import Reading
     from inspector.logs.reading import read_options
 
-    del package_root  # has been allowed
+    del package_root, max_unpacked  # have been set
     options = read_options(
         map_ or (),
         saved=mapping,

@@ -9,6 +9,7 @@ from typing import TypeAlias
 from inspector.errors import InspectorError, LogError
 from inspector.logs.log import LogReader
 from inspector.logs.options import ReadOptions
+from noisemodel import archive
 
 OpenLog: TypeAlias = Callable[[Path, ReadOptions], LogReader]
 
@@ -75,10 +76,13 @@ def is_one_log(folder: Path) -> bool:
 
 def _of_file(path: Path) -> str:
     try:
+        archive.check_regular(path)
         with path.open("rb") as stream:
             head = stream.read(16)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
+    except archive.ArchiveError as error:
+        raise LogError(path, str(error)) from error
     if head.startswith(b"PAR1") and _info_above(path):
         return "lerobot"
     return next((module for magic, module in MAGIC.items() if head.startswith(magic)), "csvlog")

@@ -1,6 +1,5 @@
 """NumPy files: run files, archives of simulators' arrays, and others by mapping."""
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +11,8 @@ from inspector.errors import LogError
 from inspector.logs.arrays import Episode, episodes_of, log_of, single_numbers
 from inspector.logs.log import Log, LogReader
 from inspector.logs.options import ReadOptions
-from noisemodel import Run, RunError, checks
-from noisemodel.runfile import ARRAYS, DAMAGE, MAX_BYTES, STAGE
+from noisemodel import Run, RunError, archive, checks
+from noisemodel.runfile import ARRAYS, STAGE
 
 OBJECTS = (
     "Python objects, such as None, or PyBullet's joint states as they are; save numbers:"
@@ -52,28 +51,15 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         with path.open("rb") as stream:
             if stream.read(len(MAGIC_PREFIX)) == MAGIC_PREFIX:
                 stream.seek(0)
-                return _alone(np.load(stream, allow_pickle=False))
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > MAX_BYTES:
-            raise LogError(path, f"unpacks to {size} bytes; the limit is {MAX_BYTES}")
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: _plain(path, archive, name) for name in archive.files}
-    except LogError:
-        raise
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile, *DAMAGE) as error:
-        problem = " ".join(str(error).split()) or type(error).__name__
-        raise LogError(path, f"not an archive of plain arrays ({problem})") from error
-
-
-def _plain(path: Path, archive: Any, name: str) -> NDArray[Any]:
-    try:
-        return np.asarray(archive[name])
-    except ValueError as error:
-        if "allow_pickle" not in str(error):
-            raise
-        problem = f"not an archive of plain arrays: {name!r} holds {OBJECTS}"
+                return _alone(archive.read_array(stream, "it", path.stat().st_size))
+        return archive.read(path)
+    except OSError as error:
+        raise LogError(path, f"cannot be read ({error.strerror or error})") from error
+    except archive.ObjectArrayError as error:
+        problem = f"not an archive of plain arrays: {error.name!r} holds {OBJECTS}"
         raise LogError(path, problem) from error
+    except archive.ArchiveError as error:
+        raise LogError(path, f"not an archive of plain arrays: {error}") from error
 
 
 def _alone(array: Any) -> dict[str, NDArray[Any]]:

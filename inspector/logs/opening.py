@@ -15,7 +15,7 @@ from inspector.logs.options import ReadOptions
 from inspector.logs.reading import jobs_of
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.wrongrobot import check_joints, named
-from noisemodel import NoiseModelError, Run, RunFileError
+from noisemodel import NoiseModelError, Run, RunFileError, archive
 from noisemodel.checks import NotUniformError
 from noisemodel.limits import joint_limits
 from noisemodel.types import Real
@@ -272,9 +272,11 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
     if path.is_dir() or not _is_npz(path) or (zipfile.is_zipfile(path) and as_log):
         return None
     if zipfile.is_zipfile(path):
-        with zipfile.ZipFile(path) as archive:
-            names = set(archive.namelist())
-        if "time.npy" not in names or not names & {"velocity.npy", "position.npy"}:
+        try:
+            names = set(archive.names_in(path))
+        except (OSError, archive.ArchiveError):
+            names = {"time", "velocity"}  # `Run.load` says what is wrong
+        if "time" not in names or not names & {"velocity", "position"}:
             return None  # arrays of a simulator
     try:
         return Run.load(path)

@@ -1,0 +1,159 @@
+"""Small files that ask for much memory or time end in one line, soon."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspector.errors import LogError
+from inspector.logs.reading import read_log
+from noisemodel import Robot, RobotError, Run, RunFileError, meshfile
+from noisemodel.errors import MeshError
+from noisemodel.linksurface import LinkSurface
+from noisemodel.quadrature import fine
+
+LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
+
+
+def npz(path: Path, **headers: str) -> Path:
+    """An archive with arrays that their headers describe, and zeros in them."""
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, header in headers.items():
+            text = header.ljust(117).encode() + b"\n"
+            archive.writestr(
+                f"{name}.npy", b"\x93NUMPY\1\0" + len(text).to_bytes(2, "little") + text
+            )
+    return path
+
+
+def test_an_stl_of_newlines_is_read_at_once(tmp_path):
+    path = tmp_path / "a.stl"
+    path.write_bytes(b"solid a\n" + b"\n" * 1_000_000 + b"endsolid a\n")
+    with pytest.raises(MeshError, match="has no triangles"):
+        meshfile.read(path)
+
+
+def test_a_scene_whose_instances_double_is_refused(tmp_path):
+    nodes = "".join(
+        f'<node id="n{n}"><instance_node url="#n{n + 1}"/><instance_node url="#n{n + 1}"/></node>'
+        for n in range(60)
+    )
+    path = tmp_path / "a.dae"
+    path.write_text(
+        f'<COLLADA><library_nodes>{nodes}<node id="n60"/></library_nodes><library_visual_scenes>'
+        '<visual_scene id="s"><node><instance_node url="#n0"/></node></visual_scene>'
+        '</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>'
+    )
+    with pytest.raises(MeshError, match="more than 10000 nodes with their instances"):
+        meshfile.read(path)
+
+
+def test_a_mesh_of_more_triangles_than_are_read_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(meshfile, "MAX_TRIANGLES", 100)
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + " 1 2 3" * 40 + "\n")
+    with pytest.raises(MeshError, match="has 118 triangles, the limit is 100; simplify it"):
+        meshfile.read(path)
+
+
+def test_a_polygon_of_many_slender_triangles_has_no_more_fine_points_than_others(tmp_path):
+    angle = np.linspace(0, 2 * np.pi, 10_000, endpoint=False)
+    rim = np.stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)), axis=1)
+    corners = np.stack((np.broadcast_to(rim[0], rim[1:-1].shape), rim[1:-1], rim[2:]), axis=1)
+    assert len(fine(corners).points) <= 1_000_000
+    assert LinkSurface.of(corners, None).area == pytest.approx(np.pi, rel=1e-6)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+@pytest.mark.parametrize(
+    ("name", "root"),
+    [("r.urdf", "<robot name='r'>{}</robot>"), ("r.xml", "<mujoco>{}</mujoco>")],
+)
+def test_entities_of_a_robot_are_not_expanded_in_any_encoding(tmp_path, name, root, encoding):
+    path = tmp_path / name
+    laughs = f'<!DOCTYPE a [<!ENTITY l0 "ha">{LAUGHS}]>{root.format("&l9;")}'
+    path.write_text(f'<?xml version="1.0" encoding="{encoding}"?>{laughs}', encoding=encoding)
+    with pytest.raises(RobotError, match="no document type or entities are read"):
+        Robot.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "root"), [("r.urdf", "<robot name='r'>{}</robot>"), ("r.xml", "<mujoco>{}</mujoco>")]
+)
+def test_elements_that_are_nested_without_end_are_refused(tmp_path, name, root):
+    path = tmp_path / name
+    path.write_text(root.format("<link name='a'>" * 100_000 + "</link>" * 100_000))
+    with pytest.raises(RobotError, match="nested more than 500 deep"):
+        Robot.load(path)
+
+
+def test_a_file_of_unclosed_comments_is_looked_at_once(tmp_path):
+    path = tmp_path / "r.xml"
+    path.write_text("<!--" * 1_000_000)
+    with pytest.raises(RobotError, match="not XML"):
+        Robot.load(path)
+
+
+def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
+    path = tmp_path / "run.npz"
+    zeros = bytes(2**20)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        with archive.open("velocity.npy", "w", force_zip64=True) as member:
+            for _ in range(600):
+                member.write(zeros)
+        archive.writestr("time.npy", b"")
+    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+        with pytest.raises(error, match=r"unpacks to 0.629 GB from 0.6\d+ MB, .*--max-unpacked"):
+            read(path)
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (-1,), }",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (0, " + "9" * 30 + "), }",
+        "{'descr': '<U0', 'fortran_order': False, 'shape': (1000000000000,), }",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (1.5,), }",
+        "{'descr': '<f8', 'fortran_order': False, 'shape': (" + "9" * 60 + ",), }",
+        "{'descr': [('a', '<f8')] * 9, 'fortran_order': False, 'shape': (), }",
+        "{'descr': 'O', 'fortran_order': False, 'shape': (), }",
+        "(" * 100,
+        "'",
+        "{",
+        "\n\t   ]",
+    ],
+)
+def test_a_broken_header_of_an_array_is_one_line(tmp_path, header):
+    path = npz(tmp_path / "run.npz", time=header, velocity=header)
+    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+        with pytest.raises(error, match="time") as caught:
+            read(path)
+        assert "\n" not in str(caught.value)
+
+
+def test_a_second_member_of_one_name_is_refused(tmp_path):
+    path = tmp_path / "run.npz"
+    np.savez(path, time=np.arange(40) / 1000, velocity=np.ones((40, 2)))
+    with zipfile.ZipFile(path) as archive:
+        again = archive.read("velocity.npy")
+    with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("velocity.npy", again)
+    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+        with pytest.raises(error, match="two arrays named 'velocity'"):
+            read(path)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_methods_that_unpack_gigabytes_at_once_are_not_read(tmp_path, method):
+    with zipfile.ZipFile(tmp_path / "run.npz", "w", method) as archive:
+        archive.writestr("time.npy", bytes(10**6))
+    with pytest.raises(RunFileError, match="another method than NumPy's"):
+        Run.load(tmp_path / "run.npz")
+
+
+def test_a_device_is_no_log():
+    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+        with pytest.raises(error, match="no regular file"):
+            read(Path("/dev/zero"))
