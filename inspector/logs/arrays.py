@@ -116,6 +116,7 @@ class Episode:
         numbers: Single numbers by name, among them perhaps the rate or the step.
         joints: Names of the joints by the ending of their signals, "" or "_desired".
         controller: What takes the actions, if the file says so.
+        not_read: Names of further arrays, of which nothing is known.
     """
 
     path: Path
@@ -125,6 +126,7 @@ class Episode:
     numbers: Mapping[str, float] = field(default_factory=dict)
     joints: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     controller: str = ""
+    not_read: tuple[str, ...] = ()
 
 
 def meaning(name: str) -> str:
@@ -188,7 +190,7 @@ def log_of(episode: Episode, options: ReadOptions) -> Log:
         path,
         fields,
         episode.name,
-        not_read=tuple(name for name in arrays if name not in read),
+        not_read=(*(name for name in arrays if name not in read), *episode.not_read),
         remarks=(*((f"taken: {taken}",) if taken else ()), *remarks),
         suggested=tuple(suggested),
     )

@@ -2,7 +2,8 @@
 
 import json
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +12,20 @@ import numpy as np
 
 from inspector.errors import LogError
 from inspector.logs.arrays import (
+    COPY,
     EPISODE_ENDS,
     JOINT_STATES,
+    STATES,
     Episode,
     episodes_of,
     log_of,
+    meaning,
     single_numbers,
 )
 from inspector.logs.log import Log, LogReader
 from inspector.logs.options import ReadOptions
-from inspector.logs.signals import listed
+from inspector.logs.signals import TIMES, listed
+from noisemodel.archive import ArchiveError, check_unpacked
 
 EPISODES = "data"
 """The group that holds the episodes of robomimic and Isaac Lab."""
@@ -30,6 +35,11 @@ NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 """Errors that h5py raises for damaged files."""
+
+SMALL = 8 * 2**20
+"""Bytes up to which a dataset is read whatever its name is."""
+
+NAMES = {*TIMES, *EPISODE_ENDS}
 
 CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
 """Type of the controller of an arm in robosuite's arguments."""
@@ -47,7 +57,9 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     """
     try:
         with h5py.File(path) as file:
-            home, episodes = _episodes(file)
+            home, episodes = _episodes(path, file)
+    except LogError:
+        raise
     except DAMAGE as error:
         raise LogError(path, f"damaged or cut off ({_one_line(error)})") from error
     return LogReader(
@@ -58,31 +70,33 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     )
 
 
-def _episodes(file: Any) -> tuple[str, tuple[str, ...]]:
+def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
     """Name of the group that holds a group for each episode, and names of these.
 
     The name is empty where the episodes are in the file itself, one after the other or alone.
     """
     for home in (EPISODES, "/"):
-        if isinstance(group := file.get(home), h5py.Group):
+        if isinstance(group := _own(path, file.get(home), file), h5py.Group):
             names = [name for name, each in group.items() if isinstance(each, h5py.Group)]
             found = [name for name in names if home == EPISODES or NUMBERED.fullmatch(name)]
             if found:
                 by_number = lambda name: [int(n) for n in re.findall(r"\d+", name)]  # noqa: E731
                 return home, tuple(sorted(found, key=by_number))
-    flags = {
-        name: file[name][()] for name in EPISODE_ENDS if isinstance(file.get(name), h5py.Dataset)
-    }
+    found = ((name, _own(path, file.get(name), file)) for name in EPISODE_ENDS)
+    flags = dict(_values(path, [each for each in found if isinstance(each[1], h5py.Dataset)]))
     return "", tuple(episodes_of(flags))
 
 
 def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
     try:
         with h5py.File(path) as file:
-            group = file[f"{home}/{episode}"] if home else file
-            arrays = dict(_arrays(group))
+            group = _own(path, file[f"{home}/{episode}"], file) if home else file
+            datasets, left_out = _wanted(group, options)
+            arrays = dict(_values(path, [(n, _own(path, each, file)) for n, each in datasets]))
             about = file.get(EPISODES, file).attrs.get("env_args")
             attributes = {**file.attrs, **group.attrs}
+    except LogError:
+        raise
     except DAMAGE as error:
         raise LogError(path, f"{episode or 'it'} is damaged ({_one_line(error)})") from error
     if not home:
@@ -97,24 +111,53 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
             rate=_rate(about),
             numbers=single_numbers(attributes | arrays),
             controller=controller[1] if controller else "",
+            not_read=left_out,
         ),
         options,
     )
 
 
-def _arrays(group: Any) -> Iterator[tuple[str, Any]]:
-    """Numeric arrays of up to two dimensions, or three of joint states, by name in the group."""
+def _own(path: Path, each: Any, file: Any) -> Any:
+    """What a file has by a name, which may not be the content of another file."""
+    if each is not None and each.file.filename != file.filename:
+        raise LogError(path, f"{each.name!r} lies in another file ({each.file.filename})")
+    if isinstance(each, h5py.Dataset) and (each.external or each.is_virtual):
+        raise LogError(path, f"{each.name!r} is stored in other files; copy its numbers into one")
+    return each
+
+
+def _values(path: Path, datasets: Sequence[tuple[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """Read datasets that are in the file, or nearly so: a few bytes may state any shape."""
+    try:
+        check_unpacked(sum(int(each.nbytes) for _, each in datasets), path.stat().st_size)
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
+    for name, dataset in datasets:
+        yield name, np.atleast_1d(dataset[()])
+
+
+def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
+    """Numeric datasets of up to two dimensions, or three of joint states, by name in the group.
+
+    Returns:
+        Those that are read, and the names of large ones that nothing is known of.
+    """
+    mapped = {entry.part()[0] for entry in options.entries}
     found: list[tuple[str, Any]] = []
+    left_out: list[str] = []
 
     def visit(name: str, each: Any) -> None:
         if isinstance(each, h5py.Dataset) and each.dtype.kind in "iufb":
             last = name.rpartition("/")[2].lower()
             if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
-                found.append((name, each))
+                known = meaning(name) not in ("", COPY) or STATES.fullmatch(name)
+                if known or name in mapped or last in NAMES or each.nbytes <= SMALL:
+                    found.append((name, each))
+                else:
+                    left_out.append(name)
 
     group.visititems(visit)
-    for name, dataset in found:
-        yield name, np.atleast_1d(dataset[()])
+    return found, tuple(left_out)
 
 
 def _rate(env_args: Any) -> float | None:
@@ -122,11 +165,15 @@ def _rate(env_args: Any) -> float | None:
     try:
         args = json.loads(env_args)
         if frequency := args.get("env_kwargs", {}).get("control_freq"):
-            return float(frequency)
+            return _positive(float(frequency))
         sim = args.get("sim_args", {})
-        return 1 / (float(sim["dt"]) * float(sim["decimation"]))
-    except (TypeError, ValueError, KeyError, AttributeError, ZeroDivisionError):
+        return _positive(1 / (float(sim["dt"]) * float(sim["decimation"])))
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, RecursionError):
         return None
+
+
+def _positive(rate: float) -> float | None:
+    return rate if 0 < rate < inf else None
 
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:

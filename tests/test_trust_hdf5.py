@@ -1,0 +1,86 @@
+"""HDF5 files that hold what is not theirs, or claim to hold more than they do."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+
+from inspector.errors import LogError
+from inspector.logs.reading import read_log
+
+TIME = np.arange(400) / 100
+MOTION = np.sin(TIME)[:, None] * (1.0, 0.5)
+
+
+def log(path, **further):
+    with h5py.File(path, "w") as file:
+        file["time"], file["joint_pos"] = TIME, MOTION
+        for name, each in further.items():
+            file[name] = each
+    return path
+
+
+def test_bytes_of_other_files_are_not_imported(tmp_path):
+    secret = tmp_path / "secret"
+    secret.write_bytes(bytes(range(256)) * 100)
+    path = log(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file.create_dataset(
+            "joint_vel", (400, 2), "<f8", external=[(str(secret), 0, h5py.h5f.UNLIMITED)]
+        )
+    with pytest.raises(LogError, match="'/joint_vel' is stored in other files"):
+        read_log(path)
+
+
+def test_numbers_of_other_files_are_not_imported_by_virtual_datasets(tmp_path):
+    other = log(tmp_path / "other.h5")
+    path = log(tmp_path / "a.h5")
+    layout = h5py.VirtualLayout((400, 2), "<f8")
+    layout[:] = h5py.VirtualSource(other, "joint_pos", (400, 2))
+    with h5py.File(path, "a") as file:
+        file.create_virtual_dataset("joint_vel", layout)
+    with pytest.raises(LogError, match="'/joint_vel' is stored in other files"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("home", ["data", "terminals"])
+def test_links_into_other_files_are_not_followed(tmp_path, home):
+    other = tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["data/demo_0/joint_pos"], file["flags"] = MOTION, np.zeros(400)
+    path = log(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file[home] = h5py.ExternalLink(other.name, "/data" if home == "data" else "/flags")
+    with pytest.raises(LogError, match=rf"lies in another file \(.*{re.escape(other.name)}\)"):
+        read_log(path)
+
+
+def test_a_shape_that_is_not_in_the_file_is_refused(tmp_path):
+    path = log(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file.create_dataset("joint_vel", (10**9, 2), "<f8", chunks=(10**4, 2), compression="gzip")
+    with pytest.raises(
+        LogError, match="unpacks to 16 GB from .* MB, the limit is .*--max-unpacked"
+    ):
+        read_log(path)
+
+
+def test_a_huge_dataset_that_nobody_asked_for_is_not_read(tmp_path):
+    path = log(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file.create_dataset("pixels", (10**9, 2), "<f8", chunks=(10**4, 2), compression="gzip")
+    imported = read_log(path)
+    np.testing.assert_allclose(imported.run.position, MOTION)
+    assert any("pixels" in remark for remark in imported.remarks)
+
+
+@pytest.mark.parametrize(
+    "args",
+    ["[" * 100_000, '{"env_kwargs": {"control_freq": 1' + "0" * 400 + "}}", '{"env_kwargs": 3}'],
+)
+def test_arguments_that_are_no_arguments_are_passed_over(tmp_path, args):
+    path = log(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file.attrs["env_args"] = args
+    assert read_log(path).run.rate == 100.0
