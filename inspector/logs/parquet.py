@@ -1,6 +1,6 @@
 """Parquet logs with a row per sample, and columns of numbers or of lists of numbers."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from inspector.logs.log import Field, Log, LogReader
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import array_signal, column_signal
 from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
+from noisemodel.archive import ArchiveError, check_unpacked
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError)
 """Errors that pyarrow raises for damaged files."""
@@ -62,19 +63,48 @@ def table_of(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any
     """
     filters = [(EPISODE, "==", int(episode))] if episode else None
     try:
+        for path in paths:
+            _check_size(path, {*columns, *([EPISODE] if episode else [])})
         tables = [
             pyarrow.parquet.read_table(path, columns=list(columns), filters=filters)
             for path in paths
         ]
+    except LogError:
+        raise
     except DAMAGE as error:
         raise LogError(paths[0], f"damaged or cut off ({_one_line(error)})") from error
     return pyarrow.concat_tables(tables)
 
 
+def _check_size(path: Path, columns: Collection[str]) -> None:
+    """Refuse columns that unpack to more than is read: a run of one value takes a few bytes."""
+    about = pyarrow.parquet.read_metadata(path)
+    groups = (about.row_group(group) for group in range(about.num_row_groups))
+    unpacked = sum(
+        max(part.total_uncompressed_size, 8 * part.num_values)
+        for group in groups
+        for part in (group.column(place) for place in range(group.num_columns))
+        if part.path_in_schema.partition(".")[0] in columns
+    )
+    try:
+        check_unpacked(unpacked, path.stat().st_size)
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
+
+
 def episodes_of(path: Path) -> tuple[str, ...]:
-    """Episodes in a file."""
-    column = table_of([path], [EPISODE], "").column(0).to_numpy()
-    return tuple(str(each) for each in np.unique(column))
+    """Episodes in a file.
+
+    Raises:
+        LogError: If the file is damaged, or they are not numbered.
+    """
+    kind = schema_of(path).field(EPISODE).type
+    if not pyarrow.types.is_integer(kind):
+        raise LogError(path, f"column {EPISODE!r} holds {kind}, expected whole numbers")
+    column = table_of([path], [EPISODE], "").column(0)
+    if column.null_count:
+        raise LogError(path, f"column {EPISODE!r} has rows without a number")
+    return tuple(str(each) for each in np.unique(column.to_numpy()))
 
 
 def values_of(path: Path, name: str, column: Any) -> NDArray[Any] | None:

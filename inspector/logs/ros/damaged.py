@@ -71,7 +71,8 @@ def _sqlite_topics(file: Path) -> Iterator[Topic]:
                 definitions = dict(database.execute(rows))
             for name, kind in database.execute("SELECT name, type FROM topics"):
                 if isinstance(name, str) and isinstance(kind, str):
-                    yield Topic(name, kind, definitions.get(kind) or "")
+                    definition = definitions.get(kind)
+                    yield Topic(name, kind, definition if isinstance(definition, str) else "")
         except sqlite3.DatabaseError as error:
             problem = " ".join(str(error).split())[:100]
             raise LogError(file, f"no topic of the bag can be read: {problem}") from error

@@ -1,5 +1,6 @@
 """Messages, deserialised by the definitions in the bag, or by those of ROS if it has none."""
 
+import struct
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -10,6 +11,12 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 
 from inspector.errors import LogError
 from inspector.logs.ros.bag import Topic
+
+DAMAGE = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError),
+    *(struct.error, SyntaxError, TypeError, ValueError),
+)
+"""Errors that rosbags lets through on definitions and messages that are damaged."""
 
 STATE = "control_msgs/msg/JointTrajectoryControllerState"
 
@@ -81,7 +88,7 @@ class Decoder:
             store = get_typestore(standard if not self.topic.definition else Stores.EMPTY)
             try:
                 store.register(get_types_from_msg(definition, self.topic.type))
-            except (TypesysError, SyntaxError) as error:
+            except (TypesysError, *DAMAGE) as error:
                 raise LogError(
                     self.path,
                     f"{self.topic.name}: the definition of {self.topic.type} cannot be read"
@@ -93,7 +100,7 @@ class Decoder:
         parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
         try:
             return parse(data, self.topic.type)
-        except (SerdeError, KeyError, AssertionError) as error:
+        except (SerdeError, *DAMAGE) as error:
             raise LogError(
                 self.path,
                 f"{self.topic.name}: a message is not a {self.topic.type}"

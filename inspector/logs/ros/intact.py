@@ -4,7 +4,9 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
+from inspector.logs.ros import chunks
 from inspector.logs.ros.bag import Bag, Message, Topic, storage_of
+from noisemodel.archive import ArchiveError
 
 
 class DamagedError(Exception):
@@ -19,16 +21,24 @@ def open_bag(path: Path) -> Bag:
 
     Raises:
         DamagedError: If rosbags cannot open it.
+        ArchiveError: If it unpacks to more than is read, then or when messages are read.
     """
     from rosbags.rosbag1 import Reader as Reader1
     from rosbags.rosbag2 import Reader as Reader2
 
+    chunks.bound_rosbags()
+    chunks.begin(path)
     ros1 = path.is_file() and storage_of(path) == "ROS 1"
     try:
         reader: Any = (Reader1 if ros1 else Reader2)(path)
         reader.open()
+    except ArchiveError:
+        raise
     except Exception as error:  # rosbags lets struct's, SQLite's and its own errors through
         raise DamagedError(_one_line(error)) from error
+    if not all(isinstance(each.topic, str) for each in reader.connections):
+        reader.close()
+        raise DamagedError("a topic has no name")
     topics: dict[str, Topic] = {}
     for connection in reader.connections:
         before = topics.get(connection.topic)
@@ -39,19 +49,22 @@ def open_bag(path: Path) -> Bag:
     seconds = reader.duration * 1e-9 if any(topic.count for topic in topics.values()) else 0.0
     kind = "ROS 1 bag" if ros1 else "ROS 2 bag"
     bag = Bag(kind, ros1, topics, lambda names: iter(()), reader.close, seconds)
-    bag.messages = lambda names: _messages(reader, bag, names)
+    bag.messages = lambda names: _messages(path, reader, bag, names)
     return bag
 
 
-def _messages(reader: Any, bag: Bag, names: Collection[str]) -> Iterator[Message]:
+def _messages(path: Path, reader: Any, bag: Bag, names: Collection[str]) -> Iterator[Message]:
     """Messages to the end, or to where the bag is damaged."""
     wanted = [each for each in reader.connections if each.topic in names]
     expected, count = sum(each.msgcount for each in wanted), 0
+    chunks.begin(path)
     try:
         if wanted:
             for connection, received, data in reader.messages(wanted):
                 yield connection.topic, received, data
                 count += 1
+    except ArchiveError:
+        raise
     except Exception as error:
         raise DamagedError(
             f"{count} of {expected} messages can be read ({_one_line(error)})"

@@ -4,13 +4,16 @@ A file that was cut off has lost the index at its end. https://mcap.dev/spec
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from mcap.records import Channel, Chunk, McapRecord, Schema
 from mcap.records import Message as McapMessage
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
+from inspector.logs.ros import chunks
 from inspector.logs.ros.bag import Message, Topic
+from noisemodel.archive import ArchiveError
 
 
 def topics(path: Path) -> Iterator[Topic]:
@@ -42,6 +45,7 @@ def messages(path: Path, lost: list[str]) -> Iterator[Message]:
 
 def _records(path: Path, lost: list[str]) -> Iterator[McapRecord]:
     """Records, including those in chunks, to where the file ends or is damaged."""
+    chunks.begin(path)
     size, place = path.stat().st_size, 0  # no record is longer than its file
     with path.open("rb") as stream:
         reader = StreamReader(stream, emit_chunks=True, validate_crcs=True, record_size_limit=size)
@@ -52,6 +56,8 @@ def _records(path: Path, lost: list[str]) -> Iterator[McapRecord]:
                 else:
                     yield record
                 place = stream.tell()
+        except ArchiveError:
+            raise
         except CRCValidationError as error:  # all messages have been read by then
             lost.append(f"some of what was read is damaged ({error})")
         except Exception as error:  # the library lets errors of struct and of text through
@@ -61,7 +67,10 @@ def _records(path: Path, lost: list[str]) -> Iterator[McapRecord]:
 
 def _unpacked(chunk: Chunk, lost: list[str]) -> list[McapRecord]:
     try:
-        return breakup_chunk(chunk, validate_crc=True)
+        raw = chunks.unpack(chunk.compression, chunk.data)
+        return breakup_chunk(replace(chunk, compression="", data=raw), validate_crc=True)
+    except ArchiveError:
+        raise
     except Exception:  # each compressor has errors of its own
         lost.append(f"a chunk of {len(chunk.data)} bytes is damaged and left out")
         return []

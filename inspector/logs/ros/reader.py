@@ -17,6 +17,12 @@ from inspector.logs.ros.messages import (
     topic_reader,
 )
 from inspector.logs.signals import listed
+from noisemodel.archive import ArchiveError
+
+LATEST = 2**62
+"""Stamps lie before, in [ns]; differences of later ones are no 64-bit integers."""
+
+Bytes = bytes | bytearray | memoryview
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
@@ -40,17 +46,26 @@ def _bag(path: Path) -> Bag:
 
 def _read(path: Path, options: ReadOptions, progress: Progress) -> Log:
     try:
-        with closing(_bag(path)) as bag:
-            return _log_of(path, bag, options, progress)
-    except intact.DamagedError as error:  # rosbags could open it
-        return _log_of(path, damaged.open_bag(path, str(error)), options, progress)
+        try:
+            with closing(_bag(path)) as bag:
+                return _log_of(path, bag, options, progress)
+        except intact.DamagedError as error:  # rosbags could open it
+            return _log_of(path, damaged.open_bag(path, str(error)), options, progress)
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
 
 
 def _log_of(path: Path, bag: Bag, options: ReadOptions, progress: Progress) -> Log:
     chosen = dict(_chosen(path, bag, options))
+    odd = 0
     total = sum(max(bag.topics[name].count, 0) for name in chosen)
     for name, received, data in progress(bag.messages(chosen), total):
-        chosen[name].add(received, data)
+        if isinstance(received, int) and abs(received) < LATEST and isinstance(data, Bytes):
+            chosen[name].add(received, data)
+        else:
+            odd += 1
+    if odd:
+        bag.lost.append(f"{odd} messages without data, or with stamps after 2116, are left out")
     fields = [field for reader in chosen.values() for field in reader.fields()]
     if not any(field.signal.startswith(("position", "velocity")) for field in fields):
         raise LogError(path, f"no message holds joints; {_contents(bag)}")
@@ -99,8 +114,11 @@ def _contents(bag: Bag) -> str:
 
 def _listing(path: Path) -> tuple[str, ...]:
     """Topics with type, count and rate, and whether they are read, a line each."""
-    with closing(_bag(path)) as bag:
-        return _rows(bag)
+    try:
+        with closing(_bag(path)) as bag:
+            return _rows(bag)
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
 
 
 def _rows(bag: Bag) -> tuple[str, ...]:

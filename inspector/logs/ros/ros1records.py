@@ -5,20 +5,22 @@ records in turn, perhaps compressed. http://wiki.ros.org/Bags/Format/2.0
 """
 
 import struct
-from bz2 import decompress as from_bz2
 from collections.abc import Iterator
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
 
+from inspector.logs.ros import chunks
 from inspector.logs.ros.bag import Message, Topic
+from noisemodel.archive import ArchiveError
 
 MESSAGE, CHUNK, CONNECTION = b"\x02", b"\x05", b"\x07"
 
 
 def topics(path: Path) -> Iterator[Topic]:
     """Topics of intact records."""
+    chunks.begin(path)
     with path.open("rb") as stream:
         for header, data in _records(stream, []):
             if header.get("op") == CONNECTION and "topic" in header:
@@ -37,6 +39,7 @@ def messages(path: Path, lost: list[str]) -> Iterator[Message]:
         lost: What was lost is appended to it, a sentence each.
     """
     names: dict[bytes, str] = {}
+    chunks.begin(path)
     with path.open("rb") as stream:
         for header, data in _records(stream, lost):
             number, time = header.get("conn", b""), header.get("time", b"")
@@ -63,6 +66,8 @@ def _records(stream: BinaryIO, lost: list[str]) -> Iterator[tuple[dict[str, byte
             data = _sized(stream)
             kind = header["op"]
             records = list(_records_of(_unpacked(header, data))) if kind == CHUNK else []
+        except ArchiveError:
+            raise
         except Exception as error:  # each compressor has errors of its own
             what = " ".join(str(error).split()) or type(error).__name__
             lost.append(f"from byte {place} on the file is damaged or cut off ({what})")
@@ -77,14 +82,7 @@ def _records_of(chunk: bytes) -> Iterator[tuple[dict[str, bytes], bytes]]:
 
 
 def _unpacked(header: dict[str, bytes], data: bytes) -> bytes:
-    compression = header["compression"]
-    if compression == b"bz2":
-        return from_bz2(data)
-    if compression == b"lz4":
-        from lz4.frame import decompress
-
-        return bytes(decompress(data))
-    return data
+    return chunks.unpack(header["compression"].decode(), data)
 
 
 def _sized(stream: BinaryIO) -> bytes:

@@ -1,0 +1,120 @@
+"""Bags that unpack to more than is read, or whose rows are no messages."""
+
+import sqlite3
+from contextlib import closing, suppress
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
+
+from inspector import read_log
+from inspector.errors import LogError
+from inspector.logs.ros import chunks
+
+TALK, OLD = Talk(), Talk(ros1=True)
+WAYS = {
+    "mcap, zstd": (TALK, {"storage": "mcap", "compression": "storage"}),
+    "each message": (TALK, {"storage": "sqlite3", "compression": "message"}),
+    "the file": (TALK, {"storage": "sqlite3", "compression": "file"}),
+    "ros1, lz4": (OLD, {"compression": "lz4"}),
+    "ros1, bz2": (OLD, {"compression": "bz2"}),
+}
+
+
+def states(talk, **how):
+    return joint_states(talk, position=numbers(), velocity=numbers(seed=1), **how)
+
+
+@pytest.fixture
+def limit(monkeypatch):
+    monkeypatch.setenv("NOISE_MAX_UNPACKED", "4000000")
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_bag_that_unpacks_to_too_much_is_refused_and_one_that_does_not_is_read(
+    tmp_path, limit, way
+):
+    talk, how = WAYS[way]
+    topics = {"/joint_states": states(talk)}
+    small = write_bag(tmp_path / ("small.bag" if talk.ros1 else "small"), talk, topics, **how)
+    assert np.array_equal(read_log(small).run.position, numbers())
+    names = ["a" * 20_000_000, "b", "c"]
+    topics["/joint_states"] = states(talk, times=TIMES[:3], names=names)
+    large = write_bag(tmp_path / ("large.bag" if talk.ros1 else "large"), talk, topics, **how)
+    with pytest.raises(LogError, match=r"unpacks to .* GB from .* MB, the limit is .*--max-unpack"):
+        read_log(large)
+
+
+@pytest.mark.parametrize("how", [CompressionType.ZSTD, CompressionType.LZ4])
+@pytest.mark.parametrize("lost", [0, 8])
+def test_a_chunk_of_zeros_is_not_unpacked(tmp_path, limit, how, lost):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=2**25, compression=how)
+        writer.start("ros2")
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", b"string[] name")
+        topic = writer.register_channel("/joint_states", "cdr", schema)
+        writer.add_message(topic, 1, bytes(2**25), 1)
+        writer.finish()
+    path.write_bytes(path.read_bytes()[: -lost or None])
+    with pytest.raises(LogError, match="unpacks to"):
+        read_log(path)
+
+
+def test_frames_of_zstandard_without_a_size_are_counted_too(limit, tmp_path):
+    import zstandard
+
+    compressor = zstandard.ZstdCompressor(write_content_size=False).compressobj()
+    data = compressor.compress(bytes(2**25)) + compressor.flush()
+    chunks.begin(tmp_path)
+    with pytest.raises(ValueError, match="unpacks to"):
+        chunks.unpack("zstd", data)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "UPDATE messages SET data = NULL WHERE id % 2",
+        "UPDATE messages SET data = 'text' WHERE id % 2",
+        "UPDATE messages SET timestamp = 9223372036854775807 WHERE id % 2",
+        "UPDATE topics SET name = NULL",
+        "UPDATE topics SET name = x'ff'",
+        "UPDATE topics SET type = NULL",
+        "UPDATE topics SET serialization_format = NULL",
+        "UPDATE message_definitions SET encoded_message_definition = x'ff00'",
+        "UPDATE message_definitions SET encoded_message_definition = NULL",
+    ],
+)
+@pytest.mark.parametrize("damaged", [False, True])
+def test_rows_that_are_no_messages_are_left_out_or_one_line(tmp_path, change, damaged):
+    topics = {"/joint_states": states(TALK)}
+    folder = write_bag(tmp_path / "bag", TALK, topics, storage="sqlite3")
+    file = next(folder.glob("*.db3"))
+    with closing(sqlite3.connect(file)) as database:
+        database.execute("PRAGMA writable_schema = ON")
+        database.execute("UPDATE sqlite_master SET sql = replace(sql, 'NOT NULL', '')")
+        database.commit()
+    with closing(sqlite3.connect(file)) as database:
+        database.execute(change)
+        database.commit()
+    path = cut(file, 0.9) if damaged else folder
+    with suppress(LogError):
+        assert np.isfinite(read_log(path).run.position).all()
+
+
+@pytest.mark.parametrize("stamp", [2**63, 2**64 - 1])
+def test_stamps_of_64_bits_are_left_out_and_said(tmp_path, stamp):
+    path = tmp_path / "a.mcap"
+    text = TALK.store.generate_msgdef("sensor_msgs/msg/JointState")[0].encode()
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        schema = writer.register_schema("sensor_msgs/msg/JointState", "ros2msg", text)
+        topic = writer.register_channel("/joint_states", "cdr", schema)
+        for at, message in [*states(TALK), (stamp, states(TALK)[-1][1])]:
+            writer.add_message(topic, int(at), bytes(TALK.raw(message)), int(at))
+        writer.finish()
+    imported = read_log(path)
+    assert len(imported.run.time) == len(TIMES)
+    assert any("1 messages without data, or with stamps after 2116" in r for r in imported.remarks)
