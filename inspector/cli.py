@@ -1,5 +1,6 @@
 """The command line: the commands in panels, and expected errors as one line."""
 
+import io
 import os
 import sys
 import traceback
@@ -95,6 +96,9 @@ def main() -> None:
     """Run the command line; expected errors become a line and exit status 3, bugs have 70."""
     # Matrices are small here: more threads mostly wait, and waiting takes processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    for stream in (sys.stdout, sys.stderr):  # names of files need not be text in their encoding
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
         app()
     except ValueError as error:

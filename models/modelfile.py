@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import os
+import stat
 import zipfile
 from collections.abc import Mapping
 from importlib import metadata
@@ -27,6 +28,7 @@ from models.errors import ModelFileError, OutputError, ProfileError
 from models.estimators.estimator import ESTIMATORS
 from models.estimators.trees import Trees
 from models.features import feature_count
+from models.jsontext import from_json
 from models.labels import ANOMALY
 from models.logbands import HIGHEST, LogBands
 from models.profile import Profile
@@ -127,6 +129,8 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
             contradicts itself.
     """
     try:
+        if not stat.S_ISREG(Path(path).stat().st_mode) and not Path(path).is_dir():
+            raise ModelFileError(path, "is no regular file")
         with zipfile.ZipFile(path) as archive:
             dimensions = _check_members(path, archive)
             members = {name: _member(path, archive, name, n) for name, n in dimensions.items()}
@@ -175,8 +179,9 @@ def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: i
         if npy.read_magic(header) != (1, 0):
             raise ValueError("another version of .npy")
         shape, _, dtype = npy.read_array_header_1_0(header)
-    except ValueError as error:
-        raise ModelFileError(path, f"array {name!r} is damaged ({error})") from error
+        size = prod(shape) * dtype.itemsize
+    except Exception as error:  # NumPy lets those of its parser through: any, by the bytes
+        raise ModelFileError(path, f"array {name!r} is damaged ({_one_line(error)})") from error
     fits = dtype.kind == "U" if name == "manifest" else dtype == np.dtype("<f8")
     if not fits or len(shape) != dimensions:
         raise ModelFileError(
@@ -184,15 +189,19 @@ def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: i
             f"array {name!r} is of type {dtype} and shape {shape},"
             f" expected {'text' if name == 'manifest' else 'float64'}, {dimensions}-D",
         )
-    if prod(shape) * dtype.itemsize != len(content) - header.tell():
+    if size != len(content) - header.tell() or min(shape, default=0) < 0 or not dtype.itemsize:
         raise ModelFileError(path, f"array {name!r} is damaged: its size is not what it declares")
     array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
     return array
 
 
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
 def _manifest(path: str | Path, text: str) -> dict[str, Any]:
     try:
-        manifest = json.loads(text)
+        manifest = from_json(text)
     except ValueError as error:
         raise ModelFileError(path, f"manifest is no JSON ({error})") from error
     given = manifest.get("format") if isinstance(manifest, dict) else manifest

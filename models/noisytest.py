@@ -1,8 +1,6 @@
 """Read the data-set folders and the configuration of NoisyTest."""
 
 import hashlib
-import json
-import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from math import inf
@@ -10,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import AnnotationError, DataFileError, ProfileError, RateError
+from models.jsontext import from_json, from_toml
 from models.logfile import nominal_rate, read_log
 from models.profile import CLASSES, TOLERANCE, Profile
 from models.recording import Block, Recording
@@ -113,8 +112,8 @@ def parse_annotations(text: str) -> Iterator[Block]:
         AnnotationError: If it is no TOML, lacks the lists, or they hold other things.
     """
     try:
-        data = tomllib.loads(text).get("data", {})
-    except tomllib.TOMLDecodeError as error:
+        data = from_toml(text).get("data", {})
+    except ValueError as error:
         raise AnnotationError(f"not TOML ({error})") from error
     table = data if isinstance(data, dict) else {}
     ranges, labels = table.get("chunk_ranges"), table.get("chunk_labels")
@@ -139,7 +138,7 @@ def profile_from_config(path: str | Path) -> Profile:
         DataFileError: If the file is no such configuration, or a name in it is unknown.
     """
     try:
-        config = json.loads(Path(path).read_text(encoding="utf-8-sig"))
+        config = from_json(Path(path).read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise DataFileError(path, f"cannot be read ({error.strerror})") from error
     except ValueError as error:

@@ -1,5 +1,6 @@
 """What makes a run valid."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
@@ -11,6 +12,15 @@ from noisemodel.types import Array, Mask, Real
 
 UNIFORM = 1e-3
 """How far a time step may lie from the median step, as a share of it (run file, version 1)."""
+
+SHORTEST, LONGEST = 1e-9, 1e9
+"""Steps of time that a run may have, in [s]."""
+
+LARGEST = 1e15
+"""Signals are smaller: the squares of much larger ones overflow, and no robot has such."""
+
+MAX_JOINTS = 1000
+"""Most joints of a run; a URDF may have as many."""
 
 
 class NotUniformError(RunError):
@@ -30,6 +40,10 @@ def check_time(time: Array) -> None:
         how = "stands still" if steps[row - 1] == 0 else "runs backwards"
         raise RunError(f"time: {how} in row {row} ({time[row - 1]:.9g} s, then {time[row]:.9g} s)")
     step = np.median(steps)
+    if not SHORTEST <= step <= LONGEST:
+        raise RunError(
+            f"time: the median step is {step:g} s, expected {SHORTEST:g} s to {LONGEST:g} s"
+        )
     # Stamps far from zero cannot be finer than their own spacing.
     tolerance = max(UNIFORM * step, 2 * np.spacing(np.abs(time).max()))
     uneven = np.abs(steps - step) > tolerance
@@ -51,7 +65,11 @@ def check_words(array: str, words: Iterable[str]) -> None:
 def check_names(array: str, names: Sequence[str]) -> None:
     """Refuse names that are no words or repeat."""
     check_words(array, names)
-    twice = sorted({name for name in names if names.count(name) > 1})
+    if not names:
+        raise RunError(f"{array}: there are no joints")
+    if len(names) > MAX_JOINTS:
+        raise RunError(f"{array}: {len(names)} joints, the limit is {MAX_JOINTS}")
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice:
         raise RunError(f"{array}: {', '.join(twice)} named twice")
 
@@ -64,9 +82,14 @@ def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
         turned = signal.ndim == 2 and signal.shape[::-1][0] == shape[0] != signal.shape[0]
         hint = "; samples come first, is it transposed?" if turned else ""
         raise RunError(f"{name}: shape {signal.shape}, expected {shape}{hint}")
-    finite = np.isfinite(signal)
+    finite = (signal > -LARGEST) & (signal < LARGEST)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
+        if np.isfinite(signal[row, column]):
+            raise RunError(
+                f"{name}: {signal[row, column]:g} in row {row}, column {column}; expected numbers"
+                f" below {LARGEST:g}"
+            )
         raise RunError(
             f"{name}: {signal[row, column]} in row {row}, column {column};"
             " mark gaps with valid = false and zeros"

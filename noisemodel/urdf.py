@@ -81,9 +81,14 @@ def read(path: Path) -> Urdf:
     if root.find("link") is None:
         raise RobotError(f"{path}: the URDF has no link")
     _check_numbers(path, root)
-    return Urdf(
-        path, root.get("name", ""), {name: m for j in joints for name, m in _mimic(path, j)}
-    )
+    mimics = {name: m for j in joints for name, m in _mimic(path, j)}
+    for name in mimics:
+        leader = name
+        for _ in mimics:
+            leader = mimics[leader].joint if leader in mimics else ""
+            if leader == name:
+                raise RobotError(f"{path}: joint {name!r} mimics itself")
+    return Urdf(path, root.get("name", ""), mimics)
 
 
 def _check_numbers(path: Path, root: ET.Element) -> None:
@@ -96,8 +101,8 @@ def _check_numbers(path: Path, root: ET.Element) -> None:
                         f"{path}: <{element.tag} {name}={element.get(name)!r}> has"
                         f" {len(values)} numbers, expected {count}"
                     )
-        if element.tag == "mass":
-            _numbers(path, element, "value")
+        if element.tag == "mass" and len(_numbers(path, element, "value")) != 1:
+            raise RobotError(f"{path}: <mass value={element.get('value')!r}> is not one number")
     for joint in root.findall("joint"):
         axis = joint.find("axis")
         if axis is not None and joint.get("type") in AXIAL and not any(_numbers(path, axis, "xyz")):

@@ -129,7 +129,11 @@ def test_annotations_take_integers_and_open_ends(log):
         ),
         ('[data]\nchunk_ranges = [[0]]\nchunk_labels = ["ok"]', r"chunk 1: \[0\] with label 'ok'"),
         ("[data]\nchunk_ranges = [[0, 1]]\nchunk_labels = [1]", r"chunk 1: \[0, 1\] with label 1"),
-        (f'[data]\nchunk_ranges = [[0, {10**400}]]\nchunk_labels = ["ok"]', "chunk 1: .* expected"),
+        (
+            f'[data]\nchunk_ranges = [[0, {10**400}]]\nchunk_labels = ["ok"]',
+            "an integer of more than 20",
+        ),
+        (f'[data]\nchunk_ranges = [[0, {10**15}]]\nchunk_labels = ["ok"]', "chunk 1: .* expected"),
     ],
 )
 def test_what_is_wrong_with_annotations_is_named(log, text, reason):

@@ -7,6 +7,7 @@ import numpy as np
 
 import noisemodel as nm
 from inspector.analysis.analyse import robot_known
+from inspector.errors import InspectorError
 from noisemodel import Run
 from noisemodel.atomic import replacing
 from noisemodel.types import Array, Real
@@ -117,8 +118,17 @@ def noise_level(run: Run, estimate: Estimate) -> NoiseLevel:
 
     Returns:
         The measures.
+
+    Raises:
+        InspectorError: If the noise is not finite.
     """
     pressure = np.where(run.mask, estimate.pressure, 0.0)
+    if not np.isfinite(pressure).all():
+        sample = int(np.argmin(np.isfinite(pressure)))
+        raise InspectorError(
+            f"the {estimate.kind} noise is {pressure[sample]:g} at {run.time[sample]:.6g} s: the"
+            " run's motion or the size of the robot is no robot's"
+        )
     energy = estimate.power[run.mask].sum(axis=0)
     shares = energy / (energy.sum() or 1.0)
     order = np.argsort(-shares, kind="stable")

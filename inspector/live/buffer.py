@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from inspector.live.errors import LiveError
 from inspector.live.warnings import Warnings
+from noisemodel.checks import LARGEST
 from noisemodel.types import Array
 
 SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_pose")
@@ -92,6 +93,7 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise LiveError(f"{name}: holds no numbers ({error})") from error
+        array = np.where((array > -LARGEST) & (array < LARGEST), array, np.nan)  # squares overflow
         rows[name] = array if array.ndim == 2 else array.reshape(1, -1)
         if array.ndim not in (1, 2):
             raise LiveError(

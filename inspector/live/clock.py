@@ -11,6 +11,8 @@ GAP_STEPS = 1.5
 """Steps after which a sample is taken to be missing; timestamps may jitter by less."""
 RATE_TOLERANCE = 0.05
 """Share by which the rate of the timestamps may differ from the nominal one."""
+LATEST = 1e19
+"""Larger stamps are no times, not even in nanoseconds."""
 RATE_STEPS = 20
 """Steps from which a rate is estimated."""
 
@@ -43,7 +45,7 @@ class Clock:
         Args:
             stamps: Timestamps, shape (samples,), in [s].
         """
-        finite = np.isfinite(stamps)
+        finite = np.abs(stamps) < LATEST
         before = -np.inf if self._last is None else self._last
         latest = np.maximum.accumulate(np.where(finite, stamps, -np.inf))
         kept = finite & (stamps > np.maximum(before, np.append(-np.inf, latest[:-1])))

@@ -54,16 +54,23 @@ def _shape(sample: dict[str, list[float]]) -> tuple[tuple[str, int], ...]:
 
 def _sample(line: bytes) -> dict[str, list[float]]:
     """Read one object, its values as lists of numbers."""
-    found = json.loads(line)
+    try:
+        found = json.loads(line, parse_int=float)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
     if not isinstance(found, dict) or "velocity" not in found:
         raise ValueError("no JSON object with a velocity")
     names = ("time", *SIGNALS)
+    if isinstance(found.get("time", 0.0), list) and len(found["time"]) != 1:
+        raise ValueError("time is no single number")
     return {name: _numbers(name, found[name]) for name in names if name in found}
 
 
 def _numbers(name: str, value: Any) -> list[float]:
     values = value if isinstance(value, list) else [value]
+    if not values:
+        raise ValueError(f"{name} is empty")
     try:
         return [nan if each is None else float(each) for each in values]
-    except TypeError as error:
+    except (TypeError, ValueError) as error:
         raise ValueError(f"{name} holds no numbers") from error

@@ -193,6 +193,7 @@ def log_of(episode: Episode, options: ReadOptions) -> Log:
         not_read=(*(name for name in arrays if name not in read), *episode.not_read),
         remarks=(*((f"taken: {taken}",) if taken else ()), *remarks),
         suggested=tuple(suggested),
+        time=time,
     )
 
 

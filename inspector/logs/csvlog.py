@@ -77,6 +77,12 @@ class Layout:
     skip: int
     remarks: tuple[str, ...] = ()
 
+MAX_COLUMNS = 10_000
+"""Most columns of a log: ten of each joint that a run may have."""
+
+DIGITS = 30
+"""Stamps have at most so many digits before or after the point."""
+
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a CSV log, with a row per sample and, unless the options name them, a header.
@@ -156,11 +162,8 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
             or CELLS.fullmatch(name)
         )
     ]
-    not_read = tuple(
-        name
-        for place, name in enumerate(header)
-        if name and place not in (time, rest, *wanted) and place not in named
-    )
+    known = {time, rest, *wanted, *named}
+    not_read = tuple(name for place, name in enumerate(header) if name and place not in known)
     if not wanted:
         raise LogError(
             path,
@@ -203,7 +206,13 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
     names = dict(zip(named.values(), next(iter(joints), ()), strict=True))
     columns = {header[place]: table[:, at : at + 1] for at, place in enumerate(wanted)}
     fields, converted = _fields(path, columns, taken, names, options)
-    log = Log(path, fields, not_read=not_read, remarks=(*layout.remarks, *converted))
+    log = Log(
+        path,
+        fields,
+        not_read=not_read,
+        remarks=(*layout.remarks, *converted),
+        time="" if time is None else header[time],
+    )
     return gathered(log, options)
 
 
@@ -372,15 +381,19 @@ def _all_positions(width: int, time: int | None) -> str:
 
 def _check_header(path: Path, layout: Layout) -> None:
     header, row = layout.header, layout.row or None
-    for place, name in enumerate(header):
+    if len(header) > MAX_COLUMNS:
+        raise LogError(path, f"{len(header)} columns, the limit is {MAX_COLUMNS}", row=row)
+    seen = set[str]()
+    for name in header:
         if not name.isprintable():
             raise LogError(
                 path,
                 f"the name {name[:40]!r} cannot be printed; is a quotation mark not closed?",
                 row=row,
             )
-        if name and name in header[:place]:
+        if name and name in seen:
             raise LogError(path, f"two columns are named {name!r}", row=row)
+        seen.add(name)
 
 
 def _time_column(path: Path, header: Sequence[str], options: ReadOptions) -> int | None:
@@ -441,7 +454,9 @@ def _decimals(
             what = "is empty" if empty else f"holds {cell!r}, which is not a number"
             raise LogError(path, f"column {name!r} {what}", row) from None
         if not stamp.is_finite():
-            raise LogError(path, f"column {name!r} holds {cell.strip()}", row)
+            raise LogError(path, f"column {name!r} holds {cell.strip()[:40]}", row)
+        if stamp and not -DIGITS < stamp.adjusted() < DIGITS:
+            raise LogError(path, f"the stamp {cell.strip()[:40]!r} is no time", row)
         found.append(stamp)
     return found
 

@@ -1,6 +1,5 @@
 """HDF5 logs, with a group for each episode (robomimic, Isaac Lab, Minari) or a row per sample."""
 
-import json
 import re
 from collections.abc import Iterator, Sequence
 from math import inf
@@ -25,6 +24,7 @@ from inspector.logs.arrays import (
 from inspector.logs.log import Log, LogReader
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import TIMES, listed
+from models.jsontext import from_json
 from noisemodel.archive import ArchiveError, check_unpacked
 
 EPISODES = "data"
@@ -82,8 +82,8 @@ def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
             if found:
                 by_number = lambda name: [int(n) for n in re.findall(r"\d+", name)]  # noqa: E731
                 return home, tuple(sorted(found, key=by_number))
-    found = ((name, _own(path, file.get(name), file)) for name in EPISODE_ENDS)
-    flags = dict(_values(path, [each for each in found if isinstance(each[1], h5py.Dataset)]))
+    ends = ((name, _own(path, file.get(name), file)) for name in EPISODE_ENDS)
+    flags = dict(_values(path, [each for each in ends if isinstance(each[1], h5py.Dataset)]))
     return "", tuple(episodes_of(flags))
 
 
@@ -163,12 +163,12 @@ def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tu
 def _rate(env_args: Any) -> float | None:
     """Control rate in [Hz] from the environment's arguments of robomimic or Isaac Lab."""
     try:
-        args = json.loads(env_args)
+        args = from_json(env_args)
         if frequency := args.get("env_kwargs", {}).get("control_freq"):
             return _positive(float(frequency))
         sim = args.get("sim_args", {})
         return _positive(1 / (float(sim["dt"]) * float(sim["decimation"])))
-    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError, RecursionError):
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError):
         return None
 
 

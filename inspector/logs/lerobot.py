@@ -4,7 +4,6 @@ States and actions are joint positions, in a unit that the data set does not nam
 degrees, or normalised to each joint's calibrated range.
 """
 
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +15,7 @@ from inspector.logs import parquet
 from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import listed
+from models.jsontext import from_json
 
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
 
@@ -27,6 +27,12 @@ PARTS = {"pos": "position", "vel": "velocity", "effort": "effort", "torque": "ef
 
 CARTESIAN = {"x", "y", "z", "roll", "pitch", "yaw", "rx", "ry", "rz", "qx", "qy", "qz", "qw"}
 """Column names of an end effector's pose."""
+
+SLOWEST, FASTEST = 1e-3, 1e6
+"""Rates that a data set may have, in [Hz]."""
+
+LATEST = 9e9
+"""Stamps and frame numbers lie before: in nanoseconds, these fit into 64 bits."""
 
 TOLERANCE = 1e-4
 """Largest difference of a stamp from its frame number over the rate, in [s], as in LeRobot."""
@@ -162,14 +168,22 @@ def _checked(path: Path, fields: list[Field], mapped: set[str]) -> list[Field]:
 def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) -> Stamps:
     """Stamps from frame numbers if they agree: logged stamps are float32, too coarse."""
     rate = options.rate or info.get("fps")
-    frames = table.column(FRAME).to_numpy() if FRAME in table.column_names else None
-    if STAMP in table.column_names:
-        logged = table.column(STAMP).to_numpy().astype(np.float64)
-        if not np.isfinite(logged).all():
-            raise LogError(path, f"column {STAMP!r} holds a value that is not finite")
+    clock = {}
+    for name in (FRAME, STAMP):
+        if name in table.column_names:
+            values = parquet.values_of(path, name, table.column(name))
+            if values is None or values.shape[1] != 1 or values.dtype.kind not in "iuf":
+                kind = table.column(name).type
+                raise LogError(path, f"column {name!r} holds {kind}, expected numbers")
+            clock[name] = values[:, 0].astype(np.float64)
+            if not (np.abs(clock[name]) < LATEST).all():
+                raise LogError(path, f"column {name!r} holds a value that is no time")
+    frames = clock.get(FRAME)
+    if STAMP in clock:
+        logged = clock[STAMP]
         if frames is None or not rate or (np.abs(logged - frames / rate) > TOLERANCE).any():
             return Stamps.of_nanoseconds(np.round(logged * 1e9).astype(np.int64))
-    if not isinstance(rate, int | float) or rate <= 0:
+    if not rate:
         raise LogError(path, "meta/info.json has no fps; specify the rate (--rate)")
     return Stamps.every(1 / rate, len(table))
 
@@ -177,11 +191,17 @@ def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) 
 def _info(folder: Path) -> dict[str, Any]:
     path = folder / "meta" / "info.json"
     try:
-        info = json.loads(path.read_text(encoding="utf-8"))
+        info = from_json(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise LogError(path, f"cannot be read ({error})") from error
     if not isinstance(info, dict) or not isinstance(info.get("features"), dict):
         raise LogError(path, "has no features")
+    for name, feature in info["features"].items():
+        if not isinstance(feature, dict):
+            raise LogError(path, f"the feature {name!r} is no table")
+    rate = info.get("fps")
+    if rate is not None and not (type(rate) in (int, float) and SLOWEST <= rate <= FASTEST):
+        raise LogError(path, f"fps is {rate!r}, expected {SLOWEST:g} to {FASTEST:g} Hz")
     return info
 
 

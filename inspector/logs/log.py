@@ -89,6 +89,7 @@ class Log:
         urdf: Text of the URDF in the log, may be empty.
         suggested: Mapping that the format defines; that of the options takes precedence.
         meta: Further metadata of the log.
+        time: Name of the column or array with the stamps, if it has one.
     """
 
     path: Path
@@ -100,6 +101,7 @@ class Log:
     urdf: str = ""
     suggested: tuple[Entry, ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
+    time: str = ""
 
 
 @dataclass(frozen=True, eq=False)

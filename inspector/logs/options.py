@@ -2,7 +2,6 @@
 
 import json
 import re
-import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from math import isfinite
@@ -11,6 +10,8 @@ from typing import Any, Self
 
 from inspector.errors import InspectorError
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS
+from models.jsontext import from_toml
+from noisemodel.archive import check_regular
 from noisemodel.atomic import replacing
 
 FORMAT = "noise-mapping/1"
@@ -106,10 +107,11 @@ class ReadOptions:
             InspectorError: If it cannot be read, or has unknown settings.
         """
         try:
-            saved = tomllib.loads(path.read_text(encoding="utf-8"))
+            check_regular(path)
+            saved = from_toml(path.read_text(encoding="utf-8"))
         except OSError as error:
             raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except ValueError as error:
             raise InspectorError(f"{path}: not a mapping in TOML ({error})") from error
         if saved.pop("format", None) != FORMAT:
             raise InspectorError(f'{path}: not a mapping; expected format = "{FORMAT}"')

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.log import Field, Log, LogReader
 from inspector.logs.options import ReadOptions
-from inspector.logs.signals import array_signal, column_signal
+from inspector.logs.signals import array_signal, column_signal, listed
 from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
 from noisemodel.archive import ArchiveError, check_unpacked
 
@@ -98,7 +98,10 @@ def episodes_of(path: Path) -> tuple[str, ...]:
     Raises:
         LogError: If the file is damaged, or they are not numbered.
     """
-    kind = schema_of(path).field(EPISODE).type
+    schema = schema_of(path)
+    if EPISODE not in schema.names:
+        raise LogError(path, f"there is no column {EPISODE!r}; it has {listed(schema.names)}")
+    kind = schema.field(EPISODE).type
     if not pyarrow.types.is_integer(kind):
         raise LogError(path, f"column {EPISODE!r} holds {kind}, expected whole numbers")
     column = table_of([path], [EPISODE], "").column(0)
@@ -167,7 +170,8 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
 
     found = tuple(fields())
     read = {field.name for field in found} | {time, EPISODE}
-    return Log(path, found, episode, not_read=tuple(name for name in names if name not in read))
+    not_read = tuple(name for name in names if name not in read)
+    return Log(path, found, episode, not_read=not_read, time=time)
 
 
 def _one_line(error: BaseException) -> str:

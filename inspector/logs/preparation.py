@@ -34,6 +34,7 @@ class PreparedLog:
         urdf: Text of the URDF in the log, may be empty.
         meta: Metadata of the log.
         in_degrees: "position" and "velocity" if these were found to be in degrees.
+        time: Name of the column or array with the stamps, if it has one.
     """
 
     path: Path
@@ -45,6 +46,7 @@ class PreparedLog:
     urdf: str = ""
     meta: Mapping[str, Any] = field(default_factory=dict)
     in_degrees: tuple[str, ...] = ()
+    time: str = ""
 
 
 def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog:
@@ -74,6 +76,7 @@ def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> PreparedLog
         unordered=unordered,
         remarks=(*log.remarks, *found.remarks, *too_short, *all_nan, *_degrees(in_degrees)),
         urdf=log.urdf,
+        time=log.time,
         meta={**log.meta, **({"units": options.units} if options.units else {})},
         in_degrees=in_degrees,
     )
@@ -91,7 +94,9 @@ def check_mapping(logs: Sequence[PreparedLog], options: ReadOptions) -> None:
     names = {name for log in logs for name in log.names}
     for entry in options.entries:
         known = entry.source in names or entry.part()[0] in names
-        if not known and entry.signal != "time":
+        if entry.signal == "time":
+            known = any(entry.source == log.time for log in logs)
+        if not known:
             raise LogError(
                 logs[0].path,
                 f"there is no column {entry.source!r} to map; it has {listed(logs[0].names)}",

@@ -6,8 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from inspector.errors import InspectorError
 from inspector.logs.floatingbase import interpolated
 from inspector.logs.log import Track
+from noisemodel.checks import LONGEST, SHORTEST
 from noisemodel.types import Array, Indices, Mask, Real
 
 ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
@@ -80,6 +82,10 @@ def clock_of(time: Array, rate: float | None = None, *, held: bool = False) -> C
     """
     steps = np.diff(time)
     step = float(np.median(steps))
+    if not SHORTEST <= step <= LONGEST:
+        raise InspectorError(
+            f"the stamps' median step is {step:g} s, expected {SHORTEST:g} s to {LONGEST:g} s"
+        )
     nominal = float(f"{1 / step:.9g}")
     uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
     if rate is None:

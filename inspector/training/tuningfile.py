@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from inspector.errors import InspectorError
+from models.jsontext import from_json
 from models.tuning.grid import Point
 from models.tuning.search import Measures
 
@@ -125,7 +126,7 @@ def _append(path: Path, file: IO[bytes], content: bytes) -> None:
 
 def _check_header(path: Path, line: bytes, settings: Mapping[str, Any]) -> None:
     try:
-        there = json.loads(line)
+        there = from_json(line)
     except ValueError:
         there = None
     if not isinstance(there, dict) or not str(there.get("format")).startswith("noise-tuning/"):
@@ -157,10 +158,10 @@ def _read(path: Path, rows: Sequence[bytes], points: Sequence[Point]) -> list[Me
     measures = []
     for number, (row, point) in enumerate(zip(rows, points, strict=False), start=2):
         try:
-            found = json.loads(row)
+            found = from_json(row)
             values = [nan if found[name] is None else float(found[name]) for name in names]
             fits = {name: found[name] for name in point} == point
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, OverflowError):
             fits = False
         if not fits:
             raise ResultsError(path, f"is damaged in line {number}")

@@ -1,0 +1,63 @@
+"""JSON and TOML parsed within limits, so that a hostile text is one ``ValueError``."""
+
+import json
+import tomllib
+from typing import Any
+
+MAX_CHARACTERS = 64 * 2**20
+"""Longest text that is parsed: a hundred times the longest manifest."""
+
+DIGITS = 20
+"""Most digits of an integer: those of 64 bits."""
+
+
+def from_json(text: str | bytes) -> Any:
+    """Value of a JSON text.
+
+    Args:
+        text: The text.
+
+    Raises:
+        ValueError: If it is not JSON, too long, nested too deeply, or has an integer of more than
+            64 bits.
+    """
+    _check_length(text)
+    try:
+        return json.loads(text, parse_int=_whole)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+
+
+def from_toml(text: str) -> dict[str, Any]:
+    """Table of a TOML text.
+
+    Args:
+        text: The text.
+
+    Raises:
+        ValueError: As `from_json`.
+    """
+    _check_length(text)
+    try:
+        table = tomllib.loads(text)
+    except RecursionError as error:
+        raise ValueError("nested too deeply") from error
+    waiting: list[Any] = [table]
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict | list):
+            waiting += value.values() if isinstance(value, dict) else value
+        elif isinstance(value, int) and abs(value) >= 10**DIGITS:
+            raise ValueError(f"an integer of more than {DIGITS} digits")
+    return table
+
+
+def _check_length(text: str | bytes) -> None:
+    if len(text) > MAX_CHARACTERS:
+        raise ValueError(f"{len(text)} characters, the limit is {MAX_CHARACTERS}")
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > DIGITS + digits.startswith("-"):
+        raise ValueError(f"an integer of more than {DIGITS} digits")
+    return int(digits)

@@ -1,0 +1,182 @@
+"""Values that no robot has are one line that names them, and never a result."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from inspector import read_log
+from inspector.analysis.level import Estimate, noise_level
+from inspector.errors import InspectorError, LogError
+from inspector.logs.options import ReadOptions
+from noisemodel import Robot, RobotError, Run, RunError, cache
+from noisemodel.cache import cached
+
+TIME = np.arange(40) / 1000
+
+
+def csv(path, stamps, header="time,a.velocity", more="0.1"):
+    path.write_text("\n".join([header, *(f"{stamp},{more}" for stamp in stamps)]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    "stamp", ["1e-99999999999999999999", "1e-40", "5e-324", "-1e-300", "1e99999999999999999999"]
+)
+def test_a_stamp_that_is_no_time_is_named(tmp_path, stamp):
+    path = csv(tmp_path / "a.csv", [0, stamp, 1, 2])
+    with pytest.raises(LogError, match=r"a.csv, row 3: "):
+        read_log(path)
+
+
+def test_steps_of_time_that_no_log_has_are_refused(tmp_path):
+    for step in (5e-324, 1e-12, 1e12):
+        with pytest.raises(RunError, match="time: the median step is .* s, expected 1e-09 s to"):
+            Run(time=np.arange(4) * step, velocity=np.ones((4, 1)), joint_names=("a",))
+
+
+def test_one_stamp_in_the_far_future_does_not_fill_the_memory(tmp_path):
+    path = csv(tmp_path / "a.csv", [*(n / 1000 for n in range(1000)), 9e9])
+    with pytest.raises(InspectorError, match=r"row 1002: time jumps by 9e\+09 s"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("value", [1e200, -1e16, 1e308])
+def test_a_velocity_whose_square_is_not_finite_is_refused(value):
+    velocity = np.full((40, 2), 0.1)
+    velocity[3, 1] = value
+    with pytest.raises(RunError, match=r"velocity: .*e\+.* in row 3, column 1; expected numbers"):
+        Run(time=TIME, velocity=velocity, joint_names=("a", "b"))
+
+
+def test_a_noise_that_is_not_finite_is_no_result():
+    run = Run(time=TIME, velocity=np.ones((40, 1)), joint_names=("a",))
+    power = np.ones((40, 1))
+    power[5] = np.inf
+    with pytest.raises(InspectorError, match="the paper noise is inf at 0.005 s"):
+        noise_level(run, Estimate("paper", "√W", power, ("a",)))
+
+
+def test_runs_without_joints_and_with_too_many_are_refused():
+    for joints, problem in ((0, "there are no joints"), (100_000, "100000 joints, the limit is")):
+        names = tuple(f"j{n}" for n in range(joints))
+        with pytest.raises(RunError, match=problem):
+            Run(time=TIME, velocity=np.ones((40, joints)), joint_names=names)
+
+
+def test_a_log_of_thousands_of_columns_is_read_or_refused_at_once(tmp_path):
+    for count, refused in ((9_000, False), (20_000, True)):
+        header = "time,a.velocity," + ",".join(f"c{n}" for n in range(count))
+        path = csv(tmp_path / "a.csv", TIME, header, "0.1" + ",0" * count)
+        begin = time.process_time()
+        if refused:
+            with pytest.raises(LogError, match="20002 columns, the limit is 10000"):
+                read_log(path)
+        else:
+            assert read_log(path).run.joint_names == ("a",)
+        assert time.process_time() - begin < 10
+
+
+def test_a_column_of_time_that_is_not_there_is_named(tmp_path):
+    path = csv(tmp_path / "a.csv", TIME)
+    with pytest.raises(LogError, match="there is no column 'nope' to map"):
+        read_log(path, mapping=["time=nope"])
+    np.savez(tmp_path / "a.npz", t=TIME, dof_vel=np.ones((40, 2)))
+    with pytest.raises(LogError, match="'nope'|there are no stamps"):
+        read_log(tmp_path / "a.npz", mapping=["time=nope"])
+    with pytest.raises(LogError, match="there is no column 'nope' to map"):
+        read_log(tmp_path / "a.npz", mapping=["time=nope"], rate=1000.0)
+
+
+MIMIC = """<robot name="r"><link name="l0"/><link name="l1"/><link name="l2"/>
+<joint name="a" type="revolute"><parent link="l0"/><child link="l1"/><axis xyz="0 0 1"/>
+<limit lower="0" upper="1" effort="1" velocity="1"/><mimic joint="{}"/></joint>
+<joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><axis xyz="0 0 1"/>
+<limit lower="0" upper="1" effort="1" velocity="1"/>{}</joint></robot>"""
+
+
+@pytest.mark.parametrize(("leader", "more"), [("a", ""), ("b", '<mimic joint="a"/>')])
+def test_joints_that_follow_themselves_are_refused(tmp_path, leader, more):
+    (tmp_path / "r.urdf").write_text(MIMIC.format(leader, more))
+    with pytest.raises(RobotError, match="joint 'a' mimics itself"):
+        Robot.load(tmp_path / "r.urdf")
+
+
+@pytest.mark.parametrize("mass", ['<mass value=""/>', "<mass/>", '<mass value="1 2"/>'])
+def test_a_mass_that_is_no_number_is_named(tmp_path, mass):
+    inertia = '<inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/>'
+    (tmp_path / "r.urdf").write_text(
+        f'<robot name="r"><link name="a"><inertial>{mass}{inertia}</inertial></link></robot>'
+    )
+    with pytest.raises(RobotError, match="<mass value=.*is not one number"):
+        Robot.load(tmp_path / "r.urdf")
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 100_000, "rate = 1" + "0" * 400, "\\u0000"])
+def test_a_mapping_that_is_hostile_is_one_line(tmp_path, text):
+    (tmp_path / "m.toml").write_text(f'format = "noise-mapping/1"\n{text}\n')
+    with pytest.raises(InspectorError, match="m.toml: not a mapping in TOML") as caught:
+        ReadOptions.load(tmp_path / "m.toml")
+    assert "\n" not in str(caught.value)
+
+
+def test_arrays_of_the_cache_that_another_user_made_are_made_anew(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    right, wrong = {"a": np.ones(3)}, {"a": 10 * np.ones(3)}
+    assert cached("key", lambda: right)["a"][0] == 1
+    assert cached("key", lambda: wrong)["a"][0] == 1  # it is kept
+    file = cache.folder() / "key.npz"
+    cached("other", lambda: wrong)
+    (cache.folder() / "other.npz").replace(file)  # of another key
+    assert cached("key", lambda: right)["a"][0] == 1
+    (cache.folder().parent / "secret").unlink()  # as if it had been made elsewhere
+    assert cached("key", lambda: wrong)["a"][0] == 10
+
+
+def test_a_secret_that_others_can_read_is_not_used(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    cached("key", lambda: {"a": np.ones(3)})
+    (cache.folder().parent / "secret").chmod(0o644)
+    assert cached("key", lambda: {"a": np.zeros(3)})["a"][0] == 0
+
+
+LIVE = [f'{{"time": {n / 1000}, "velocity": [{n % 7 / 10}, 0.1]}}' for n in range(600)]
+
+
+def test_no_row_ends_a_live_session(tmp_path):
+    odd = [
+        '{"velocity": []}',
+        '{"time": [], "velocity": [0.1, 0.2]}',
+        '{"time": 0.2995, "velocity": [1e308, -1e308]}',
+        '{"time": 1e308, "velocity": [0.1, 0.2]}',
+        '{"time": 0.2996, "velocity": [1' + "0" * 400 + ", 0]}",
+        '{"time": 1' + "0" * 5000 + ', "velocity": [0, 0]}',
+        '{"velocity": ' + "[" * 100_000,
+        '{"velocity": ["\\ud800"]}',
+        "\x00\x1b]0;title\x07",
+    ]
+    path = tmp_path / "a.rrd"
+    done = subprocess.run(
+        [sys.executable, "-m", "inspector", "live", "--rate", "1000", "--save", path],
+        input="\n".join([*LIVE[:300], *odd, *LIVE[300:]]),
+        text=True,
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("604 samples")
+    assert path.exists()
+
+
+def test_a_file_whose_name_is_not_utf_8_is_printed_escaped(tmp_path):
+    name = os.fsencode(tmp_path) + b"/\xff\xfe.csv"
+    csv(Path(os.fsdecode(name)), np.arange(600) / 1000)
+    done = subprocess.run(
+        [sys.executable, "-m", "inspector", "noise", name], capture_output=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert rb"\udcff\udcfe.csv: 0.60 s" in done.stdout
