@@ -82,7 +82,8 @@ def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
         turned = signal.ndim == 2 and signal.shape[::-1][0] == shape[0] != signal.shape[0]
         hint = "; samples come first, is it transposed?" if turned else ""
         raise RunError(f"{name}: shape {signal.shape}, expected {shape}{hint}")
-    finite = (signal > -LARGEST) & (signal < LARGEST)
+    largest = np.float64(LARGEST)  # no float16
+    finite = (signal > -largest) & (signal < largest)
     if not finite.all():
         row, column = np.argwhere(~finite)[0]
         if np.isfinite(signal[row, column]):

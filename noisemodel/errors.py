@@ -139,7 +139,8 @@ class UnknownJointError(RobotError):
 
     def __init__(self, joint: str, robot: str, known: Sequence[str]) -> None:
         self.joint, self.robot, self.known = joint, robot, tuple(known)
-        super().__init__(f"no joint {joint!r} in robot {robot!r}; it has {', '.join(known)}")
+        has = ", ".join(known) or "no joints"
+        super().__init__(f"no joint {joint!r} in robot {robot!r}; it has {has}")
 
 
 def hint(name: str, known: Iterable[str]) -> str:

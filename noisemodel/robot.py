@@ -228,8 +228,9 @@ def locate(name: str | Path) -> Path:
     if str(name) in catalog.ROBOTS:
         return catalog.urdf_path(str(name))
     path = Path(name)
-    if path.is_file():
-        return path
+    with suppress(OSError, ValueError):  # no name that a file can have
+        if path.is_file():
+            return path
     if catalog.is_name(str(name)):
         return catalog.menagerie_path(str(name))
     if catalog.is_file_name(str(name)):

@@ -330,7 +330,14 @@ def _meta(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     try:
         meta = json.loads(str(arrays.get("meta", "{}")))
     except (ValueError, RecursionError) as error:
-        raise RunError(f"meta: not JSON ({error})") from error
+        reason = "nested too deeply" if isinstance(error, RecursionError) else error
+        raise RunError(f"meta: not JSON ({reason})") from error
     if not isinstance(meta, dict):
         raise RunError("meta: expected a JSON object")
+    try:
+        json.dumps(meta, ensure_ascii=False).encode()
+    except ValueError as error:  # half of a surrogate pair
+        raise RunError("meta: holds text that cannot be written as UTF-8") from error
+    if not isinstance(meta.get("differentiated", {}), dict):
+        raise RunError("meta: expected a JSON object as differentiated")
     return meta

@@ -6,7 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import models
+from inspector.assets import model_files
 from inspector.errors import LogError
+from inspector.library import load_library
 from inspector.logs.reading import read_log
 from noisemodel import Robot, RobotError, Run, RunFileError, meshfile
 from noisemodel.errors import MeshError
@@ -151,6 +154,20 @@ def test_methods_that_unpack_gigabytes_at_once_are_not_read(tmp_path, method):
         archive.writestr("time.npy", bytes(10**6))
     with pytest.raises(RunFileError, match="another method than NumPy's"):
         Run.load(tmp_path / "run.npz")
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, '{"a": 1' + "0" * 400 + "}", "\0"])
+def test_a_hostile_manifest_of_a_model_is_one_line(tmp_path, text):
+    with np.load(model_files()[0]) as shipped:
+        np.savez(tmp_path / "m.npz", **{**shipped, "manifest": np.array(text)})
+    with pytest.raises(models.ModelFileError, match="m.npz: manifest is no JSON") as caught:
+        load_library([tmp_path / "m.npz"])
+    assert "\n" not in str(caught.value)
+
+
+def test_a_device_is_no_model():
+    with pytest.raises(models.ModelFileError, match="is no regular file"):
+        load_library([Path("/dev/zero")])
 
 
 def test_a_device_is_no_log():

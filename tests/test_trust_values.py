@@ -144,6 +144,35 @@ def test_a_secret_that_others_can_read_is_not_used(tmp_path, monkeypatch):
     assert cached("key", lambda: {"a": np.zeros(3)})["a"][0] == 0
 
 
+@pytest.mark.parametrize(
+    ("fields", "problem"),
+    [
+        ({"meta": "[" * 100_000}, "meta: not JSON .nested too deeply"),
+        ({"meta": "1" * 5000}, "meta: not JSON"),
+        ({"meta": '{"source": "\\ud800"}'}, "meta: holds text that cannot be written as UTF-8"),
+        ({"meta": '{"differentiated": 3}'}, "meta: expected a JSON object as differentiated"),
+        ({"joint_names": ["\ud800"]}, "joint_names: '\\\\ud800' is no name"),
+    ],
+)
+def test_text_of_a_run_that_is_hostile_is_one_line(tmp_path, fields, problem):
+    arrays = {name: np.array(value) for name, value in fields.items()}
+    np.savez(tmp_path / "run.npz", time=TIME, velocity=np.ones((40, 1)), **arrays)
+    with pytest.raises(RunError, match=problem) as caught:
+        Run.load(tmp_path / "run.npz")
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a" * 5000 + ".urdf", "a\0b", "\ud800", "/dev/zero"])
+def test_a_name_that_no_file_can_have_is_no_robot(name):
+    with pytest.raises(RobotError, match="no such URDF file|neither a URDF or MJCF file"):
+        Robot.load(name)
+
+
+def test_a_run_in_half_precision_is_checked_without_warnings():
+    velocity = np.ones((40, 1), dtype=np.float16)
+    assert Run(time=TIME, velocity=velocity, joint_names=("a",)).velocity.dtype == np.float16
+
+
 LIVE = [f'{{"time": {n / 1000}, "velocity": [{n % 7 / 10}, 0.1]}}' for n in range(600)]
 
 

@@ -286,12 +286,13 @@ def faults(
     """
     bad = [block for block in blocks if block.label != "ok"]
     found = []
-    for event in meta.get("events") or ():
+    events = meta.get("events") or ()
+    for event in events if isinstance(events, list | tuple) else (events,):
         try:
             label, start, stop = str(event["label"]), float(event["start"]), float(event["stop"])
             overlaps = any(block.start <= stop and block.stop >= start for block in bad)
             felt = float(event["labelled"]) > 0.0 if "labelled" in event else overlaps
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (LookupError, TypeError, ValueError, OverflowError) as error:
             raise InspectorError(
                 f"{path}: an event of its meta lacks label, start or stop as numbers in s"
             ) from error
