@@ -11,7 +11,8 @@ import os
 import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -37,7 +38,10 @@ MAX_INCLUDED = 200
 """Most files that one MJCF may consist of."""
 
 MAX_COPIES = 10_000
-"""Most copies that nested ``<replicate>`` may make of an element."""
+"""Most copies that ``<replicate>`` and the like may make of an element."""
+
+MAX_BODIES, MAX_CELLS = 20_000, 10_000_000
+"""Most bodies and geoms of a robot and its scene, and cells of a height field."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +103,7 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     try:
         # An absolute path: files that an included file names get its folder before their names.
         spec = mujoco.MjSpec.from_file(str(path.absolute()))
+        spec.memory = -1  # nothing is simulated
         spec.compiler.fusestatic = spec.compiler.discardvisual = False
         meshes = _without_files(spec, path, folders)
         with warnings.catch_warnings(action="ignore"):  # such as attributes that are deprecated
@@ -131,6 +136,7 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
         The folders of the file and of those that it includes or attaches.
     """
     waiting, known = [path], {path.resolve()}
+    parts: dict[Path, _Part] = {}
     folders, below, named = [path.parent], {""}, set()
     while waiting:
         part = waiting.pop()
@@ -139,6 +145,8 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
             raise RobotError(f"{path}: not an MJCF, its root is <{root.tag}>, expected <mujoco>")
         if _copies(root) > MAX_COPIES:
             raise RobotError(f"{part}: replicates an element more than {MAX_COPIES} times")
+        _check_sizes(part, root)
+        parts[part.resolve()] = own = _Part(root)
         for compiler in root.iter("compiler"):
             below |= {compiler.get("assetdir", ""), compiler.get("meshdir", "")}
         for element in root.iter():
@@ -150,12 +158,14 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
                 if not found:
                     raise RobotError(f"{part}: includes {file!r}, which is missing")
                 _inside(path, file, found[0], roots)
+                own.files[element.get("name") or file] = found[0].resolve()
                 if found[0].resolve() not in known:
                     known.add(found[0].resolve())
                     waiting.append(found[0])
                     folders.append(found[0].parent)
         if len(known) > MAX_INCLUDED:
             raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
+    _check_count(path, parts)
     folders = list(dict.fromkeys(folders))
     for file in sorted(named):
         for folder in (folder / each for folder in folders for each in below):
@@ -181,17 +191,67 @@ def _parsed(path: Path) -> ET.Element:
         raise RobotError(f"{path}: {error}") from error
 
 
+@dataclass
+class _Part:
+    """One of the files of an MJCF; ``files`` are those that it includes, or names as models."""
+
+    root: ET.Element
+    files: dict[str, Path] = field(default_factory=dict)
+
+
 def _copies(root: ET.Element) -> int:
     """How often the most replicated element of a file is there."""
-    waiting, most = [(root, 1)], 1
+    return max(copies for _, copies in _elements(root))
+
+
+def _elements(root: ET.Element) -> Iterator[tuple[ET.Element, int]]:
+    """Elements of a file, and how often each is there."""
+    waiting = [(root, 1)]
     while waiting:
         element, copies = waiting.pop()
-        count = element.get("count", "")
-        if element.tag == "replicate" and count.isdecimal():
-            copies *= int(count)
-        most = max(most, copies)
+        if element.tag in ("replicate", "composite", "flexcomp"):
+            for count in re.findall(r"\d+", element.get("count", ""))[:3]:
+                copies *= min(max(int(count[:9]), 1), MAX_COPIES + 1)
+        yield element, copies
         waiting += [(child, copies) for child in element]
-    return most
+
+
+def _check_sizes(part: Path, root: ET.Element) -> None:
+    """Refuse sizes that MuJoCo would take gigabytes for."""
+    for element in root.iter():
+        if element.tag == "size":
+            for name, text in element.items():
+                if name.startswith("nuser") and len(text.strip()) > 5:
+                    raise RobotError(f"{part}: <{element.tag} {name}={text[:40]!r}> is too large")
+        cells = [element.get(name, "1")[:9] for name in ("nrow", "ncol")]
+        if all(map(str.isdecimal, cells)) and int(cells[0]) * int(cells[1]) > MAX_CELLS:
+            raise RobotError(f"{part}: a height field of more than {MAX_CELLS} cells")
+
+
+def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
+    """Refuse what is copied or attached to more bodies or joints than a robot has."""
+
+    @cache
+    def counts(part: Path) -> tuple[int, int]:
+        bodies = joints = 0
+        for element, copies in _elements(parts[part].root):
+            bodies += copies * (element.tag in ("body", "geom", "composite", "flexcomp"))
+            joints += copies * (element.tag in ("joint", "freejoint") and not element.get("joint"))
+            name = {"include": "file", "attach": "model"}.get(element.tag, "")
+            other = parts[part].files.get(element.get(name, "")) if name else None
+            if other is not None and other != part:
+                more = counts(other)
+                bodies, joints = bodies + copies * more[0], joints + copies * more[1]
+            if bodies > MAX_BODIES:
+                raise RobotError(f"{path}: more than {MAX_BODIES} bodies and geoms")
+        return bodies, joints
+
+    try:
+        _, joints = counts(path.resolve())
+    except RecursionError as error:
+        raise RobotError(f"{path}: its models attach each other") from error
+    if joints > 10 * MAX_JOINTS:  # those of defaults, sensors and equalities are counted too
+        raise RobotError(f"{path}: more than {MAX_JOINTS} joints")
 
 
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:

@@ -98,6 +98,56 @@ def test_a_file_of_unclosed_comments_is_looked_at_once(tmp_path):
         Robot.load(path)
 
 
+def attached(folder, count):
+    """MJCFs that attach the next one twice each."""
+    for n in range(count):
+        model = f'<asset><model name="m" file="a{n + 1}.xml"/></asset>' if n < count - 1 else ""
+        arm = '<body name="{0}"><attach model="m" body="b" prefix="{0}"/></body>' if model else ""
+        (folder / f"a{n}.xml").write_text(
+            f"<mujoco>{model}<worldbody><body name='b'>{arm.format('l')}{arm.format('r')}"
+            "<geom size='1'/></body></worldbody></mujoco>"
+        )
+    return folder / "a0.xml"
+
+
+def test_models_that_attach_each_other_twice_are_counted_before_they_are_built(tmp_path):
+    assert len(Robot.load(attached(tmp_path, 3)).joints) == 0
+    with pytest.raises(RobotError, match="more than 20000 bodies and geoms"):
+        Robot.load(attached(tmp_path, 40))
+    (tmp_path / "a39.xml").write_text((tmp_path / "a0.xml").read_text())
+    (tmp_path / "a0.xml").write_text((tmp_path / "a0.xml").read_text().replace("a1.", "a39."))
+    (tmp_path / "a39.xml").write_text((tmp_path / "a39.xml").read_text().replace("a1.", "a0."))
+    with pytest.raises(RobotError, match="its models attach each other"):
+        Robot.load(tmp_path / "a0.xml")
+
+
+@pytest.mark.parametrize(
+    ("element", "problem"),
+    [
+        ('<flexcomp name="f" type="grid" count="300 300 300"/>', "more than 10000 times"),
+        ('<composite type="cable" prefix="a" count="1000000 1 1"/>', "more than 10000 times"),
+        ("<body/>" * 30_000, "more than 20000 bodies and geoms"),
+        ("<body><joint/></body>" * 15_000, "more than 1000 joints"),
+    ],
+)
+def test_an_mjcf_of_more_than_any_robot_has_is_refused_at_once(tmp_path, element, problem):
+    path = tmp_path / "r.xml"
+    path.write_text(f'<mujoco><worldbody><body name="b">{element}</body></worldbody></mujoco>')
+    with pytest.raises(RobotError, match=problem):
+        Robot.load(path)
+
+
+def test_sizes_for_which_mujoco_would_take_gigabytes_are_refused(tmp_path):
+    path = tmp_path / "r.xml"
+    for head, problem in (
+        ('<size nuserdata="1000000000"/>', "nuserdata='1000000000'> is too large"),
+        ('<asset><hfield name="h" nrow="60000" ncol="60000" size="1 1 1 1"/></asset>', "height fi"),
+    ):
+        path.write_text(f"<mujoco>{head}<worldbody><geom size='1'/></worldbody></mujoco>")
+        with pytest.raises(RobotError, match=problem):
+            Robot.load(path)
+
+
 def test_an_archive_of_zeros_is_refused_before_it_is_unpacked(tmp_path):
     path = tmp_path / "run.npz"
     zeros = bytes(2**20)
