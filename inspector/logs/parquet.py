@@ -84,7 +84,7 @@ def _check_size(path: Path, columns: Collection[str]) -> None:
         max(part.total_uncompressed_size, 8 * part.num_values)
         for group in groups
         for part in (group.column(place) for place in range(group.num_columns))
-        if part.path_in_schema.partition(".")[0] in columns
+        if any(f"{part.path_in_schema}.".startswith(f"{name}.") for name in columns)
     )
     try:
         check_unpacked(unpacked, path.stat().st_size)
