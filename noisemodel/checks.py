@@ -65,8 +65,6 @@ def check_words(array: str, words: Iterable[str]) -> None:
 def check_names(array: str, names: Sequence[str]) -> None:
     """Refuse names that are no words or repeat."""
     check_words(array, names)
-    if not names:
-        raise RunError(f"{array}: there are no joints")
     if len(names) > MAX_JOINTS:
         raise RunError(f"{array}: {len(names)} joints, the limit is {MAX_JOINTS}")
     twice = sorted(name for name, count in Counter(names).items() if count > 1)

@@ -89,6 +89,8 @@ class Run:
             assign(self, "valid", np.ones(len(self.time), dtype=bool))
         checks.check_valid(self.mask, len(self.time))
         checks.check_names("joint_names", self.joint_names)
+        if not self.joint_names and self.base_velocity is None:
+            raise RunError("joint_names: there are no joints, and the base does not move")
         checks.check_names("desired_joint_names", self.desired_joint_names)
         checks.check_words("stages", self.stages)
         for name, signal, width in self._signals():

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import call
 
 from inspector import read_log
 from inspector.analysis.level import Estimate, noise_level
@@ -66,6 +67,25 @@ def test_runs_without_joints_and_with_too_many_are_refused():
         names = tuple(f"j{n}" for n in range(joints))
         with pytest.raises(RunError, match=problem):
             Run(time=TIME, velocity=np.ones((40, joints)), joint_names=names)
+
+
+@pytest.mark.parametrize("command", ["classify", "audit", "noise", "report", "view"])
+def test_a_base_that_moves_without_joints_gives_a_result_or_one_line(tmp_path, command):
+    pose = np.zeros((4000, 7))
+    pose[:, 6] = 1.0
+    stamps = np.arange(4000) / 1000
+    twist = np.sin(5.0 * stamps)[:, None] * np.ones(6)
+    Run(
+        time=stamps,
+        velocity=np.zeros((4000, 0)),
+        joint_names=(),
+        base_pose=pose,
+        base_velocity=twist,
+    ).save(tmp_path / "run.npz")
+    output = {"report": ("-o", tmp_path / "a.html"), "view": ("--save", tmp_path / "a.rrd")}
+    status, _, err = call(command, tmp_path / "run.npz", *output.get(command, ()))
+    assert status in (0, 4)
+    assert "Traceback" not in err
 
 
 def test_a_log_of_thousands_of_columns_is_read_or_refused_at_once(tmp_path):

@@ -39,6 +39,8 @@ def unit_warnings(run: Run) -> Iterator[str]:
     Args:
         run: The run.
     """
+    if not run.joint_names:
+        return
     factor = _factor(run)
     for known, warning in FACTORS.items():
         if factor is not None and abs(factor / known - 1) <= NEAR:

@@ -77,6 +77,7 @@ class Layout:
     skip: int
     remarks: tuple[str, ...] = ()
 
+
 MAX_COLUMNS = 10_000
 """Most columns of a log: ten of each joint that a run may have."""
 

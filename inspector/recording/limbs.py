@@ -22,6 +22,8 @@ def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, .
     Returns:
         The joints of each limb, by its name.
     """
+    if not names:
+        return {}
     groups = [tuple(names)] if tree is None else _chains(names, tree)
     parts = []
     for group in groups:
