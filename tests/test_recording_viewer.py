@@ -1,4 +1,5 @@
 import os
+import re
 import shutil
 import signal
 import socket
@@ -69,6 +70,39 @@ def test_a_missing_viewer_is_an_error(monkeypatch):
     monkeypatch.setattr(viewer, "find_spec", lambda _: None)
     with pytest.raises(ViewerError, match="viewer is missing; `pip install rerun-sdk`"):
         viewer.open_window(Path("run.rrd"))
+
+
+@pytest.mark.parametrize("env", [None, {"PATH": os.environ["PATH"]}])
+def test_every_viewer_is_told_to_send_no_usage_data(monkeypatch, tmp_path, env):
+    monkeypatch.delenv("CI", raising=False)
+    fake_viewer(monkeypatch, f"echo $CI > {tmp_path}/told")
+    with viewer.started(env=env) as started:
+        started.process.wait()
+    assert (tmp_path / "told").read_text() == "true\n"
+
+
+def test_nothing_but_the_viewer_s_own_starter_starts_one():
+    starts = [
+        path.relative_to(ROOT).as_posix()
+        for package in ("inspector", "models", "noisemodel", "scenarios")
+        for path in (ROOT / package).rglob("*.py")
+        if re.search(r"\bviewer\.command\(|\brr\.spawn\(|\bPopen\(|spawn=True", path.read_text())
+    ]
+    assert starts == ["inspector/recording/viewer.py"]
+
+
+@pytest.mark.parametrize(("forced", "collects"), [("", False), ("1", True)])
+def test_a_viewer_collects_usage_data_only_if_it_is_forced_to(
+    monkeypatch, recording, tmp_path, forced, collects
+):
+    monkeypatch.delenv("CI", raising=False)
+    monkeypatch.setenv("HTTPS_PROXY", "http://127.0.0.1:9")  # nothing leaves this machine
+    for name in ("HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME"):
+        monkeypatch.setenv(name, str(tmp_path))
+    monkeypatch.setenv("FORCE_RERUN_ANALYTICS", forced)
+    with web.serving(recording):
+        pass
+    assert bool(list(tmp_path.glob("**/rerun/analytics"))) == collects
 
 
 def printed(*command):

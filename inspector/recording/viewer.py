@@ -23,6 +23,11 @@ SETTLE = 2.0
 PORT = "9876"
 """Where rerun's viewer listens; one that does already takes the recording over."""
 HOST = "127.0.0.1"
+NO_ANALYTICS = {"CI": "true"}
+"""Rerun's viewer sends no usage data if ``CI`` is set, unless ``FORCE_RERUN_ANALYTICS=1`` is.
+
+It has no option for it; ``rerun analytics disable`` would change the user's own settings.
+"""
 MAX_SCRATCH_FILES = 20
 """Recordings without a name that are kept, the newest."""
 MAX_SCRATCH_BYTES = 1_000_000_000
@@ -126,7 +131,7 @@ class Process:
 def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[Process]:
     """Start a viewer, whose stderr can be read for as long as the block lasts.
 
-    It does not end with the block, nor by Ctrl-C.
+    It does not end with the block, nor by Ctrl-C, and it sends no usage data.
 
     Args:
         arguments: Options.
@@ -141,7 +146,7 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
     with tempfile.TemporaryFile() as stderr:
         process = subprocess.Popen(
             command(*arguments),
-            env=env,
+            env=NO_ANALYTICS | dict(os.environ if env is None else env),
             start_new_session=True,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
