@@ -87,6 +87,9 @@ def write(
     _replace(Path(path), content.getvalue(), overwrite=overwrite)
 
 
+EXISTS = "exists already; choose another name, or overwrite it (--overwrite)"
+
+
 def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
     """Write a file beside its place, and move it there when it is safely on the disk.
 
@@ -95,10 +98,8 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
     if path.is_dir():
         raise OutputError(path, "is a folder; name a file")
     if path.exists() and not overwrite:
-        raise OutputError(
-            path, "exists already; choose another name, or overwrite it (--overwrite)"
-        )
-    temporary = path.with_name(f".{path.name}.{uuid4().hex[:8]}")
+        raise OutputError(path, EXISTS)
+    temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")  # swept by `noisemodel`
     try:
         file = temporary.open("xb")
     except OSError as error:
@@ -108,11 +109,29 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
             file.write(content)
             file.flush()
             os.fsync(file.fileno())
-        temporary.replace(path)
+        if overwrite:
+            temporary.replace(path)
+        else:
+            _place(temporary, path)
     except OSError as error:
         raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _place(temporary: Path, path: Path) -> None:
+    """Give a file its final name, unless another process has taken it meanwhile."""
+    try:
+        os.link(temporary, path)
+        return
+    except FileExistsError:
+        raise OutputError(path, EXISTS) from None
+    except OSError:  # a file system without hard links: the name is claimed by an empty file
+        try:
+            path.open("xb").close()
+        except FileExistsError:
+            raise OutputError(path, EXISTS) from None
+    temporary.replace(path)
 
 
 def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:

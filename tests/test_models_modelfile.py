@@ -96,6 +96,23 @@ def test_numpy_alone_reads_it_too(path):
     assert set(manifest["runs"]) == {"ok", "rattle", "squeal"}
 
 
+@pytest.mark.parametrize("links", [True, False])
+def test_of_two_that_write_one_model_at_once_the_second_fails(path, monkeypatch, links):
+    link, target = os.link, path.with_name("new.npz")
+
+    def late(temporary, name):
+        target.write_text("first")  # another process, after the name was found free
+        if not links:
+            raise PermissionError(1, "Operation not permitted")
+        link(temporary, name)
+
+    monkeypatch.setattr(os, "link", late)
+    with pytest.raises(models.OutputError, match=r"new\.npz: exists already"):
+        models.Classifier.load(path).save(target)
+    assert target.read_text() == "first"
+    assert sorted(os.listdir(path.parent)) == sorted({path.name, "new.npz"})
+
+
 def test_a_model_is_not_overwritten_unless_requested(path):
     before = path.read_bytes()
     with pytest.raises(models.OutputError, match=r"model.npz: exists already; choose another name"):

@@ -1,4 +1,5 @@
 import os
+import time
 
 import pytest
 
@@ -87,3 +88,39 @@ def test_a_full_disk_is_one_error_and_leaves_nothing(tmp_path):
     with pytest.raises(OutputError, match=r"out.txt: cannot be written \(No space left on device"):
         full()
     assert os.listdir(tmp_path) == []
+
+
+def write_late(path):
+    """Write a file that somebody else has written by the end."""
+    with replacing(path) as late:
+        write(path, "first")
+        late.write_text("second")
+
+
+def test_of_two_that_write_one_file_at_once_the_second_fails_and_changes_nothing(tmp_path):
+    with pytest.raises(OutputError, match=r"out\.txt: exists already; choose another name"):
+        write_late(tmp_path / "out.txt")
+    assert (tmp_path / "out.txt").read_text() == "first"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def without_links(*_):
+    raise PermissionError(1, "Operation not permitted")
+
+
+def test_without_hard_links_the_second_of_two_writers_fails_as_well(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "link", without_links)
+    with pytest.raises(OutputError, match=r"out\.txt: exists already"):
+        write_late(tmp_path / "out.txt")
+    assert (tmp_path / "out.txt").read_text() == "first"
+    assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_temporary_files_of_killed_processes_are_deleted_after_a_day(tmp_path):
+    names = [".noise-inspector-0123abcd", ".noise-inspector-4567abcd", ".other-0123abcd", "a.txt"]
+    for name in names:
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (time.time() - 90_000,) * 2)
+    os.utime(tmp_path / names[1])  # one that is being written
+    write(tmp_path / "out.txt", "")
+    assert sorted(os.listdir(tmp_path)) == sorted([*names[1:], "out.txt"])

@@ -182,7 +182,9 @@ def classify(
     lost = [line for verdict in verdicts for line in verdict.lost]
     lost += _tried(lambda: _print(FORMATS[format](verdicts)), "standard output")
     for path, name in files.items():
-        lost += _tried(partial(_write, path, FORMATS[name], verdicts), str(path))
+        lost += _tried(
+            partial(_write, path, FORMATS[name], verdicts, overwrite=overwrite), str(path)
+        )
     if targets:
         from inspector.labels.findings import write_findings
 
@@ -273,10 +275,12 @@ def _print(text: str) -> None:
     sys.stdout.flush()
 
 
-def _write(path: Path, written: "Callable[[Sequence[Verdict]], str]", verdicts: Any) -> None:
+def _write(
+    path: Path, written: "Callable[[Sequence[Verdict]], str]", verdicts: Any, *, overwrite: bool
+) -> None:
     from noisemodel.atomic import replacing
 
-    with replacing(path, overwrite=True) as temporary:
+    with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(f"{written(verdicts)}\n", encoding="utf-8")
 
 
