@@ -5,10 +5,12 @@ import os
 import sys
 import traceback
 from collections.abc import Callable
-from typing import Annotated, NoReturn
+from contextlib import suppress
+from typing import Annotated, Any
 
 import typer
 
+from inspector.analysis.status import EXIT, OUTPUT_LOST, Status
 from inspector.commands.adapt import adapt
 from inspector.commands.audit import audit
 from inspector.commands.baseline import baseline
@@ -93,27 +95,80 @@ app.add_typer(simulate, name="simulate", rich_help_panel="Simulate")
 
 
 def main() -> None:
-    """Run the command line; expected errors become a line and exit status 3, bugs have 70."""
+    """Run the command line: expected errors end as one line with 3 or 5, bugs with 70."""
     # Matrices are small here: more threads mostly wait, and waiting takes processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # Of a file that it cannot write, rerun tells in several lines; we do in one.
+    os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
+    output = _standard_output()
     for stream in (sys.stdout, sys.stderr):  # names of files need not be text in their encoding
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    status = _run(output)
+    if output is not None:
+        with suppress(OSError):
+            sys.stdout.flush()
+        if output.lost is not None and status not in (OUTPUT_LOST, EXIT[Status.INTERNAL_ERROR]):
+            reason = f"standard output: cannot be written ({output.lost.strerror})"
+            typer.echo(f"inspector: output lost: {reason}", err=True)
+            status = OUTPUT_LOST
+    sys.exit(status)
+
+
+class _StandardOutput(io.FileIO):
+    """Standard output that keeps its first error, and drops what comes after it.
+
+    Libraries end a program whose reader is gone with 1, which would be that of a finding.
+    """
+
+    lost: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        if self.lost is None:
+            try:
+                return super().write(data)
+            except OSError as error:
+                self.lost = error
+                raise
+        return memoryview(data).nbytes
+
+
+def _standard_output() -> _StandardOutput | None:
+    """Watch standard output for errors, if it is a file or a pipe."""
+    plain = sys.__stdout__
+    if plain is None or sys.stdout is not plain or plain.isatty():
+        return None
+    watched = _StandardOutput(plain.fileno(), "w", closefd=False)
+    sys.stdout = io.TextIOWrapper(
+        io.BufferedWriter(watched), encoding=plain.encoding, errors=plain.errors
+    )
+    return watched
+
+
+def _run(output: _StandardOutput | None) -> int:
+    """Run the command line; the exit status."""
     try:
         app()
-    except ValueError as error:
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0
+    except Exception as error:
+        if output is not None and error is output.lost:
+            return 0  # `main` says it
+        return _failed(error)
+    return 0
+
+
+def _failed(error: Exception) -> int:
+    """Print an expected error as one line, or the traceback of a bug; the exit status."""
+    if isinstance(error, ValueError):
+        import models
+        import noisemodel
         from inspector.analysis.verdict import EXPECTED
         from scenarios import ScenarioError
 
-        if not isinstance(error, (*EXPECTED, ScenarioError)):
-            _end_by_bug()
-        typer.echo(f"inspector: {error}", err=True)
-        sys.exit(3)
-    except Exception:  # Python's own exit status would be that of a finding
-        _end_by_bug()
-
-
-def _end_by_bug() -> NoReturn:
-    """Print the traceback of a bug and end."""
-    traceback.print_exc()
-    sys.exit(70)
+        if isinstance(error, (*EXPECTED, ScenarioError)):
+            typer.echo(f"inspector: {error}", err=True)
+            output = isinstance(error, (noisemodel.OutputError, models.OutputError))
+            return OUTPUT_LOST if output and isinstance(error.__cause__, OSError) else 3
+    traceback.print_exception(error)
+    return EXIT[Status.INTERNAL_ERROR]  # Python's own would be that of a finding

@@ -13,6 +13,7 @@ import rerun as rr
 
 from inspector.live.errors import SinkError
 from inspector.recording import viewer
+from inspector.recording.stream import require_whole
 from inspector.recording.viewer import HOST
 from inspector.recording.web import free_port
 from noisemodel.atomic import replacing
@@ -58,12 +59,14 @@ class Sink:
     ) -> None:
         self._address: tuple[str, int] | None = None
         self.gone = False
+        self._temporary: Path | None = None
         self._file, self._checked = save is not None, time.monotonic()
         sinks: list[rr.GrpcSink | rr.FileSink] = []
         places = []
         with ExitStack() as stack:
             if save is not None:
-                sinks.append(rr.FileSink(stack.enter_context(replacing(save, overwrite=overwrite))))
+                self._temporary = stack.enter_context(replacing(save, overwrite=overwrite))
+                sinks.append(rr.FileSink(self._temporary))
                 places.append(f"written to {save}")
             if connect is not None or save is None:
                 host, port = self._address = _viewer(connect)
@@ -98,22 +101,27 @@ class Sink:
             raise _Discarded
 
     def close(self) -> bool:
-        """Send what waits, and put the file in its place.
+        """Send what waits, and put the file in its place if it is whole.
 
         Returns:
             Whether the viewer, if there is one, took everything.
+
+        Raises:
+            OutputError: If the file could not be written.
         """
         taken = not self.gone
         with self._stack:
             try:
                 if self.alive:
                     self.recording.flush(timeout_sec=FLUSH_TIMEOUT)
-            except RuntimeError:  # it is gone, or hangs
-                taken = False
+            except RuntimeError:  # it is gone, or hangs, or the file cannot be written
+                taken = self._address is None
             # Rerun waits for a viewer that hangs, for good; we do not.
             ending = Thread(target=self.recording.disconnect, daemon=True)
             ending.start()
             ending.join(FLUSH_TIMEOUT)
+            if self._temporary is not None and not ending.is_alive():
+                require_whole(self._temporary)
         return taken
 
 

@@ -1,12 +1,13 @@
 """A recording in a file, whole or not at all, with its report."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import rerun as rr
 
+from inspector.recording import unstable
 from noisemodel.atomic import replacing
 
 APPLICATION = "inspector"
@@ -32,8 +33,23 @@ def writing(path: Path, identity: str, *, overwrite: bool = False) -> Iterator[r
         recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
         recording.save(temporary)
         yield recording
-        recording.flush()
+        with suppress(RuntimeError):  # its file cannot be written, which is noticed below
+            recording.flush()
         recording.disconnect()
+        require_whole(temporary)
+
+
+def require_whole(recording: Path) -> None:
+    """Refuse a recording that rerun could not write to its end; it tells that to its log only.
+
+    Raises:
+        OSError: Why the file cannot be written.
+    """
+    if unstable.has_end(recording):
+        return
+    with recording.open("ab") as file:
+        file.write(bytes(1 << 16))  # fails as rerun did
+    raise OSError("the recording is incomplete")
 
 
 def log_report(

@@ -8,6 +8,7 @@ What changes between versions, as of 0.41:
   time that it is logged at; a static asset is not played;
 - ``ViewCoordinates``;
 - ``rerun.experimental``, by which a viewer returns pictures and what its views report;
+- the end of a recording's file;
 - columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
 
 Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
@@ -16,6 +17,7 @@ When rerun moves on, this module follows and no other.
 """
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 import numpy as np
@@ -33,6 +35,13 @@ Part: TypeAlias = rrb.View | rrb.Container
 
 BACKGROUND = (24, 26, 30)
 GRID = (70, 74, 82, 130)
+
+
+def has_end(recording: Path) -> bool:
+    """Whether a file ends as a recording does that was written whole."""
+    with recording.open("rb") as file:
+        file.seek(max(0, recording.stat().st_size - 12))
+        return file.read().startswith(b"RRF2FOOT")
 
 
 def plot(

@@ -1,0 +1,147 @@
+"""Output that cannot be written: full disks, readers that are gone, processes that are killed."""
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from inspector.assets import demo_run
+
+ROOT = Path(__file__).parents[1]
+NO_SPACE = "cannot be written (No space left on device)"
+TOO_LARGE = "cannot be written (File too large)"
+COMMANDS = (
+    ["--help"],
+    ["robots"],
+    ["noise", demo_run()],
+    ["classify", demo_run()],
+)
+ROWS = "time,elbow.velocity\n" + "".join(f"{k / 1000},{k % 70 / 70}\n" for k in range(4000))
+
+
+def command(*arguments):
+    return [sys.executable, "-m", "inspector", *map(str, arguments)]
+
+
+def run(*arguments, limit=None, **settings):
+    """Run the command line, with files no larger than `limit` in [byte]."""
+
+    def limited():
+        if limit is not None:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+
+    return subprocess.run(
+        command(*arguments),
+        cwd=ROOT,
+        check=False,
+        text=True,
+        stderr=subprocess.PIPE,
+        preexec_fn=limited,
+        **settings,
+    )
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda each: each[0])
+def test_every_command_ends_with_5_if_standard_output_is_on_a_full_disk(arguments):
+    with Path("/dev/full").open("w") as full:
+        done = run(*arguments, stdout=full)
+    assert done.returncode == 5
+    assert f"inspector: output lost: standard output: {NO_SPACE}\n" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda each: each[0])
+def test_every_command_ends_with_5_if_the_reader_of_standard_output_is_gone(arguments):
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = run(*arguments, stdout=writer)
+    os.close(writer)
+    assert done.returncode == 5
+    assert "output lost: standard output: cannot be written (Broken pipe)\n" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "limit"),
+    [
+        (["view", demo_run(), "--save"], 300_000),
+        (["live", "--rate", "1000", "--save"], 30_000),
+        (["noise", demo_run(), "--csv"], 10_000),
+        (["export", demo_run(), "-o"], 10_000),
+        (["listen", demo_run(), "-o"], 10_000),
+    ],
+    ids=lambda each: str(each[0]) if isinstance(each, list) else "",
+)
+def test_a_file_that_cannot_be_written_whole_is_one_line_and_leaves_nothing(
+    tmp_path, arguments, limit
+):
+    suffix = {"noise": "csv", "export": "mcap", "listen": "wav"}.get(arguments[0], "rrd")
+    target = tmp_path / f"out.{suffix}"
+    done = run(*arguments, target, limit=limit, stdout=subprocess.PIPE, input=ROWS)
+    assert done.stderr.splitlines()[-1] == f"inspector: {target}: {TOO_LARGE}"
+    assert "Traceback" not in done.stderr
+    assert done.returncode == 5
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_recording_that_is_lost_keeps_the_one_that_it_would_replace(tmp_path):
+    target = tmp_path / "out.rrd"
+    target.write_text("before")
+    done = run("view", demo_run(), "--save", target, "--overwrite", limit=300_000)
+    assert (done.returncode, target.read_text()) == (5, "before")
+    assert done.stderr == f"inspector: {target}: {TOO_LARGE}\n"
+
+
+def test_a_file_that_exists_is_wrong_input_and_not_lost_output(tmp_path):
+    (tmp_path / "out.csv").write_text("before")
+    done = run("noise", demo_run(), "--csv", tmp_path / "out.csv")
+    assert done.returncode == 3
+    assert "exists already" in done.stderr
+
+
+def children(pid):
+    found = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True, check=False)
+    return [int(each) for each in found.stdout.split()]
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+SLOW = """
+import sys, time
+from noisemodel.parallel import each
+def wait(seconds):
+    open(f"{sys.argv[1]}/{seconds}", "w").close()
+    time.sleep(seconds)
+list(each(wait, [50, 51, 52], jobs=2))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="needs /proc")
+@pytest.mark.parametrize("stop", [signal.SIGKILL, signal.SIGTERM])
+def test_workers_end_with_the_process_that_waits_for_them(tmp_path, stop):
+    script = tmp_path / "slow.py"
+    script.write_text(SLOW.replace("sys.argv[1]", repr(str(tmp_path))))
+    with subprocess.Popen(
+        [sys.executable, script], env=os.environ | {"PYTHONPATH": str(ROOT)}
+    ) as p:
+        until = time.monotonic() + 30
+        while len(list(tmp_path.glob("5?"))) < 2 and time.monotonic() < until:
+            time.sleep(0.1)
+        workers = children(p.pid)
+        p.send_signal(stop)
+    assert len(workers) >= 2
+    until = time.monotonic() + 10
+    while any(alive(each) for each in workers) and time.monotonic() < until:
+        time.sleep(0.1)
+    assert not [each for each in workers if alive(each)]
