@@ -19,8 +19,8 @@ from inspector.analysis.status import EXIT, Status, Unknown, worst
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.opening import Reading, Source, open_source
+from inspector.workers import in_order
 from models import Event
-from noisemodel.parallel import each
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
@@ -256,7 +256,7 @@ def classify_files(
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         localise: Whether to localise each finding.
         draw: Draws a picture of an analysis, see `classify_file`; importable for several jobs.
-        jobs: How many to work on at once.
+        jobs: How many to work on at once. A run with which a worker dies is an internal error.
 
     Returns:
         A verdict per file, in their order.
@@ -269,7 +269,20 @@ def classify_files(
         localise=localise,
         draw=draw,
     )
-    return each(one, paths, jobs=jobs)
+    return in_order(one, paths, jobs=jobs, died=partial(_died, unknown=unknown), work=_work(paths))
+
+
+def _died(path: Path | Source, unknown: Unknown) -> Verdict:
+    """The verdict on a run with which a worker died."""
+    shown = path.shown if isinstance(path, Source) else path
+    message = "the worker died, of lack of memory or a crash; classify this run alone to see why"
+    return Verdict(shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
+
+
+def _work(paths: Sequence[Path | Source]) -> float:
+    """About how long runs take, in [s]: one core does 50 MB/s of samples that are not packed."""
+    files = (each.path if isinstance(each, Source) else each for each in paths)
+    return sum(file.stat().st_size for file in files if file.is_file()) / 50e6
 
 
 def _has_header(path: Path) -> bool:

@@ -1,0 +1,148 @@
+"""Many runs in several processes: one that dies is replaced, and its run named.
+
+Workers are forked where that is safe: then they start in 30 ms, with all modules and models in
+place, and several are faster from a few runs on. It is not safe with threads in this process,
+nor on macOS, and does not exist on Windows. There joblib's loky starts fresh interpreters, which
+takes about `FRESH` seconds.
+"""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+FRESH = 3.0
+"""Work in [s] below which two fresh interpreters are not faster than this one alone."""
+
+
+def in_order(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: int,
+    died: Callable[[Item], Result],
+    work: float = float("inf"),
+) -> Iterator[Result]:
+    """Results of a function, in the order of its arguments, see `as_done`."""
+    early: dict[int, Result] = {}
+    following = 0
+    for index, result in as_done(function, items, jobs=jobs, died=died, work=work):
+        early[index] = result
+        while following in early:
+            yield early.pop(following)
+            following += 1
+
+
+def as_done(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: int,
+    died: Callable[[Item], Result],
+    work: float = float("inf"),
+) -> Iterator[tuple[int, Result]]:
+    """Results of a function as they are ready, from several processes if requested.
+
+    If a process dies, those of its items that may be the cause are tried again one by one, each
+    alone; the item with which a process dies then gets the result of ``died``.
+
+    Args:
+        function: What to call; where processes cannot be forked it must be importable.
+        items: Its arguments.
+        jobs: Number of processes; 1 is this one, which nothing survives.
+        died: The result of an item with which a process died.
+        work: About how long all items take one after the other, in [s].
+
+    Yields:
+        The index of an item, and its result.
+    """
+    jobs = min(jobs, len(items))
+    if jobs < 2 or (work < FRESH and not _forks()):
+        yield from enumerate(map(function, items))
+        return
+    waiting = list(range(len(items)))[::-1]
+    suspects: list[int] = []
+    while waiting or suspects:
+        alone = bool(suspects)
+        todo, width = (suspects, 1) if alone else (waiting, 2 * jobs)
+        pool = _pool(function, 1 if alone else jobs)
+        running: dict[Future[Any], int] = {}
+        broken = False
+        try:
+            while (todo or running) and not broken:
+                try:
+                    while todo and len(running) < width:
+                        future = pool.submit(_call, items[todo[-1]])
+                        running[future] = todo.pop()
+                except BrokenProcessPool:
+                    broken = True
+                done, _ = wait(running, return_when=FIRST_COMPLETED)
+                for future in done:
+                    try:
+                        result = future.result()
+                    except BrokenProcessPool:
+                        broken = True
+                    else:
+                        yield running.pop(future), result
+        finally:
+            for future in running:
+                future.cancel()
+            pool.shutdown(wait=True)
+        if alone and broken:
+            for index in running.values():
+                yield index, died(items[index])
+        else:
+            suspects += sorted(running.values(), reverse=True)
+
+
+def _forks() -> bool:
+    """Whether a fork is safe: of a process with other threads one may hold a lock for ever."""
+    return sys.platform == "linux" and threading.active_count() == 1
+
+
+def _pool(function: Callable[..., Any], jobs: int) -> Executor:
+    threads = max(1, (os.cpu_count() or 1) // jobs)
+    if _forks():
+        return ProcessPoolExecutor(
+            jobs, multiprocessing.get_context("fork"), _begin, (function, threads)
+        )
+    from joblib.externals.loky import ProcessPoolExecutor as Fresh
+
+    pool: Executor = Fresh(jobs, timeout=60, initializer=_begin, initargs=(function, threads))
+    return pool
+
+
+_function: Callable[[Any], Any]
+
+
+def _begin(function: Callable[[Any], Any], threads: int) -> None:
+    """Prepare a worker: it has the function, and as many threads as there are cores for it."""
+    from threadpoolctl import threadpool_limits
+
+    global _function
+    _function = function
+    threadpool_limits(threads)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops its workers
+    parent = multiprocessing.parent_process()
+    if parent is not None and parent.sentinel is not None:  # of a fresh one loky takes care
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    """End this process with its parent, which may be killed at any moment."""
+    with suppress(OSError):
+        parent.join()
+    os._exit(1)
+
+
+def _call(item: Any) -> Any:
+    return _function(item)
