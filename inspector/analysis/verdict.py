@@ -269,17 +269,17 @@ def classify_files(
         localise=localise,
         draw=draw,
     )
-    return in_order(one, paths, jobs=jobs, died=partial(_died, unknown=unknown), work=_work(paths))
+    return in_order(one, paths, jobs=jobs, died=partial(died, unknown=unknown), work=work_of(paths))
 
 
-def _died(path: Path | Source, unknown: Unknown) -> Verdict:
+def died(path: Path | Source, unknown: Unknown) -> Verdict:
     """The verdict on a run with which a worker died."""
     shown = path.shown if isinstance(path, Source) else path
     message = "the worker died, of lack of memory or a crash; classify this run alone to see why"
     return Verdict(shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
 
 
-def _work(paths: Sequence[Path | Source]) -> float:
+def work_of(paths: Sequence[Path | Source]) -> float:
     """About how long runs take, in [s]: one core does 50 MB/s of samples that are not packed."""
     files = (each.path if isinstance(each, Source) else each for each in paths)
     return sum(file.stat().st_size for file in files if file.is_file()) / 50e6

@@ -82,6 +82,10 @@ def classify(
         _of_output("--report-url", help="Where this folder is published, for links to pictures."),
     ] = "",
     overwrite: Overwrite = False,
+    resume: Annotated[
+        Path | None,
+        typer.Option("--resume", help="Keep verdicts in this file; continue if it exists."),
+    ] = None,
     unknown: Annotated[
         Unknown,
         _of_gate(help="Frames out of distribution, two or more: a finding, or ignored."),
@@ -153,22 +157,28 @@ def classify(
         html.require()
         index.prepare(report, overwrite=overwrite)
         draw = partial(index.draw, folder=report)
-    classified = classify_files(
-        found,
-        library,
-        reading=reading,
-        unknown=unknown,
-        localise=localise or any(each.by_joint for each in expected.values()),
-        draw=draw,
-        jobs=jobs,
-    )
+    settings: dict[str, Any] = {
+        "reading": reading,
+        "unknown": unknown,
+        "localise": localise or any(each.by_joint for each in expected.values()),
+        "draw": draw,
+        "jobs": jobs,
+    }
+    if resume is None:
+        classified = classify_files(found, library, **settings)
+    else:
+        from inspector.analysis.resuming import classify_resumed
+
+        classified = classify_resumed(found, library, resume, **settings)
+    classified = progress(classified, "classify", total=len(found))
+    place = {path: number for number, path in enumerate(shown)}
     verdicts = [
         replace(
             judge(each, expected.get(each.path), gate=gate, today=today),
             ignored=each.status is Status.BAD_INPUT and on_bad_input is BadInput.IGNORE,
             picture_url=_url(each, report_url),
         )
-        for each in progress(classified, "classify", total=len(found))
+        for each in sorted(classified, key=lambda each: place[each.path])
     ]
     for expectations in _whole(runs, expected.values()) if expect is None else ():
         if (absent := without_run(verdicts, expectations)) is not None:

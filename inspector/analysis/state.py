@@ -1,0 +1,194 @@
+"""The state of a batch: one line of JSON per verdict, so that a killed batch resumes.
+
+The first line is the header: models and settings. A verdict is appended as soon as it is there,
+with the SHA-256 of its input. A line without its end was being written when the process was
+killed: it is dropped. Of several verdicts on a run the last one of its present content counts.
+Internal errors are not kept: these runs are tried again.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from inspector.analysis.status import Status, Unknown
+from inspector.analysis.verdict import Verdict
+from inspector.errors import InspectorError
+from inspector.localisation.order import Order
+from inspector.localisation.stage import Localisation
+from models import Event
+
+FORMAT = "noise-classify-state/1"
+
+
+class StateError(InspectorError):
+    """A state file that a batch cannot resume.
+
+    Args:
+        path: The file.
+        problem: What is wrong with it, in one line.
+    """
+
+    def __init__(self, path: Path, problem: str) -> None:
+        self.path, self.problem = path, problem
+        super().__init__(f"{path}: {problem}; name another file, or delete it")
+
+
+@dataclass(eq=False)
+class State:
+    """The verdicts so far.
+
+    Attributes:
+        path: The file.
+        verdicts: By run and SHA-256 of its content.
+    """
+
+    path: Path
+    verdicts: dict[tuple[Path, str], Verdict]
+    _file: IO[bytes]
+
+    def add(self, verdict: Verdict, sha256: str) -> None:
+        """Append a verdict, flushed to the disk.
+
+        Raises:
+            InspectorError: If it cannot be written.
+        """
+        if verdict.status is not Status.INTERNAL_ERROR:
+            _append(self.path, self._file, {"sha256": sha256, **_as_dict(verdict)})
+
+
+@contextmanager
+def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
+    """Open a state file to resume, or create it.
+
+    Args:
+        path: The file.
+        settings: Models and settings, by name, as JSON can hold them.
+
+    Yields:
+        The state so far.
+
+    Raises:
+        StateError: If the file is no such file, is damaged, or of other models or settings.
+        InspectorError: If it cannot be read or written, or another process is writing it.
+    """
+    try:
+        file = path.open("a+b")
+    except OSError as error:
+        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError as error:
+            raise InspectorError(
+                f"{path}: is being written by another process; wait for it, or name another file"
+            ) from error
+        file.seek(0)
+        whole, end, torn = file.read().rpartition(b"\n")
+        header = {"format": FORMAT, **settings}
+        verdicts = {}
+        if end:
+            first, *rows = whole.split(b"\n")
+            _check_header(path, first, header)
+            for number, row in enumerate(rows, start=2):
+                try:
+                    content = json.loads(row)
+                    verdict = _verdict(content)
+                    verdicts[verdict.path, content["sha256"]] = verdict
+                except (ValueError, KeyError, TypeError) as error:
+                    raise StateError(path, f"is damaged in line {number}") from error
+        elif not json.dumps(header).encode().startswith(torn):
+            raise StateError(path, "holds no state of classify")
+        file.truncate(len(whole) + len(end))
+        if not end:
+            _append(path, file, header)
+        yield State(path, verdicts, file)
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, or of all names and files in a folder; empty if it cannot be read."""
+    try:
+        if path.is_file():
+            with path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        inside = sorted(each for each in path.rglob("*") if each.is_file())
+        lines = [f"{each.relative_to(path)} {digest(each)}" for each in inside]
+        return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+    except OSError:
+        return ""
+
+
+def _append(path: Path, file: IO[bytes], content: Mapping[str, Any]) -> None:
+    try:
+        file.write(json.dumps(content).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+    except OSError as error:
+        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
+    try:
+        there = json.loads(line)
+    except ValueError:
+        there = None
+    if not isinstance(there, dict) or there.get("format") != header["format"]:
+        raise StateError(path, "holds no state of classify")
+    for name, value in header.items():
+        if there.get(name) != value:
+            raise StateError(path, f"is of other {name}")
+
+
+def _as_dict(verdict: Verdict) -> dict[str, Any]:
+    return {
+        "run": str(verdict.path),
+        "status": verdict.status.value,
+        "unknown": verdict.unknown.value,
+        "events": [
+            {
+                **asdict(event),
+                "localisation": event in verdict.localisations
+                and asdict(verdict.localisations[event]),
+                "order": event in verdict.orders and asdict(verdict.orders[event]),
+            }
+            for event in verdict.events
+        ],
+        "picture": None if verdict.picture is None else str(verdict.picture),
+        **{name: getattr(verdict, name) for name in PLAIN},
+    }
+
+
+PLAIN = ("model", "message", "model_sha256", "assumed", "scenario", "duration", "seconds", "lost")
+"""Attributes of a verdict that JSON can hold as they are."""
+
+
+def _verdict(content: Mapping[str, Any]) -> Verdict:
+    localisations, orders, events = {}, {}, []
+    for row in content["events"]:
+        localisation, order = row.pop("localisation"), row.pop("order")
+        event = Event(**row)
+        events.append(event)
+        if order:
+            orders[event] = Order(**order)
+        if localisation:
+            joints = tuple((name, share) for name, share in localisation.pop("joints"))
+            band = localisation.pop("band")
+            localisations[event] = Localisation(
+                **localisation, joints=joints, band=None if band is None else tuple(band)
+            )
+    plain = {name: content[name] for name in PLAIN}
+    return Verdict(
+        Path(content["run"]),
+        Status(content["status"]),
+        events=tuple(events),
+        unknown=Unknown(content["unknown"]),
+        localisations=localisations,
+        orders=orders,
+        picture=None if content["picture"] is None else Path(content["picture"]),
+        **{**plain, "lost": tuple(plain["lost"])},
+    )

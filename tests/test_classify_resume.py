@@ -1,0 +1,84 @@
+"""A batch that is killed and resumes."""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from commandline import call
+
+from inspector.assets import demo_run
+
+ROOT = Path(__file__).parents[1]
+COUNT = 24
+
+
+@pytest.fixture
+def runs(tmp_path):
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for number in range(COUNT):
+        shutil.copy(demo_run(), folder / f"{number:02d}.npz")
+    return folder
+
+
+def rows(state):
+    return [json.loads(line) for line in state.read_bytes().split(b"\n")[1:-1]]
+
+
+def start(*arguments):
+    command = [sys.executable, "-m", "inspector", *map(str, arguments)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, jobs):
+    state = tmp_path / "state.jsonl"
+    process = start("classify", runs, "--resume", state, "-j", jobs)
+    while not state.exists() or len(state.read_bytes().split(b"\n")) < 5:
+        assert process.poll() is None
+        time.sleep(0.005)
+    process.kill()
+    process.wait()
+    before = rows(state)
+    assert 0 < len(before) < COUNT
+    with state.open("ab") as file:
+        file.write(b'{"run": "half a li')
+    status, out, err = call("classify", runs, "--resume", state, "-j", jobs)
+    assert status == 1, err
+    after = rows(state)
+    assert after[: len(before)] == before
+    assert sorted(row["run"] for row in after) == sorted(map(str, runs.glob("*.npz")))
+    assert call("classify", runs)[1] == out
+
+
+def test_only_what_changed_is_done_again(runs, tmp_path):
+    state = tmp_path / "state.jsonl"
+    first = call("classify", runs, "--format", "json", "--localise", "--resume", state)[1]
+    again = call("classify", runs, "--format", "json", "--localise", "--resume", state)[1]
+    assert again == first
+    assert len(rows(state)) == COUNT
+    (runs / "03.npz").write_text("broken")
+    status, _, err = call("classify", runs, "--localise", "--format", "json", "--resume", state)
+    assert status == 3
+    assert "03.npz" in err
+    assert len(rows(state)) == COUNT + 1
+    assert rows(state)[-1]["status"] == "bad-input"
+
+
+def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
+    state = tmp_path / "state.jsonl"
+    call("classify", demo_run(), "--resume", state)
+    status, _, err = call("classify", demo_run(), "--resume", state, "--unknown", "ignore")
+    assert (status, err) == (
+        3,
+        f"inspector: {state}: is of other settings; name another file, or delete it\n",
+    )
+    state.write_text("some notes")
+    status, _, err = call("classify", demo_run(), "--resume", state)
+    assert status == 3
+    assert "holds no state of classify" in err
+    assert state.read_text() == "some notes"
