@@ -1,6 +1,7 @@
 """A batch that is killed and resumes."""
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -10,7 +11,9 @@ from pathlib import Path
 import pytest
 from commandline import call
 
+from inspector.analysis import verdict
 from inspector.assets import demo_run
+from inspector.logs.opening import open_source
 
 ROOT = Path(__file__).parents[1]
 COUNT = 24
@@ -82,3 +85,17 @@ def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
     assert status == 3
     assert "holds no state of classify" in err
     assert state.read_text() == "some notes"
+
+
+def test_a_run_that_kills_its_worker_is_named_and_the_others_are_classified(runs, monkeypatch):
+    monkeypatch.setattr(verdict, "open_source", die_of_seven)
+    status, out, err = call("classify", runs, "-j", 2)
+    assert status == 70
+    assert out.splitlines()[-1].startswith(f"{COUNT} runs: 1 internal error, {COUNT - 1} with")
+    assert f"inspector: {runs}/07.npz: the worker died" in err
+
+
+def die_of_seven(source, reading=None):
+    if source.path.name == "07.npz":
+        os._exit(137)
+    return open_source(source, reading)
