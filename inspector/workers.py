@@ -1,6 +1,6 @@
 """Many runs in several processes: one that dies is replaced, and its run named.
 
-Workers are forked where that is safe: then they start in 30 ms, with all modules and models in
+Workers are forked where that is safe: then they start at once, with all modules and models in
 place, and several are faster from a few runs on. It is not safe with threads in this process,
 nor on macOS, and does not exist on Windows. There joblib's loky starts fresh interpreters, which
 takes about `FRESH` seconds.
