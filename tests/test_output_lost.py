@@ -105,6 +105,18 @@ def test_a_file_that_exists_is_wrong_input_and_not_lost_output(tmp_path):
     assert "exists already" in done.stderr
 
 
+def test_run_files_that_cannot_be_written_are_lost_output_and_not_bad_logs(tmp_path):
+    logs, imported = tmp_path / "logs", tmp_path / "imported"
+    logs.mkdir()
+    for name in ("a.csv", "b.csv"):
+        (logs / name).write_text(ROWS)
+    done = run("import", logs, "-o", imported, limit=8000)
+    lines = [f"inspector: {imported / name}: {TOO_LARGE}" for name in ("a.npz", "b.npz")]
+    assert done.stderr.splitlines() == lines
+    assert done.returncode == 5
+    assert os.listdir(imported) == []
+
+
 def children(pid):
     found = subprocess.run(["pgrep", "-P", str(pid)], capture_output=True, text=True, check=False)
     return [int(each) for each in found.stdout.split()]

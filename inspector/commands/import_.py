@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inspector.analysis.status import EXIT, OUTPUT_LOST, Status, worst
 from inspector.commands.options import Overwrite, reads_logs
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def import_(
 ) -> None:
     """Convert logs of robots to run files.
 
-    The exit status is 3 if a log cannot be read; the others are written.
+    The exit status is 3 if a log cannot be read, 5 if a run file cannot be written; the others are.
     """
     from inspector.logs.batch import import_logs
     from inspector.logs.reading import listing
@@ -49,7 +50,7 @@ def import_(
         return
     if output is None:
         raise typer.BadParameter("name the run file to write", param_hint="'--output' / '-o'")
-    failed = False
+    statuses = [0]
     for result in import_logs(
         logs,
         output,
@@ -59,8 +60,8 @@ def import_(
         overwrite=overwrite,
         progress=_progress,
     ):
-        failed |= bool(result.problem)
         if result.problem:
+            statuses.append(OUTPUT_LOST if result.lost else EXIT[Status.BAD_INPUT])
             typer.echo(f"inspector: {result.problem}", err=True)
             continue
         for remark in result.remarks:
@@ -68,8 +69,7 @@ def import_(
         typer.echo(f"{result.path}: {result.duration:.2f} s at {result.rate:g} Hz")
     if save_mapping:
         options.save(save_mapping, overwrite=overwrite)
-    if failed:
-        raise typer.Exit(3)
+    raise typer.Exit(worst(statuses))
 
 
 def _progress(items: Iterable[Any], total: int) -> Iterator[Any]:

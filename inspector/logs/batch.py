@@ -11,7 +11,7 @@ from inspector.logs.opening import logs_in
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import Job, jobs_of
 from inspector.wrongrobot import limit_warnings
-from noisemodel import NoiseModelError
+from noisemodel import NoiseModelError, OutputError
 from noisemodel.atomic import refuse_existing, replacing
 
 
@@ -25,6 +25,7 @@ class Written:
         rate: Of the run, in [Hz].
         remarks: What was decided during the import, a sentence each.
         problem: Why there is no run file; empty if there is one.
+        lost: Whether the log could be read and the run file not be written.
     """
 
     path: Path
@@ -32,6 +33,7 @@ class Written:
     rate: float = 0.0
     remarks: tuple[str, ...] = ()
     problem: str = ""
+    lost: bool = False
 
 
 def import_logs(
@@ -86,7 +88,8 @@ def import_logs(
         except (InspectorError, NoiseModelError) as error:
             if len(targets) == 1 and not several:
                 raise
-            yield Written(target, problem=str(error))
+            lost = isinstance(error, OutputError) and isinstance(error.__cause__, OSError)
+            yield Written(target, problem=str(error), lost=lost)
 
 
 def _targets(
