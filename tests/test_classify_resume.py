@@ -37,7 +37,7 @@ def start(*arguments):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
+@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, jobs):
     state = tmp_path / "state.jsonl"
     process = start("classify", runs, "--resume", state, "-j", jobs)

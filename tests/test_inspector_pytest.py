@@ -23,6 +23,8 @@ def run(seed, tone=0.0):
     return Run(time=time, velocity=velocity, joint_names=("elbow", "wrist"))
 """
 
+PROCESSES = [(), pytest.param(("-p", "xdist", "-n", "2"), marks=pytest.mark.slow)]
+
 
 @pytest.fixture
 def project(tmp_path):
@@ -61,7 +63,7 @@ def test_allowed_elsewhere(noise):
 """
 
 
-@pytest.mark.parametrize("processes", [(), ("-p", "xdist", "-n", "2")])
+@pytest.mark.parametrize("processes", PROCESSES)
 def test_a_finding_fails_with_its_name_a_recording_and_a_picture(project, tmp_path, processes):
     status, out = project(QUIET, *processes, "--junitxml", tmp_path / "junit.xml")
     assert status == 1
@@ -93,7 +95,7 @@ def test_repetitions(noise):
 """
 
 
-@pytest.mark.parametrize("processes", [(), ("-p", "xdist", "-n", "2")])
+@pytest.mark.parametrize("processes", PROCESSES)
 def test_runs_are_compared_with_stored_ones(project, tmp_path, processes):
     status, out = project(WORSE.format(tone=0.0, first=0), *processes)
     assert status == 1
