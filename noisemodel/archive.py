@@ -28,7 +28,8 @@ RATIO = 20
 """A large file may unpack to so many times its own size; the numbers of logs hardly shrink."""
 
 DAMAGE = (EOFError, MemoryError, RuntimeError, struct.error, zlib.error, lzma.LZMAError)
-"""What zipfile and NumPy raise on archives that are broken, encrypted or state a wrong size."""
+"""What zipfile and NumPy raise on archives that are broken, encrypted, of a kind that zipfile does
+not read, or state a wrong size."""
 
 PIECE = 2**20
 """Bytes that are unpacked at once."""
@@ -179,7 +180,7 @@ def _opened(path: Path, use: Callable[[zipfile.ZipFile], Result]) -> Result:
             return use(archive)
     except zipfile.BadZipFile as error:
         raise ArchiveError(one_line(error)) from error
-    except DAMAGE as error:  # NotImplementedError is a RuntimeError
+    except DAMAGE as error:
         raise ArchiveError(f"damaged: {one_line(error)}") from error
 
 
