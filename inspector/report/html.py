@@ -82,14 +82,7 @@ def page(analysis: Analysis, *, audit: str = "") -> str:
     """
     from inspector.report.picture import picture
 
-    html = ET.Element("html", lang="en")
-    head = ET.SubElement(html, "head")
-    ET.SubElement(head, "meta", charset="utf-8")
-    ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": POLICY})
-    ET.SubElement(head, "meta", name="viewport", content="width=device-width")
-    add_text(head, "title", f"{analysis.name}: {analysis.headline}")
-    add_text(head, "style", STYLE)
-    body = ET.SubElement(html, "body")
+    html, body = document(f"{analysis.name}: {analysis.headline}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
     add_text(body, "p", analysis.headline, "verdict")
     _add_table(body, facts(analysis))
@@ -167,6 +160,24 @@ def _add_list(body: ET.Element, title: str, lines: tuple[str, ...] | list[str]) 
         items = ET.SubElement(body, "ul")
         for line in lines:
             add_text(items, "li", line.strip())
+
+
+def document(title: str, style: str, policy: str) -> tuple[ET.Element, ET.Element]:
+    """An HTML page without content, and its body.
+
+    Args:
+        title: Its title.
+        style: Its style sheet.
+        policy: Its content security policy.
+    """
+    html = ET.Element("html", lang="en")
+    head = ET.SubElement(html, "head")
+    ET.SubElement(head, "meta", charset="utf-8")
+    ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": policy})
+    ET.SubElement(head, "meta", name="viewport", content="width=device-width")
+    add_text(head, "title", title)
+    add_text(head, "style", style)
+    return html, ET.SubElement(html, "body")
 
 
 def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:

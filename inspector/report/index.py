@@ -11,7 +11,7 @@ from inspector.analysis.status import Status
 from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError
 from inspector.report.formats import WORDS, excused, failing, summary
-from inspector.report.html import STYLE, add_text
+from inspector.report.html import STYLE, add_text, document
 from noisemodel.atomic import replacing
 
 PAGE = "index.html"
@@ -107,14 +107,7 @@ def page(verdicts: Sequence[Verdict]) -> str:
     Returns:
         HTML.
     """
-    html = ET.Element("html", lang="en")
-    head = ET.SubElement(html, "head")
-    ET.SubElement(head, "meta", charset="utf-8")
-    ET.SubElement(head, "meta", {"http-equiv": "Content-Security-Policy", "content": POLICY})
-    ET.SubElement(head, "meta", name="viewport", content="width=device-width")
-    add_text(head, "title", f"Noise: {summary(verdicts)}")
-    add_text(head, "style", STYLE + ROWS)
-    body = ET.SubElement(html, "body")
+    html, body = document(f"Noise: {summary(verdicts)}", STYLE + ROWS, POLICY)
     add_text(body, "h1", "Noise of the joints")
     add_text(body, "p", summary(verdicts), "verdict")
     table = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
