@@ -38,6 +38,8 @@ which much of a motion may have, and a probability at the alarm threshold is abo
 EXCESS = 0.4
 """Mean by which alarms in the good motion of a robot exceed a level, in log odds: that of twelve
 simulated robots of the source domains."""
+GOOD_RUNS, ITSELF = "good runs", "the signal itself"
+"""What features may be relative to."""
 FITTED = 10
 """Alarms by which its tail is fitted at most: log odds below fall faster."""
 
@@ -71,9 +73,10 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
         unit = "log odds of a failure"
         return limit(failing, good, half, least=least, fitted=FITTED, expected=EXCESS, unit=unit)
 
-    limits = [(limit_of(each), each) for each in (by_others, by_itself)]
-    itself = limits[1][0].distance < limits[0][0].distance
-    odds, failing = limits[itself]
+    scores = {GOOD_RUNS: by_others, ITSELF: by_itself}
+    limits = {name: limit_of(failing) for name, failing in scores.items()}
+    reference = min(limits, key=lambda name: limits[name].distance)
+    odds, failing = limits[reference], scores[reference]
     far = limit(novel, good, half, least=max(counted(novel, good, allowed), NOVELTY_LIMIT))
     beyond = np.maximum(failing - odds.distance, novel - far.distance)
     found = replace(odds, budget=alarms, alarms=len(alarm_peaks(beyond, good, 0.0)))
@@ -83,7 +86,7 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
         "novelty": far.distance,
         "groups": groups,
         "runs": len(good.hashes),
-        "reference": "the signal itself" if itself else "good runs",
+        "reference": reference,
     }
 
     everything = np.arange(len(good))
@@ -96,7 +99,7 @@ def adapt(general: Classifier, good: GoodMotion, *, alarms: float = 1.0) -> Lear
     classifier = replace(
         general,
         estimator=replace(trees, known=known, calibration=calibration),
-        reference=None if itself else Reference.of(plain),
+        reference=Reference.of(plain) if reference == GOOD_RUNS else None,
         runs={**general.runs, **good.hashes},
         metrics={**general.metrics, "adapted": facts},
     )
