@@ -1,9 +1,9 @@
 """Many runs in several processes: one that dies is replaced, and its run named.
 
 Workers are forked where that is safe: then they start at once, with all modules and models in
-place, and several are faster from a few runs on. It is not safe with threads in this process,
-nor on macOS, and does not exist on Windows. There joblib's loky starts fresh interpreters, which
-takes about `FRESH` seconds.
+place, and several are faster from a few runs on. It is not safe with other threads in this process,
+of Python or of a library, nor on macOS, and does not exist on Windows. There joblib's loky starts
+fresh interpreters, which takes about `FRESH` seconds.
 """
 
 import multiprocessing
@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, TypeVar
 
 Item = TypeVar("Item")
@@ -106,7 +107,7 @@ def as_done(
 
 def _forks() -> bool:
     """Whether a fork is safe: of a process with other threads one may hold a lock for ever."""
-    return sys.platform == "linux" and threading.active_count() == 1
+    return sys.platform == "linux" and len([*Path("/proc/self/task").iterdir()]) == 1
 
 
 def _pool(function: Callable[..., Any], jobs: int) -> Executor:
