@@ -2,6 +2,7 @@ import csv
 import json
 import sys
 from itertools import islice
+from xml.etree import ElementTree
 
 import numpy as np
 import pyarrow.parquet
@@ -28,7 +29,8 @@ def exported(demo, tmp_path_factory):
     """The demo in all formats, and what was to be written."""
     folder = tmp_path_factory.mktemp("export")
     for suffix in ("mcap", "csv", "parquet"):
-        content = export(demo, folder / f"demo.{suffix}", LIBRARY)
+        layouts = suffix == "mcap"
+        content = export(demo, folder / f"demo.{suffix}", LIBRARY, layouts=layouts)
     return folder, content
 
 
@@ -152,17 +154,68 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
     folder, content = exported
     with (folder / "demo.mcap").open("rb") as stream:
         summary = make_reader(stream).get_summary()
-    assert summary.statistics.message_count == (
-        len(demo.time)
-        + len(content.analysis.labels)
-        + len(content.analysis.findings)
-        + len(demo.blocks)
-    )
-    assert {channel.message_encoding for channel in summary.channels.values()} == {"json"}
+    count = {
+        channel.topic: summary.statistics.channel_message_counts[key]
+        for key, channel in summary.channels.items()
+    }
+    assert count == {
+        "/joint_states": len(demo.time),
+        "/joint_states/desired": len(demo.time),
+        "/noise": len(demo.time),
+        "/labels": len(content.analysis.labels),
+        "/class": len(content.analysis.lane) + 1,
+        "/findings": len(content.analysis.findings),
+        "/log": len(content.analysis.findings),
+        "/annotations": len(demo.blocks),
+    }
     for channel in summary.channels.values():
         schema = summary.schemas[channel.schema_id]  # PlotJuggler takes no channel without
-        assert schema.encoding == "jsonschema"
-        assert json.loads(schema.data)["type"] == "object"
+        if channel.message_encoding == "json":
+            assert schema.encoding == "jsonschema"
+            assert json.loads(schema.data)["type"] == "object"
+        else:
+            assert (channel.message_encoding, schema.encoding) == ("cdr", "ros2msg")
+            assert schema.name == "sensor_msgs/msg/JointState"
+
+
+def test_an_exported_run_is_imported_again_to_the_bit(exported, demo, tmp_path):
+    folder, _ = exported
+    status, out, err = call(
+        "import", folder / "demo.mcap", "-o", tmp_path / "back.npz", "--robot", "panda"
+    )
+    assert (status, err) == (0, "")
+    assert "damaged" not in out
+    back = Run.load(tmp_path / "back.npz")
+    assert back.joint_names == demo.joint_names
+    for name in ("position", "velocity", "velocity_desired", "mask"):
+        np.testing.assert_array_equal(getattr(back, name), getattr(demo, name))
+
+
+def test_the_class_ends_where_the_frames_end(exported):
+    folder, content = exported
+    changes = messages(folder / "demo.mcap", "/class")
+    lane = content.analysis.lane
+    assert [each["label"] for _, each in changes] == [*(name for _, _, name in lane), ""]
+    np.testing.assert_allclose(
+        [at * 1e-9 for at, _ in changes], [*(start for start, _, _ in lane), lane[-1][1]]
+    )
+
+
+def test_the_class_is_empty_where_no_frame_is(tmp_path):
+    valid = np.ones(4000, dtype=bool)
+    valid[1800:2200] = False
+    export(plain_run(seconds=4.0, valid=valid), tmp_path / "run.mcap", LIBRARY)
+    labels = [each["label"] for _, each in messages(tmp_path / "run.mcap", "/class")]
+    assert labels == ["ok", "", "ok", ""]
+
+
+def test_each_finding_is_a_line_of_the_log(exported):
+    folder, content = exported
+    lines = messages(folder / "demo.mcap", "/log")
+    (event,) = content.analysis.findings
+    ((at, line),) = lines
+    assert line["timestamp"] == {"sec": at // 10**9, "nsec": at % 10**9}
+    assert line["message"] == f"impact from {event.start:.2f} s to {event.stop:.2f} s"
 
 
 def test_mcap_holds_the_noise_to_the_bit(exported, demo):
@@ -191,7 +244,9 @@ def test_mcap_holds_labels_scores_findings_and_annotations(exported, demo):
 def test_messages_keep_their_schema(exported):
     folder, _ = exported
     with (folder / "demo.mcap").open("rb") as stream:
-        for schema, _, message in islice(make_reader(stream).iter_messages(), 0, None, 50):
+        topics = ["/noise", "/labels", "/class", "/findings", "/log", "/annotations"]
+        found = make_reader(stream).iter_messages(topics=topics)
+        for schema, _, message in islice(found, 0, None, 20):
             assert json.loads(message.data).keys() == json.loads(schema.data)["properties"].keys()
 
 
@@ -212,6 +267,59 @@ def test_a_run_before_time_0_is_shifted(tmp_path):
     export(plain_run(start=-1.0), tmp_path / "run.mcap", LIBRARY)
     (first, noise), *_ = messages(tmp_path / "run.mcap", "/noise")
     assert (first, noise["time"]) == (0, -1.0)
+
+
+# --- layouts
+
+
+def test_every_line_of_the_layouts_is_in_the_file(exported, demo):
+    folder, _ = exported
+    with (folder / "demo.mcap").open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    fields = {
+        f"{channel.topic}.{field}"
+        for channel in summary.channels.values()
+        if channel.message_encoding == "json"
+        for field in json.loads(summary.schemas[channel.schema_id].data)["properties"]
+    }
+    topics = ("/joint_states", "/joint_states/desired")
+    places = {f"{topic}.velocity[{i}]" for topic in topics for i in range(7)}
+    foxglove = json.loads((folder / "demo.foxglove.json").read_text())
+    panels = foxglove["configById"]
+    shown = {path["value"] for panel in panels.values() for path in panel.get("paths", ())}
+    assert shown <= fields | places
+    assert shown >= places | {"/noise.simplified", "/labels.failure", "/class.label"}
+    assert panels["RosOut!findings"]["topicToRender"] == "/log"
+    assert sorted(panels) == sorted(panels_of(foxglove["layout"]))
+    joints = {f"{topic}/{name}/velocity" for topic in topics for name in demo.joint_names}
+    curves = ElementTree.parse(folder / "demo.plotjuggler.xml").iter("curve")
+    names = {curve.get("name") for curve in curves}
+    assert names == joints | {"/noise/simplified", "/labels/failure"}
+
+
+def panels_of(layout):
+    """Names of the panels of a layout of Foxglove."""
+    if isinstance(layout, str):
+        return [layout]
+    return [*panels_of(layout["first"]), *panels_of(layout["second"])]
+
+
+def test_a_layout_has_no_panel_for_what_is_not_there(tmp_path):
+    export(plain_run(rate=50.0), tmp_path / "run.mcap", LIBRARY, layouts=True)
+    foxglove = json.loads((tmp_path / "run.foxglove.json").read_text())
+    assert panels_of(foxglove["layout"]) == ["Plot!noise", "Plot!measured"]
+
+
+def test_layouts_are_for_mcap_and_replace_nothing_unasked(tmp_path):
+    plain_run().save(tmp_path / "run.npz")
+    status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "a.csv", "--layouts")
+    assert (status, err) == (3, f"inspector: {tmp_path / 'a.csv'}: layouts are for .mcap\n")
+    (tmp_path / "run.foxglove.json").write_text("mine")
+    status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap", "--layouts")
+    assert status == 3
+    assert "run.foxglove.json: exists already" in err
+    assert (tmp_path / "run.foxglove.json").read_text() == "mine"
+    assert not (tmp_path / "run.mcap").exists()
 
 
 # --- bad input

@@ -21,21 +21,36 @@ def export(
         str, typer.Option("--kind", help="Extended noise: normal, rms, mean, paper, A, B or C.")
     ] = "normal",
     model: ModelFiles = None,
+    layouts: Annotated[
+        bool,
+        typer.Option("--layouts", help="Write layouts for Foxglove and PlotJuggler beside .mcap."),
+    ] = False,
     overwrite: Overwrite = False,
     *,
     reading: "Reading",
 ) -> None:
     """Write noise, labels and scores as MCAP, CSV or Parquet.
 
-    Foxglove and PlotJuggler read MCAP; data frames read CSV and Parquet.
+    Foxglove and PlotJuggler read MCAP, which holds the joints' motion as well; data frames read
+    CSV and Parquet.
     """
     from inspector import assets
+    from inspector.export import LAYOUTS
     from inspector.export import export as write
     from inspector.library import load_library
 
     library = load_library(assets.model_files(model))
-    found = write(opened(run, reading).run, output, library, kind=kind, overwrite=overwrite)
+    found = write(
+        opened(run, reading).run,
+        output,
+        library,
+        kind=kind,
+        overwrite=overwrite,
+        layouts=layouts,
+    )
     typer.echo(f"{run}: {found.analysis.headline}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")
     typer.echo(f"{output}: {found}")
+    if layouts:
+        typer.echo(f"  layouts: {', '.join(str(output.with_suffix(each)) for each in LAYOUTS)}")

@@ -1,4 +1,4 @@
-"""Bags that were cut off or are damaged, read record by record."""
+"""Bags that rosbags cannot open, as it is with damaged ones, read record by record."""
 
 import sqlite3
 from collections import deque
@@ -26,11 +26,14 @@ def open_bag(path: Path, problem: str) -> Bag:
     if len(storages) != 1 or storages == {""}:
         raise LogError(path, f"not a bag that can be read: {problem}")
     storage = storages.pop()
-    bag = Bag(f"damaged bag ({storage})", storage == "ROS 1", {}, lambda names: iter(()))
-    bag.lost.append(f"the bag is damaged or cut off ({problem})")
+    whole = storage == "MCAP" and all(mcaprecords.is_whole(file) for file in files)
+    kind = storage if whole else f"damaged bag ({storage})"
+    bag = Bag(kind, storage == "ROS 1", {}, lambda names: iter(()))
+    if not whole:
+        bag.lost.append(f"the bag is damaged or cut off ({problem})")
     for file in files:
         bag.topics |= {topic.name: topic for topic in _topics(file, storage, bag)}
-    bag.messages = lambda names: _messages(files, storage, bag, names)
+    bag.messages = lambda names: _messages(files, storage, bag, names, whole=whole)
     if not bag.topics:
         raise LogError(path, f"no topic of the bag can be read: {problem}")
     return bag
@@ -45,7 +48,7 @@ def _topics(file: Path, storage: str, bag: Bag) -> Iterator[Topic]:
 
 
 def _messages(
-    files: Collection[Path], storage: str, bag: Bag, names: Collection[str]
+    files: Collection[Path], storage: str, bag: Bag, names: Collection[str], *, whole: bool
 ) -> Iterator[Message]:
     count = 0
     for file in files:
@@ -58,7 +61,8 @@ def _messages(
             if message[0] in names:
                 yield message
                 count += 1
-    bag.lost.append(f"{count} messages were recovered")
+    if not whole:
+        bag.lost.append(f"{count} messages were recovered")
 
 
 def _sqlite_topics(file: Path) -> Iterator[Topic]:

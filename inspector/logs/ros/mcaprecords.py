@@ -1,6 +1,7 @@
 """Topics and messages of an MCAP file without its index, read record by record.
 
-A file that was cut off has lost the index at its end. https://mcap.dev/spec
+A file that was cut off has lost the index at its end; one with other messages beside those of ROS,
+as Foxglove writes it, rosbags refuses. https://mcap.dev/spec
 """
 
 from collections.abc import Iterator
@@ -14,6 +15,16 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 from inspector.logs.ros import chunks
 from inspector.logs.ros.bag import Message, Topic
 from noisemodel.archive import ArchiveError
+
+MAGIC = b"\x89MCAP0\r\n"
+"""The bytes with which a file begins and ends."""
+
+
+def is_whole(path: Path) -> bool:
+    """Whether a file was written to its end."""
+    with path.open("rb") as stream:
+        stream.seek(max(0, path.stat().st_size - len(MAGIC)))
+        return stream.read() == MAGIC
 
 
 def topics(path: Path) -> Iterator[Topic]:
