@@ -11,7 +11,7 @@ import hashlib
 import json
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -22,6 +22,7 @@ from inspector.errors import InspectorError
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from models import Event
+from noisemodel import OutputError
 
 FORMAT = "noise-classify-state/1"
 
@@ -56,7 +57,7 @@ class State:
         """Append a verdict, flushed to the disk.
 
         Raises:
-            InspectorError: If it cannot be written.
+            OutputError: If it cannot be written.
         """
         if verdict.status is not Status.INTERNAL_ERROR:
             _append(self.path, self._file, {"sha256": sha256, **_as_dict(verdict)})
@@ -75,13 +76,14 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
 
     Raises:
         StateError: If the file is no such file, is damaged, or of other models or settings.
-        InspectorError: If it cannot be read or written, or another process is writing it.
+        InspectorError: If another process is writing it.
+        OutputError: If it cannot be written.
     """
     try:
         file = path.open("a+b")
     except OSError as error:
-        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
-    with file:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with _closing(file):
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
@@ -129,7 +131,17 @@ def _append(path: Path, file: IO[bytes], content: Mapping[str, Any]) -> None:
         file.flush()
         os.fsync(file.fileno())
     except OSError as error:
-        raise InspectorError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+@contextmanager
+def _closing(file: IO[bytes]) -> Iterator[None]:
+    """Close a file in the end; what it could not write has been said by then."""
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            file.close()
 
 
 def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:

@@ -10,15 +10,14 @@ from rerun.blueprint import Blueprint
 from inspector import colors
 from inspector.recording import series, unstable
 from inspector.recording.spectrogram import TOP_HZ, log_bands
+from inspector.recording.stream import writing
 from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
 from noisemodel import Comparisons, RobotComparison
-from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
 from noisemodel.noise import decibel
 from noisemodel.types import Array
 
-APPLICATION = "inspector"
 STEP = 0.01
 """Time over which a level is taken, in [s]."""
 FLOOR_DB = -60.0
@@ -41,16 +40,13 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
     text = str(found)
     # The same comparison has the same id: opened again, it replaces itself in the viewer.
     identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
-    with replacing(path, overwrite=overwrite) as temporary:
-        recording = rr.RecordingStream(APPLICATION, recording_id=identity.hexdigest()[:32])
-        recording.save(temporary, default_blueprint=layout(found))
+    with writing(path, identity.hexdigest(), overwrite=overwrite) as recording:
+        recording.send_blueprint(layout(found))
         for one in found:
             _log(recording, one)
         document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
         recording.log("/report", document, static=True)
         recording.send_recording_name(f"noise models: {', '.join(one.name for one in found)}")
-        recording.flush()
-        recording.disconnect()
 
 
 def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:

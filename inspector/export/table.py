@@ -56,7 +56,8 @@ def write_parquet(content: Content, path: Path) -> None:
     """
     from pyarrow import parquet
 
-    parquet.write_table(arrow_table(content), path, compression="zstd")
+    with path.open("wb") as file:  # its own errors lack the number
+        parquet.write_table(arrow_table(content), file, compression="zstd")
 
 
 def write_csv(content: Content, path: Path) -> None:
