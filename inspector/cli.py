@@ -33,6 +33,7 @@ from inspector.commands.smoothness import smoothness
 from inspector.commands.train import train
 from inspector.commands.tune import tune
 from inspector.commands.view import view
+from inspector.text import printable
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -104,6 +105,10 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):  # names of files need not be text in their encoding
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
+    odd = next((each for each in sys.argv[1:] if printable(each) != each), None)
+    if odd is not None:
+        typer.echo(f"inspector: {printable(odd)}: has control characters", err=True)
+        sys.exit(2)
     status = _run(output)
     if output is not None:
         with suppress(OSError):
@@ -167,7 +172,7 @@ def _failed(error: Exception) -> int:
         from scenarios import ScenarioError
 
         if isinstance(error, (*EXPECTED, ScenarioError)):
-            typer.echo(f"inspector: {error}", err=True)
+            typer.echo(f"inspector: {printable(str(error))}", err=True)
             output = isinstance(error, (noisemodel.OutputError, models.OutputError))
             return OUTPUT_LOST if output and isinstance(error.__cause__, OSError) else 3
     traceback.print_exception(error)

@@ -42,11 +42,12 @@ def import_(
     """
     from inspector.logs.batch import import_logs
     from inspector.logs.reading import listing
+    from inspector.text import printable
 
     options = reading.options
     if list_:
         for line in (line for log in logs for line in listing(log, options)):
-            typer.echo(line)
+            typer.echo(printable(line))
         return
     if output is None:
         raise typer.BadParameter("name the run file to write", param_hint="'--output' / '-o'")

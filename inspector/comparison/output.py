@@ -6,6 +6,7 @@ from pathlib import Path
 
 from inspector.comparison import picture
 from inspector.errors import InspectorError
+from inspector.text import cell
 from noisemodel import Comparisons
 from noisemodel.atomic import refuse_existing, replacing
 
@@ -94,4 +95,6 @@ def _cell(name: str, value: str | bool | int | float) -> str | int:
     """Print a number as the CSV of earlier versions did."""
     if isinstance(value, float):
         return f"{value:g}" if name == "rate_hz" else f"{value:.4f}"
+    if isinstance(value, str):
+        return cell(value)
     return int(value) if isinstance(value, bool) else value

@@ -9,6 +9,7 @@ import numpy as np
 
 import models
 from inspector.export.content import Content
+from inspector.text import cell
 from noisemodel.types import Array
 
 UNITS = {
@@ -70,6 +71,10 @@ def write_csv(content: Content, path: Path) -> None:
     import pyarrow.csv
 
     table = arrow_table(content)
+    for place, name in enumerate(table.column_names):
+        if name in ("label", "annotated"):
+            cells = [None if each is None else cell(each) for each in table[name].to_pylist()]
+            table = table.set_column(place, name, [cells])
     with path.open("w", newline="", encoding="utf-8") as file:
         # Arrow would quote all names, which not every reader of CSV accepts.
         csv.writer(file, lineterminator="\n").writerow(table.column_names)

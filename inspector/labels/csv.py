@@ -5,6 +5,7 @@ import io
 from collections.abc import Iterator, Sequence
 
 from inspector.labels.entry import Entry, EntryError, Span, number
+from inspector.text import cell, uncell
 from models import Event
 
 COLUMNS = ("start", "stop", "label")
@@ -21,10 +22,12 @@ def render(spans: Sequence[Span]) -> str:
     writer = csv.writer(text, lineterminator="\n")
     if scored:
         writer.writerow((*COLUMNS, "score"))
-        writer.writerows((repr(e.start), repr(e.stop), e.label, repr(e.score)) for e in scored)
+        writer.writerows(
+            (repr(e.start), repr(e.stop), cell(e.label), repr(e.score)) for e in scored
+        )
     else:
         writer.writerow(COLUMNS)
-        writer.writerows((repr(span.start), repr(span.stop), span.label) for span in spans)
+        writer.writerows((repr(span.start), repr(span.stop), cell(span.label)) for span in spans)
     return text.getvalue()
 
 
@@ -57,6 +60,6 @@ def parse(text: str) -> Iterator[Entry]:
                     f"{len(cells)} cells where the header names {len(header)} columns", where
                 )
             start, stop, label = (cells[header.index(name)] for name in COLUMNS)
-            yield Entry(number(start, where), number(stop, where), label, where)
+            yield Entry(number(start, where), number(stop, where), uncell(label), where)
     except csv.Error as error:
         raise EntryError(f"not CSV ({error})", f"line {rows.line_num}") from error

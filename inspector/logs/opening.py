@@ -14,6 +14,7 @@ from inspector.logs.log import Progress, without_progress
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import jobs_of
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, listed
+from inspector.text import printable
 from inspector.wrongrobot import check_joints, named
 from noisemodel import NoiseModelError, Run, RunFileError, archive
 from noisemodel.checks import NotUniformError
@@ -57,8 +58,8 @@ class Source:
 
     @property
     def shown(self) -> Path:
-        """The path, with the episode as its last part."""
-        return self.path / self.episode if self.episode else self.path
+        """The path, with the episode as its last part, in characters that can be printed."""
+        return Path(printable(str(self.path / self.episode if self.episode else self.path)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +123,8 @@ def open_source(
         NoiseModelError: If it makes no run.
     """
     reading = reading or Reading()
+    if printable(str(source.path)) != str(source.path):
+        raise LogError(source.shown, "its name has control characters; rename it")
     run = _run_file(source.path, reading)
     if run is None:
         (job,) = jobs_of(
@@ -207,7 +210,8 @@ def left_out(others: Sequence[Path]) -> str:
     if not others:
         return ""
     plural = "" if len(others) == 1 else "s"
-    return f"{len(others)} other file{plural} left out: {listed([each.name for each in others])}"
+    names = [printable(each.name) for each in others]
+    return f"{len(others)} other file{plural} left out: {listed(names)}"
 
 
 def assumed(imported: Imported, path: Path) -> str:

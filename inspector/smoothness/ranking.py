@@ -11,6 +11,7 @@ from pathlib import Path
 from inspector.smoothness.episodes import Failed
 from inspector.smoothness.measures import CUTOFF, PADDING, THRESHOLD
 from inspector.smoothness.scores import FAST, SCORES, TRACKED, VELOCITIES, Episode
+from inspector.text import cell
 
 FORMAT = "noise-smoothness/1"
 ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc")
@@ -124,7 +125,13 @@ def as_csv(ranking: Ranking) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(["rank", "log", "episode", "duration", "rate", *SCORES])
     for rank, episode in zip(ranking.ranks, ranking.episodes, strict=True):
-        known = [rank, episode.log, episode.episode, episode.duration, episode.rate]
+        known = [
+            rank,
+            cell(str(episode.log)),
+            cell(episode.episode),
+            episode.duration,
+            episode.rate,
+        ]
         values = [*known, *episode.scores.values()]
         writer.writerow(["" if value is None else _plain(value) for value in values])
     return out.getvalue().removesuffix("\n")

@@ -1,0 +1,22 @@
+"""Text from files, where a terminal, a CI's log or a spreadsheet would take it for more."""
+
+import re
+
+CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+FORMULA = ("=", "+", "-", "@")
+"""What a cell begins with that a spreadsheet computes."""
+
+
+def printable(text: str) -> str:
+    """Write out control characters and ends of lines, as Python's escapes."""
+    return CONTROL.sub(lambda found: found.group().encode("unicode_escape").decode(), text)
+
+
+def cell(text: str) -> str:
+    """Text as a cell of a CSV: a quotation mark before what would be a formula; see `uncell`."""
+    return f"'{text}" if text.startswith((*FORMULA, "'")) else text
+
+
+def uncell(text: str) -> str:
+    """The text that `cell` was given."""
+    return text[1:] if text.startswith(tuple(f"'{each}" for each in (*FORMULA, "'"))) else text

@@ -1,0 +1,100 @@
+"""Names that would write to a terminal, a CI's log or a spreadsheet."""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from inspector.assets import demo_run
+from inspector.text import cell, uncell
+from noisemodel import Block, Run
+
+ROOT = Path(__file__).parents[1]
+HOSTILE = "a\n::error::b\x1b[31m\r"
+SHOWN = r"a\n::error::b\x1b[31m\r"
+
+
+@pytest.mark.parametrize("form", ["text", "json", "github", "junit", "markdown", "sarif"])
+def test_a_file_whose_name_has_control_characters_is_bad_input_and_named_without_them(
+    tmp_path, form
+):
+    shutil.copy(demo_run(), tmp_path / f"{HOSTILE}.npz")
+    shutil.copy(demo_run(), tmp_path / "demo.npz")
+    (tmp_path / f"{HOSTILE}.txt").write_text("left out")
+    status, out, err = call("classify", tmp_path, "--format", form)
+    assert status == 3
+    assert f"{SHOWN}.npz: its name has control characters; rename it" in err
+    assert "1.78" in out  # the other run has its finding
+    for text in (out, err):
+        assert not set(text) & set("\x1b\r")
+        assert not any(line.startswith("::error::b") for line in text.splitlines())
+
+
+def test_a_typed_name_with_control_characters_is_wrong_usage(tmp_path):
+    for arguments in (["classify", tmp_path / HOSTILE], ["noise", demo_run(), "--csv", HOSTILE]):
+        status, out, err = call(*arguments)
+        assert (status, out) == (2, "")
+        assert err.endswith(f"{SHOWN}: has control characters\n")
+        assert len(err.splitlines()) == 1
+
+
+def test_the_contents_of_a_log_are_listed_without_control_characters(tmp_path):
+    (tmp_path / "log.csv").write_text("time,b\x1b[31m.velocity\n0,1\n0.1,2\n")
+    status, out, _ = call("import", tmp_path / "log.csv", "--list")
+    assert status == 0
+    assert "\x1b" not in out
+    assert r"b\x1b[31m.velocity" in out
+
+
+def test_joints_cannot_be_named_by_control_characters(tmp_path):
+    (tmp_path / "log.csv").write_text("time,b\x1b[31m.velocity\n0,1\n0.1,2\n")
+    status, _, err = call("classify", tmp_path / "log.csv")
+    assert status == 3
+    assert "\x1b" not in err
+    with pytest.raises(ValueError, match="it is empty or cannot be printed"):
+        Run(time=np.arange(9) / 9, velocity=np.zeros((9, 1)), joint_names=("a\nb",))
+
+
+@pytest.mark.parametrize("start", ["=", "+", "-", "@"])
+def test_a_table_has_no_cell_that_a_spreadsheet_would_compute(tmp_path, monkeypatch, start):
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(2000) / 1000
+    name = f"{start}HYPERLINK(1)"
+    block = Block(0.5, 1.0, name)
+    run = Run(time=time, velocity=np.sin(time)[:, None], joint_names=("a",), blocks=(block,))
+    run.save(f"{name}.npz")
+    run.save("run.npz")
+    _, table, _ = call("smoothness", "--format", "csv", "--", f"{name}.npz")
+    assert call("export", "run.npz", "-o", "run.csv")[0] == 0
+    assert call("labels", "run.npz", "--to", "labels.csv")[0] == 0
+    assert call("labels", "run.npz", "--from", "labels.csv", "-o", "back.npz")[0] == 0
+    for text in (table, Path("run.csv").read_text(), Path("labels.csv").read_text()):
+        cells = {cell.strip('"') for line in text.splitlines() for cell in line.split(",")}
+        assert {each for each in cells if name in each} in ({f"'{name}"}, {f"'{name}.npz"})
+    assert Run.load("back.npz").blocks == (block,)
+
+
+@given(st.text())
+@settings(max_examples=200, derandomize=True, deadline=None)
+def test_a_cell_is_no_formula_and_gives_its_text_back(given_text):
+    assert not cell(given_text).startswith(("=", "+", "-", "@"))
+    assert uncell(cell(given_text)) == given_text
+
+
+def test_standard_error_of_a_real_process_has_no_control_characters(tmp_path):
+    shutil.copy(demo_run(), tmp_path / f"{HOSTILE}.npz")
+    done = subprocess.run(
+        [sys.executable, "-m", "inspector", "audit", tmp_path],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert SHOWN in done.stdout + done.stderr
+    assert not set(done.stdout + done.stderr) & set("\x1b\r")
