@@ -9,11 +9,9 @@ import pytest
 from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict, exit_status
 from inspector.localisation.localise import Localisation
+from inspector.report.cases import ANNOTATIONS, COMMENT, MARKER
 from inspector.report.formats import (
-    ANNOTATIONS,
-    COMMENT,
     FORMATS,
-    MARKER,
     as_json,
     github,
     junit,

@@ -1,7 +1,6 @@
 """`inspector classify`: the verdicts on runs."""
 
-import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from datetime import date
 from enum import StrEnum
@@ -13,9 +12,9 @@ import typer
 
 from inspector.analysis.status import OUTPUT_LOST, Status, Unknown, worst
 from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
+from inspector.commands.outputs import BadInput, files_of, tried, written
 
 if TYPE_CHECKING:
-    from inspector.analysis.verdict import Verdict
     from inspector.expectations.expectations import Expectations
     from inspector.library import Library
     from inspector.logs.opening import Reading
@@ -30,13 +29,6 @@ class Format(StrEnum):
     GITHUB = "github"
     SARIF = "sarif"
     MARKDOWN = "markdown"
-
-
-class BadInput(StrEnum):
-    """What becomes of files that cannot be read."""
-
-    FAIL = "fail"
-    IGNORE = "ignore"
 
 
 def _of_gate(*names: str, **settings: Any) -> Any:
@@ -132,13 +124,14 @@ def classify(
     from inspector.library import load_library
     from inspector.logs.opening import left_out, sources
     from inspector.progress import progress
+    from inspector.report.cases import published
     from inspector.report.formats import FORMATS
 
     if localise and format is not Format.JSON:
         raise typer.BadParameter("--localise takes --format json")
     if expect is not None and no_expect:
         raise typer.BadParameter("--expect and --no-expect exclude each other")
-    files = _files(write or [], overwrite=overwrite)
+    files = files_of(write or [], list(Format), overwrite=overwrite)
     library = load_library(assets.model_files(model))
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     found, others = sources(runs, reading)
@@ -176,7 +169,7 @@ def classify(
         replace(
             judge(each, expected.get(each.path), gate=gate, today=today),
             ignored=each.status is Status.BAD_INPUT and on_bad_input is BadInput.IGNORE,
-            picture_url=_url(each, report_url),
+            picture_url=published(each.picture, report, report_url),
         )
         for each in sorted(classified, key=lambda each: place[each.path])
     ]
@@ -190,11 +183,7 @@ def classify(
         for remark in expectations.remarks(today):
             typer.echo(f"inspector: {remark}", err=True)
     lost = [line for verdict in verdicts for line in verdict.lost]
-    lost += _tried(lambda: _print(FORMATS[format](verdicts)), "standard output")
-    for path, name in files.items():
-        lost += _tried(
-            partial(_write, path, FORMATS[name], verdicts, overwrite=overwrite), str(path)
-        )
+    lost += written(verdicts, FORMATS, format, files, overwrite=overwrite)
     if targets:
         from inspector.labels.findings import write_findings
 
@@ -205,32 +194,15 @@ def classify(
             format_name=labels_format,
             overwrite=overwrite,
         )
-        lost += _tried(save, str(labels_to))
+        lost += tried(save, str(labels_to))
     if report is not None:
-        lost += _tried(lambda: index.write(verdicts, report), str(report))
+        lost += tried(lambda: index.write(verdicts, report), str(report))
     for bad in verdicts:
         if bad.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
             typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.message}", err=True)
     for line in lost:
         typer.echo(f"inspector: output lost: {line}", err=True)
     raise typer.Exit(worst([exit_status(verdicts), *([OUTPUT_LOST] if lost else [])]))
-
-
-def _files(given: Sequence[str], *, overwrite: bool) -> dict[Path, str]:
-    """The files that are written beside standard output, with the format of each."""
-    from noisemodel.atomic import refuse_existing
-
-    files = {}
-    for each in given:
-        name, equals, path = each.partition("=")
-        if name not in list(Format) or not equals or not path:
-            raise typer.BadParameter(
-                f"{each!r}: expected FORMAT=FILE, with one of {', '.join(Format)}",
-                param_hint="'--write'",
-            )
-        refuse_existing(path, overwrite=overwrite)
-        files[Path(path)] = name
-    return files
 
 
 def _classes(given: Sequence[str], library: "Library") -> tuple[str, ...]:
@@ -269,39 +241,3 @@ def _whole(given: Sequence[Path], expected: "Iterable[Expectations]") -> "Iterat
     for each in {each.path: each for each in expected}.values():
         if any(each.path.resolve().is_relative_to(folder) for folder in folders):
             yield each
-
-
-def _url(verdict: "Verdict", folder: str) -> str:
-    """Where the picture of a run will be published; empty if that is not known."""
-    from urllib.parse import quote
-
-    if verdict.picture is None or not folder:
-        return ""
-    return f"{folder.rstrip('/')}/{verdict.picture.parent.name}/{quote(verdict.picture.name)}"
-
-
-def _print(text: str) -> None:
-    typer.echo(text)
-    sys.stdout.flush()
-
-
-def _write(
-    path: Path, written: "Callable[[Sequence[Verdict]], str]", verdicts: Any, *, overwrite: bool
-) -> None:
-    from noisemodel.atomic import replacing
-
-    with replacing(path, overwrite=overwrite) as temporary:
-        temporary.write_text(f"{written(verdicts)}\n", encoding="utf-8")
-
-
-def _tried(output: Callable[[], object], name: str) -> list[str]:
-    """Write an output; a sentence if it is lost."""
-    from noisemodel import OutputError
-
-    try:
-        output()
-    except OutputError as error:
-        return [str(error)]
-    except OSError as error:
-        return [f"{name}: cannot be written ({error.strerror or error})"]
-    return []

@@ -1,13 +1,16 @@
 """`inspector diff`: runs before and after a change of code."""
 
+from dataclasses import replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from inspector.analysis.status import Unknown
+from inspector.analysis.status import OUTPUT_LOST, Unknown, worst
 from inspector.commands.options import ModelFiles, Overwrite
+from inspector.commands.outputs import BadInput, files_of, tried, written
 
 
 class Format(StrEnum):
@@ -15,6 +18,9 @@ class Format(StrEnum):
 
     TEXT = "text"
     JSON = "json"
+    JUNIT = "junit"
+    GITHUB = "github"
+    MARKDOWN = "markdown"
 
 
 class FailOn(StrEnum):
@@ -50,6 +56,17 @@ def diff(
             help="Write recording and picture of the worst pair and diff.json to this folder.",
         ),
     ] = None,
+    report_url: Annotated[
+        str, typer.Option("--report-url", help="Where this folder is published, for its picture.")
+    ] = "",
+    write: Annotated[
+        list[str] | None,
+        typer.Option("--write", help="FORMAT=FILE: write another format as well; repeatable."),
+    ] = None,
+    on_bad_input: Annotated[
+        BadInput,
+        typer.Option("--on-bad-input", help="A file that cannot be read: fails, or ignored."),
+    ] = BadInput.FAIL,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
     model: ModelFiles = None,
     robot: Annotated[
@@ -73,26 +90,32 @@ def diff(
       2  wrong usage
       3  bad input: a file cannot be read, or nothing can be paired
       4  cannot tell: too few repetitions of every scenario
+      5  output lost: an output could not be written
+     70  internal error: a bug, with its traceback on standard error
+
+    Of several, the worst: 70, 5, 3, 1, 4, 0.
     """
     from inspector import assets
     from inspector.library import load_library
     from inspector.progress import progress
     from inspector.regression import output
     from inspector.regression import report as reporting
-    from inspector.regression.difference import difference
+    from inspector.regression.difference import Gate, difference
     from inspector.regression.measure import Measured, Unreadable, measure_files
-    from inspector.regression.pairing import files_in, paired
+    from inspector.regression.pairing import Pairing, files_in, paired
+    from inspector.report.cases import published
 
+    files = files_of(write or [], list(Format), overwrite=overwrite)
     if report:
         reporting.prepare(report, overwrite=overwrite)
     library = load_library(assets.model_files(model))
     sides = [files_in(path) for path in (reference, candidate)]
-    files = [*sides[0], *sides[1]]
+    runs = [*sides[0], *sides[1]]
     measured = list(
         progress(
-            measure_files(files, library, links=robot, unknown=unknown, jobs=jobs),
+            measure_files(runs, library, links=robot, unknown=unknown, jobs=jobs),
             "diff",
-            total=len(files),
+            total=len(runs),
         )
     )
     split = len(sides[0])
@@ -102,16 +125,28 @@ def diff(
     )
     unreadable = [run for run in measured if isinstance(run, Unreadable)]
     for bad in unreadable:
-        typer.echo(f"inspector: {bad.path}: {bad.problem}", err=True)
-    if not before or not after:
-        raise typer.Exit(3)
-    found = difference(
-        paired(before, after, (reference, candidate)), margin=margin, unreadable=unreadable
+        typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.problem}", err=True)
+    roots = (reference, candidate)
+    pairing = paired(before, after, roots) if before and after else Pairing("file name", (), ())
+    found = difference(pairing, margin=margin, unreadable=unreadable)
+    gate = Gate(
+        new=fail_on is not FailOn.WORSE,
+        worse=fail_on is not FailOn.NEW,
+        unreadable=on_bad_input is BadInput.FAIL,
     )
-    typer.echo((output.as_json if format is Format.JSON else output.as_text)(found))
+    drawn = report / reporting.PICTURE if report and found.scenarios else None
+    address = published(drawn, report, report_url)
+    found = replace(found, gate=gate, picture=drawn, picture_url=address)
+    told: list[str] = []
+    lost: list[str] = []
+    if report and found.scenarios:
+        save = partial(reporting.write, found, report, library, robot=robot, overwrite=overwrite)
+        lost += tried(lambda: told.append(save()), str(report))
+    lost += written(found, output.FORMATS, format, files, overwrite=overwrite)
+    for line in told:
+        typer.echo(line, err=format is not Format.TEXT)
     for bad in found.unreadable[len(unreadable) :]:
         typer.echo(f"inspector: {bad.path}: {bad.problem}", err=True)
-    if report and found.scenarios:
-        told = reporting.write(found, report, library, robot=robot, overwrite=overwrite)
-        typer.echo(told, err=format is Format.JSON)
-    raise typer.Exit(found.exit_status(new=fail_on is not FailOn.WORSE, worse=fail_on != "new"))
+    for line in lost:
+        typer.echo(f"inspector: output lost: {line}", err=True)
+    raise typer.Exit(worst([found.exit_status, *([OUTPUT_LOST] if lost else [])]))

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from inspector.analysis.status import EXIT, Status
+from inspector.analysis.status import worst as worst_code
 from inspector.pair.changes import NEW
 from inspector.regression.findings import LOUDER, ChangedFinding, aligned, changed_findings, lag
 from inspector.regression.levels import Levels, edges
@@ -138,6 +140,21 @@ class Compared:
     remarks: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Gate:
+    """What fails.
+
+    Attributes:
+        new: Whether new or louder findings do.
+        worse: Whether a verdict "worse" does.
+        unreadable: Whether files that cannot be read do; they always do if there are no others.
+    """
+
+    new: bool = False
+    worse: bool = True
+    unreadable: bool = True
+
+
 @dataclass(frozen=True, eq=False)
 class Difference:
     """What became of all scenarios.
@@ -148,6 +165,9 @@ class Difference:
         together: What changed over all scenarios of one robot together; None for a single one.
         unreadable: Files that are no run, and scenarios that cannot be compared.
         margin: A change within this is the same, in [dB].
+        gate: What fails.
+        picture: A picture of the worst pair, if one was drawn.
+        picture_url: Where that will be published; empty if that is not known.
     """
 
     pairing: Pairing
@@ -155,6 +175,9 @@ class Difference:
     together: Compared | None
     unreadable: tuple[Unreadable, ...] = ()
     margin: float = MARGIN_DB
+    gate: Gate = Gate()
+    picture: Path | None = None
+    picture_url: str = ""
 
     @property
     def rows(self) -> tuple[Compared, ...]:
@@ -183,18 +206,32 @@ class Difference:
         together = self.together is not None and self.together.testable
         return together or any(row.testable for row in self.scenarios)
 
-    def exit_status(self, *, new: bool, worse: bool) -> int:
-        """Exit status of `diff`: 3, 1, 4 or 0, the first that applies.
+    def status(self, row: Compared) -> Status:
+        """What a scenario, or all of them together, is for a test."""
+        news = any(each.kind in (NEW, LOUDER) for each in row.findings)
+        worse = row.verdict is Verdict.WORSE
+        if (self.gate.new and news) or (self.gate.worse and worse):
+            return Status.FINDINGS
+        if self.gate.worse and not row.testable and row.verdict is not Verdict.SAME:
+            return Status.CANNOT_TELL
+        return Status.OK
 
-        Args:
-            new: Whether new or louder findings count.
-            worse: Whether a verdict "worse" counts.
+    def ignored(self, file: Unreadable) -> bool:
+        """Whether a file that cannot be read is left out of the exit status."""
+        return not (self.gate.unreadable or file.trace) and bool(self.scenarios)
+
+    @property
+    def exit_status(self) -> int:
+        """Exit status of `diff`: the worst of 70, 3, 1, 4 and 0.
+
+        Scenarios with too few repetitions are 4 only if all scenarios are such.
         """
-        if self.unreadable:
-            return 3
-        if (new and self.new) or (worse and self.verdict is Verdict.WORSE):
-            return 1
-        return 0 if not worse or self.testable or self.verdict is Verdict.SAME else 4
+        codes = [EXIT[each.status] for each in self.unreadable if not self.ignored(each)]
+        if any(self.status(row) is Status.FINDINGS for row in self.rows):
+            codes.append(EXIT[Status.FINDINGS])
+        if self.gate.worse and not self.testable and self.verdict is not Verdict.SAME:
+            codes.append(EXIT[Status.CANNOT_TELL])
+        return worst_code(codes)
 
 
 @dataclass(frozen=True)

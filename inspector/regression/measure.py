@@ -1,5 +1,6 @@
 """What `diff` keeps of a run: findings, levels over time, envelope of the motion."""
 
+import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -93,15 +94,22 @@ class Measured:
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A file that is no run.
+    """A file that is no run, or shows a bug.
 
     Attributes:
         path: The file.
         problem: Why, in one line.
+        trace: The traceback of a bug; empty without.
     """
 
     path: Path
     problem: str
+    trace: str = ""
+
+    @property
+    def status(self) -> Status:
+        """Bad input, or an internal error."""
+        return Status.INTERNAL_ERROR if self.trace else Status.BAD_INPUT
 
 
 def measure_files(
@@ -131,11 +139,13 @@ def measure_files(
 def measure_file(
     path: Path, library: Library, *, links: bool = True, unknown: Unknown = Unknown.FINDING
 ) -> Measured | Unreadable:
-    """Measure one file; expected errors become part of the result."""
+    """Measure one file; errors become part of the result."""
     try:
         return measure(open_run(path).run, path, library, links=links, unknown=unknown)
     except EXPECTED as error:
         return Unreadable(path, str(error).removeprefix(f"{path}: "))
+    except Exception as error:  # a bug that one run shows must not hide the changes of others
+        return Unreadable(path, f"{type(error).__name__}: {error}", traceback.format_exc())
 
 
 def measure(

@@ -1,12 +1,13 @@
-"""What `diff` prints: a table of scenarios, and JSON."""
+"""What `diff` prints: a table of scenarios, JSON, JUnit XML, GitHub annotations, Markdown."""
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
+from inspector.analysis.status import EXIT, Status
 from inspector.pair.changes import NEW, RESOLVED
 from inspector.regression.difference import (
     Change,
@@ -18,6 +19,8 @@ from inspector.regression.difference import (
 )
 from inspector.regression.findings import LOUDER, ChangedFinding
 from inspector.regression.statistic import ALPHA, CONFIDENCE
+from inspector.report import cases
+from inspector.report.cases import DIFF_MARKER, Case, Job, Outcome, program_version
 
 FORMAT = "noise-diff/1"
 FINDINGS, CHANGES = 10, 5
@@ -35,6 +38,9 @@ def as_json(found: Difference) -> str:
     return json.dumps(
         {
             "format": FORMAT,
+            "version": program_version(),
+            "exit_status": found.exit_status,
+            "counts": counts(found),
             "verdict": found.verdict,
             "alpha": ALPHA,
             "confidence": CONFIDENCE,
@@ -42,6 +48,7 @@ def as_json(found: Difference) -> str:
             "paired_by": found.pairing.by,
             "scenarios": [_row(row) for row in found.scenarios],
             "together": None if found.together is None else _row(found.together),
+            "picture": None if found.picture is None else str(found.picture),
             "not_paired": [str(path) for path in found.pairing.alone],
             "failed": {str(each.path): each.problem for each in found.unreadable},
         },
@@ -51,12 +58,130 @@ def as_json(found: Difference) -> str:
     )
 
 
-def _lines(found: Difference) -> Iterator[str]:
-    counts = Counter(row.verdict for row in found.scenarios)
+def junit(found: Difference) -> str:
+    """Write verdicts as JUnit XML: a test case per scenario, and one per file that is no run."""
+    return cases.junit(_job(found))
+
+
+def github(found: Difference) -> str:
+    """Write verdicts as GitHub workflow commands: the ten worst scenarios, and the counts.
+
+    A scenario has the file of a run of the candidate that shows what changed.
+    """
+    return cases.github(_job(found))
+
+
+def markdown(found: Difference) -> str:
+    """Write verdicts for a job's summary or a comment: a table, the worst first, and a picture."""
+    head, notes = "| scenario | verdict | what changed |", "Changes that do not count"
+    return cases.markdown(_job(found), head=head, notes=notes, marker=DIFF_MARKER)
+
+
+FORMATS: dict[str, Callable[[Difference], str]] = {
+    "text": as_text,
+    "json": as_json,
+    "junit": junit,
+    "github": github,
+    "markdown": markdown,
+}
+
+
+def counts(found: Difference) -> dict[str, dict[str, int]]:
+    """Count what all outputs state.
+
+    Args:
+        found: The difference.
+
+    Returns:
+        `scenarios`, by verdict; `findings`, by what became of them; `files`: runs that are
+        compared, files that only one side has, and those that cannot be compared. Each has all its
+        keys.
+    """
+    verdicts = Counter(row.verdict for row in found.scenarios)
+    kinds = Counter(each.kind for row in found.scenarios for each in row.findings)
+    compared = sum(len(row.reference) + len(row.candidate) for row in found.scenarios)
+    bugs = sum(bool(each.trace) for each in found.unreadable)
+    return {
+        "scenarios": {verdict.value: verdicts[verdict] for verdict in Verdict},
+        "findings": {kind: kinds[kind] for kind in (NEW, LOUDER, RESOLVED)},
+        "files": {
+            "compared": compared,
+            "not-paired": len(found.pairing.alone),
+            "bad-input": len(found.unreadable) - bugs,
+            "internal-error": bugs,
+        },
+    }
+
+
+def summary(found: Difference) -> str:
+    """Count scenarios by verdict, findings and files by what became of them, in a line."""
+    number = counts(found)
     total = len(found.scenarios)
-    parts = ", ".join(f"{counts[each]} {each}" for each in Verdict if counts[each])
-    plural = "" if total == 1 else "s"
-    yield f"{found.verdict}: {total} scenario{plural} ({parts}), paired by {found.pairing.by}"
+    parts = [f"{found.verdict}: {total} scenario{'s' * (total != 1)}"]
+    if total:
+        parts[0] += f" ({_listed(number['scenarios'])}), paired by {found.pairing.by}"
+    parts += (
+        [f"findings: {_listed(number['findings'])}"] if any(number["findings"].values()) else []
+    )
+    left = {name: n for name, n in number["files"].items() if name != "compared"}
+    parts += [f"files: {_listed(left)}"] if any(left.values()) else []
+    return "; ".join(parts)
+
+
+def _listed(numbers: Mapping[str, int]) -> str:
+    return ", ".join(f"{n} {name.replace('-', ' ')}" for name, n in numbers.items() if n)
+
+
+def _job(found: Difference) -> Job:
+    shown = [_case(found, row) for row in found.scenarios]
+    own = {row.verdict for row in found.scenarios}
+    if found.together is not None and found.verdict not in own:
+        shown.append(_case(found, found.together))  # what no scenario shows by itself
+    shown += [
+        Case(
+            name=str(each.path),
+            path=each.path,
+            status=each.status,
+            words=each.status.replace("-", " "),
+            outcome=Outcome.SKIPPED if found.ignored(each) else Outcome.ERROR,
+            rank=(list(EXIT).index(each.status),),
+            kind=each.status,
+            message=each.problem,
+            trace=each.trace,
+        )
+        for each in found.unreadable
+    ]
+    return Job("Noise beside the reference", summary(found), counts(found), shown)
+
+
+def _case(found: Difference, row: Compared) -> Case:
+    status = found.status(row)
+    fails = status is Status.FINDINGS
+    clearest = list(_significant(row)) if row.verdict is Verdict.WORSE else []
+    news = [str(each) for each in row.findings if each.kind != RESOLVED]
+    counted = [*clearest * found.gate.worse, *news * found.gate.new]
+    others = [str(each) for each in row.findings if str(each) not in counted]
+    outcomes = {Status.FINDINGS: Outcome.FAILURE, Status.CANNOT_TELL: Outcome.SKIPPED}
+    worse = row.verdict is Verdict.WORSE and found.gate.worse
+    return Case(
+        name=row.name,
+        path=(worst_runs(row)[1] if fails else row.candidate[0]).path,
+        status=row.verdict,
+        words=row.verdict,
+        outcome=outcomes.get(status, Outcome.PASSED),
+        rank=(list(EXIT).index(status), list(Verdict).index(row.verdict), -len(news)),
+        kind="worse" if worse else "new finding",
+        sentences=tuple(counted) if fails else (),
+        message="" if fails else row.reason,
+        notes=(*others, *row.remarks),
+        quiet=row.verdict is Verdict.SAME,
+        picture=found.picture if row is worst(found) else None,
+        picture_url=found.picture_url,
+    )
+
+
+def _lines(found: Difference) -> Iterator[str]:
+    yield summary(found)
     yield ""
     rows = [HEAD, *(_cells(row) for row in found.rows)]
     widths = [max(len(row[place]) for row in rows) for place in range(len(HEAD))]
@@ -108,14 +233,19 @@ def _details(row: Compared) -> Iterator[str]:
         return
     yield f"{row.name}: {row.verdict}, {row.reason}"
     if row.verdict in (Verdict.WORSE, Verdict.BETTER):
-        for change in [c for c in row.changes if min(c.p_louder, c.p_quieter) <= ALPHA][:CHANGES]:
-            interval = _interval(change, row.confidence)
-            p = min(change.p_louder, change.p_quieter)
-            yield f"  {change.name} {_change(change)}{f' {interval}' * bool(interval)}, p {p:.4f}"
+        yield from (f"  {sentence}" for sentence in _significant(row))
     yield from (f"  {finding}" for finding in row.findings[:FINDINGS])
     if len(row.findings) > FINDINGS:
         yield f"  and {len(row.findings) - FINDINGS} more findings (--format json)"
     yield from (f"  {remark}" for remark in row.remarks)
+
+
+def _significant(row: Compared) -> Iterator[str]:
+    """The clearest changes, a sentence each."""
+    for change in [c for c in row.changes if min(c.p_louder, c.p_quieter) <= ALPHA][:CHANGES]:
+        interval = _interval(change, row.confidence)
+        p = min(change.p_louder, change.p_quieter)
+        yield f"{change.name} {_change(change)}{f' {interval}' * bool(interval)}, p {p:.4f}"
 
 
 def _change(change: Change) -> str:

@@ -2,29 +2,22 @@
 
 import hashlib
 import json
-import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote
-from xml.etree import ElementTree as ET
 
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.analysis.verdict import Verdict, counts, exit_status
+from inspector.report import cases
+from inspector.report.cases import Case, Job, Outcome, program_version
 from models import Event
 from models.labels import interval
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
 
-ANNOTATIONS = 10
-"""GitHub silently drops what goes beyond ten of a kind per step."""
-COMMENT = 60_000
-"""Most characters of the Markdown: GitHub refuses comments of more than 65,536."""
-MARKER = "<!-- noise-inspector -->"
-"""First line of the Markdown, by which a script finds its own comment to replace it."""
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 RESULTS = 5000
 """GitHub shows no more results of one SARIF file."""
@@ -119,7 +112,7 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
     ]
     whole = {
         "format": "noise-verdict/3",
-        "version": _version(),
+        "version": program_version(),
         "exit_status": exit_status(verdicts),
         "counts": counts(verdicts),
         "runs": runs,
@@ -128,71 +121,16 @@ def as_json(verdicts: Sequence[Verdict]) -> str:
 
 
 def junit(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts as JUnit XML: a test case per run.
-
-    A case has one `failure` with all of its findings, since Jenkins keeps the last of several. Its
-    type is the class of the finding with the best score. A picture is attached by a line
-    ``[[ATTACHMENT|path]]``, which GitLab, Jenkins and Azure read.
-    """
-    tags = [_tag(verdict) for verdict in verdicts]
-    suite = ET.Element(
-        "testsuite",
-        name="inspector",
-        tests=str(len(verdicts)),
-        failures=str(tags.count("failure")),
-        errors=str(tags.count("error")),
-        skipped=str(tags.count("skipped")),
-        time=f"{sum(verdict.seconds for verdict in verdicts):.3f}",
-    )
-    properties = ET.SubElement(suite, "properties")
-    for kind, numbers in counts(verdicts).items():
-        for name, number in numbers.items():
-            ET.SubElement(properties, "property", name=f"{kind}.{name}", value=str(number))
-    seen: Counter[str] = Counter()
-    for verdict, tag in zip(verdicts, tags, strict=True):
-        name = _plain(verdict.path)
-        seen[name] += 1  # GitLab reads the first of several cases of one name only
-        name = name if seen[name] == 1 else f"{name} ({seen[name]})"
-        time = f"{verdict.seconds:.3f}"
-        case = ET.SubElement(suite, "testcase", classname="inspector", name=name, time=time)
-        if tag:
-            sentences = failing(verdict) or [verdict.message]
-            outcome = ET.SubElement(case, tag, message=_plain("; ".join(sentences)))
-            if tag != "skipped":
-                outcome.set("type", _plain(_kind(verdict)))
-            outcome.text = _plain("\n".join([*sentences, *filter(None, [verdict.trace])]))
-        lines = [*excused(verdict)]
-        if verdict.message and verdict.status in (Status.OK, Status.FINDINGS):
-            lines.insert(0, verdict.message)
-        if verdict.picture is not None:
-            lines.append(f"[[ATTACHMENT|{verdict.picture}]]")
-        if lines:
-            ET.SubElement(case, "system-out").text = _plain("\n".join(lines))
-    root = ET.Element("testsuites")
-    root.append(suite)
-    ET.indent(root)
-    return ET.tostring(root, encoding="unicode", xml_declaration=True)
+    """Write verdicts as JUnit XML: a test case per run, of the type of its best score."""
+    return cases.junit(_job(verdicts))
 
 
 def github(verdicts: Sequence[Verdict]) -> str:
     """Write verdicts as GitHub workflow commands: the ten worst, and the counts of several runs.
 
-    Of ten errors, bad input takes five at most where there are findings, so that it hides none.
     Runs that cannot be told, and bad input that is ignored, are warnings.
     """
-    ranked = sorted(verdicts, key=lambda verdict: verdict.severity)
-    bad = [v for v in ranked if _tag(v) == "error"]
-    found = [v for v in ranked if _tag(v) == "failure"]
-    shown = [*bad[: max(ANNOTATIONS // 2, ANNOTATIONS - len(found))], *found][:ANNOTATIONS]
-    quiet = [v for v in ranked if _tag(v) == "skipped"][:ANNOTATIONS]
-    lines = [_annotation("error", each) for each in shown]
-    lines += [_annotation("warning", each) for each in quiet]
-    lines += [f"::notice::{IGNORED}"] if _ignoring(verdicts) else []
-    left = len(bad) + len(found) - len(shown)
-    more = f"; {left} more are not shown here" if left else ""
-    if len(verdicts) > 1:
-        lines += [f"::notice title=noise-inspector::{_escaped(summary(verdicts))}{more}"]
-    return "\n".join(lines)
+    return cases.github(_job(verdicts))
 
 
 def sarif(verdicts: Sequence[Verdict]) -> str:
@@ -207,18 +145,18 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
     rules = dict.fromkeys(result["ruleId"] for result in results)
     notes = [
         {
-            "level": "error" if _tag(verdict) == "error" else "warning",
+            "level": "error" if _outcome(verdict) is Outcome.ERROR else "warning",
             "message": {"text": f"{verdict.status}: {verdict.message}"},
             "locations": [_location(verdict.path)],
         }
         for verdict in ranked
-        if _tag(verdict) in ("error", "skipped")
+        if _outcome(verdict) in (Outcome.ERROR, Outcome.SKIPPED)
     ]
     run = {
         "tool": {
             "driver": {
                 "name": "noise-inspector",
-                "version": _version(),
+                "version": program_version(),
                 "rules": [
                     {
                         "id": rule,
@@ -231,7 +169,9 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
         },
         "invocations": [
             {
-                "executionSuccessful": not any(_tag(each) == "error" for each in verdicts),
+                "executionSuccessful": not any(
+                    _outcome(each) is Outcome.ERROR for each in verdicts
+                ),
                 "exitCode": exit_status(verdicts),
                 "toolExecutionNotifications": notes,
             }
@@ -246,31 +186,9 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
 
 
 def markdown(verdicts: Sequence[Verdict]) -> str:
-    """Write verdicts for a job's summary or a comment: a table, the worst first, and a picture.
-
-    GitHub takes no pictures inside the text: that of the worst run is linked if its address is
-    known, and else its file is named.
-    """
-    ranked = sorted(verdicts, key=lambda verdict: verdict.severity)
-    failed = [each for each in ranked if each.status is not Status.OK]
-    head = [MARKER, f"### Noise: {summary(verdicts)}", ""]
-    tail = ["", f"{IGNORED.capitalize()}.", ""] if _ignoring(verdicts) else [""]
-    worst = next((each for each in ranked if each.picture is not None), None)
-    if worst is not None and failed:
-        told = f"Picture of {_code(worst.path)}: {_code(worst.picture)}."
-        drawn = f"![{_cell(worst.path)} over time]({worst.picture_url})"
-        tail += [drawn if worst.picture_url else told]
-    rows = [f"| {_code(v.path)} | {WORDS[v.status]} | {_cell(_told(v))} |" for v in failed]
-    ruled = [f"- {_code(v.path)}: {_cell(each)}" for v in ranked for each in excused(v)]
-    parts = [*head]
-    if rows:
-        parts += _cut(["| run | status | findings |", "|---|---|---|"], rows, COMMENT * 2 // 3)
-    parts += tail
-    if ruled:
-        title = f"Findings that do not count: {len(ruled)}"
-        opened = ["", f"<details><summary>{title}</summary>", ""]
-        parts += [*_cut(opened, ruled, COMMENT // 4), "", "</details>"]
-    return "\n".join(parts).rstrip()
+    """Write verdicts for a job's summary or a comment: a table, the worst first, and a picture."""
+    head, notes = "| run | status | findings |", "Findings that do not count"
+    return cases.markdown(_job(verdicts), head=head, notes=notes)
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
@@ -287,16 +205,41 @@ def _ignoring(verdicts: Sequence[Verdict]) -> bool:
     return any(verdict.unknown is Unknown.IGNORE for verdict in verdicts)
 
 
-def _tag(verdict: Verdict) -> str:
-    """What a run is as a test: "failure", "error", "skipped", or nothing if it passes."""
+def _job(verdicts: Sequence[Verdict]) -> Job:
+    found = [
+        Case(
+            name=str(verdict.path),
+            path=verdict.path,
+            status=verdict.status,
+            words=WORDS[verdict.status],
+            outcome=_outcome(verdict),
+            rank=verdict.severity,
+            kind=_kind(verdict),
+            sentences=tuple(failing(verdict)),
+            message=verdict.message,
+            notes=tuple(excused(verdict)),
+            trace=verdict.trace,
+            seconds=verdict.seconds,
+            quiet=verdict.status is Status.OK,
+            picture=verdict.picture,
+            picture_url=verdict.picture_url,
+        )
+        for verdict in verdicts
+    ]
+    remarks = (IGNORED,) if _ignoring(verdicts) else ()
+    return Job("Noise", summary(verdicts), counts(verdicts), found, remarks)
+
+
+def _outcome(verdict: Verdict) -> Outcome:
+    """What a run is as a test."""
     if verdict.ignored:
-        return "skipped"
+        return Outcome.SKIPPED
     return {
-        Status.FINDINGS: "failure",
-        Status.BAD_INPUT: "error",
-        Status.INTERNAL_ERROR: "error",
-        Status.CANNOT_TELL: "skipped",
-        Status.OK: "",
+        Status.FINDINGS: Outcome.FAILURE,
+        Status.BAD_INPUT: Outcome.ERROR,
+        Status.INTERNAL_ERROR: Outcome.ERROR,
+        Status.CANNOT_TELL: Outcome.SKIPPED,
+        Status.OK: Outcome.PASSED,
     }[verdict.status]
 
 
@@ -318,10 +261,6 @@ def failing(verdict: Verdict) -> list[str]:
 def excused(verdict: Verdict) -> list[str]:
     """Sentences on findings that do not."""
     return [_sentence(verdict, event) for event in verdict.excused]
-
-
-def _told(verdict: Verdict) -> str:
-    return "; ".join(failing(verdict)) or verdict.message
 
 
 def _localised(verdict: Verdict, event: Event) -> dict[str, object]:
@@ -356,7 +295,7 @@ def _sentence(verdict: Verdict, event: Event) -> str:
 
 
 def _results(verdict: Verdict) -> list[dict[str, Any]]:
-    if _tag(verdict) != "failure":
+    if _outcome(verdict) is not Outcome.FAILURE:
         return []
     number: Counter[str] = Counter()
     results = []
@@ -411,51 +350,5 @@ def _described(rule: str) -> str:
     return f"The noise of the joints shows a failure of class {label}."
 
 
-def _version() -> str:
-    try:
-        return version("noise-inspector")
-    except PackageNotFoundError:  # run from its folder
-        return "0"
-
-
 def _words(ruling: str) -> str:
     return ruling.replace("-", " ")
-
-
-def _plain(value: object) -> str:
-    """Drop the control characters that XML forbids."""
-    return re.sub(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "", str(value))
-
-
-def _cell(value: object) -> str:
-    """A text that stays in its cell, and is no HTML."""
-    line = " ".join(str(value).split())
-    for mark, written in (("&", "&amp;"), ("<", "&lt;"), ("|", "\\|"), ("`", "'")):
-        line = line.replace(mark, written)
-    return line
-
-
-def _code(path: object) -> str:
-    """A path that stays in its cell."""
-    return f"`{' '.join(str(path).split()).replace('`', chr(39)).replace('|', chr(92) + '|')}`"
-
-
-def _cut(head: list[str], rows: list[str], room: int) -> list[str]:
-    """As many rows as there is room for, and how many are left out."""
-    kept = []
-    for row in rows:
-        room -= len(row) + 1
-        if room < 0:
-            break
-        kept.append(row)
-    left = len(rows) - len(kept)
-    return [*head, *kept, *(["", f"{left} more are left out here."] if left else [])]
-
-
-def _annotation(kind: str, verdict: Verdict) -> str:
-    path = _escaped(str(verdict.path)).replace(":", "%3A").replace(",", "%2C")
-    return f"::{kind} file={path}::{_escaped(f'{verdict.status}: {_told(verdict)}')}"
-
-
-def _escaped(value: str) -> str:
-    return value.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
