@@ -175,7 +175,17 @@ def _as_dict(verdict: Verdict) -> dict[str, Any]:
     }
 
 
-PLAIN = ("model", "message", "model_sha256", "assumed", "scenario", "duration", "seconds", "lost")
+PLAIN = (
+    "model",
+    "message",
+    "model_sha256",
+    "assumed",
+    "scenario",
+    "begin",
+    "duration",
+    "seconds",
+    "lost",
+)
 """Attributes of a verdict that JSON can hold as they are."""
 
 
@@ -193,6 +203,7 @@ def _verdict(content: Mapping[str, Any]) -> Verdict:
             localisations[event] = Localisation(
                 **localisation, joints=joints, band=None if band is None else tuple(band)
             )
+    content = {"begin": 0.0, **content}  # which earlier versions have not written
     plain = {name: content[name] for name in PLAIN}
     return Verdict(
         Path(content["run"]),

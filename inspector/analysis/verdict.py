@@ -115,6 +115,7 @@ class Verdict:
         picture_url: Where that will be published, empty if that is not known.
         lost: Outputs of the run that could not be written, a sentence each.
         trace: The traceback of an internal error.
+        begin: Time of the run's first sample, in [s].
     """
 
     path: Path
@@ -138,6 +139,7 @@ class Verdict:
     picture_url: str = ""
     lost: tuple[str, ...] = ()
     trace: str = ""
+    begin: float = 0.0
 
     def ruled(self, event: Event) -> Ruled:
         """Give what became of a finding."""
@@ -182,6 +184,7 @@ class Verdict:
             analysis.assumed,
             str(analysis.run.meta.get("scenario", "")),
             analysis.run.duration,
+            begin=float(analysis.run.time[0]),
         )
 
 

@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -9,6 +10,7 @@ from xml.etree import ElementTree as ET
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import Verdict
+from inspector.colors import of_classes
 from inspector.errors import InspectorError
 from inspector.report.formats import WORDS, excused, failing, summary
 from inspector.report.html import STYLE, add_text, document
@@ -16,22 +18,45 @@ from noisemodel.atomic import replacing
 
 PAGE = "index.html"
 PICTURES = "pictures"
+WIDTH = 1000
+"""Of a timeline, in units of its own."""
 POLICY = "default-src 'none'; img-src 'self' file:; style-src 'unsafe-inline'"
 """Policy for browsers: nothing but the pictures is fetched, also from a page on a disk."""
-COLORS = {
-    Status.INTERNAL_ERROR: "#82071e",
-    Status.BAD_INPUT: "#82071e",
-    Status.FINDINGS: "#cf222e",
-    Status.CANNOT_TELL: "#9a6700",
-    Status.OK: "#1a7f37",
-}
 ROWS = """
-body { max-width: 80rem; }
-td { vertical-align: top; }
-td.run { max-width: 32rem; overflow-wrap: anywhere; }
-td.run p { margin: .2rem 0; }
-td.picture { width: 36rem; padding-right: 0; }
-.status { font-weight: 600; }
+:root { color-scheme: light dark; --ink: #1b1f24; --dim: #57606a; --line: #d0d7de; --back: #fff;
+  --bad: #cf222e; --warn: #9a6700; --good: #1a7f37; }
+@media (prefers-color-scheme: dark) { :root { --ink: #e6edf3; --dim: #9da7b3; --line: #30363d;
+  --back: #0d1117; --bad: #ff7b72; --warn: #e3b341; --good: #56d364; } }
+body { max-width: 82rem; color: var(--ink); background: var(--back); }
+.note { color: var(--dim); }
+th, td { border-color: var(--line); vertical-align: top; }
+td:last-child, th:last-child { padding-right: 0; }
+a { color: inherit; text-underline-offset: .15em; }
+.counts a { display: inline-block; margin: 0 .6rem .6rem 0; text-decoration: none; }
+.counts strong { font-size: 1.5rem; margin-right: .3rem; font-variant-numeric: tabular-nums; }
+.status { display: inline-block; border: 2px solid; border-radius: .4rem; padding: 0 .5rem;
+  font-weight: 600; white-space: nowrap; }
+.internal-error, .bad-input { color: var(--bad); border-style: dashed; }
+.findings { color: var(--bad); } .cannot-tell { color: var(--warn); border-style: dotted; }
+.ok { color: var(--good); }
+table { width: 100%; }
+td.run, td.told { overflow-wrap: anywhere; }
+td.told { max-width: 26rem; }
+td.line { width: 15rem; }
+svg { display: block; width: 15rem; height: 1.1rem; margin-top: .2rem;
+  border: 1px solid var(--dim); }
+svg .missing { fill: none; stroke: var(--ink); stroke-width: 2; stroke-dasharray: 4 3; }
+svg .excused { opacity: .45; }
+svg line, svg rect { vector-effect: non-scaling-stroke; }
+section { display: grid; grid-template-columns: minmax(0, 2fr) minmax(0, 3fr); gap: 0 1.5rem;
+  border-top: 1px solid var(--line); padding: 1rem 0; break-inside: avoid; }
+section h2 { margin: 0 0 .4rem; overflow-wrap: anywhere; }
+section p { margin: .2rem 0; overflow-wrap: anywhere; }
+section img { background: #fff; border-radius: .2rem; }
+@media (max-width: 60rem) { section { display: block; } td.line, th.line { display: none; } }
+@media print { :root { --ink: #000; --dim: #444; --line: #bbb; --back: #fff; --bad: #a40e26;
+  --warn: #7d4e00; --good: #116329; } body { margin: 0; max-width: none; font-size: 12px; }
+  thead { display: table-header-group; } tr { break-inside: avoid; } }
 """
 
 
@@ -105,42 +130,127 @@ def page(verdicts: Sequence[Verdict]) -> str:
         verdicts: What was found in runs; their pictures lie in the folder of the page.
 
     Returns:
-        HTML.
+        HTML: the counts, a row for each run with its findings over time, then each run with its
+        picture; the worst first.
     """
     html, body = document(f"Noise: {summary(verdicts)}", STYLE + ROWS, POLICY)
     add_text(body, "h1", "Noise of the joints")
     add_text(body, "p", summary(verdicts), "verdict")
+    ranked = sorted(verdicts, key=lambda each: each.severity)
+    _add_counts(body, ranked)
+    shared = _shared_facts(ranked)
+    for fact in shared:
+        add_text(body, "p", fact, "note")
     table = ET.SubElement(ET.SubElement(body, "div", {"class": "wide"}), "table")
-    for verdict in sorted(verdicts, key=lambda each: each.severity):
-        _add_row(table, verdict)
+    head = ET.SubElement(ET.SubElement(table, "thead"), "tr")
+    for name, kind in (("status", ""), ("run", ""), ("findings", ""), ("over time", "line")):
+        add_text(head, "th", name, kind)
+    rows = ET.SubElement(table, "tbody")
+    for number, verdict in enumerate(ranked, 1):
+        _add_row(rows, verdict, number)
+    add_text(body, "h2", "Pictures")
+    for number, verdict in enumerate(ranked, 1):
+        _add_run(body, verdict, number, shared)
     return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
 
 
-def _add_row(table: ET.Element, verdict: Verdict) -> None:
-    row = ET.SubElement(table, "tr")
-    cell = ET.SubElement(row, "td", {"class": "run"})
-    add_text(cell, "p", str(verdict.path), "status")
-    status = f"{WORDS[verdict.status]}{' (ignored)' if verdict.ignored else ''}"
-    state = ET.SubElement(cell, "p", {"class": "status", "style": f"color: {_color(verdict)}"})
-    state.text = status
-    for sentence in failing(verdict):
-        add_text(cell, "p", sentence)
-    facts = [
-        *excused(verdict),
-        verdict.message,
+def _add_counts(body: ET.Element, ranked: Sequence[Verdict]) -> None:
+    """Add the number of runs of each status, a link to the first of them."""
+    line = ET.SubElement(body, "p", {"class": "counts"})
+    first = {each.status: number for number, each in reversed(list(enumerate(ranked, 1)))}
+    for status, number in sorted(first.items(), key=lambda item: item[1]):
+        link = ET.SubElement(line, "a", href=f"#run-{number}")
+        badge = ET.SubElement(link, "span", {"class": f"status {status}"})
+        add_text(badge, "strong", str(sum(each.status is status for each in ranked)))
+        badge[-1].tail = WORDS[status]
+
+
+def _shared_facts(verdicts: Sequence[Verdict]) -> list[str]:
+    """What is so of all runs that it is of, if they are several: said once."""
+    every = [_facts(each) for each in verdicts if each.model]
+    if len(every) < 2:
+        return []
+    return [fact for fact in every[0] if all(fact in facts for facts in every)]
+
+
+def _facts(verdict: Verdict) -> list[str]:
+    facts = (
+        f"model {verdict.model}" if verdict.model else "",
+        f"expectations: {verdict.expectations}" if verdict.expectations else "",
+        verdict.message if verdict.model else "",
         verdict.assumed,
-        f"by {verdict.expectations}" if verdict.expectations else "",
-        f"{verdict.duration:.2f} s, model {verdict.model}" if verdict.model else "",
+    )
+    return [fact for fact in facts if fact]
+
+
+def _add_row(rows: ET.Element, verdict: Verdict, number: int) -> None:
+    row = ET.SubElement(rows, "tr")
+    _add_status(ET.SubElement(row, "td"), verdict)
+    name = ET.SubElement(row, "td", {"class": "run"})
+    add_text(name, "a", str(verdict.path))
+    name[0].set("href", f"#run-{number}")
+    counts = Counter(event.label for event in verdict.failing)
+    told = [f"{label} {f'({n})' * (n > 1)}".strip() for label, n in counts.items()]
+    told += [f"missing: {each.label}" for each in verdict.missing]
+    told += [f"{len(verdict.excused)} that do not count"] if verdict.excused else []
+    failed = verdict.status not in (Status.OK, Status.FINDINGS)
+    add_text(row, "td", verdict.message if failed else ", ".join(told), "told")
+    _add_timeline(ET.SubElement(row, "td", {"class": "line"}), verdict)
+
+
+def _add_timeline(cell: ET.Element, verdict: Verdict) -> None:
+    """Draw the findings of a run from its start to its end."""
+    if not verdict.duration or not verdict.model:
+        return
+    shades = of_classes(tuple(dict.fromkeys(event.label for event in verdict.events)))
+    drawn = ET.SubElement(
+        cell, "svg", viewBox=f"0 0 {WIDTH} 10", preserveAspectRatio="none", role="img"
+    )
+    sentences = [*failing(verdict), *excused(verdict)]
+    told = f"{verdict.duration:.2f} s: {'; '.join(sentences) or 'no finding'}"
+    ET.SubElement(drawn, "title").text = told
+    scale = WIDTH / verdict.duration
+    spans = [
+        (event.start, event.stop, "" if event in verdict.failing else "excused", event.label)
+        for event in verdict.events
     ]
-    for fact in filter(None, facts):
-        add_text(cell, "p", fact, "note")
-    shown = ET.SubElement(row, "td", {"class": "picture"})
+    spans += [
+        (each.start, each.stop or each.start, "missing", "")
+        for each in verdict.missing
+        if each.start is not None
+    ]
+    for start, stop, kind, label in spans:
+        place = {
+            "x": f"{(start - verdict.begin) * scale:.1f}",
+            "width": f"{max((stop - start) * scale, 4.0):.1f}",
+        }
+        rect = ET.SubElement(drawn, "rect", place | {"y": "0", "height": "10"})
+        if kind:
+            rect.set("class", kind)
+        if label:
+            rect.set("fill", "#{:02x}{:02x}{:02x}".format(*shades[label][:3]))
+
+
+def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[str]) -> None:
+    part = ET.SubElement(body, "section", id=f"run-{number}")
+    told = ET.SubElement(part, "div")
+    add_text(told, "h2", str(verdict.path))
+    _add_status(ET.SubElement(told, "p"), verdict)
+    for sentence in failing(verdict):
+        add_text(told, "p", sentence)
+    message = "" if verdict.model else verdict.message
+    facts = [fact for fact in _facts(verdict) if fact not in shared]
+    length = f"{verdict.duration:.2f} s" if verdict.duration else ""
+    for note in filter(None, [*excused(verdict), message, *facts, length]):
+        add_text(told, "p", note, "note")
     if verdict.picture is not None:
         source = f"{PICTURES}/{verdict.picture.name}"
-        link = ET.SubElement(shown, "a", href=source)
+        link = ET.SubElement(ET.SubElement(part, "div"), "a", href=source)
         described = f"{verdict.path} over time: classes, noise, spectrogram"
         ET.SubElement(link, "img", src=source, alt=described, loading="lazy")
 
 
-def _color(verdict: Verdict) -> str:
-    return COLORS[Status.CANNOT_TELL if verdict.ignored else verdict.status]
+def _add_status(parent: ET.Element, verdict: Verdict) -> None:
+    words = f"{WORDS[verdict.status]}{' (ignored)' if verdict.ignored else ''}"
+    kind = Status.CANNOT_TELL if verdict.ignored else verdict.status
+    add_text(parent, "span", words, f"status {kind}")
