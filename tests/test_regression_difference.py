@@ -9,6 +9,7 @@ from inspector.library import load_library
 from inspector.regression.difference import Verdict, difference
 from inspector.regression.measure import Measured, measure_file
 from inspector.regression.pairing import Pairing, PairingError, Scenario, files_in, paired
+from inspector.regression.statistic import ALPHA
 from noisemodel import Run
 from noisemodel.limits import joint_limits
 
@@ -69,6 +70,40 @@ def test_repetitions_with_a_tone_are_worse_in_its_joint_and_octave(sides):
     assert 0 < top["low"] < top["change"] < top["high"]
 
 
+def test_a_deviation_of_one_joint_from_its_desired_motion_is_a_tracking_error(tmp_path, library):
+    """What the motion itself masks, as the seeds differ in it, shows beside the desired motion."""
+
+    def moved(seed, tone):
+        time = np.arange(4000) / RATE
+        random = np.random.default_rng(seed)
+        desired = np.cos(2 * np.pi * 80 * time)[:, None] * 10 ** random.normal(size=2)
+        noise = 0.002 * random.normal(size=desired.shape)
+        error = np.stack((tone * np.sin(2 * np.pi * 70 * time), np.zeros(4000)), axis=1)
+        brief = (time > 1.0) & (time < 1.2)
+        velocity = desired + noise + error * brief[:, None]
+        return Run(time=time, velocity=velocity, velocity_desired=desired, joint_names=JOINTS)
+
+    for name, first, tone in (("before", 0, 0.0), ("after", 5, 0.1)):
+        (tmp_path / name).mkdir()
+        for number in range(5):
+            moved(first + number, tone).save(tmp_path / name / f"walk-{number}.npz")
+    status, out, _ = diff(tmp_path / "before", tmp_path / "after", "--format", "json")
+    assert status == 1
+    (walk,) = json.loads(out)["scenarios"]
+    clear = [each for each in walk["changes"] if each["p_louder"] <= ALPHA]
+    assert {each["kind"] for each in clear} == {"tracking error", "peak of tracking error"}
+    assert walk["reason"].startswith("peak of tracking error, 45 to 91 Hz +")
+
+
+def test_desired_velocities_that_one_side_lacks_are_remarked_on(tmp_path):
+    for name, desired in (("before", np.zeros((4000, 2))), ("after", None)):
+        (tmp_path / name).mkdir()
+        replace(run(1), velocity_desired=desired).save(tmp_path / name / "walk.npz")
+    _, out, _ = diff(tmp_path / "before", tmp_path / "after")
+    lacking = tmp_path / "after" / "walk.npz"
+    assert f"Tracking errors are not compared: {lacking} has no desired velocities." in out
+
+
 def test_the_other_way_round_it_is_better(sides):
     status, out, _ = diff(sides / "worse", sides / "reference")
     assert status == 0
@@ -93,7 +128,7 @@ def test_too_few_repetitions_are_inconclusive_and_say_how_many_it_takes(tmp_path
     after = folder(tmp_path / "after", range(3, 6), tone=0.03)
     status, out, _ = diff(before, after)
     assert status == 4
-    assert "3 and 3 runs cannot show more, at least 5 and 5 can (9 beside 3" in out
+    assert "3 and 3 runs cannot show more, at least 5 and 5 can (10 beside 3" in out
 
 
 def test_new_findings_fail_from_one_run_on_if_they_are_to(tmp_path):

@@ -15,6 +15,8 @@ from inspector.regression.statistic import (
     shift,
 )
 
+SIDES = "reference", "candidate"
+
 
 def sample(reference, candidate, paired=False):
     """A sample of quantities whose changes below 1 do not matter."""
@@ -54,6 +56,29 @@ def test_p_of_a_single_quantity_is_that_of_the_permutation_test():
 def test_without_a_change_few_samples_are_called_louder(count):
     called = [(p_values([drawn(seed, count)])[0][0].louder <= ALPHA).any() for seed in range(100)]
     assert np.mean(called) <= 0.03  # 3 or less of 100, expected 0.5
+
+
+def test_many_quantities_of_another_family_mask_no_change():
+    spread = 0.1 * np.arange(5.0)[:, None]
+    few, many = sample(spread, 2.0 + spread), drawn(1, quantities=300)
+    sides = (np.hstack((getattr(few, side), getattr(many, side))) for side in SIDES)
+    both = sample(*sides)
+    (alone,), _ = p_values([few])
+    (masked,), _ = p_values([both])
+    (apart,), _ = p_values([replace(both, family=(0,) + (1,) * 300)])
+    assert masked.louder[0] > ALPHA
+    assert apart.louder[0] == alone.louder[0] <= ALPHA
+    assert apart.quieter[0] == alone.quieter[0]
+
+
+def test_each_family_has_a_level_of_its_own():
+    families = (0,) * 10 + (1,) * 10
+    called = [
+        [(found.louder[place] <= ALPHA).any() for place in (slice(10), slice(10, None))]
+        for seed in range(200)
+        for (found,) in [p_values([replace(drawn(seed), family=families)])[0]]
+    ]
+    assert (np.mean(called, axis=0) <= 0.02).all()  # 4 or less of 200, expected 0.8
 
 
 def test_exchanged_sides_have_exchanged_p():

@@ -45,6 +45,10 @@ class Verdict(StrEnum):
     BETTER = "better"
 
 
+OVER_ALL, IN_DETAIL = range(2)
+"""Families of quantities: over all joints, few; by joint or link, many."""
+
+
 @dataclass(frozen=True)
 class Kind:
     """A kind of quantity.
@@ -52,21 +56,32 @@ class Kind:
     Attributes:
         name: What has it.
         unit: Of its changes.
-        least: A change below this is none, and is added to standard errors.
+        least: A change below this is none.
+        steady: What is added to standard errors: a change that says little of so few runs.
+        family: The quantities that it is tested with.
     """
 
     name: str
     unit: str = "dB"
     least: float = 1.0
+    steady: float = 1.0
+    family: int = IN_DETAIL
 
 
-CELL, JOINT, BAND, LINK, PEAK = map(Kind, ("joint and band", "joint", "band", "link", "peak"))
-FINDINGS = Kind("findings", "per run", least=0.5)
+CELL, JOINT, LINK, PEAK = map(Kind, ("joint and band", "joint", "link", "peak"))
+BAND, BAND_PEAK, ERROR, ERROR_PEAK = (
+    Kind(name, steady=3.0, family=OVER_ALL)
+    for name in ("band", "peak of band", "tracking error", "peak of tracking error")
+)
+FINDINGS = Kind("findings", "per run", least=0.5, steady=0.5, family=OVER_ALL)
 FEWEST_SIDE = 1000
 """More repetitions than one of the reference takes to be compared."""
 FINDINGS_MARGIN = 1.0
 """A change of their number within this is the same, per run."""
-LEAST = {kind.name: kind.least for kind in (CELL, JOINT, BAND, LINK, PEAK, FINDINGS)}
+LEAST = {
+    kind.name: kind.least
+    for kind in (CELL, JOINT, LINK, PEAK, BAND, BAND_PEAK, ERROR, ERROR_PEAK, FINDINGS)
+}
 
 
 @dataclass(frozen=True)
@@ -74,8 +89,9 @@ class Change:
     """By how much a quantity changed.
 
     Attributes:
-        kind: "joint and band", "joint", "band", "link", "peak" (loudest 0.2 s of a joint) or
-            "findings" (per run, by class).
+        kind: "joint and band", "joint", "link", "peak" (loudest 0.2 s of a joint), "band" (all
+            joints), "peak of band" (loudest 0.2 s of any joint), the same two of the tracking
+            error, or "findings" (per run, by class).
         joint: The joint, empty for none.
         link: The link, empty for none.
         band: Limits of the octave, in [Hz]; None for all.
@@ -106,7 +122,13 @@ class Change:
         where = self.joint or self.link or self.label
         octave = "" if self.band is None else "{:.0f} to {:.0f} Hz".format(*self.band)
         named = ", ".join(part for part in (where, octave) if part)
-        return {"peak": f"peak of {named}", "findings": f"findings {named}"}.get(self.kind, named)
+        return {
+            PEAK.name: f"peak of {named}",
+            BAND_PEAK.name: f"peak of {named}",
+            ERROR.name: f"tracking error, {named}",
+            ERROR_PEAK.name: f"peak of tracking error, {named}",
+            FINDINGS.name: f"findings {named}",
+        }.get(self.kind, named)
 
 
 @dataclass(frozen=True, eq=False)
@@ -363,6 +385,7 @@ def _prepared(scenario: Scenario) -> _Prepared:
     power = [_of(run.levels, span, joints, bands) for run, span in zip(runs, spans, strict=True)]
     mean = np.array([each.mean(axis=0) for each in power])  # runs, joints, bands
     peak = np.array([each.sum(axis=2).max(axis=0) for each in power])  # runs, joints
+    loudest = np.array([each.max(axis=(0, 1)) for each in power])  # runs, bands
     octaves = list(map(edges, bands))
     quantities = [_Quantity(CELL, joint=j, band=b) for j in joints for b in octaves]
     columns = [_levels(mean.reshape(len(runs), -1))]
@@ -370,6 +393,15 @@ def _prepared(scenario: Scenario) -> _Prepared:
     quantities += [_Quantity(BAND, band=b) for b in octaves]
     quantities += [_Quantity(PEAK, joint=j) for j in joints]
     columns += [_levels(mean.sum(axis=2)), _levels(mean.sum(axis=1)), _levels(peak)]
+    quantities += [_Quantity(BAND_PEAK, band=b) for b in octaves]
+    columns.append(_levels(loudest))
+    errors = [run.errors for run in runs]
+    if all(each is not None for each in errors):
+        known = [each for each in errors if each is not None]
+        power = [_of(own, span, joints, bands) for own, span in zip(known, spans, strict=True)]
+        quantities += [_Quantity(kind, band=b) for kind in (ERROR, ERROR_PEAK) for b in octaves]
+        columns.append(_levels(np.array([each.mean(axis=0).sum(axis=0) for each in power])))
+        columns.append(_levels(np.array([each.max(axis=(0, 1)) for each in power])))
     links = [run.links for run in runs]
     if all(each is not None for each in links):
         known = [each for each in links if each is not None]
@@ -389,8 +421,9 @@ def _prepared(scenario: Scenario) -> _Prepared:
         columns.append(np.array(counts, dtype=np.float64).reshape(len(runs), len(labels)))
     values = np.hstack(columns)
     split = len(scenario.reference)
-    scale = np.array([quantity.kind.least for quantity in quantities])
-    sample = Sample(values[:split], values[split:], scale, paired=scenario.paired)
+    scale = np.array([quantity.kind.steady for quantity in quantities])
+    family = tuple(quantity.kind.family for quantity in quantities)
+    sample = Sample(values[:split], values[split:], scale, family, paired=scenario.paired)
     return _Prepared(scenario, tuple(quantities), sample, tuple(remarks))
 
 
@@ -472,6 +505,10 @@ def _remarks(scenario: Scenario) -> "Sequence[str]":
         lacking = next(run for run in runs if run.signals != every)
         names = ", ".join(sorted(every - lacking.signals)).replace("_", " ")
         found.append(f"Findings are not compared: {lacking.path} has no {names}, others have.")
+    errors = [run.errors is not None for run in runs]
+    if any(errors) and not all(errors):
+        lacking = runs[errors.index(False)]
+        found.append(f"Tracking errors are not compared: {lacking.path} has no desired velocities.")
     counts = [run.links is not None for run in runs]
     if any(counts) and not all(counts):
         lacking = runs[counts.index(False)]
@@ -568,7 +605,7 @@ def _equal(
     twins = sample.paired or before == after == 1
     if not news and twins:
         apart = np.abs(sample.candidate - sample.reference)
-        if bool(np.all(apart < sample.scale)):
+        if bool(np.all(apart < [quantity.kind.least for quantity in each.quantities])):
             return Verdict.SAME, "each run is within 1 dB of its twin"
 
     def excess(change: Change) -> float:

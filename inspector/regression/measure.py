@@ -2,7 +2,7 @@
 
 import traceback
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -58,6 +58,7 @@ class Measured:
         model: Name of the model that labelled, empty if none could.
         findings: What was found, in order.
         levels: Its levels.
+        errors: Levels of measured less desired velocities; None without the latter.
         links: Power of each link's vibration above 10 Hz, in [W], in one band; None without a known
             robot.
         envelope: Envelope of its motion at 200 Hz at most; NaN in gaps, shape (bins,).
@@ -76,6 +77,7 @@ class Measured:
     model: str
     findings: tuple[Finding, ...]
     levels: Levels
+    errors: Levels | None
     links: Levels | None
     envelope: Array
     clock: Array
@@ -192,10 +194,16 @@ def measure(
         model=analysis.model,
         findings=_findings(analysis),
         levels=levels(run),
+        errors=_errors(run),
         links=None if analysis.links is None else _links(analysis.links),
         envelope=motion,
         clock=clock,
     )
+
+
+def _errors(run: Run) -> Levels | None:
+    desired = run.velocity_desired
+    return None if desired is None else levels(replace(run, velocity=run.velocity - desired))
 
 
 def _findings(analysis: Analysis) -> tuple[Finding, ...]:

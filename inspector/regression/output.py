@@ -196,7 +196,7 @@ def _lines(found: Difference) -> Iterator[str]:
         more = f" and {len(alone) - 3} more" if len(alone) > 3 else ""
         yield f"not compared, on one side only: {', '.join(map(str, alone[:3]))}{more}"
     yield (
-        f"worse and better: p ≤ {ALPHA:g} for all quantities of all scenarios together;"
+        f"worse and better: p ≤ {ALPHA:g} for all quantities of a family in all scenarios together;"
         f" same: no change by {found.margin:g} dB within intervals of {CONFIDENCE:.0%}"
     )
     if found.new or found.verdict is Verdict.WORSE:

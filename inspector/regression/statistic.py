@@ -6,10 +6,12 @@ repetitions can be exchanged, and the statistic of the observed sides is compare
 others (Fisher; Pitman). Of all quantities in all scenarios the largest statistic is taken in each
 exchange, which holds the probability of any false alarm at the level of the test (single-step maxT,
 P. Westfall and S. Young, *Resampling-Based Multiple Testing*, 1993). It is at least as sharp as
-Holm's bound, and keeps the dependence of quantities. The statistic is the difference of means by
-its standard error, plus a constant that keeps quantities of small spread from ruling (V. Tusher,
-R. Tibshirani and G. Chu, PNAS 98, 2001). Drawn exchanges count the observed one (B. Phipson and
-G. Smyth, SAGMB 9, 2010), so that p is never 0.
+Holm's bound, and keeps the dependence of quantities. Of several families of quantities, such as the
+few of all joints and the many of each joint, each has a largest statistic and a level of its own,
+so that the many do not mask the few; their levels add up (Bonferroni). The statistic is the
+difference of means by its standard error, plus a constant that keeps quantities of small spread
+from ruling (V. Tusher, R. Tibshirani and G. Chu, PNAS 98, 2001). Drawn exchanges count the
+observed one (B. Phipson and G. Smyth, SAGMB 9, 2010), so that p is never 0.
 
 The estimate of a change is that of Hodges and Lehmann, its interval that of Moses: without
 assumptions on the distribution, and exact (M. Hollander, D. Wolfe and E. Chicken, *Nonparametric
@@ -21,20 +23,22 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations, product
 from math import comb, prod
+from typing import Any
 
 import numpy as np
 
+from models.types import Index
 from noisemodel.types import Array
 
-ALPHA = 0.005
-"""Probability that any quantity of any scenario is called louder though nothing changed; as much
-for quieter."""
+ALPHA = 0.004
+"""Probability that any quantity of a family in any scenario is called louder though nothing
+changed; as much for quieter."""
 CONFIDENCE = 0.9
 """Of intervals; two one-sided tests at 5 % each (D. Schuirmann, 1987)."""
 EXCHANGES = 9999
 """Most exchanges of sides that are computed beside the observed one; more are drawn from."""
 FEWEST_PAIRS = 8
-"""Pairs from which on exchanges within pairs reach `ALPHA`: 2**8 > 1 / 0.005."""
+"""Pairs from which on exchanges within pairs reach `ALPHA`: 2**8 > 1 / 0.004."""
 SEED = 0
 ROUNDING = 1e-9
 """By which share statistics of equal exchanges may differ."""
@@ -49,6 +53,7 @@ class Sample:
         candidate: Shape (repetitions, quantities).
         scale: What is added to each standard error, shape (quantities,): a difference that does
             not matter.
+        family: Number of the family of each quantity, shape (quantities,); one unless given.
         shared: Indices of those quantities that scenarios have in common, in one order for all.
         paired: Whether the repetitions are pairs, row by row.
     """
@@ -56,8 +61,14 @@ class Sample:
     reference: Array
     candidate: Array
     scale: Array
+    family: tuple[int, ...] = ()
     shared: tuple[int, ...] = ()
     paired: bool = False
+
+    @property
+    def families(self) -> Index:
+        """The family of each quantity."""
+        return np.array(self.family or np.zeros(len(self.scale)), dtype=np.intp)
 
     @property
     def within_pairs(self) -> bool:
@@ -91,34 +102,54 @@ def p_values(samples: Sequence[Sample]) -> tuple[tuple[PValues, ...], PValues]:
         samples: The scenarios; the shared quantities of all are the same.
 
     Returns:
-        The p-values of each scenario, adjusted for all quantities of all; and those of the shared
-        quantities over all scenarios together, empty for a single one.
+        The p-values of each scenario, adjusted for all quantities of one family of all; and those
+        of the shared quantities over all scenarios together, empty for a single one.
     """
     own: list[Array] = []
-    highest, lowest = np.array(-np.inf), np.array(np.inf)
+    families = [sample.families for sample in samples]
+    known = sorted(set(np.concatenate(families).tolist()))
+    extremes = _Extremes(dict.fromkeys(known, -np.inf), dict.fromkeys(known, np.inf))
     differences, variances = np.array(0.0), np.array(0.0)
-    for sample, sides in zip(samples, _exchanged(samples), strict=True):
+    for sample, family, sides in zip(samples, families, _exchanged(samples), strict=True):
         difference, error = _statistics(sample, sides)
         statistic = difference / (error + sample.scale)
         own.append(statistic[0].copy())
-        highest = np.maximum(highest, statistic.max(axis=1))
-        lowest = np.minimum(lowest, statistic.min(axis=1))
+        extremes.add(statistic, family)
         shared = list(sample.shared)
         differences = differences + difference[:, shared]
         variances = variances + error[:, shared] ** 2
-    together = np.zeros(0)
+    together, common = np.zeros(0), np.zeros(0, dtype=np.intp)
     if len(samples) > 1 and samples[0].shared:
-        scale = len(samples) * samples[0].scale[list(samples[0].shared)]
+        shared = list(samples[0].shared)
+        scale, common = len(samples) * samples[0].scale[shared], families[0][shared]
         statistic = differences / (np.sqrt(variances) + scale)
-        together = statistic[0]
-        highest = np.maximum(highest, statistic.max(axis=1))
-        lowest = np.minimum(lowest, statistic.min(axis=1))
-    highest, lowest = np.sort(highest), np.sort(-lowest)
+        together = statistic[0].copy()
+        extremes.add(statistic, common)
+    return tuple(map(extremes.adjusted, own, families)), extremes.adjusted(together, common)
 
-    def adjusted(observed: Array) -> PValues:
-        return PValues(_share(highest, observed), _share(lowest, -observed))
 
-    return tuple(map(adjusted, own)), adjusted(together)
+@dataclass(frozen=True, eq=False)
+class _Extremes:
+    """The largest and the least statistic of each family in each exchange, shape (exchanges,)."""
+
+    highest: dict[int, Any]
+    lowest: dict[int, Any]
+
+    def add(self, statistic: Array, family: Index) -> None:
+        """Take in statistics of shape (exchanges, quantities)."""
+        for number in set(family.tolist()):
+            mine = statistic[:, family == number]
+            self.highest[number] = np.maximum(self.highest[number], mine.max(axis=1))
+            self.lowest[number] = np.minimum(self.lowest[number], mine.min(axis=1))
+
+    def adjusted(self, observed: Array, family: Index) -> PValues:
+        """The p-values of observed statistics."""
+        louder, quieter = np.ones(len(observed)), np.ones(len(observed))
+        for number in set(family.tolist()):
+            mine = family == number
+            louder[mine] = _share(np.sort(self.highest[number]), observed[mine])
+            quieter[mine] = _share(np.sort(-self.lowest[number]), -observed[mine])
+        return PValues(louder, quieter)
 
 
 def attainable(sample: Sample) -> bool:
