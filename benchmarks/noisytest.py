@@ -34,6 +34,8 @@ SIDE = Path(__file__).resolve().parent / "noisytestside.py"
 TASKS = {
     "train": "train: read, learn, measure",
     "file": "label a file of 10 s",
+    "folder": "label 50 files, each",
+    "folder, general": "the same by `general`, with onsets, each",
     "hop": "label a hop of 0.1 s",
     "hop, stream": "label a hop of 0.1 s, `Stream`",
     "hop, general": "label a hop of 0.1 s, `Stream` of `general`",
@@ -41,7 +43,12 @@ TASKS = {
     "points": "a point of the grid as `inspector tune` does it",
 }
 """The timed tasks, by their titles in the table."""
-INSTEAD = {"hop, stream": "hop", "hop, general": "hop", "points": "point"}
+INSTEAD = {
+    "folder, general": "folder",
+    "hop, stream": "hop",
+    "hop, general": "hop",
+    "points": "point",
+}
 """The task of the original that replaces one that it does not have."""
 
 

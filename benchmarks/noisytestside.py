@@ -11,6 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,22 @@ FILE = "earlycontacttoe.log"
 HOPS = 100
 POINTS = 3
 """Points of the grid that are trained and measured by themselves."""
-TIMES = {"hop": HOPS, "hop, stream": HOPS, "hop, general": HOPS, "point": POINTS}
+FILES = 50
+"""Files of a folder; NoisyTest's data set has 32, the first ones come twice."""
+TIMES = {
+    "hop": HOPS,
+    "hop, stream": HOPS,
+    "hop, general": HOPS,
+    "point": POINTS,
+    "folder": FILES,
+    "folder, general": FILES,
+}
 """Repetitions of a task per call."""
+
+
+def files(folder: Path) -> list[Path]:
+    """The logs of all sets, in order, `FILES` of them."""
+    return list(islice(cycle(sorted(folder.glob("*/*.log"))), FILES))
 
 
 class Original:
@@ -44,6 +59,7 @@ class Original:
             "train": self._train,
             "prepare": self._prepare,
             "file": self._label,
+            "folder": self._label_all,
             "hop": self._hop,
             "point": self._point,
         }
@@ -61,6 +77,9 @@ class Original:
     def _label(self) -> list[int]:
         _, labels = self._pipeline.test(str(self._folder / "validation" / FILE))
         return [round(label) for label in labels.tolist()]
+
+    def _label_all(self) -> int:
+        return sum(len(self._pipeline.test(str(path))[1]) for path in files(self._folder))
 
     def _hop(self, count: int = HOPS) -> None:
         for index in range(count):
@@ -92,6 +111,8 @@ class Ours:
             "train": self._train,
             "prepare": self._prepare,
             "file": self._label,
+            "folder": lambda: self._label_all({"trained": self._classifier}),
+            "folder, general": lambda: self._label_all({"general": self._shipped}),
             "hop": self._hop,
             "hop, stream": lambda: self._push(self._classifier),
             "hop, general": lambda: self._push(self._general),
@@ -110,7 +131,8 @@ class Ours:
     def _prepare(self) -> None:
         models, profile = self._models, self._profile
         shipped = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
-        self._general = models.load(shipped).at(profile.rate)
+        self._shipped = models.load(shipped)
+        self._general = self._shipped.at(profile.rate)
         _, self._noise = models.read_log(self._folder / "validation" / FILE)
         self._windows = models.frame(self._noise[1:], length=profile.length, hop=profile.hop)
         self._recordings = [
@@ -127,6 +149,14 @@ class Ours:
     def _hop(self, count: int = HOPS) -> None:
         for index in range(count):
             self._classifier.predict(self._windows[index % len(self._windows)][None])
+
+    def _label_all(self, library: dict[str, Any]) -> int:
+        """What `inspector classify` does: findings with onset and end."""
+        from inspector.analysis.verdict import classify_files
+
+        verdicts = list(classify_files(files(self._folder), library))
+        assert all(verdict.model for verdict in verdicts)
+        return sum(len(verdict.events) for verdict in verdicts)
 
     def _push(self, classifier: Any) -> None:
         """Push hops; those before the first complete frame cost less."""

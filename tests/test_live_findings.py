@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inspector.live.findings import Findings
+from inspector.live.findings import Findings, News
 from models import Labels
 
 NAMES = {".": "ok", "i": "impact", "o": "oscillations", "u": "unknown"}
@@ -51,3 +51,42 @@ def test_what_is_over_is_forgotten_but_for_its_events():
     for _ in range(100):
         found.add(labels("...II..."))
     assert len(found._open) == 1
+
+
+@given(
+    st.text(alphabet="..iIoOu", min_size=1, max_size=40),
+    st.lists(st.integers(1, 5), max_size=40),
+    st.lists(st.integers(0, 40), max_size=3).map(sorted),
+)
+def test_the_news_of_a_stream_end_with_its_events_each_once(text, sizes, gaps):
+    whole, found, first, told = labels(text, gaps), Findings(), 0, []
+    news = News(lambda event, over: told.append((event, over)))
+    for size in [*sizes, len(text)]:
+        found.add(whole.part(slice(first, first + size)))
+        news.update(found.confirmed, found.decided)
+        first += size
+    news.update(found.events, float("inf"))
+    ended = [event for event, over in told if over]
+    assert sorted(ended, key=lambda event: (event.start, event.stop)) == list(whole.events())
+    for place, event in enumerate(ended):
+        begun = [each for each, over in told[: told.index((event, True))] if not over]
+        assert any(each.label == event.label and each.start >= event.start for each in begun), place
+
+
+def test_a_single_frame_above_the_threshold_is_no_news():
+    whole, found, told = labels("....I......"), Findings(), []
+    news = News(lambda event, over: told.append(event))
+    for place in range(len(whole.start)):
+        found.add(whole.part(slice(place, place + 1)))
+        news.update(found.confirmed, found.decided)
+    news.update(found.events, float("inf"))
+    assert told == []
+
+
+def test_a_finding_is_told_of_as_soon_as_it_is_confirmed_and_when_it_is_over():
+    whole, found, told = labels("...III....."), Findings(), []
+    news = News(lambda event, over: told.append((place, event.label, over)))
+    for place in range(len(whole.start)):
+        found.add(whole.part(slice(place, place + 1)))
+        news.update(found.confirmed, found.decided)
+    assert told == [(4, "impact", False), (10, "impact", True)]

@@ -1,11 +1,23 @@
 """`inspector live`: the noise of motion while it is measured."""
 
+from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inspector.commands.options import ModelFiles, Overwrite, PackageRoot
+
+if TYPE_CHECKING:
+    from inspector.library import Library
+    from inspector.live.gate import Gate
+
+
+class Format(StrEnum):
+    """The output formats of findings while they come."""
+
+    TEXT = "text"
+    JSON = "json"
 
 
 def live(
@@ -30,14 +42,34 @@ def live(
         str | None,
         typer.Option(help="Send to the viewer at PORT or HOST:PORT; by default one is opened."),
     ] = None,
+    format: Annotated[  # noqa: A002
+        Format, typer.Option("--format", help="Of findings: lines of text, or JSON lines.")
+    ] = Format.TEXT,
+    expect: Annotated[
+        Path | None,
+        typer.Option("--expect", help="Expectations (TOML); a stream is a run called `live`."),
+    ] = None,
+    fail_fast: Annotated[
+        bool, typer.Option("--fail-fast", help="End at the first finding that counts.")
+    ] = False,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Show samples from standard input as they arrive.
+    """Show samples from standard input as they arrive, and print findings as they come.
 
     CSV has a header: time,elbow.velocity,elbow.velocity_desired,elbow.position
     JSON lines have one object each: {"time": 0.1, "velocity": [0.2]}
     Ctrl-C ends the recording.
+
+    Exit status:
+
+      0  ok: no finding that counts
+      1  findings: there was one, or one that is required is missing
+      2  wrong usage
+      3  bad input: the samples cannot be understood
+      4  cannot tell: say, the rate is too low for every model
+      5  output lost: an output could not be written
+     70  internal error: a bug, with its traceback on standard error
     """
     import sys
     from functools import partial
@@ -52,16 +84,46 @@ def live(
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"
         )
+    library = load_library(assets.model_files(model))
+    gate = _gate(expect, library, as_json=format is Format.JSON)
     session = partial(
         LiveSession,
         rate,
         robot=robot,
-        library=load_library(assets.model_files(model)),
+        library=library,
         save=save,
         connect=connect,
         overwrite=overwrite,
         on_warning=partial(typer.echo, err=True),
+        on_finding=gate.take,
     )
     given = tuple(name.strip() for name in names.split(",") if name.strip())
-    summary = follow(sys.stdin.buffer, given, lambda found: session(joint_names=found))
-    typer.echo(str(summary))
+    summary = follow(
+        sys.stdin.buffer,
+        given,
+        lambda found: gate.watch(session(joint_names=found)),
+        enough=lambda: fail_fast and gate.failed,
+    )
+    raise typer.Exit(gate.end(summary))
+
+
+def _gate(expect: Path | None, library: "Library", *, as_json: bool) -> "Gate":
+    """What becomes of the findings."""
+    from contextlib import suppress
+    from datetime import date
+
+    from inspector.expectations.expectations import read
+    from inspector.live.gate import Gate
+
+    expectations = None if expect is None else read(expect)
+    today = date.today()
+    if expectations is not None:
+        expectations.check_classes(library)
+        for remark in expectations.remarks(today):
+            typer.echo(f"inspector: {remark}", err=True)
+
+    def tell(line: str) -> None:
+        with suppress(OSError):  # the recording goes on; the command line says what is lost
+            typer.echo(line)
+
+    return Gate(tell, expectations, as_json=as_json, today=today)

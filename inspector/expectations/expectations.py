@@ -2,7 +2,7 @@
 
 import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from fnmatch import fnmatchcase
 from math import isfinite
@@ -170,6 +170,22 @@ class Expectations:
             for entry in self.entries
             if entry.expired(today)
         )
+
+    def widened(self, slack: float) -> "Expectations":
+        """The same of findings whose times are less exact.
+
+        Args:
+            slack: By how much earlier they may begin, and later end, in [s].
+        """
+
+        def wider(entry: Entry) -> Entry:
+            lies_within = entry.kind not in ("forbid", "budget")
+            time = entry.time
+            if time is not None and lies_within:
+                time = (time[0] - slack, time[1] + slack)
+            return replace(entry, time=time, tolerance=entry.tolerance + slack)
+
+        return replace(self, entries=tuple(map(wider, self.entries)))
 
     def check_classes(self, library: Library) -> None:
         """Refuse entries for a class that cannot be found.

@@ -18,14 +18,19 @@ EXPECTED = "expected a CSV header and rows, or a JSON object per line"
 
 
 def follow(
-    stream: BinaryIO, names: tuple[str, ...], session_of: Callable[[tuple[str, ...]], LiveSession]
+    stream: BinaryIO,
+    names: tuple[str, ...],
+    session_of: Callable[[tuple[str, ...]], LiveSession],
+    *,
+    enough: Callable[[], bool] = lambda: False,
 ) -> Summary:
-    """Show rows as they arrive, until they end or Ctrl-C is pressed.
+    """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough.
 
     Args:
         stream: The rows, such as standard input.
         names: Names of the joints, as the user gave them.
         session_of: Begins a session, given the names of the joints.
+        enough: Whether to end, asked after each batch of rows.
 
     Returns:
         What became of the samples.
@@ -46,6 +51,8 @@ def follow(
             for lines, number, received in chain([start], incoming):
                 for rows in reader.read(lines, number, session.note):
                     session.push(**rows.signals, time=rows.time, received=received)
+                if enough():
+                    break
     if not session.summary.samples:
         raise LiveError(f"the input has no samples; {EXPECTED}")
     return session.summary

@@ -1,6 +1,6 @@
-"""Events of labels while they arrive, the same as those of all labels at once."""
+"""Events of labels while they arrive, the same as those of all labels at once; and their news."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,10 +38,69 @@ class Findings:
         self._open = waiting.part(slice(last, None))
 
     @property
+    def decided(self) -> float:
+        """Time at which the earliest frame starts whose event may still change, in [s]."""
+        return -float("inf") if self._open is None else float(self._open.start[0])
+
+    @property
+    def confirmed(self) -> tuple[Event, ...]:
+        """The events that will not vanish, whatever comes: as if an `ok` frame came next."""
+        if self._open is None:
+            return tuple(self._closed)
+        last = self._open.part(slice(-1, None))
+        quiet = replace(
+            last,
+            label=np.full_like(last.label, "ok"),
+            above_threshold=None if last.above_threshold is None else np.zeros(1, dtype=bool),
+            novel=None if last.novel is None else np.zeros(1, dtype=bool),
+        )
+        rest = Labels.concatenated((self._open, quiet)).events()
+        return tuple(_merged(self._closed, rest))
+
+    @property
     def events(self) -> tuple[Event, ...]:
         """The events so far, as if the signal ended here."""
         rest = () if self._open is None else self._open.events()
         return tuple(_merged(self._closed, rest))
+
+
+class News:
+    """Tells of each event twice: as soon as it is there, and when it is over.
+
+    What an event is called may still change while it lasts: `unknown` frames take the class of a
+    failure that follows. Such an event is told of again under its new name, and only that ends.
+
+    Args:
+        tell: Called with an event, and whether it is over.
+    """
+
+    def __init__(self, tell: Callable[[Event, bool], None]) -> None:
+        self._tell = tell
+        self._begun: dict[str, float] = {}
+        self._ended: dict[str, float] = {}
+
+    def update(self, events: Sequence[Event], decided: float) -> None:
+        """Tell of what is new.
+
+        Args:
+            events: All events so far, in order of time.
+            decided: Time up to which nothing changes any more, in [s]: an event that stops earlier
+                is over, since what continues it would begin before its end.
+        """
+        never = -float("inf")
+        for event in events:
+            if event.stop <= self._ended.get(event.label, never):
+                continue
+            if event.stop > self._begun.get(event.label, never) and not self._lasts(event):
+                self._tell(event, False)
+            self._begun[event.label] = event.stop
+            if event.stop < decided:
+                self._ended[event.label] = event.stop
+                self._tell(event, True)
+
+    def _lasts(self, event: Event) -> bool:
+        """Whether an event has been told of before: it continues one of its class."""
+        return self._begun.get(event.label, -float("inf")) >= event.start
 
 
 def _merged(events: Sequence[Event], others: Sequence[Event]) -> list[Event]:

@@ -43,6 +43,7 @@ class Summary:
         status: The same as that of `inspector classify` for these labels.
         findings: From the start of the first frame of each to the end of its last.
         reason: Why nothing can be told; empty otherwise.
+        frame: Duration of a frame, by which findings may begin too early, in [s].
     """
 
     samples: int
@@ -55,6 +56,7 @@ class Summary:
     status: Status = Status.CANNOT_TELL
     findings: Sequence[Event] = ()
     reason: str = "no frame was labelled"
+    frame: float = 0.0
 
     def __str__(self) -> str:
         counts = ", ".join(f"{count} {label}" for label, count in self.labels.items())
@@ -92,6 +94,8 @@ class LiveSession:
             this machine is used, and one is opened if none runs.
         overwrite: Whether a file that exists may be replaced.
         on_warning: Called with a line for what cannot be shown, once per kind.
+        on_finding: Called with each finding as soon as it is confirmed, and False; and with it and
+            True when it is over. The latter are those of the summary.
 
     Raises:
         LiveError: If the rate is none.
@@ -110,12 +114,14 @@ class LiveSession:
         connect: str | None = None,
         overwrite: bool = False,
         on_warning: Callable[[str], None] = lambda line: None,
+        on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
         if not 1.0 <= rate < np.inf:
             raise LiveError(f"a rate of {rate:g} Hz; expected 1 or more")
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
         self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
+        self._on_finding = on_finding
         self._latest = -1.0 / rate
         self._buffer: SampleBuffer | None = None
         self._worker: Worker | None = None
@@ -203,6 +209,7 @@ class LiveSession:
             status=status_of(frames, findings),
             findings=findings,
             reason=(worker.reason if worker else "") or "no frame was labelled",
+            frame=worker.frame if worker else 0.0,
         )
 
     def close(self) -> Summary:
@@ -257,6 +264,7 @@ class LiveSession:
             library=for_robot(self._library, self._robot),
             warnings=self._warnings,
             watch=LimitWatch(names, self._robot) if self._robot else None,
+            on_finding=self._on_finding,
         )
         if self._robot and "position" not in widths:
             self.note("missing signals", "no positions: the robot is not drawn")

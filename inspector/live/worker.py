@@ -2,7 +2,7 @@
 
 import time as clocks
 from collections import Counter, deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,7 +14,7 @@ from inspector.live.blueprint import Contents, layout
 from inspector.live.buffer import SampleBuffer
 from inspector.live.clock import Clock
 from inspector.live.drawing import Drawing
-from inspector.live.findings import Findings
+from inspector.live.findings import Findings, News
 from inspector.live.labeller import NOISY, Labeller
 from inspector.live.lane import Lane
 from inspector.live.robot import LiveRobot
@@ -22,6 +22,7 @@ from inspector.live.sink import Sink
 from inspector.live.spectrogram import SpectrogramStream
 from inspector.live.warnings import Warnings
 from inspector.wrongrobot import LONG, LimitWatch
+from models import Event
 from noisemodel.types import Array, Mask
 
 MAX_DELAYS = 100_000
@@ -40,6 +41,7 @@ class Worker:
         library: Models to choose from.
         warnings: Where to count what cannot be shown.
         watch: The limits of the robot that the samples are said to be of; None checks none.
+        on_finding: Called with each finding when it is there, and when it is over.
 
     Raises:
         RobotError: If the robot cannot be read.
@@ -58,6 +60,7 @@ class Worker:
         library: Library,
         warnings: Warnings,
         watch: LimitWatch | None = None,
+        on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
         self.samples, self._now = 0, 0.0
         self._unconfirmed = 0  # samples since the viewer was last known to be there
@@ -68,6 +71,7 @@ class Worker:
         self._lane = Lane(self._labeller.hop, self._labeller.length)
         self._counts: Counter[str] = Counter()
         self.findings = Findings()
+        self._news = None if on_finding is None else News(on_finding)
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._robot = None
         self._watch = watch
@@ -100,6 +104,11 @@ class Worker:
     def reason(self) -> str:
         """Why there are no labels; empty if a model labels."""
         return "" if self._labeller.model else self._labeller.remark
+
+    @property
+    def frame(self) -> float:
+        """Duration of a frame, in [s]; 0 without a model."""
+        return self._labeller.length
 
     @property
     def labels(self) -> Mapping[str, int]:
@@ -158,7 +167,9 @@ class Worker:
             self._drawing.event(self._now, line)
 
     def finish(self) -> None:
-        """Show what waits."""
+        """Show what waits, and tell of findings that last to the end."""
+        if self._news is not None:
+            self._news.update(self.findings.events, float("inf"))
         if self._sink.alive:
             self._drawing.flush()
             self._drawing.changes(self._lane.end())
@@ -183,6 +194,8 @@ class Worker:
             shift = end - self._labeller.elapsed
             labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
             self.findings.add(labels)
+            if self._news is not None:
+                self._news.update(self.findings.confirmed, self.findings.decided)
             labels = replace(labels, label=labels.raw)
             self._counts.update(labels.label.tolist())
             changes = self._lane.take(labels)
