@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from commandline import call
 
-from inspector import workers
+from inspector import assets, workers
 from inspector.analysis import verdict
 from inspector.assets import demo_run
 from inspector.logs.opening import open_source
+from inspector.version import program_version
 
 ROOT = Path(__file__).parents[1]
 COUNT = 24
@@ -73,14 +74,51 @@ def test_only_what_changed_is_done_again(runs, tmp_path):
     assert rows(state)[-1]["status"] == "bad-input"
 
 
-def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
+@pytest.mark.parametrize(
+    ("key", "value", "problem"),
+    [
+        (
+            "format",
+            "noise-classify-state/0",
+            "is of format noise-classify-state/0, this version writes noise-classify-state/1",
+        ),
+        ("version", "0.4.9", f"is of another version (0.4.9, this is {program_version()})"),
+    ],
+)
+def test_a_state_of_another_version_is_refused(tmp_path, key, value, problem):
     state = tmp_path / "state.jsonl"
+    call("classify", demo_run(), "--resume", state)
+    head, _, rest = state.read_text().partition("\n")
+    state.write_text(f"{json.dumps(json.loads(head) | {key: value})}\n{rest}")
+    status, _, err = call("classify", demo_run(), "--resume", state)
+    assert (status, err) == (
+        3,
+        f"inspector: {state}: {problem}; name another file, or delete it\n",
+    )
+
+
+def test_a_state_without_a_version_is_continued(tmp_path):
+    state = tmp_path / "state.jsonl"
+    first = call("classify", demo_run(), "--format", "json", "--resume", state)[1]
+    head, row = state.read_text().splitlines()
+    header = {key: value for key, value in json.loads(head).items() if key != "version"}
+    row = {key: value for key, value in json.loads(row).items() if key != "begin"}
+    state.write_text(f"{json.dumps(header)}\n{json.dumps(row)}\n")
+    assert call("classify", demo_run(), "--format", "json", "--resume", state)[1] == first
+
+
+def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
+    state, other = tmp_path / "state.jsonl", tmp_path / "other.npz"
+    shutil.copy(assets.model_files()[0], other)
     call("classify", demo_run(), "--resume", state)
     status, _, err = call("classify", demo_run(), "--resume", state, "--unknown", "ignore")
     assert (status, err) == (
         3,
         f"inspector: {state}: is of other settings; name another file, or delete it\n",
     )
+    status, _, err = call("classify", demo_run(), "--resume", state, "--model", other)
+    assert status == 3
+    assert err == f"inspector: {state}: is of other models; name another file, or delete it\n"
     state.write_text("some notes")
     status, _, err = call("classify", demo_run(), "--resume", state)
     assert status == 3

@@ -76,6 +76,14 @@ def test_a_required_finding_that_is_missing_has_exit_status_1(runs, tmp_path):
     assert "  missing: impact from 2.80 s to 3.20 s" in out.splitlines()
 
 
+@pytest.mark.parametrize("command", ["classify", "expect"])
+def test_an_empty_folder_is_one_line(tmp_path, command):
+    status, out, err = call(command, tmp_path)
+    assert (status, out) == (3, "")
+    (line,) = err.splitlines()
+    assert line.startswith(f"inspector: {tmp_path}: a folder without logs (.bag, .csv, ")
+
+
 def test_a_log_that_is_missing_from_a_folder_lacks_its_required_finding(runs):
     (runs / "broken.npz").unlink()
     text = 'others = "allow"\n[[require]]\nruns = "{}.npz"\nclass = "impact"'

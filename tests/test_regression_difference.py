@@ -278,6 +278,14 @@ def test_two_runs_of_one_name_are_refused(tmp_path, library):
         )
 
 
+def test_two_runs_of_one_name_are_one_line(tmp_path):
+    before, twice = (folder(tmp_path / name, [1]) for name in ("before", "twice"))
+    run(2).save(twice / "walk_0.npz")
+    status, out, err = diff(before, twice)
+    told = f"{twice / 'walk-0.npz'} and {twice / 'walk_0.npz'} are two runs of one name"
+    assert (status, out, err) == (3, "", f"inspector: {told}\n")
+
+
 def test_the_report_has_recording_picture_and_numbers_of_the_worst_pair(sides, tmp_path):
     given = sides / "reference", sides / "worse", "--report", tmp_path / "report"
     status, out, _ = diff(*given)

@@ -10,6 +10,7 @@ from inspector.analysis.status import Unknown
 from inspector.analysis.verdict import Verdict, classify_file, died, work_of
 from inspector.library import Library
 from inspector.logs.opening import Reading, Source
+from inspector.version import program_version
 from inspector.workers import as_done
 
 
@@ -44,6 +45,7 @@ def classify_resumed(
     """
     beside = (reading.desired, Path(str(reading.options.robot or "")))
     settings = {
+        "version": program_version(),
         "models": {name: model.sha256 for name, model in library.items()},
         "settings": [repr(reading), unknown.value, localise, draw is not None]
         + [digest(each) for each in beside if each and each.is_file()],

@@ -24,7 +24,8 @@ from inspector.localisation.stage import Localisation
 from models import Event
 from noisemodel import OutputError
 
-FORMAT = "noise-classify-state/1"
+KIND = "noise-classify-state/"
+FORMAT = f"{KIND}1"
 
 
 class StateError(InspectorError):
@@ -149,11 +150,16 @@ def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
         there = json.loads(line)
     except ValueError:
         there = None
-    if not isinstance(there, dict) or there.get("format") != header["format"]:
+    form = there.get("format") if isinstance(there, dict) else None
+    if not isinstance(there, dict) or not str(form).startswith(KIND):
         raise StateError(path, "holds no state of classify")
+    if form != header["format"]:
+        raise StateError(path, f"is of format {form}, this version writes {header['format']}")
+    there = {"version": header.get("version"), **there}  # 0.5.0 wrote none
     for name, value in header.items():
         if there.get(name) != value:
-            raise StateError(path, f"is of other {name}")
+            both = f" ({there.get(name)}, this is {value})" if name == "version" else ""
+            raise StateError(path, f"is of {'another' if both else 'other'} {name}{both}")
 
 
 def _as_dict(verdict: Verdict) -> dict[str, Any]:

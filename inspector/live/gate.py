@@ -12,7 +12,7 @@ from inspector.analysis.verdict import Verdict, counts
 from inspector.expectations.expectations import Expectations
 from inspector.expectations.judge import judge
 from inspector.live.session import LiveSession, Summary
-from inspector.report.cases import program_version
+from inspector.version import program_version
 from models import Event
 from models.labels import interval
 

@@ -20,7 +20,8 @@ from inspector.regression.difference import (
 from inspector.regression.findings import LOUDER, ChangedFinding
 from inspector.regression.statistic import ALPHA, CONFIDENCE
 from inspector.report import cases
-from inspector.report.cases import DIFF_MARKER, Case, Job, Outcome, program_version
+from inspector.report.cases import DIFF_MARKER, Case, Job, Outcome
+from inspector.version import program_version
 
 FORMAT = "noise-diff/1"
 FINDINGS, CHANGES = 10, 5

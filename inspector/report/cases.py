@@ -5,7 +5,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from urllib.parse import quote
 from xml.etree import ElementTree as ET
@@ -201,14 +200,6 @@ def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
         opened = ["", f"<details><summary>{notes}: {len(left)}</summary>", ""]
         lines += [*_cut(opened, left, COMMENT // 4), "", "</details>"]
     return "\n".join(lines).rstrip()
-
-
-def program_version() -> str:
-    """The version of this program; "0" if it is run from its folder."""
-    try:
-        return version("noise-inspector")
-    except PackageNotFoundError:
-        return "0"
 
 
 def published(picture: Path | None, folder: Path | None, address: str) -> str:

@@ -11,7 +11,8 @@ from urllib.parse import quote
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.analysis.verdict import Verdict, counts, exit_status
 from inspector.report import cases
-from inspector.report.cases import Case, Job, Outcome, program_version
+from inspector.report.cases import Case, Job, Outcome
+from inspector.version import program_version
 from models import Event
 from models.labels import interval
 
