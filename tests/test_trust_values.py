@@ -216,7 +216,7 @@ def test_no_row_ends_a_live_session(tmp_path):
         capture_output=True,
         check=False,
     )
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 4, done.stderr  # no stretch is long enough for a label
     assert done.stdout.startswith("604 samples")
     assert path.exists()
 
