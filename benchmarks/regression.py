@@ -1,7 +1,7 @@
 """`inspector diff` on repetitions of the same code, and of code with a defect.
 
     python -m benchmarks.regression freeze --runs build/regression
-    python -m benchmarks.regression measure --runs build/regression
+    python -m benchmarks.regression measure --runs build/regression --picture power.png
     python -m benchmarks.regression twins --runs build/regression
 
 Runs are simulated by `scenarios` at 10 kHz with fresh seeds, which draw motion, robot and noise,
@@ -29,6 +29,7 @@ from collections.abc import Sequence  # noqa: E402
 from dataclasses import replace  # noqa: E402
 from functools import cache  # noqa: E402
 from pathlib import Path  # noqa: E402
+from typing import TypeAlias  # noqa: E402
 
 import numpy as np  # noqa: E402
 from scipy.stats import beta  # noqa: E402
@@ -69,6 +70,11 @@ NULLS, POWERS, TWINS = 1000, 100, 20
 of pairs."""
 TAPER = 0.02
 """Time in which a defect fades in and out around an annotated failure, in [s]."""
+NAMES = dict(zip(DEFECTS, ("oscillation", "obstacle", "jumps"), strict=True))
+SHADES, MARKS = ("#0072b2", "#d55e00", "#009e73"), {"panda": "o", "go2": "s"}
+"""Colours of defects and markers of robots in the picture."""
+Shares: TypeAlias = dict[tuple[int, str, str], list[float]]
+"""Share of the comparisons that say "worse" at each size, by repetitions, robot and defect."""
 LEAST_DB, MOST_DB = -60.0, 40.0
 """Factors between which the least one that is found is searched, in [dB]."""
 
@@ -182,8 +188,9 @@ def seed_of(run: Measured) -> str:
     return run.path.name.rpartition("-")[2]
 
 
-def measured(folder: Path) -> None:
-    """Print the shares of verdicts."""
+def measured(folder: Path, picture: Path | None = None) -> None:
+    """Print the shares of verdicts, and draw those of "worse" by the size of the defect."""
+    shares: Shares = {}
     library = load_library()
     every = {robot: pools(folder, robot, library) for robot in ROBOTS}
     print(f"simulated and classified after {time.process_time():.0f} s of processor time\n")
@@ -221,11 +228,42 @@ def measured(folder: Path) -> None:
                         flush=True,
                     )
                     sums[size] += verdicts
+                    share = verdicts[Verdict.WORSE] / POWERS
+                    shares.setdefault((count, robot, defect), []).append(share)
         for size, verdicts in sums.items():
             seen = interval(verdicts[Verdict.WORSE], verdicts.total())
             print(f"{count} + {count}, all defects, {size:g} times: worse {seen}")
         print(flush=True)
     print(f"{time.process_time():.0f} s of processor time")
+    if picture:
+        draw(shares, picture)
+
+
+def draw(shares: Shares, path: Path) -> None:
+    """Draw the power against the size of each defect, a panel for each number of repetitions."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9, 3.4), dpi=110, layout="constrained")
+    panels = figure.subplots(1, len(REPETITIONS), sharey=True, squeeze=False)[0]
+    for axes, count in zip(panels, REPETITIONS, strict=True):
+        curves = {key[1:]: values for key, values in shares.items() if key[0] == count}
+        for (robot, defect), values in curves.items():
+            style = {"color": SHADES[DEFECTS.index(defect)], "marker": MARKS[robot], "lw": 1.2}
+            shown = [100 * value for value in values]
+            axes.plot(SIZES, shown, label=f"{robot}, {NAMES[defect]}", clip_on=False, **style)
+        mean = 100 * np.mean(list(curves.values()), axis=0)
+        axes.plot(SIZES, mean, color="#24292f", lw=2.2, label="all")
+        axes.axhline(95, color="#888", ls=":", lw=1)
+        axes.set_xscale("log")
+        axes.set_xticks(SIZES, [f"{size:g}" for size in SIZES])
+        axes.minorticks_off()
+        axes.set_xlabel("amplitude, 1: `classify` finds half")
+        axes.set_title(f"{count} and {count} runs", fontsize=10, loc="left")
+        axes.grid(alpha=0.3)
+    panels[0].set_ylabel('"worse" [% of comparisons]')
+    panels[0].set_ylim(0, 101)
+    panels[-1].legend(fontsize=8, loc="lower right")
+    figure.savefig(path, metadata={"Software": None})
 
 
 def twins(folder: Path) -> None:
@@ -256,8 +294,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("what", choices=("freeze", "measure", "twins"))
     parser.add_argument("--runs", type=Path, default=Path("build/regression"))
+    parser.add_argument("--picture", type=Path, help="of `measure`: the power by size of defect")
     options = parser.parse_args()
-    {"freeze": freeze, "measure": measured, "twins": twins}[options.what](options.runs)
+    if options.what == "measure":
+        measured(options.runs, options.picture)
+    else:
+        {"freeze": freeze, "twins": twins}[options.what](options.runs)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,17 @@
 """Read NoisyTest's `.log`: a row for each sample, with its time and its noise."""
 
 import warnings
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
 from models.errors import DataFileError
 from models.types import Array
+
+LARGE = 1_000_000
+"""Files of so many bytes or more are read by Arrow: a quarter of NumPy's time, after 45 ms for its
+import."""
 
 
 def read_log(path: str | Path) -> tuple[Array, Array]:
@@ -46,7 +51,10 @@ def nominal_rate(time: Array) -> float:
 
 
 def _read_fast(path: str | Path) -> Array | None:
-    """Array by NumPy's compiled reader; None if it fails, or the rows are ragged."""
+    """Array by a compiled reader; None if it fails, or the rows are ragged."""
+    with suppress(OSError):
+        if Path(path).stat().st_size >= LARGE and (columns := _read_by_arrow(path)) is not None:
+            return columns
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -55,6 +63,30 @@ def _read_fast(path: str | Path) -> Array | None:
             return None
         except OSError as error:
             raise DataFileError(path, f"cannot be read ({error.strerror or error})") from error
+
+
+def _read_by_arrow(path: str | Path) -> Array | None:
+    """Array of rows with one blank, below comments; None of any other layout."""
+    import pyarrow
+    from pyarrow import csv
+
+    raw, start = Path(path).read_bytes(), 0
+    while raw.startswith(b"#", start):
+        start = raw.find(b"\n", start) + 1
+        if not start:
+            return None
+    try:
+        table = csv.read_csv(
+            pyarrow.py_buffer(memoryview(raw)[start:]),
+            read_options=csv.ReadOptions(use_threads=False, column_names=["time", "noise"]),
+            parse_options=csv.ParseOptions(delimiter=" ", quote_char=False),
+            convert_options=csv.ConvertOptions(
+                column_types=dict.fromkeys(("time", "noise"), pyarrow.float64()), null_values=[]
+            ),
+        )
+    except pyarrow.ArrowInvalid:
+        return None
+    return np.stack([column.to_numpy() for column in table.columns], axis=1)
 
 
 def _read_slowly(path: str | Path) -> Array:

@@ -21,9 +21,10 @@ chunk_labels = ["ok", "impact"]
 """
 
 
-@pytest.fixture
-def log(tmp_path):
-    """Writes a `.log` of some text."""
+@pytest.fixture(params=[0, 1_000_000], ids=["Arrow", "NumPy"])
+def log(tmp_path, monkeypatch, request):
+    """Writes a `.log` of some text, for either reader."""
+    monkeypatch.setattr("models.logfile.LARGE", request.param)
 
     def write(text, name="walk.log"):
         path = tmp_path / name
@@ -67,6 +68,15 @@ def test_logs_give_back_what_was_written(log, noise, start, gap, end):
     time, read = models.read_log(log(text))
     assert time.tolist() == [start + i for i in range(len(noise))]
     assert read.tolist() == noise
+
+
+def test_both_readers_read_the_same_bits(log):
+    values = np.random.default_rng(0).standard_cauchy(30_000) * 10.0 ** np.arange(-150, 150).repeat(
+        100
+    )
+    path = log("# t p\n" + "".join(f"{i / 1000:.12f} {v:.15e}\n" for i, v in enumerate(values)))
+    _, noise = models.read_log(path)
+    assert (noise == [float(f"{value:.15e}") for value in values]).all()
 
 
 @IN_PLACE
