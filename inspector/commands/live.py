@@ -55,7 +55,9 @@ def live(
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Show samples from standard input as they arrive, and print findings as they come.
+    """Show samples from standard input as they arrive.
+
+    Findings are printed as they come.
 
     CSV has a header: time,elbow.velocity,elbow.velocity_desired,elbow.position
     JSON lines have one object each: {"time": 0.1, "velocity": [0.2]}
