@@ -96,7 +96,8 @@ def test_a_browser_shows_the_page_in_both_schemes(tmp_path, scheme):
         window.on("console", lambda message: said.append(message.text))
         window.emulate_media(color_scheme=scheme)
         window.goto((tmp_path / "index.html").as_uri())
-        window.wait_for_function("document.images[0].complete")
+        window.locator("img").scroll_into_view_if_needed()  # pictures are loaded when seen
+        window.evaluate("() => document.images[0].decode()")
         assert window.evaluate("document.images[0].naturalWidth") > 0
         ink, back = (
             sum(
