@@ -48,7 +48,9 @@ def _bytes(data: bytes, random: Random) -> bytes:
         length = random.choice((1, 4, 8, 100, 4096))
         part = bytes(changed[at : at + length])
         pieces = (
-            lambda part=part: bytes(each ^ (1 << random.randrange(8)) for each in part[:1]) + part[1:],
+            lambda part=part: (
+                bytes(each ^ (1 << random.randrange(8)) for each in part[:1]) + part[1:]
+            ),
             lambda part=part: random.randbytes(len(part)),
             lambda part=part: bytes(len(part)),
             lambda part=part: b"\xff" * len(part),

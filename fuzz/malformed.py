@@ -7,8 +7,10 @@ Every file is read by the real command line in a process of its own, forked from
 """
 
 import argparse
+import gc
 import json
 import os
+import pkgutil
 import re
 import resource
 import shutil
@@ -21,6 +23,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stderr, redirect_stdout, suppress
 from dataclasses import asdict, dataclass
+from importlib import import_module
 from pathlib import Path
 from random import Random
 
@@ -76,6 +79,7 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="file for all results, one line of JSON each")
     options = parser.parse_args()
     warnings.simplefilter("ignore")
+    _imported()
     found: list[Result] = []
     with tempfile.TemporaryDirectory(dir=_fast_folder()) as scratch:
         for name in options.only or READERS:
@@ -130,7 +134,11 @@ def results(
     _forked(lambda: (whole / ".made").write_text(str(reader.make(whole).relative_to(whole))))
     place = (whole / ".made").read_text()
     data = (whole / place).read_bytes()
-    for case in (Bomb("whole", data), *bombs(name, whole / place), *_random(reader, data, name, count, seed)):
+    for case in (
+        Bomb("whole", data),
+        *bombs(name, whole / place),
+        *_random(reader, data, name, count, seed),
+    ):
         folder = scratch / "case"
         shutil.copytree(whole, folder, symlinks=True)
         path = case.put(folder / place)
@@ -237,6 +245,20 @@ def _judged(
         outcome = "handled"
     said = lines[-1][:300] if lines else ""
     return Result(name, case.name, outcome, status, round(seconds, 2), round(peak / 1e6), said)
+
+
+def _imported() -> None:
+    """Import once what every command would import again."""
+    for package in ("noisemodel", "models", "scenarios", "inspector"):
+        path = import_module(package).__path__
+        for each in pkgutil.walk_packages(path, f"{package}."):
+            if "pytest" not in each.name and "__main__" not in each.name:
+                import_module(each.name)
+    from commandline import call
+
+    call("noise", "/nowhere.npz")  # what the command line itself imports when it is used
+    gc.collect()
+    gc.freeze()
 
 
 def _fast_folder() -> str | None:

@@ -37,8 +37,8 @@ from scenarios import ScenarioError
 from scenarios import noisytest as simulated_noisytest
 from scenarios.folder import Folder
 from scenarios.sample import RECIPE, Sample
-from scenarios.simulation import SHORTEST
 from scenarios.signals import WHOLE
+from scenarios.simulation import SHORTEST
 from scenarios.tasks import Task
 
 ROOT = Path(__file__).parents[1]
@@ -154,7 +154,9 @@ def _run_file(folder: Path) -> Path:
     return _written("other", "")(folder).with_name("run.npz")
 
 
-def _rows(separator: str = ",", names: str = "time,a.position,b.position,a.velocity,b.velocity") -> str:
+def _rows(
+    separator: str = ",", names: str = "time,a.position,b.position,a.velocity,b.velocity"
+) -> str:
     rows = np.column_stack((TIME, POSITION, VELOCITY))
     lines = (separator.join(repr(float(each)) for each in row) for row in rows)
     return "\n".join([names.replace(",", separator), *lines]) + "\n"
@@ -380,7 +382,9 @@ def _read_resume(path: Path) -> None:
 
 
 def _read_tuning(path: Path) -> None:
-    with tuningfile.opened(path, _header(path), [{"regularization": 1.0}, {"regularization": 10.0}]):
+    with tuningfile.opened(
+        path, _header(path), [{"regularization": 1.0}, {"regularization": 10.0}]
+    ):
         pass
 
 
@@ -552,7 +556,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
             EVALUATE,
         ),
         "NoisyTest, two columns": Reader(
-            "text", lambda folder: _noisytest(folder).with_suffix(".log"), _read_log, CLASSIFY
+            "text", lambda folder: _noisytest(folder).with_suffix(".log"), models.read_log, CLASSIFY
         ),
         "simulated labels": Reader(
             "text",

@@ -52,12 +52,16 @@ def main() -> None:
     parser.add_argument("--group", choices=GROUPS)
     parser.add_argument("--seconds", type=int, default=15)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--found", type=Path, help="folder for inputs that raise what is not expected")
+    parser.add_argument(
+        "--found", type=Path, help="folder for inputs that raise what is not expected"
+    )
     options = parser.parse_args()
     names = tuple(options.readers) + GROUPS.get(options.group, ())
     if not names or set(names) - set(READERS):
         parser.error(f"name some of {', '.join(READERS)}, or a --group")
-    with tempfile.TemporaryDirectory(dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
+    with tempfile.TemporaryDirectory(
+        dir="/dev/shm" if Path("/dev/shm").is_dir() else None
+    ) as folder:
         fuzz(names, Path(folder), options.seconds, options.seed, options.found)
 
 
@@ -73,6 +77,8 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
     """
     corpus, paths = folder / "corpus", []
     corpus.mkdir()
+    if found:
+        found.mkdir(parents=True, exist_ok=True)
     for place, name in enumerate(names):
         home = folder / str(place)
         home.mkdir()
@@ -140,7 +146,6 @@ def target(
             places[where] = f"{name}: {more}{error!r}"[:300]
             print(f"FOUND {where}: {places[where]}", file=sys.stderr, flush=True)
             if found:
-                found.mkdir(parents=True, exist_ok=True)
                 (found / f"{len(places)}-{type(error).__name__}").write_bytes(data)
 
     return one

@@ -1,7 +1,10 @@
 """JSON and TOML parsed within limits, so that a hostile text is one ``ValueError``."""
 
 import json
+import re
+import stat
 import tomllib
+from pathlib import Path
 from typing import Any
 
 MAX_CHARACTERS = 64 * 2**20
@@ -9,6 +12,35 @@ MAX_CHARACTERS = 64 * 2**20
 
 DIGITS = 20
 """Most digits of an integer: those of 64 bits."""
+
+PARTS = 100
+"""Most parts of a TOML key; `tomllib` takes memory by their square."""
+
+LONG_KEY = re.compile(
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*"|'[^'\n]*')[ \t]*+\.[ \t]*+){{{PARTS}}}"""
+)
+
+
+def text_of(path: str | Path) -> str:
+    """Text of a file in UTF-8, with or without a byte order mark.
+
+    Args:
+        path: A regular file: a device or a pipe may have no end.
+
+    Raises:
+        ValueError: If it is no regular file, too long, or not text in UTF-8.
+        OSError: If it cannot be read.
+    """
+    path = Path(path)
+    about = path.stat()
+    if not (stat.S_ISREG(about.st_mode) or stat.S_ISDIR(about.st_mode)):
+        raise ValueError("is no regular file; save what it holds to one")
+    if about.st_size > MAX_CHARACTERS:
+        raise ValueError(f"{about.st_size} bytes, the limit is {MAX_CHARACTERS}")
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ValueError("not text in UTF-8") from error
 
 
 def from_json(text: str | bytes) -> Any:
@@ -38,6 +70,8 @@ def from_toml(text: str) -> dict[str, Any]:
         ValueError: As `from_json`.
     """
     _check_length(text)
+    if LONG_KEY.search(text):
+        raise ValueError(f"a key of more than {PARTS} parts")
     try:
         table = tomllib.loads(text)
     except RecursionError as error:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from models.errors import AnnotationError, DataFileError, ProfileError, RateError
-from models.jsontext import from_json, from_toml
+from models.jsontext import from_json, from_toml, text_of
 from models.logfile import nominal_rate, read_log
 from models.profile import CLASSES, TOLERANCE, Profile
 from models.recording import Block, Recording
@@ -88,15 +88,15 @@ def read_annotations(path: str | Path) -> tuple[Block, ...]:
         DataFileError: If the file is missing, or cannot be understood.
     """
     try:
-        return tuple(parse_annotations(Path(path).read_text(encoding="utf-8-sig")))
+        return tuple(parse_annotations(text_of(path)))
     except OSError as error:
         raise DataFileError(
             path, f"cannot be read ({error.strerror}); each .log needs its .toml"
         ) from error
-    except UnicodeDecodeError as error:
-        raise DataFileError(path, f"not TOML ({error})") from error
     except AnnotationError as error:
         raise DataFileError(path, str(error)) from error
+    except ValueError as error:
+        raise DataFileError(path, f"not TOML ({error})") from error
 
 
 def parse_annotations(text: str) -> Iterator[Block]:
@@ -138,7 +138,7 @@ def profile_from_config(path: str | Path) -> Profile:
         DataFileError: If the file is no such configuration, or a name in it is unknown.
     """
     try:
-        config = from_json(Path(path).read_text(encoding="utf-8-sig"))
+        config = from_json(text_of(path))
     except OSError as error:
         raise DataFileError(path, f"cannot be read ({error.strerror})") from error
     except ValueError as error:

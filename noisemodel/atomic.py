@@ -1,5 +1,6 @@
 """Files that are written whole or not at all."""
 
+import fcntl
 import os
 import re
 import time
@@ -22,7 +23,7 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Offer a temporary path beside ``path`` that takes its place only if the block succeeds.
 
     Of several that write one file at once and may not replace it, one succeeds. Temporary files
-    that have not changed for a day are deleted from the folder.
+    that have not changed for a day, and that no process holds, are deleted from the folder.
 
     Args:
         path: The file to write.
@@ -38,17 +39,30 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     refuse_existing(path, overwrite=overwrite)
     _sweep(path.parent.absolute())
     temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")
-    try:
-        temporary.touch(exist_ok=False)  # with the permissions that the umask leaves to any file
+    try:  # with the permissions that the umask leaves to any file
+        held = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
     try:
+        _lock(held)  # a live recording may wait for its next sample for days
         yield temporary
         _place(temporary, path, overwrite=overwrite)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
+        os.close(held)
+
+
+def _lock(file: int) -> bool:
+    """Lock an open file; whether nobody else has. It ends with the process."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks: age alone decides
+        return True
+    return True
 
 
 def _place(temporary: Path, path: Path, *, overwrite: bool) -> None:
@@ -80,8 +94,17 @@ def _sweep(folder: Path) -> None:
         for entry in entries:
             if TEMPORARY.fullmatch(entry.name):
                 with suppress(OSError):
-                    if time.time() - entry.stat().st_mtime > ABANDONED:
+                    if time.time() - entry.stat().st_mtime > ABANDONED and _is_left(entry.path):
                         Path(entry.path).unlink()
+
+
+def _is_left(path: str) -> bool:
+    """Whether no process holds a temporary file."""
+    file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        return _lock(file)
+    finally:
+        os.close(file)
 
 
 def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from noisemodel.block import Block
+from noisemodel.bounds import beyond, limit
 from noisemodel.errors import RunError
 from noisemodel.types import Array, Mask, Real
 
@@ -18,9 +19,6 @@ SHORTEST, LONGEST = 1e-9, 1e9
 
 LARGEST = 1e15
 """Signals are smaller: the squares of much larger ones overflow, and no robot has such."""
-
-MAX_JOINTS = 1000
-"""Most joints of a run; a URDF may have as many."""
 
 
 class NotUniformError(RunError):
@@ -65,8 +63,8 @@ def check_words(array: str, words: Iterable[str]) -> None:
 def check_names(array: str, names: Sequence[str]) -> None:
     """Refuse names that are no words or repeat."""
     check_words(array, names)
-    if len(names) > MAX_JOINTS:
-        raise RunError(f"{array}: {len(names)} joints, the limit is {MAX_JOINTS}")
+    if len(names) > limit("joints"):
+        raise RunError(f"{array}: {len(names)} joints, {beyond('joints')}")
     twice = sorted(name for name, count in Counter(names).items() if count > 1)
     if twice:
         raise RunError(f"{array}: {', '.join(twice)} named twice")

@@ -11,7 +11,8 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from noisemodel import xmltext
-from noisemodel.polygons import MAX_TRIANGLES, fans
+from noisemodel.bounds import beyond, limit
+from noisemodel.polygons import fans
 from noisemodel.types import Array, Indices, Mesh
 
 Named: TypeAlias = Mapping[str, ET.Element]
@@ -52,8 +53,8 @@ def read(data: bytes) -> Mesh:
         faces.append(corners + count)
         count += len(placed)
         triangles += len(corners)
-        if max(triangles, count) > MAX_TRIANGLES:
-            raise ValueError(f"it has more than {MAX_TRIANGLES} triangles or points")
+        if max(triangles, count) > limit("triangles"):
+            raise ValueError(f"it has too many triangles or points, {beyond('triangles')}")
     return np.concatenate(points), np.concatenate(faces)
 
 

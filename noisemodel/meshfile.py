@@ -13,16 +13,16 @@ from types import MappingProxyType
 import numpy as np
 
 from noisemodel import collada, obj, stl
+from noisemodel.bounds import beyond, limit
 from noisemodel.cache import Arrays, cached
 from noisemodel.errors import MeshError
-from noisemodel.polygons import MAX_TRIANGLES
 from noisemodel.types import Array, Mesh
 
 VERSION = 1
 """Version of the code that reads triangles; to be raised with every change of its results."""
 
-MAX_BYTES = 256 * 2**20
-"""Most bytes of a file that is read: more than a binary STL of ``MAX_TRIANGLES``."""
+TRIANGLE_BYTES = 134
+"""Most bytes of a file by triangle that it may have: more than a binary STL has, 256 MiB in all."""
 
 TAIL = 1024
 """Bytes at the end of a file among which its closing word is."""
@@ -98,8 +98,13 @@ def _content(path: Path) -> bytes:
         known = ", ".join(READERS)
         raise MeshError(path, f"of kind {path.suffix!r}, expected {known}")
     check_whole(path)
-    if (size := path.stat().st_size) > MAX_BYTES:
-        raise MeshError(path, f"has {size} bytes, the limit is {MAX_BYTES}; simplify it")
+    most = TRIANGLE_BYTES * limit("triangles")
+    if (size := path.stat().st_size) > most:
+        raise MeshError(
+            path,
+            f"has {size} bytes, {most} are read of {limit('triangles')} triangles,"
+            f" {beyond('triangles')}; simplify it",
+        )
     return path.read_bytes()
 
 
@@ -121,10 +126,8 @@ def _parsed(path: Path, data: bytes) -> Mesh:
     except (ValueError, LookupError, OverflowError, RecursionError) as error:
         # The readers' own words, or those of numpy on what is no number.
         raise MeshError(path, f"cannot be read ({' '.join(str(error).split())})") from error
-    if len(faces) > MAX_TRIANGLES:
-        raise MeshError(
-            path, f"has {len(faces)} triangles, the limit is {MAX_TRIANGLES}; simplify it"
-        )
+    if len(faces) > limit("triangles"):
+        raise MeshError(path, f"has {len(faces)} triangles, {beyond('triangles')}; simplify it")
     if not len(faces):
         raise MeshError(path, "has no triangles")
     if not np.isfinite(points[faces]).all():

@@ -20,11 +20,12 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from noisemodel import shapes, xmltext
+from noisemodel.bounds import beyond, limit
 from noisemodel.errors import RobotError
 from noisemodel.linkshapes import LinkShape
 from noisemodel.meshpath import HINT
 from noisemodel.types import Array
-from noisemodel.urdf import MAX_BYTES, MAX_JOINTS, Mimic
+from noisemodel.urdf import MAX_BYTES, Mimic
 
 SUFFIXES = (".xml", ".mjcf")
 
@@ -40,8 +41,8 @@ MAX_INCLUDED = 200
 MAX_COPIES = 10_000
 """Most copies that ``<replicate>`` and the like may make of an element."""
 
-MAX_BODIES, MAX_CELLS = 20_000, 10_000_000
-"""Most bodies and geoms of a robot and its scene, and cells of a height field."""
+MAX_CELLS = 10_000_000
+"""Most cells of a height field."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,8 +112,8 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ")
         raise RobotError(f"{path}: MuJoCo cannot read the MJCF ({reason})") from error
-    if compiled.njnt > MAX_JOINTS:
-        raise RobotError(f"{path}: {compiled.njnt} joints; the limit is {MAX_JOINTS}")
+    if compiled.njnt > limit("joints"):
+        raise RobotError(f"{path}: {compiled.njnt} joints; {beyond('joints')}")
     drawn = [
         (geom, shape)
         for geom in range(compiled.ngeom)
@@ -242,16 +243,18 @@ def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
             if other is not None and other != part:
                 more = counts(other)
                 bodies, joints = bodies + copies * more[0], joints + copies * more[1]
-            if bodies > MAX_BODIES:
-                raise RobotError(f"{path}: more than {MAX_BODIES} bodies and geoms")
+            if bodies > limit("bodies"):
+                raise RobotError(
+                    f"{path}: more than {limit('bodies')} bodies and geoms; {beyond('bodies')}"
+                )
         return bodies, joints
 
     try:
         _, joints = counts(path.resolve())
     except RecursionError as error:
         raise RobotError(f"{path}: its models attach each other") from error
-    if joints > 10 * MAX_JOINTS:  # those of defaults, sensors and equalities are counted too
-        raise RobotError(f"{path}: more than {MAX_JOINTS} joints")
+    if joints > 10 * limit("joints"):  # those of defaults, sensors and equalities are counted too
+        raise RobotError(f"{path}: more than {limit('joints')} joints; {beyond('joints')}")
 
 
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:

@@ -4,9 +4,6 @@ import numpy as np
 
 from noisemodel.types import Indices
 
-MAX_TRIANGLES = 2_000_000
-"""Most triangles of a mesh; a robot's have some ten thousand."""
-
 
 def fans(counts: Indices) -> Indices:
     """Cut polygons that lie one after the other into the fans of their first corners.

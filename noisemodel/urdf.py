@@ -6,10 +6,10 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from noisemodel import xmltext
+from noisemodel.bounds import beyond, limit
 from noisemodel.errors import RobotError
 
 MAX_BYTES = 64 * 2**20
-MAX_JOINTS = 1000
 NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1, "iyz": 1}
 
 AXIAL = {"revolute", "continuous", "prismatic", "planar"}
@@ -76,8 +76,8 @@ def read(path: Path) -> Urdf:
     if not root.get("name"):
         raise RobotError(f"{path}: the URDF is empty or unexpanded, its <robot> has no name")
     joints = root.findall("joint")
-    if len(joints) > MAX_JOINTS:
-        raise RobotError(f"{path}: {len(joints)} joints; the limit is {MAX_JOINTS}")
+    if len(joints) > limit("joints"):
+        raise RobotError(f"{path}: {len(joints)} joints; {beyond('joints')}")
     if root.find("link") is None:
         raise RobotError(f"{path}: the URDF has no link")
     _check_numbers(path, root)

@@ -173,7 +173,7 @@ class Sample:
 
 def is_sample(path: str | Path) -> bool:
     """Whether a file is a sample, of any version."""
-    if not zipfile.is_zipfile(path):
+    if not (Path(path).is_file() and zipfile.is_zipfile(path)):
         return False
     try:
         names_in(Path(path))

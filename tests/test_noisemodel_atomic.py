@@ -4,7 +4,7 @@ import time
 import pytest
 
 from noisemodel import OutputError
-from noisemodel.atomic import replacing
+from noisemodel.atomic import _sweep, replacing
 
 
 def write(path, text, **options):
@@ -124,3 +124,13 @@ def test_temporary_files_of_killed_processes_are_deleted_after_a_day(tmp_path):
     os.utime(tmp_path / names[1])  # one that is being written
     write(tmp_path / "out.txt", "")
     assert sorted(os.listdir(tmp_path)) == sorted([*names[1:], "out.txt"])
+
+
+def test_the_temporary_file_of_a_process_that_waits_for_days_is_kept(tmp_path):
+    with replacing(tmp_path / "out.txt") as temporary:
+        temporary.write_text("of last week")
+        os.utime(temporary, (time.time() - 600_000,) * 2)
+        _sweep.cache_clear()
+        write(tmp_path / "other.txt", "of today")
+        assert temporary.exists()
+    assert (tmp_path / "out.txt").read_text() == "of last week"

@@ -53,10 +53,12 @@ def test_a_scene_whose_instances_double_is_refused(tmp_path):
 
 
 def test_a_mesh_of_more_triangles_than_are_read_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(meshfile, "MAX_TRIANGLES", 100)
+    monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", "100")
     path = tmp_path / "a.obj"
     path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf" + " 1 2 3" * 40 + "\n")
-    with pytest.raises(MeshError, match="has 118 triangles, the limit is 100; simplify it"):
+    with pytest.raises(
+        MeshError, match="has 118 triangles, the limit is 100 .--limit triangles=N raises it.; simp"
+    ):
         meshfile.read(path)
 
 

@@ -10,6 +10,7 @@ import fcntl
 import hashlib
 import json
 import os
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -22,10 +23,14 @@ from inspector.errors import InspectorError
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from models import Event
+from models.jsontext import from_json
 from noisemodel import OutputError
 
 KIND = "noise-classify-state/"
 FORMAT = f"{KIND}1"
+
+MAX_BYTES = 256 * 2**20
+"""Most bytes of a state file that is read: those of some hundred thousand runs."""
 
 
 class StateError(InspectorError):
@@ -91,6 +96,9 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
             raise InspectorError(
                 f"{path}: is being written by another process; wait for it, or name another file"
             ) from error
+        about = os.fstat(file.fileno())
+        if not stat.S_ISREG(about.st_mode) or about.st_size > MAX_BYTES:
+            raise StateError(path, f"is no regular file of {MAX_BYTES} bytes or less")
         file.seek(0)
         whole, end, torn = file.read().rpartition(b"\n")
         header = {"format": FORMAT, **settings}
@@ -100,7 +108,7 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
             _check_header(path, first, header)
             for number, row in enumerate(rows, start=2):
                 try:
-                    content = json.loads(row)
+                    content = from_json(row)
                     verdict = _verdict(content)
                     verdicts[verdict.path, content["sha256"]] = verdict
                 except (ValueError, KeyError, TypeError) as error:
@@ -147,7 +155,7 @@ def _closing(file: IO[bytes]) -> Iterator[None]:
 
 def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
     try:
-        there = json.loads(line)
+        there = from_json(line)
     except ValueError:
         there = None
     form = there.get("format") if isinstance(there, dict) else None

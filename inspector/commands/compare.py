@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import Overwrite, PackageRoot
+from inspector.commands.options import Limits, Overwrite, PackageRoot
 
 
 def compare(
@@ -17,6 +17,7 @@ def compare(
         str, typer.Option(help="Robots to move by a generated motion: talos,go2 or all.")
     ] = "",
     package_root: PackageRoot = None,
+    limit: Limits = None,
     kinds: Annotated[
         str, typer.Option(help="Some of simplified, paper, A, B, C, mean, rms, normal.")
     ] = "simplified,C,paper,mean,rms,normal",
@@ -38,7 +39,7 @@ def compare(
     from inspector.comparison.output import Outputs
     from inspector.progress import progress
 
-    del package_root  # has been allowed
+    del package_root, limit  # have been set
     names = list(nm.ROBOTS) if robots == "all" else [name.strip() for name in robots.split(",")]
     sources = list(dict.fromkeys([*(runs or ()), *filter(None, names)]))
     if not sources:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles, Overwrite, PackageRoot
+from inspector.commands.options import Limits, ModelFiles, Overwrite, PackageRoot
 
 if TYPE_CHECKING:
     from inspector.library import Library
@@ -31,6 +31,7 @@ def live(
         ),
     ] = None,
     package_root: PackageRoot = None,
+    limit: Limits = None,
     names: Annotated[
         str, typer.Option(help="Joints in the order of the columns: elbow,wrist,...")
     ] = "",
@@ -81,7 +82,7 @@ def live(
     from inspector.live import LiveError, LiveSession
     from inspector.live.feeding import follow
 
-    del package_root  # has been allowed
+    del package_root, limit  # have been set
     if sys.stdin.isatty():
         raise LiveError(
             "samples are read from standard input; pipe them in: robot | inspector live"

@@ -72,6 +72,36 @@ def _raise_limit(gigabytes: float | None) -> float | None:
     return gigabytes
 
 
+def _raise_limits(limits: list[str] | None) -> list[str] | None:
+    for each in limits or ():
+        name, _, number = each.partition("=")
+        if name not in LIMITS or not number.isdecimal():
+            raise typer.BadParameter(f"{each!r} is none of {', '.join(f'{n}=N' for n in LIMITS)}")
+        os.environ[f"NOISE_LIMIT_{name.upper()}"] = number
+    return limits
+
+
+LIMITS = ("joints", "columns", "triangles", "bodies")
+"""Those of ``noisemodel.bounds``, which would take too long to import here."""
+
+Limits = Annotated[
+    list[str] | None,
+    _of_log(
+        "--limit",
+        callback=_raise_limits,
+        metavar="NAME=N",
+        help=f"Another limit on what files ask for: {', '.join(LIMITS)}; repeatable.",
+    ),
+]
+MaxUnpacked = Annotated[
+    float | None,
+    _of_log(
+        "--max-unpacked",
+        callback=_raise_limit,
+        help="Most that a compressed file may unpack to, in GB; by default 0.5, or 20 times its"
+        " size.",
+    ),
+]
 PackageRoot = Annotated[
     Path | None,
     typer.Option(
@@ -88,15 +118,8 @@ def _log_options(
         _of_log("--robot", help="A name that `robots` lists, URDF or MJCF; none takes no robot."),
     ] = None,
     package_root: PackageRoot = None,
-    max_unpacked: Annotated[
-        float | None,
-        _of_log(
-            "--max-unpacked",
-            callback=_raise_limit,
-            help="Most that a compressed file may unpack to, in GB; by default 0.5, or 20 times"
-            " its size.",
-        ),
-    ] = None,
+    max_unpacked: MaxUnpacked = None,
+    limit: Limits = None,
     rate: Annotated[
         float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
     ] = None,
@@ -137,7 +160,7 @@ def _log_options(
     from inspector.logs.opening import Reading
     from inspector.logs.reading import read_options
 
-    del package_root, max_unpacked  # have been set
+    del package_root, max_unpacked, limit  # have been set
     options = read_options(
         map_ or (),
         saved=mapping,

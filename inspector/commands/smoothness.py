@@ -6,7 +6,13 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles, Overwrite
+from inspector.commands.options import (
+    Limits,
+    MaxUnpacked,
+    ModelFiles,
+    Overwrite,
+    PackageRoot,
+)
 
 
 class Format(StrEnum):
@@ -52,7 +58,7 @@ def smoothness(
         bool, typer.Option("--labels/--no-labels", help="Classify episodes from 80 Hz on.")
     ] = True,
     robot: Annotated[
-        str | None, typer.Option(help="A name that `robots` lists, or a URDF.")
+        str | None, typer.Option(help="A name that `robots` lists, a URDF or an MJCF.")
     ] = None,
     rate: Annotated[
         float | None, typer.Option(min=1.0, help="Rate of the logs in [Hz], if it is known.")
@@ -64,6 +70,9 @@ def smoothness(
         list[str] | None,
         typer.Option("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
     ] = None,
+    package_root: PackageRoot = None,
+    max_unpacked: MaxUnpacked = None,
+    limit: Limits = None,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -83,6 +92,7 @@ def smoothness(
     if picture:
         refuse_existing(picture, overwrite=overwrite)
         histograms.require()
+    del package_root, max_unpacked, limit  # have been set
     options = read_options(map_ or (), robot=robot, rate=rate, units=units)
     library = load_library(assets.model_files(model)) if labels else None
     episodes, failed = episodes_of(logs, options)

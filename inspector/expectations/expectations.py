@@ -1,6 +1,5 @@
 """The file of expectations, ``expect.toml``: which findings of which runs are expected."""
 
-import tomllib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
@@ -11,6 +10,7 @@ from typing import Any
 
 from inspector.errors import InspectorError
 from inspector.library import Library
+from models.jsontext import from_toml, text_of
 from models.labels import UNKNOWN
 
 NAME = "expect.toml"
@@ -236,10 +236,10 @@ def read(path: Path) -> Expectations:
         ExpectationError: If it cannot be read, or holds what is not known.
     """
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = from_toml(text_of(path))
     except OSError as error:
         raise ExpectationError(path, f"cannot be read ({error.strerror})") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except ValueError as error:
         raise ExpectationError(path, f"no TOML ({error})") from error
     form = content.pop("format", FORMAT)
     if form != FORMAT:

@@ -9,6 +9,7 @@ from pathlib import Path
 from inspector.errors import InspectorError
 from inspector.labels import audacity, csv, noisytest
 from inspector.labels.entry import Entry, EntryError, LabelFileError, Span
+from models.jsontext import text_of
 from noisemodel import Block, Run
 from noisemodel.atomic import replacing
 
@@ -100,14 +101,13 @@ def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, 
     """
     chosen = format_of(path, format_name)
     try:
-        text = path.read_bytes().decode("utf-8-sig")
-        entries = sorted(chosen.parse(text), key=_order)
+        entries = sorted(chosen.parse(text_of(path)), key=_order)
     except OSError as error:
         raise LabelFileError(path, f"cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise LabelFileError(path, "not a file of labels: not text in UTF-8") from error
     except EntryError as error:
         raise LabelFileError(path, error.problem, error.where) from error
+    except ValueError as error:
+        raise LabelFileError(path, f"not a file of labels: {error}") from error
     begin, last = float(run.time[0]), float(run.time[-1])
     step = (last - begin) / (len(run.time) - 1)
     blocks = [_block(entry, last + step) for entry in entries]

@@ -1,17 +1,24 @@
-"""Logs imported as run files: one file, or a folder of them."""
+"""Logs imported as run files: one file, or a folder of them.
 
+In a folder, ``meta`` of each run file has a digest of its log and of how it was read. By that, an
+interrupted import knows which run files it has written when it is called again.
+"""
+
+import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from inspector.errors import InspectorError
 from inspector.logs.importing import Imported
 from inspector.logs.log import Progress, without_progress
-from inspector.logs.opening import logs_in
+from inspector.logs.opening import SUFFIXES, logs_in
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import Job, jobs_of
 from inspector.wrongrobot import limit_warnings
-from noisemodel import NoiseModelError, OutputError
+from models.jsontext import from_json
+from noisemodel import NoiseModelError, OutputError, archive
 from noisemodel.atomic import refuse_existing, replacing
 
 
@@ -26,6 +33,7 @@ class Written:
         remarks: What was decided during the import, a sentence each.
         problem: Why there is no run file; empty if there is one.
         lost: Whether the log could be read and the run file not be written.
+        kept: Whether the run file is there already, from a call that was interrupted.
     """
 
     path: Path
@@ -34,6 +42,35 @@ class Written:
     remarks: tuple[str, ...] = ()
     problem: str = ""
     lost: bool = False
+    kept: bool = False
+
+
+DIGEST = "import_sha256"
+"""Key of ``meta`` with the digest of what a run file was made of."""
+
+READ = (*SUFFIXES, ".json", ".yaml")
+"""Suffixes of the files of a folder that are read if it is a log."""
+
+
+@dataclass(eq=False)
+class _Log:
+    """A log, and how it is read."""
+
+    path: Path
+    options: ReadOptions
+    desired: Path | None
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the options, the robot's file, and what is read of the logs."""
+        found = hashlib.sha256(repr(self.options).encode(errors="surrogatepass"))
+        for log in (self.path, self.desired or Path(), Path(self.options.robot)):
+            files = sorted(log.rglob("*")) if log != Path() and log.is_dir() else [log]
+            for path in files:  # not the videos of a data set
+                if path.is_file() and (path == log or path.suffix.lower() in READ):
+                    with path.open("rb") as stream:
+                        found.update(hashlib.file_digest(stream, "sha256").digest())
+        return found.hexdigest()
 
 
 def import_logs(
@@ -47,6 +84,8 @@ def import_logs(
     progress: Progress,
 ) -> Iterator[Written]:
     """Write a run file for each run of some logs.
+
+    In a folder, those that an interrupted call of the same logs and options has written are kept.
 
     Args:
         logs: The logs, and folders of them.
@@ -68,23 +107,31 @@ def import_logs(
     several = len(logs) > 1
     if desired and several:
         raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")
-    jobs: list[Job] = []
+    jobs: list[tuple[_Log, Job]] = []
     failed: list[Written] = []
     for log in logs:
         try:
             inner = without_progress if several else progress  # there is one bar at a time
-            jobs += jobs_of(
+            found = jobs_of(
                 log, options, desired=desired, episodes=episodes or None, progress=inner
             )
+            one = _Log(log, options, desired)
+            jobs += ((one, job) for job in found)
         except (InspectorError, NoiseModelError) as error:
             if not several:
                 raise
             failed.append(Written(log, problem=str(error)))
     targets = _targets(jobs, output, several=several, overwrite=overwrite)
+    in_folder = targets != (output,)
+    there = {target for target in targets if target.exists() and not overwrite}
     yield from failed
-    for job, target in progress(zip(jobs, targets, strict=True), len(jobs)):
+    for (log, job), target in progress(zip(jobs, targets, strict=True), len(jobs)):
+        if target in there:
+            yield Written(target, kept=True)
+            continue
         try:
-            yield _written(job.read(), target, overwrite=overwrite)
+            digest = log.digest if in_folder else ""
+            yield _written(job.read(), target, digest, overwrite=overwrite)
         except (InspectorError, NoiseModelError) as error:
             if len(targets) == 1 and not several:
                 raise
@@ -93,7 +140,7 @@ def import_logs(
 
 
 def _targets(
-    jobs: Sequence[Job], output: Path, *, several: bool, overwrite: bool
+    jobs: Sequence[tuple[_Log, Job]], output: Path, *, several: bool, overwrite: bool
 ) -> tuple[Path, ...]:
     """Paths of the run files, checked before the logs are read."""
     if len(jobs) == 1 and not several and not output.is_dir():
@@ -104,7 +151,7 @@ def _targets(
             f"{output}: {len(jobs)} runs do not fit into one file; name a folder, or choose one"
             " (--episode)"
         )
-    targets = tuple(output / f"{job.name}.npz" for job in jobs)
+    targets = tuple(output / f"{job.name}.npz" for _, job in jobs)
     duplicates = [path for place, path in enumerate(targets) if path in targets[:place]]
     if duplicates:
         raise InspectorError(
@@ -114,17 +161,30 @@ def _targets(
         output.mkdir(exist_ok=True)
     except OSError as error:
         raise InspectorError(f"{output}: cannot be created ({error.strerror})") from error
-    for target in targets:
-        refuse_existing(target, overwrite=overwrite)
+    for (log, _), target in zip(jobs, targets, strict=True):
+        if not (target.exists() and _digest_in(target) == log.digest):
+            refuse_existing(target, overwrite=overwrite)
     return targets
 
 
-def _written(imported: Imported, target: Path, *, overwrite: bool) -> Written:
+def _digest_in(target: Path) -> object:
+    """What a run file was made of; None of another file."""
+    try:
+        meta = from_json(str(archive.read(target, ["meta"])["meta"]))
+    except (OSError, ValueError, KeyError):
+        return None
+    return meta.get(DIGEST) if isinstance(meta, dict) else None
+
+
+def _written(imported: Imported, target: Path, digest: str, *, overwrite: bool) -> Written:
     run, remarks = imported.run, list(imported.remarks)
+    if digest:
+        run = replace(run, meta={**run.meta, DIGEST: digest})
     if imported.urdf:
         urdf = target.with_suffix(".urdf")
-        with replacing(urdf, overwrite=overwrite) as temporary:
-            temporary.write_text(imported.urdf, encoding="utf-8")
+        if not (urdf.is_file() and urdf.read_bytes() == imported.urdf.encode()):
+            with replacing(urdf, overwrite=overwrite) as temporary:
+                temporary.write_bytes(imported.urdf.encode())
         run = replace(run, robot=str(urdf))
         remarks.append(f"{urdf.name}: the robot, as the log describes it")
     remarks += limit_warnings(run)

@@ -34,6 +34,7 @@ from inspector.logs.signals import (
     UNITS as SIGNAL_UNITS,
 )
 from inspector.logs.timestamps import UNITS, unit_of
+from noisemodel.bounds import beyond, limit
 from noisemodel.types import Array
 
 DELIMITERS = (";", "\t", ",", " ")
@@ -77,9 +78,6 @@ class Layout:
     skip: int
     remarks: tuple[str, ...] = ()
 
-
-MAX_COLUMNS = 10_000
-"""Most columns of a log: ten of each joint that a run may have."""
 
 DIGITS = 30
 """Stamps have at most so many digits before or after the point."""
@@ -382,8 +380,8 @@ def _all_positions(width: int, time: int | None) -> str:
 
 def _check_header(path: Path, layout: Layout) -> None:
     header, row = layout.header, layout.row or None
-    if len(header) > MAX_COLUMNS:
-        raise LogError(path, f"{len(header)} columns, the limit is {MAX_COLUMNS}", row=row)
+    if len(header) > limit("columns"):
+        raise LogError(path, f"{len(header)} columns, {beyond('columns')}", row=row)
     seen = set[str]()
     for name in header:
         if not name.isprintable():

@@ -15,7 +15,7 @@ from inspector.logs import parquet
 from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import listed
-from models.jsontext import from_json
+from models.jsontext import from_json, text_of
 
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
 
@@ -191,7 +191,7 @@ def _stamps(path: Path, info: dict[str, Any], table: Any, options: ReadOptions) 
 def _info(folder: Path) -> dict[str, Any]:
     path = folder / "meta" / "info.json"
     try:
-        info = from_json(path.read_text(encoding="utf-8"))
+        info = from_json(text_of(path))
     except (OSError, ValueError) as error:
         raise LogError(path, f"cannot be read ({error})") from error
     if not isinstance(info, dict) or not isinstance(info.get("features"), dict):

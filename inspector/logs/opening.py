@@ -273,9 +273,9 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
     """The run of a run file; None of another log, or if it has to be read as one."""
     options = reading.options
     as_log = bool(reading.desired or options.entries or options.units or options.joints)
-    if path.is_dir() or not _is_npz(path) or (zipfile.is_zipfile(path) and as_log):
+    if path.is_dir() or not _is_npz(path) or (_is_archive(path) and as_log):
         return None
-    if zipfile.is_zipfile(path):
+    if _is_archive(path):
         try:
             names = set(archive.names_in(path))
         except (OSError, archive.ArchiveError):
@@ -291,4 +291,8 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
 
 
 def _is_npz(path: Path) -> bool:
-    return path.suffix.lower() == ".npz" or (path.is_file() and zipfile.is_zipfile(path))
+    return path.suffix.lower() == ".npz" or _is_archive(path)
+
+
+def _is_archive(path: Path) -> bool:
+    return path.is_file() and zipfile.is_zipfile(path)  # a device or a pipe may have no end

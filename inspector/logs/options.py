@@ -10,8 +10,7 @@ from typing import Any, Self
 
 from inspector.errors import InspectorError
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS
-from models.jsontext import from_toml
-from noisemodel.archive import check_regular
+from models.jsontext import from_toml, text_of
 from noisemodel.atomic import replacing
 
 FORMAT = "noise-mapping/1"
@@ -107,8 +106,7 @@ class ReadOptions:
             InspectorError: If it cannot be read, or has unknown settings.
         """
         try:
-            check_regular(path)
-            saved = from_toml(path.read_text(encoding="utf-8"))
+            saved = from_toml(text_of(path))
         except OSError as error:
             raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
         except ValueError as error:

@@ -8,6 +8,7 @@ killed search resumes there; a complete one is only read.
 import fcntl
 import json
 import os
+import stat
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
@@ -21,6 +22,9 @@ from models.tuning.grid import Point
 from models.tuning.search import Measures
 
 FORMAT = "noise-tuning/1"
+
+MAX_BYTES = 256 * 2**20
+"""Most bytes of a results file that is read: those of some hundred thousand points."""
 
 
 class ResultsError(InspectorError):
@@ -84,6 +88,9 @@ def opened(
         InspectorError: If it cannot be read or written, or another process is writing it.
     """
     with _locked(path) as file:
+        about = os.fstat(file.fileno())
+        if not stat.S_ISREG(about.st_mode) or about.st_size > MAX_BYTES:
+            raise ResultsError(path, f"is no regular file of {MAX_BYTES} bytes or less")
         file.seek(0)
         whole, _, torn = (b"" if overwrite else file.read()).rpartition(b"\n")
         header = _line({"format": FORMAT, **settings})
