@@ -35,7 +35,7 @@ from fuzz.readers import READERS, Reader
 
 SECONDS, BYTES = 20, 2 * 10**9
 """Processor time in [s] and resident memory in [byte] that a command may take."""
-WALL = 40.0
+WALL = 150.0
 """Time that it may take in all, in [s]: one that waits takes no processor time."""
 
 OUTCOMES = ("handled", "traceback", "hang", "memory", "nonsense", "raw text")

@@ -58,7 +58,8 @@ URDF = f"""<robot name="r"><link name="l0"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>
 <visual><origin xyz="0 0 0.5"/><geometry><box size="0.1 0.1 1.0"/></geometry></visual></link>
 <link name="l2"><visual><geometry><MESH/></geometry></visual></link>
-<joint name="a" type="revolute"><parent link="l0"/><child link="l1"/><axis xyz="0 1 0"/>{LIMIT}</joint>
+<joint name="a" type="revolute"><parent link="l0"/><child link="l1"/>
+<axis xyz="0 1 0"/>{LIMIT}</joint>
 <joint name="b" type="revolute"><parent link="l1"/><child link="l2"/><origin xyz="0 0 1"/>
 <axis xyz="0 1 0"/>{LIMIT}</joint></robot>
 """
@@ -154,9 +155,10 @@ def _run_file(folder: Path) -> Path:
     return _written("other", "")(folder).with_name("run.npz")
 
 
-def _rows(
-    separator: str = ",", names: str = "time,a.position,b.position,a.velocity,b.velocity"
-) -> str:
+COLUMNS = "time,a.position,b.position,a.velocity,b.velocity"
+
+
+def _rows(separator: str = ",", names: str = COLUMNS) -> str:
     rows = np.column_stack((TIME, POSITION, VELOCITY))
     lines = (separator.join(repr(float(each)) for each in row) for row in rows)
     return "\n".join([names.replace(",", separator), *lines]) + "\n"
@@ -286,7 +288,7 @@ def _by_command(name: str, *arguments: str) -> Callable[[Path], Path]:
 
 def _sample(folder: Path) -> Path:
     signal = {name: np.random.default_rng(0).normal(size=4000) for name in WHOLE}
-    meta = dict.fromkeys(RECIPE, 1) | {"duration": 4.0}
+    meta = dict.fromkeys(RECIPE, 1) | {"duration": 4.0, "scenario": "own"}
     blocks = (nm.Block(0.0, 4.0, "ok"),)
     sample = Sample(
         robot="panda", rate=1000.0, signals=signal, decimated={}, blocks=blocks, meta=meta

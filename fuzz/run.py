@@ -4,7 +4,7 @@
     python -m fuzz.run --group text --seconds 600 --found found/
 
 The corpus begins with a whole file of each reader and with damaged ones. An error that is not
-expected is counted by its place and kept, and fuzzing goes on; the exit status is 1 if there is one.
+expected is kept by its place, and fuzzing goes on; the exit status is 1 if there is one.
 """
 
 import argparse

@@ -1,8 +1,11 @@
 """Read NoisyTest's `.log`: a row for each sample, with its time and its noise."""
 
+import stat
 import warnings
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 
@@ -12,6 +15,8 @@ from models.types import Array
 LARGE = 1_000_000
 """Files of so many bytes or more are read by Arrow: a quarter of NumPy's time, after 45 ms for its
 import."""
+LONGEST_LINE = 2**16
+"""Characters of a line: far more than those of two numbers and a comment."""
 
 
 def read_log(path: str | Path) -> tuple[Array, Array]:
@@ -30,6 +35,7 @@ def read_log(path: str | Path) -> tuple[Array, Array]:
         DataFileError: If the file is missing or empty, a line is no pair of finite numbers, or
             time does not go forward in even steps; the line is named.
     """
+    _check_regular(path)
     columns = _read_fast(path)
     if columns is None or columns.shape[1] != 2 or not np.isfinite(columns).all():
         columns = _read_slowly(path)
@@ -50,6 +56,16 @@ def nominal_rate(time: Array) -> float:
     return float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
 
 
+def _check_regular(path: str | Path) -> None:
+    """Refuse a device or a pipe, which may have no end."""
+    try:
+        regular = stat.S_ISREG(Path(path).stat().st_mode) or Path(path).is_dir()
+    except OSError as error:
+        raise DataFileError(path, f"cannot be read ({error.strerror or error})") from error
+    if not regular:
+        raise DataFileError(path, "is no regular file; save what it holds to one")
+
+
 def _read_fast(path: str | Path) -> Array | None:
     """Array by a compiled reader; None if it fails, or the rows are ragged."""
     with suppress(OSError):
@@ -58,7 +74,10 @@ def _read_fast(path: str | Path) -> Array | None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            return np.loadtxt(Path(path), ndmin=2, encoding="latin-1")
+            with Path(path).open(encoding="latin-1") as stream:
+                return np.loadtxt(_lines(path, stream), ndmin=2)
+        except DataFileError:
+            raise
         except (ValueError, UserWarning):
             return None
         except OSError as error:
@@ -89,11 +108,19 @@ def _read_by_arrow(path: str | Path) -> Array | None:
     return np.stack([column.to_numpy() for column in table.columns], axis=1)
 
 
+def _lines(path: str | Path, stream: TextIO) -> Iterator[str]:
+    """Lines of a log, which end."""
+    while line := stream.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise DataFileError(path, f"has a line of more than {LONGEST_LINE} characters")
+        yield line
+
+
 def _read_slowly(path: str | Path) -> Array:
     """Read line by line, to name the line that is wrong."""
     rows = []
     with Path(path).open(encoding="utf-8-sig", errors="replace") as lines:
-        for number, line in enumerate(lines, start=1):
+        for number, line in enumerate(_lines(path, lines), start=1):
             words = line.partition("#")[0].split()
             if words:
                 rows.append(_row(path, number, words))

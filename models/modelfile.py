@@ -155,8 +155,9 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
             members = {name: _member(path, archive, name, n) for name, n in dimensions.items()}
     except OSError as error:
         raise ModelFileError(path, f"cannot be read ({error.strerror or error})") from error
-    except (zipfile.BadZipFile, EOFError, RuntimeError) as error:
-        raise ModelFileError(path, f"is no model file, or a damaged one ({error})") from error
+    except (zipfile.BadZipFile, EOFError, RuntimeError, UnicodeDecodeError) as error:
+        problem = f"is no model file, or a damaged one ({_one_line(error)})"
+        raise ModelFileError(path, problem) from error
     manifest = _manifest(path, str(members.pop("manifest")))
     if "threshold" in members:
         members.setdefault("missing", np.zeros_like(members["threshold"]))
@@ -179,7 +180,7 @@ def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]
     if not kinds:
         wanted = " or ".join(", ".join(sorted(kind)) for kind in _KINDS[: len(ESTIMATORS)])
         raise ModelFileError(
-            path, f"is no model file: holds {', '.join(there)[:200]}, expected {wanted}"
+            path, f"is no model file: holds {_escaped(', '.join(there))}, expected {wanted}"
         )
     for info in archive.infolist():
         # Stored as they are, members cannot be larger than the file that holds them.
@@ -212,6 +213,10 @@ def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: i
         raise ModelFileError(path, f"array {name!r} is damaged: its size is not what it declares")
     array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
     return array
+
+
+def _escaped(text: str) -> str:
+    return text[:200].encode("unicode_escape").decode()
 
 
 def _one_line(error: Exception) -> str:

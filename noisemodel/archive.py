@@ -27,9 +27,15 @@ UNPACKED = 512 * 2**20
 RATIO = 20
 """A large file may unpack to so many times its own size; the numbers of logs hardly shrink."""
 
-DAMAGE = (EOFError, MemoryError, RuntimeError, struct.error, zlib.error, lzma.LZMAError)
+DAMAGE = (
+    *(EOFError, MemoryError, RuntimeError, UnicodeDecodeError),
+    *(struct.error, zlib.error, lzma.LZMAError),
+)
 """What zipfile and NumPy raise on archives that are broken, encrypted, of a kind that zipfile does
 not read, or state a wrong size."""
+
+TEXT = 64 * 2**20
+"""Most bytes of a text that is read at once."""
 
 PIECE = 2**20
 """Bytes that are unpacked at once."""
@@ -144,6 +150,22 @@ def check_regular(path: Path) -> None:
     mode = path.stat().st_mode
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         raise ArchiveError("is no regular file; save what it holds to one")
+
+
+def read_text(path: Path) -> str:
+    """Text of a regular file in UTF-8 of up to ``TEXT`` bytes.
+
+    Raises:
+        ArchiveError: If it is no regular file, too long, or not text in UTF-8.
+        OSError: If it cannot be read.
+    """
+    check_regular(path)
+    if (size := path.stat().st_size) > TEXT:
+        raise ArchiveError(f"{size} bytes, the limit is {TEXT}")
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ArchiveError("not text in UTF-8") from error
 
 
 def check_unpacked(unpacked: int, packed: int) -> None:

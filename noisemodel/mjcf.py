@@ -96,6 +96,10 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
     """
     folders = _check(path, roots)
     try:
+        str(path.absolute()).encode()
+    except UnicodeEncodeError as error:
+        raise RobotError(f"{path}: its path is not UTF-8, as MuJoCo needs it") from error
+    try:
         import mujoco
     except ImportError as error:
         raise RobotError(

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from noisemodel import Block, Run
+from noisemodel.archive import ArchiveError, read_text
 from noisemodel.atomic import replacing
 from scenarios.errors import DatasetError, SampleError, SimulationError
 from scenarios.formats import FORMATS, Format
@@ -150,7 +151,7 @@ class Folder:
     def times(self) -> dict[Task, float]:
         """Processor time of each run, where it was recorded, in [s]."""
         path, times = self.path / TIMES, {}
-        for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        for line in _text(path).splitlines() if path.exists() else ():
             name, _, seconds = line.partition(",")
             found = _NAMES.fullmatch(name)
             if found and self.format.holds(_task(found)) and re.fullmatch(r"\d+\.\d\d", seconds):
@@ -215,9 +216,16 @@ def _compare(path: Path, made: Any, settings: dict[str, Any]) -> None:
 
 def _read_json(path: Path) -> Any:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
+        return json.loads(_text(path))
+    except (ValueError, RecursionError) as error:
         raise DatasetError(f"{path}: damaged ({error}); name another folder") from error
+
+
+def _text(path: Path) -> str:
+    try:
+        return read_text(path)
+    except (OSError, ArchiveError) as error:
+        raise DatasetError(f"{path}: cannot be read ({error})") from error
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

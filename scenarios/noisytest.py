@@ -6,6 +6,7 @@ folder ``training`` and validates on a folder ``validation``, both at 10 kHz.
 """
 
 import json
+import re
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,9 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from noisemodel import Block, Run, simplified
+from noisemodel.archive import read_text
 from noisemodel.atomic import replacing
 from scenarios.errors import SampleError
 from scenarios.sample import digest
+
+LONG_KEY = re.compile(r"""(?<![\w"'-])(?:[\w"'-]++[ \t]*+\.[ \t]*+){50}""")
+"""A key of TOML that no writer writes; `tomllib` takes memory by the square of its parts."""
 
 RATE = 10_000.0
 """The only sample rate of NoisyTest, in [Hz]."""
@@ -99,7 +104,10 @@ def read(log: Path) -> tuple[tuple[Block, ...], float]:
     """
     path = log.with_suffix(".toml")
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = read_text(path)
+        if LONG_KEY.search(text):
+            raise ValueError("a key of many parts")
+        content = tomllib.loads(text)
         ranges, labels = content["data"]["chunk_ranges"], content["data"]["chunk_labels"]
         recipe = json.loads(content["simulation"]["recipe"])
         blocks = tuple(
@@ -109,7 +117,7 @@ def read(log: Path) -> tuple[tuple[Block, ...], float]:
         return blocks, float(recipe["duration"])
     except FileNotFoundError as error:
         raise SampleError(log, f"lacks its {path.name}") from error
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
         raise SampleError(path, f"damaged ({' '.join(str(error).split())})") from error
 
 

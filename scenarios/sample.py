@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from noisemodel import Block, Run, decimated, runfile
 from noisemodel.archive import DAMAGE as DAMAGED
-from noisemodel.archive import names_in
+from noisemodel.archive import names_in, read
 from scenarios.errors import SampleError, ScenarioError
 from scenarios.signals import WHOLE, Signals, joints, norms, signals, with_error
 
@@ -113,6 +113,10 @@ class Sample:
         if abs(rate / self.rate - 1) < CLOSE:
             return replace(self, joints={})
         if abs(rate / DECIMATED - 1) < CLOSE:
+            if lacking := {*WHOLE} & self.signals.keys() - self.decimated.keys():
+                raise ScenarioError(
+                    f"{self.name}: has no {', '.join(sorted(lacking))} at {DECIMATED:g} Hz"
+                )
             return replace(self, rate=DECIMATED, signals=self.decimated)
         raise ScenarioError(
             f"{self.name}: keeps its noise at {self.rate:g} Hz and {DECIMATED:g} Hz and no"
@@ -162,9 +166,7 @@ class Sample:
         if not zipfile.is_zipfile(path):
             raise SampleError(path, "not a sample, or truncated: not a complete archive")
         try:
-            names_in(path)  # within the limits of sizes
-            with np.load(path, allow_pickle=False) as archive:
-                return cls(**_fields(path, archive, only))
+            return cls(**_fields(path, only))
         except SampleError:
             raise
         except DAMAGE as error:
@@ -176,9 +178,7 @@ def is_sample(path: str | Path) -> bool:
     if not (Path(path).is_file() and zipfile.is_zipfile(path)):
         return False
     try:
-        names_in(Path(path))
-        with np.load(path, allow_pickle=False) as archive:
-            return str(archive["format"]).startswith("noise-sample/")
+        return str(read(Path(path), ["format"])["format"]).startswith("noise-sample/")
     except DAMAGE:
         return False
 
@@ -213,33 +213,46 @@ def _columns(blocks: tuple[Block, ...]) -> dict[str, NDArray[Any]]:
     }
 
 
-def _fields(path: Path, archive: Any, only: Iterable[str] | None) -> dict[str, Any]:
+def _fields(path: Path, only: Iterable[str] | None) -> dict[str, Any]:
+    held = names_in(path)
+    there = [name for name in held if name not in _FACTS and PREFIX not in name]
+    names = there if only is None else list(only)
+    archive = read(path, {*_FACTS, *names, *(f"{PREFIX}{name}" for name in names)})
     version = str(archive["format"]) if "format" in archive else "none"
     if version != FORMAT:
-        raise SampleError(path, f"format {version!r}, expected {FORMAT!r}")
-    there = [name for name in archive.files if name not in _FACTS and PREFIX not in name]
-    names = there if only is None else list(only)
+        raise SampleError(path, f"format {version[:40]!r}, expected {FORMAT!r}")
     lacking = [name for name in (*WHOLE, *names) if name not in there]
     if lacking:
-        raise SampleError(path, f"has no signal {', '.join(lacking)}; it has {', '.join(there)}")
-    read = _equal(path, {name: archive[name] for name in names})
+        raise SampleError(
+            path, f"has no signal {', '.join(sorted(lacking))}; it has {', '.join(there)}"
+        )
+    whole = _equal(path, {name: archive[name] for name in names})
     low = {name: archive[f"{PREFIX}{name}"] for name in names if f"{PREFIX}{name}" in archive}
-    columns = (archive[name].tolist() for name in ("block_start", "block_stop", "block_label"))
+    columns = [archive[name] for name in ("block_start", "block_stop", "block_label")]
+    if [column.dtype.kind for column in columns] != ["f", "f", "U"]:
+        raise SampleError(path, "its blocks are no times and labels")
     meta = json.loads(str(archive["meta"]))
     if not meta.keys() >= RECIPE:
         raise SampleError(path, f"its meta lacks {', '.join(sorted(RECIPE - meta.keys()))}")
+    if type(meta["seed"]) is not int or not isinstance(meta["scenario"], str):
+        raise SampleError(path, "its meta has no scenario and seed")
     return {
         "robot": str(archive["robot"]),
         "rate": float(archive["rate"]),
-        "signals": read,
+        "signals": whole,
         "decimated": _equal(path, low),
         "joints": with_error(*(archive[name] for name in KEPT)) if KEPT[0] in archive else {},
-        "blocks": tuple(Block(*block) for block in zip(*columns, strict=True)),
+        "blocks": tuple(
+            Block(*block) for block in zip(*(column.tolist() for column in columns), strict=True)
+        ),
         "meta": meta,
     }
 
 
 def _equal(path: Path, signals: Signals) -> Signals:
+    for name, signal in signals.items():
+        if signal.dtype.kind != "f" or signal.ndim != 1 or not np.isfinite(signal).all():
+            raise SampleError(path, f"{name} is no row of finite numbers")
     if len({signal.shape for signal in signals.values()}) > 1:
         shapes = ", ".join(f"{name} {signal.shape}" for name, signal in signals.items())
         raise SampleError(path, f"signals of different shapes: {shapes}")

@@ -226,3 +226,18 @@ def test_a_device_is_no_log():
     for read, error in ((Run.load, RunFileError), (read_log, LogError)):
         with pytest.raises(error, match="no regular file"):
             read(Path("/dev/zero"))
+
+
+def test_an_archive_whose_names_are_no_text_is_one_line(tmp_path):
+    path = tmp_path / "run.npz"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("é\n.npy", b"")
+    path.write_bytes(path.read_bytes().replace("é".encode(), b"\xff\xfe"))
+    for read, error in (
+        (Run.load, RunFileError),
+        (read_log, LogError),
+        (lambda each: load_library([each]), models.ModelFileError),
+    ):
+        with pytest.raises(error) as caught:
+            read(path)
+        assert "\n" not in str(caught.value)

@@ -3,6 +3,8 @@
 import os
 import subprocess
 import sys
+import tracemalloc
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -116,3 +118,29 @@ def test_the_commands_take_a_package_root(tmp_path):
     assert failed.returncode == 3
     assert "--package-root" in failed.stderr
     assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("r.urdf", '<robot name="r"><link name="a"/></robot>'),
+        ("r.xml", "<mujoco><worldbody><geom size='1'/></worldbody></mujoco>"),
+    ],
+)
+def test_a_robot_whose_name_is_not_utf8_is_read_or_one_line(tmp_path, name, text):
+    path = tmp_path / os.fsdecode(b"\xff\xfe" + name.encode())
+    path.write_text(text)
+    with suppress(RobotError):
+        assert Robot.load(path).path == path
+
+
+@pytest.mark.parametrize("name", ["r.urdf", "r.xml"])
+def test_a_robot_of_gigabytes_is_not_read(tmp_path, name):
+    path = tmp_path / name
+    path.touch()
+    os.truncate(path, 3 * 10**9)
+    tracemalloc.start()
+    with pytest.raises(RobotError, match="larger than 67108864 bytes"):
+        Robot.load(path)
+    assert tracemalloc.get_traced_memory()[1] < 200e6
+    tracemalloc.stop()

@@ -288,10 +288,14 @@ def work_of(paths: Sequence[Path | Source]) -> float:
     return sum(file.stat().st_size for file in files if file.is_file()) / 50e6
 
 
+LONGEST_LINE = 2**16
+"""Characters of a line that are looked at."""
+
+
 def _has_header(path: Path) -> bool:
     """Whether a text begins with a line of names: NoisyTest's logs have two numbers a line."""
     with suppress(OSError), path.open(encoding="utf-8", errors="replace") as stream:
-        for line in stream:
+        while line := stream.readline(LONGEST_LINE):
             content = line.partition("#")[0].strip()
             if content:
                 return len(re.split(r"[,;\s]+", content)) > 2 or content[0].isalpha()

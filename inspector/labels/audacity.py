@@ -31,5 +31,7 @@ def parse(text: str) -> Iterator[Entry]:
         if cells == [""] or cells[0] == "\\":
             continue
         if len(cells) != 3:
-            raise EntryError(f"expected start, stop and label between tabs, not {line!r}", where)
+            raise EntryError(
+                f"expected start, stop and label between tabs, not {line[:80]!r}", where
+            )
         yield Entry(number(cells[0], where), number(cells[1], where), cells[2], where)

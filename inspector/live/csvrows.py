@@ -148,7 +148,7 @@ class CsvReader:
             try:
                 rows.append(self._row(line.decode(errors="replace").split(self._delimiter)))
             except ValueError as error:
-                note("malformed rows", f"line {number}: {error}; such rows are left out")
+                note("malformed rows", f"line {number}: {str(error)[:200]}; such rows are left out")
                 if self._time is None:  # without stamps, the row alone keeps the time
                     rows.append([nan] * len(self._header))
         return np.array(rows).reshape(-1, len(self._header))

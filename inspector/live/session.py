@@ -20,6 +20,7 @@ from inspector.live.warnings import Warnings
 from inspector.live.worker import Worker
 from inspector.wrongrobot import LimitWatch, check_joints
 from models import Event
+from noisemodel.bounds import beyond, limit
 from noisemodel.limits import joint_limits
 from noisemodel.types import Array
 
@@ -252,6 +253,8 @@ class LiveSession:
     def _begin(self, rows: Mapping[str, Array]) -> tuple[SampleBuffer, Worker]:
         """Fix signals and names by the first samples."""
         widths = widths_of(rows, self._names)
+        if widths["velocity"] > limit("joints"):
+            raise LiveError(f"{widths['velocity']} joints, {beyond('joints')}")
         names = _names(self._names, self._robot, widths["velocity"])
         absent = check_joints(names, self._robot)
         size = max(1, round(BATCH * self._rate))

@@ -79,6 +79,9 @@ class Layout:
     remarks: tuple[str, ...] = ()
 
 
+LONGEST_LINE = 4 * 2**20
+"""Characters of a line: far more than those of so many columns as are read."""
+
 DIGITS = 30
 """Stamps have at most so many digits before or after the point."""
 
@@ -121,7 +124,7 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
     with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
         layout = _layout(path, stream, options)
         stream.seek(0)
-        rows = sum(1 for _ in islice(stream, layout.skip, None))
+        rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
     time = options.time or time_column(layout.header)
     naming = Naming.of(layout.header)
     return (
@@ -132,6 +135,14 @@ def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
             if name
         ),
     )
+
+
+def _lines(path: Path, stream: TextIO) -> Iterator[str]:
+    """Lines of a log, which end."""
+    while line := stream.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise LogError(path, f"not a CSV log: a line of more than {LONGEST_LINE} characters")
+        yield line
 
 
 def _meaning(name: str, naming: Naming) -> str:
@@ -251,7 +262,7 @@ def _fields(
 
 def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
     """Delimiter and header of a file, found by its first row of numbers."""
-    lines = list(islice(stream, HEAD))
+    lines = list(islice(_lines(path, stream), HEAD))
     stream.seek(0)
     try:
         return _layout_of(path, lines, options)
@@ -450,7 +461,7 @@ def _decimals(
             stamp = Decimal(cell.strip().replace(",", "."))
         except InvalidOperation:
             empty = not cell.strip()
-            what = "is empty" if empty else f"holds {cell!r}, which is not a number"
+            what = "is empty" if empty else f"holds {cell[:40]!r}, which is not a number"
             raise LogError(path, f"column {name!r} {what}", row) from None
         if not stamp.is_finite():
             raise LogError(path, f"column {name!r} holds {cell.strip()[:40]}", row)
@@ -463,7 +474,9 @@ def _decimals(
 def _rows(path: Path, stream: TextIO, layout: Layout) -> Iterator[tuple[int, list[str]]]:
     """Line number and cells of each row, without comments, blank lines and trailing separators."""
     lines = csv.reader(
-        islice(stream, layout.skip, None), delimiter=layout.delimiter, skipinitialspace=True
+        islice(_lines(path, stream), layout.skip, None),
+        delimiter=layout.delimiter,
+        skipinitialspace=True,
     )
     width = len(layout.header)
     try:
@@ -506,7 +519,7 @@ def _numbers(
         elif _is_number(cell):
             found.append(float(cell.replace(",", ".")))
         else:
-            raise LogError(path, f"column {name!r} holds {cell!r}, which is not a number", row)
+            raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)
     return found
 
 

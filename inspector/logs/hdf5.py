@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from math import inf
+from math import inf, prod
 from pathlib import Path
 from typing import Any
 
@@ -94,7 +94,7 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
             datasets, left_out = _wanted(group, options)
             arrays = dict(_values(path, [(n, _own(path, each, file)) for n, each in datasets]))
             about = file.get(EPISODES, file).attrs.get("env_args")
-            attributes = {**file.attrs, **group.attrs}
+            attributes = {**_single(file.attrs), **_single(group.attrs)}
     except LogError:
         raise
     except DAMAGE as error:
@@ -115,6 +115,16 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
         ),
         options,
     )
+
+
+def _single(attributes: Any) -> dict[str, Any]:
+    """Attributes that are one number; others may be of any size, and are not read."""
+    about = {name: attributes.get_id(name) for name in attributes}
+    return {
+        name: attributes[name]
+        for name, each in about.items()
+        if each.dtype.kind in "iuf" and each.shape is not None and prod(each.shape) == 1
+    }
 
 
 def _own(path: Path, each: Any, file: Any) -> Any:

@@ -17,7 +17,7 @@ from inspector.logs.signals import array_signal, column_signal, listed
 from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
 from noisemodel.archive import ArchiveError, check_unpacked
 
-DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError)
+DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
 """Errors that pyarrow raises for damaged files."""
 
 EPISODE = "episode_index"

@@ -131,6 +131,9 @@ NOT_MOTION = re.compile(
 GENERIC = re.compile(rf"(?:{JOINT_WORD}|j|a)[ _]?(?P<number>\d+)", re.IGNORECASE)
 """``joint1``, ``J1``, ``axis 1``: names that number the joints."""
 
+LONGEST = 300
+"""Characters of a name from which on it is that of no signal: patterns take their square."""
+
 SIDES = ("before", "within", "after", "last")
 """Parts of a name that tell whether it is desired."""
 
@@ -166,7 +169,7 @@ class Naming:
 
 def without_unit(name: str) -> tuple[str, str]:
     """Name of a column, and the unit at its end in small letters, or an empty text."""
-    match = UNIT.fullmatch(name.strip())
+    match = UNIT.fullmatch(name.strip()) if len(name) <= LONGEST else None
     unit = (match["bracketed"] or match["suffix"]).strip().lower() if match else ""
     if match and (unit in UNITS or unit in TIME_UNITS):
         return match["name"].rstrip(), unit
@@ -207,7 +210,9 @@ def array_signal(name: str) -> str | None:
     bare = ROBOSUITE.sub("", name.rpartition("/")[2].lower())
     if bare in SIGNALS:
         return bare
-    match = PATTERNS["a quantity of all joints, or of the only one"].fullmatch(bare)
+    match = len(name) <= LONGEST and PATTERNS[
+        "a quantity of all joints, or of the only one"
+    ].fullmatch(bare)
     return _signal(match.groupdict(), Naming()) if match else None
 
 
@@ -215,7 +220,7 @@ def number_of(joint: str | int) -> int | None:
     """Number of a joint that a column tells by its number, or by a name that is one."""
     if isinstance(joint, int):
         return joint
-    match = GENERIC.fullmatch(joint)
+    match = GENERIC.fullmatch(joint) if len(joint) <= LONGEST else None
     return int(match["number"]) if match else None
 
 
@@ -232,7 +237,8 @@ def time_column(names: Sequence[str]) -> str:
     """Name of the column or array that holds the stamps; empty if there is none."""
     found: dict[str, str] = {}
     for name in names:
-        if match := TIME.fullmatch(without_unit(name)[0]):
+        bare = without_unit(name)[0]
+        if len(bare) <= LONGEST and (match := TIME.fullmatch(bare)):
             word = re.sub("[_ ](?=stamp)", "", match["name"].lower())
             plain = "/" not in name and "." not in name
             found.setdefault(word if plain else f"{word} of a record", name)
@@ -241,13 +247,13 @@ def time_column(names: Sequence[str]) -> str:
 
 
 def listed(names: Sequence[str]) -> str:
-    """The first ten of some names, and how many more there are."""
-    shown = ", ".join(names[:10])
+    """The first ten of some names, long ones cut off, and how many more there are."""
+    shown = ", ".join(name if len(name) <= 80 else f"{name[:77]}..." for name in names[:10])
     return shown + (f" and {len(names) - 10} more" if len(names) > 10 else "")
 
 
 def _match(name: str) -> re.Match[str] | None:
-    if NOT_MOTION.fullmatch(name):
+    if len(name) > LONGEST or NOT_MOTION.fullmatch(name):
         return None
     found = next((match for each in PATTERNS.values() if (match := each.fullmatch(name))), None)
     if found is None or found.re is next(iter(PATTERNS.values())):

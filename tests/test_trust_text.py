@@ -1,0 +1,187 @@
+"""Text of any kind where settings, labels and states are expected: one line, and within limits."""
+
+import os
+import tracemalloc
+
+import numpy as np
+import pytest
+
+import models
+from inspector.analysis import state
+from inspector.errors import InspectorError
+from inspector.expectations import expectations
+from inspector.labels import read_labels
+from inspector.live import LiveError, LiveSession
+from inspector.live.feeding import reader_of
+from inspector.logs.options import ReadOptions
+from inspector.logs.reading import read_log
+from inspector.logs.signals import column_signal, time_column
+from inspector.training import tuningfile
+from models import jsontext, noisytest
+from noisemodel import Block, Run
+from scenarios import DatasetError, SampleError
+from scenarios import noisytest as simulated
+from scenarios.folder import Folder
+from scenarios.sample import Sample, is_sample
+from scenarios.signals import WHOLE
+
+TIME = np.arange(40) / 100
+RUN = Run(time=TIME, velocity=np.ones((40, 1)), joint_names=("a",))
+
+
+def read_state(path):
+    with state.opened(path, {}):
+        pass
+
+
+def read_tuning(path):
+    with tuningfile.opened(path, {}, [{"C": 1.0}]):
+        pass
+
+
+READERS = {
+    "labels.toml": lambda path: read_labels(path, RUN),
+    "labels.csv": lambda path: read_labels(path, RUN),
+    "labels.txt": lambda path: read_labels(path, RUN),
+    "expect.toml": expectations.read,
+    "mapping.toml": ReadOptions.load,
+    "state": read_state,
+    "tuned.jsonl": read_tuning,
+    "noisytest.toml": noisytest.read_annotations,
+    "noisytest.log": models.read_log,
+    "noisytest-config.json": noisytest.profile_from_config,
+    "simulated.toml": simulated.read,
+    "dataset.json": lambda path: Folder.opened(path.parent),
+}
+EXPECTED = (InspectorError, models.ModelsError, DatasetError, SampleError)
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("kind", ["zero", "pipe", "3 GB"])
+def test_a_file_without_end_is_one_line(tmp_path, name, kind):
+    path = tmp_path / name
+    if kind == "zero":
+        path.symlink_to("/dev/zero")
+    elif kind == "pipe":
+        os.mkfifo(path)
+    else:
+        path.touch()
+        os.truncate(path, 3 * 10**9)
+    with pytest.raises(EXPECTED) as caught:
+        READERS[name](path)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_line_without_end_is_no_row_of_a_log(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("time,a.velocity\n" + "".join(f"{at},1\n" for at in TIME))
+    os.truncate(path, 3 * 10**9)
+    with pytest.raises(InspectorError, match="a line of more than 4194304 characters"):
+        read_log(path)
+
+
+@pytest.mark.parametrize("name", [each for each in READERS if each.endswith("toml")])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "x = " + "[" * 100_000,
+        "x = " + "{a=" * 5000,
+        "x = " + "9" * 5000,
+        "a." * 100_000 + "b = 1",
+        f"[{'a. ' * 20_000}b]",
+        '"a" . ' * 20_000 + "b = 1",
+        "x = '\ud800'",
+    ],
+    ids=lambda text: text[:8],
+)
+def test_toml_that_takes_much_memory_or_stack_is_one_line(tmp_path, name, text):
+    path = tmp_path / name
+    path.write_bytes(text.encode(errors="surrogatepass"))
+    tracemalloc.start()
+    with pytest.raises(EXPECTED) as caught:
+        READERS[name](path)
+    assert "\n" not in str(caught.value)
+    assert tracemalloc.get_traced_memory()[1] < 200e6
+    tracemalloc.stop()
+
+
+def test_keys_and_numbers_that_people_write_are_no_long_keys():
+    text = "a.b.c = 1\nranges = [" + ", ".join(f"[{n}.0, {n}.5]" for n in range(5000)) + "]\n"
+    assert jsontext.from_toml(text)["a"] == {"b": {"c": 1}}
+    assert simulated.LONG_KEY.search(text) is None
+
+
+@pytest.mark.parametrize("settings", ["[" * 100_000, "[]", "9" * 5000, '{"format": NaN}', "\xff"])
+def test_settings_of_a_data_set_that_are_none_are_one_line(tmp_path, settings):
+    (tmp_path / "dataset.json").write_text(settings, encoding="latin-1")
+    with pytest.raises(DatasetError, match="damaged|cannot be read|made with format") as caught:
+        Folder.opened(tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+def test_times_of_a_data_set_that_are_no_text_are_one_line(tmp_path):
+    folder = Folder.opened(tmp_path / "set")
+    (tmp_path / "set" / "times.csv").write_bytes(b"\xff\xfe")
+    with pytest.raises(DatasetError, match=r"times\.csv: cannot be read \(not text in UTF-8\)"):
+        folder.times()
+
+
+@pytest.mark.parametrize("name", ["a" * 10_000, "[" * 100_000, "q" + "9" * 5000, "a_" * 50_000])
+def test_a_long_name_is_that_of_no_signal_and_decided_at_once(name):
+    assert column_signal(name) is None
+    assert time_column([name]) == ""
+    with pytest.raises(LiveError, match="names no velocity") as caught:
+        reader_of(f"time,{name}".encode(), ())
+    assert len(str(caught.value)) < 300
+
+
+def test_cells_are_quoted_only_as_far_as_they_can_be_read(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(f"time,a.velocity\n0,1\n0.01,{'x' * 10_000}\n")
+    with pytest.raises(InspectorError, match="row 3: column 'a.velocity' holds 'x") as caught:
+        read_log(path)
+    assert len(str(caught.value)) < 300
+
+
+def test_a_live_row_of_more_joints_than_a_run_may_have_is_refused(tmp_path):
+    with (
+        pytest.raises(LiveError, match="100000 joints, the limit is 1000 .--limit joints=N"),
+        LiveSession(100.0, save=tmp_path / "a.rrd", library={}) as session,
+    ):
+        session.push(velocity=np.ones(100_000))
+
+
+META = {"scenario": "straight", "seed": 1, "duration": 0.4, "sha256": ""}
+
+
+def sample(**changes):
+    signals = {name: np.sin(TIME, dtype=np.float32) for name in WHOLE}
+    fields = {"robot": "panda", "rate": 100.0, "signals": signals, "decimated": {}, "meta": META}
+    return Sample(blocks=(Block(0.0, 0.4, "ok"),), **fields | changes)
+
+
+@pytest.mark.parametrize(
+    ("changes", "problem"),
+    [
+        ({"meta": META | {"seed": "1"}}, "scenario and seed"),
+        ({"meta": META | {"scenario": 1}}, "scenario and seed"),
+        ({"signals": dict.fromkeys(WHOLE, np.array(["a"] * 40))}, "no row of finite numbers"),
+        ({"signals": dict.fromkeys(WHOLE, np.full(40, np.nan))}, "no row of finite numbers"),
+        ({"signals": dict.fromkeys(WHOLE, np.ones((2, 2)))}, "no row of finite numbers"),
+    ],
+)
+def test_a_sample_of_other_contents_is_refused(tmp_path, changes, problem):
+    sample(**changes).save(tmp_path / "a.npz")
+    with pytest.raises(SampleError, match=problem):
+        Sample.load(tmp_path / "a.npz")
+
+
+def test_a_sample_without_the_noise_of_a_slower_logger_says_so(tmp_path):
+    fast = sample(rate=10_000.0, decimated={"measured": np.ones(4)})
+    with pytest.raises(ValueError, match="has no desired, error at 1000 Hz"):
+        fast.at(1000.0)
+
+
+def test_a_pipe_is_no_sample(tmp_path):
+    os.mkfifo(tmp_path / "a.npz")
+    assert not is_sample(tmp_path / "a.npz")
