@@ -43,7 +43,7 @@ OUTCOMES = ("handled", "traceback", "hang", "memory", "nonsense", "raw text")
 control characters or commands of a CI system in the output."""
 
 RAW = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\x9b]|^::", re.M)
-NOT_FINITE = re.compile(r"\b(nan|inf)\b")
+NOT_FINITE = re.compile(r"\b(nan|inf) (√W|W|rad|m|s|Hz|dB|ms)\b")
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ def results(
         folder = scratch / "case"
         shutil.copytree(whole, folder, symlinks=True)
         path = case.put(folder / place)
-        result = _judged(name, case, *_run(reader, folder, path))
+        result = judged(name, case, *_run(reader, folder, path))
         if keep and result.outcome != "handled" and path.is_file() and path.stat().st_size < 10**8:
             keep.mkdir(parents=True, exist_ok=True)
             slug = re.sub(r"\W+", "-", f"{name}-{case.name}")
@@ -225,9 +225,20 @@ def _forked(work: Callable[[], object]) -> tuple[int, resource.struct_rusage, in
     return os.waitstatus_to_exitcode(status), usage, max(peak, usage.ru_maxrss * 1024)
 
 
-def _judged(
+def judged(
     name: str, case: Bomb, status: int, seconds: float, peak: int, out: str, err: str
 ) -> Result:
+    """What became of a file.
+
+    Args:
+        name: Its reader.
+        case: The file.
+        status: Exit status of the command, or minus the signal that ended it.
+        seconds: Processor time, in [s].
+        peak: Peak of the resident memory, in [byte].
+        out: What the command printed.
+        err: What it complained.
+    """
     lines = (err.strip() or out.strip()).splitlines()
     if peak > BYTES:
         outcome = "memory"
@@ -237,7 +248,7 @@ def _judged(
         outcome = "traceback"
     elif RAW.search(out + err):
         outcome = "raw text"
-    elif status in (0, 1, 4) and (case.refuse or NOT_FINITE.search(out.lower())):
+    elif status in (0, 1, 4) and (case.refuse or NOT_FINITE.search(out)):
         outcome = "nonsense"
     elif status not in (0, 1, 2, 3, 4) or (status == 3 and not lines):
         outcome = "traceback"

@@ -122,6 +122,7 @@ class Reader:
     words: tuple[bytes, ...] = field(default=())
 
 
+@cache
 def run() -> nm.Run:
     """A run of two joints, two seconds at 100 Hz."""
     return nm.Run(

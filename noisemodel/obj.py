@@ -26,6 +26,8 @@ def read(data: bytes) -> Mesh:
     for line in text.splitlines():
         word, *rest = line.partition("#")[0].split() or [""]
         if word == "v":
+            if len(rest) < 3:
+                raise ValueError(f"{line.strip()[:60]!r} is no point")
             points.append(tuple(map(float, rest[:3])))  # a weight or a colour may follow
         elif word == "f":
             named = [int(corner.partition("/")[0]) for corner in rest]

@@ -271,8 +271,8 @@ def package_roots(name: str | Path, package_root: str | Path | None = None) -> t
 
 def _own_roots(path: Path) -> tuple[Path, ...]:
     try:
-        with path.open("rb") as stream:
-            packages = set(PACKAGE.findall(stream.read(urdf.MAX_BYTES)))
+        text = path.read_bytes() if path.stat().st_size <= urdf.MAX_BYTES else b""
+        packages = set(PACKAGE.findall(text))
     except OSError as error:
         raise RobotError(f"{path}: cannot be read ({error.strerror})") from error
     above = [folder for folder in path.parents if not _is_wide(folder)]

@@ -81,6 +81,7 @@ def read(path: Path) -> Urdf:
     if root.find("link") is None:
         raise RobotError(f"{path}: the URDF has no link")
     _check_numbers(path, root)
+    _check_tree(path, root, joints)
     mimics = {name: m for j in joints for name, m in _mimic(path, j)}
     for name in mimics:
         leader = name
@@ -107,6 +108,24 @@ def _check_numbers(path: Path, root: ET.Element) -> None:
         axis = joint.find("axis")
         if axis is not None and joint.get("type") in AXIAL and not any(_numbers(path, axis, "xyz")):
             raise RobotError(f"{path}: the axis of joint {joint.get('name')!r} has length 0")
+
+
+def _check_tree(path: Path, root: ET.Element, joints: list[ET.Element]) -> None:
+    """Refuse joints that go round in a circle, which Pinocchio leaves out."""
+    parents = {}
+    for joint in joints:
+        parent, child = joint.find("parent"), joint.find("child")
+        if parent is not None and child is not None:
+            parents[child.get("link")] = parent.get("link")
+    done = set[str | None]()
+    for link in parents:
+        chain = set[str | None]()
+        while link in parents and link not in done:
+            if link in chain:
+                raise RobotError(f"{path}: the joints of link {link!r} go round in a circle")
+            chain.add(link)
+            link = parents[link]
+        done |= chain
 
 
 def _numbers(path: Path, element: ET.Element, name: str) -> list[float]:

@@ -178,7 +178,8 @@ def is_sample(path: str | Path) -> bool:
     if not (Path(path).is_file() and zipfile.is_zipfile(path)):
         return False
     try:
-        return str(read(Path(path), ["format"])["format"]).startswith("noise-sample/")
+        version = read(Path(path), ["format"])["format"]
+        return not version.shape and str(version).startswith("noise-sample/")
     except DAMAGE:
         return False
 
@@ -218,6 +219,9 @@ def _fields(path: Path, only: Iterable[str] | None) -> dict[str, Any]:
     there = [name for name in held if name not in _FACTS and PREFIX not in name]
     names = there if only is None else list(only)
     archive = read(path, {*_FACTS, *names, *(f"{PREFIX}{name}" for name in names)})
+    for name in ("format", "robot", "meta"):
+        if name in archive and (archive[name].shape or archive[name].dtype.kind != "U"):
+            raise SampleError(path, f"{name} is no text")
     version = str(archive["format"]) if "format" in archive else "none"
     if version != FORMAT:
         raise SampleError(path, f"format {version[:40]!r}, expected {FORMAT!r}")

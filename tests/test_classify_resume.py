@@ -12,7 +12,9 @@ import pytest
 from commandline import call
 
 from inspector import assets, workers
-from inspector.analysis import verdict
+from inspector.analysis import state, verdict
+from inspector.analysis.status import Status
+from inspector.analysis.verdict import Verdict
 from inspector.assets import demo_run
 from inspector.logs.opening import open_source
 from inspector.version import program_version
@@ -139,3 +141,27 @@ def die_of_seven(source, reading=None):
     if source.path.name == "07.npz":
         os._exit(137)
     return open_source(source, reading)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"events": [0]},
+        {"events": [{"label": 1, "start": "a", "stop": 1.0, "score": 1.0}]},
+        {"duration": "long"},
+        {"model": None},
+        {"run": 3},
+        {"lost": [1]},
+        {"events": {"label": 1}},
+    ],
+)
+def test_a_state_of_other_types_is_damaged(tmp_path, change):
+    path = tmp_path / "state"
+    with state.opened(path, {}) as opened:
+        opened.add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
+    header, row = path.read_text().splitlines()
+    with state.opened(path, {}) as opened:
+        assert len(opened.verdicts) == 1
+    path.write_text(f"{header}\n{json.dumps(json.loads(row) | change)}\n")
+    with pytest.raises(state.StateError, match="is damaged in line 2"), state.opened(path, {}):
+        pass

@@ -1,6 +1,8 @@
 """Bags that unpack to more than is read, or whose rows are no messages."""
 
+import os
 import sqlite3
+import tracemalloc
 from contextlib import closing, suppress
 
 import numpy as np
@@ -118,3 +120,12 @@ def test_stamps_of_64_bits_are_left_out_and_said(tmp_path, stamp):
     imported = read_log(path)
     assert len(imported.run.time) == len(TIMES)
     assert any("1 messages without data, or with stamps after 2116" in r for r in imported.remarks)
+
+
+def test_a_bag_whose_metadata_is_gigabytes_is_read_without_it(tmp_path):
+    folder = write_bag(tmp_path / "bag", TALK, {"/joint_states": states(TALK)}, storage="sqlite3")
+    os.truncate(folder / "metadata.yaml", 3 * 10**9)
+    tracemalloc.start()
+    assert len(read_log(folder).run.time) == len(TIMES)
+    assert tracemalloc.get_traced_memory()[1] < 200e6
+    tracemalloc.stop()

@@ -1,13 +1,16 @@
 """HDF5 files that hold what is not theirs, or claim to hold more than they do."""
 
 import re
+import time
+import tracemalloc
 
 import h5py
 import numpy as np
 import pytest
 
 from inspector.errors import LogError
-from inspector.logs.reading import read_log
+from inspector.logs.options import ReadOptions
+from inspector.logs.reading import listing, read_log
 
 TIME = np.arange(400) / 100
 MOTION = np.sin(TIME)[:, None] * (1.0, 0.5)
@@ -84,3 +87,35 @@ def test_arguments_that_are_no_arguments_are_passed_over(tmp_path, args):
     with h5py.File(path, "a") as file:
         file.attrs["env_args"] = args
     assert read_log(path).run.rate == 100.0
+
+
+def test_the_contents_of_a_damaged_file_are_listed_or_one_line(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["data/demo_0/obs/joint_pos"] = np.zeros((40, 2))
+    data = path.read_bytes()
+    refused = 0
+    for place in range(512, len(data) - 8, 40):  # headers of groups and datasets
+        path.write_bytes(data[:place] + b"\xff" * 8 + data[place + 8 :])
+        try:
+            listing(path, ReadOptions())
+        except LogError as error:
+            refused += "\n" not in str(error)
+    assert refused > 10
+
+
+def test_attributes_of_any_number_and_size_cost_nothing(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w", libver="latest") as file:
+        file["data/demo_0/obs/joint_pos"] = np.sin(np.arange(80).reshape(40, 2) / 9)
+        attributes = file["data/demo_0"].attrs
+        attributes["fps"] = 50.0
+        attributes.create("image", np.zeros(4 * 10**6))
+        for number in range(2000):
+            attributes[f"a{number}"] = number
+    tracemalloc.start()
+    begin = time.process_time()
+    assert read_log(path).run.rate == 50.0
+    assert tracemalloc.get_traced_memory()[1] < 20e6
+    assert time.process_time() - begin < 10
+    tracemalloc.stop()

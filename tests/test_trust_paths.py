@@ -98,6 +98,8 @@ def test_a_home_and_what_contains_it_are_no_roots(tmp_path, monkeypatch):
 
 
 def test_the_root_of_the_disk_is_no_root(tmp_path, monkeypatch):
+    about = tmp_path.stat()
+    monkeypatch.setattr(Path, "stat", lambda path, **_: about)
     monkeypatch.setattr(Path, "read_bytes", lambda path: b'"package://usr/x" "package://home/y"')
     for path in ("/r.urdf", "/usr/r/r.urdf", "/home/me/r.urdf", "/home/me/r/r.urdf"):
         for root in robot.package_roots(path):

@@ -8,6 +8,8 @@ import pytest
 
 import models
 from inspector.analysis import state
+from inspector.analysis.status import Status
+from inspector.analysis.verdict import classify_file
 from inspector.errors import InspectorError
 from inspector.expectations import expectations
 from inspector.labels import read_labels
@@ -185,3 +187,18 @@ def test_a_sample_without_the_noise_of_a_slower_logger_says_so(tmp_path):
 def test_a_pipe_is_no_sample(tmp_path):
     os.mkfifo(tmp_path / "a.npz")
     assert not is_sample(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("name", ["format", "robot", "meta"])
+def test_a_sample_whose_texts_are_arrays_is_refused_before_they_are_printed(tmp_path, name):
+    sample().save(tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as archive:
+        arrays = dict(archive) | {name: np.zeros((2,) * 20, dtype="u1")}
+    np.savez(tmp_path / "a.npz", **arrays)
+    with pytest.raises(SampleError, match=f"{name} is no text"):
+        Sample.load(tmp_path / "a.npz")
+
+
+def test_a_pipe_is_no_log_of_two_columns(tmp_path):
+    os.mkfifo(tmp_path / "a.log")
+    assert classify_file(tmp_path / "a.log", {}).status is Status.BAD_INPUT

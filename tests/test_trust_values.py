@@ -14,7 +14,7 @@ from inspector import read_log
 from inspector.analysis.level import Estimate, noise_level
 from inspector.errors import InspectorError, LogError
 from inspector.logs.options import ReadOptions
-from noisemodel import Robot, RobotError, Run, RunError, cache
+from noisemodel import MeshError, Robot, RobotError, Run, RunError, cache, meshfile
 from noisemodel.cache import cached
 
 TIME = np.arange(40) / 1000
@@ -229,3 +229,21 @@ def test_a_file_whose_name_is_not_utf_8_is_printed_escaped(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert rb"\udcff\udcfe.csv: 0.60 s" in done.stdout
+
+
+@pytest.mark.parametrize(("parent", "child"), [("l2", "l2"), ("l2", "l1")])
+def test_joints_that_go_round_in_a_circle_are_refused(tmp_path, parent, child):
+    joint = '<joint name="{}" type="fixed"><parent link="{}"/><child link="{}"/></joint>'
+    joints = joint.format("a", "l1", "l2") * (child == "l1") + joint.format("b", parent, child)
+    links = "".join(f'<link name="l{n}"/>' for n in range(3))
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{links}{joints}</robot>')
+    with pytest.raises(RobotError, match="the joints of link 'l[12]' go round in a circle"):
+        Robot.load(tmp_path / "r.urdf")
+
+
+@pytest.mark.parametrize("point", ["v", "v 1", "v 1 2"])
+def test_a_point_of_a_mesh_has_three_numbers(tmp_path, point):
+    path = tmp_path / "a.obj"
+    path.write_text(f"{point}\n" * 6 + "f 1 2 3\n")
+    with pytest.raises(MeshError, match="is no point"):
+        meshfile.read(path)

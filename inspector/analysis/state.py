@@ -11,10 +11,11 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from time import monotonic, sleep
 from typing import IO, Any
 
 from inspector.analysis.status import Status, Unknown
@@ -28,6 +29,9 @@ from noisemodel import OutputError
 
 KIND = "noise-classify-state/"
 FORMAT = f"{KIND}1"
+
+PATIENCE = 2.0
+"""How long a file that another process holds is waited for, in [s]."""
 
 MAX_BYTES = 256 * 2**20
 """Most bytes of a state file that is read: those of some hundred thousand runs."""
@@ -91,7 +95,7 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     with _closing(file):
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _lock(file)
         except OSError as error:
             raise InspectorError(
                 f"{path}: is being written by another process; wait for it, or name another file"
@@ -111,7 +115,7 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
                     content = from_json(row)
                     verdict = _verdict(content)
                     verdicts[verdict.path, content["sha256"]] = verdict
-                except (ValueError, KeyError, TypeError) as error:
+                except (ValueError, KeyError, TypeError, AttributeError) as error:
                     raise StateError(path, f"is damaged in line {number}") from error
         elif not json.dumps(header).encode().startswith(torn):
             raise StateError(path, "holds no state of classify")
@@ -119,6 +123,22 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
         if not end:
             _append(path, file, header)
         yield State(path, verdicts, file)
+
+
+def _lock(file: IO[bytes]) -> None:
+    """Lock a file, once the workers of a process that was killed have ended.
+
+    Raises:
+        OSError: If another process still holds it after ``PATIENCE``.
+    """
+    until = monotonic() + PATIENCE
+    while True:
+        try:
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            if monotonic() > until:
+                raise
+            sleep(0.02)
 
 
 def digest(path: Path) -> str:
@@ -219,6 +239,7 @@ def _verdict(content: Mapping[str, Any]) -> Verdict:
             )
     content = {"begin": 0.0, **content}  # which earlier versions have not written
     plain = {name: content[name] for name in PLAIN}
+    _check_types(content["run"], plain, (*events, *orders.values()), localisations.values())
     return Verdict(
         Path(content["run"]),
         Status(content["status"]),
@@ -229,3 +250,22 @@ def _verdict(content: Mapping[str, Any]) -> Verdict:
         picture=None if content["picture"] is None else Path(content["picture"]),
         **{**plain, "lost": tuple(plain["lost"])},
     )
+
+
+def _check_types(
+    run: str, plain: Mapping[str, Any], shown: Iterable[object], found: Iterable[Localisation]
+) -> None:
+    """Write a verdict as it will be printed, once.
+
+    Raises:
+        TypeError: If a text is no text.
+        ValueError: If a number is no number.
+    """
+    texts = [run, *(plain[name] for name in PLAIN[:5]), *plain["lost"], *map(str, shown)]
+    numbers = [plain["begin"], plain["duration"], plain["seconds"]]
+    for each in found:
+        texts += [each.stage, each.following, *(name for name, _ in each.joints)]
+        numbers += [each.lag, *(share for _, share in each.joints), *(each.band or ())]
+        numbers += [] if each.onset is None else [each.onset]
+    " ".join(texts)
+    " ".join(f"{number:.3f}" for number in numbers)

@@ -294,6 +294,8 @@ LONGEST_LINE = 2**16
 
 def _has_header(path: Path) -> bool:
     """Whether a text begins with a line of names: NoisyTest's logs have two numbers a line."""
+    if not path.is_file():  # a device or a pipe may have no end
+        return True
     with suppress(OSError), path.open(encoding="utf-8", errors="replace") as stream:
         while line := stream.readline(LONGEST_LINE):
             content = line.partition("#")[0].strip()

@@ -170,7 +170,8 @@ def _targets(
 def _digest_in(target: Path) -> object:
     """What a run file was made of; None of another file."""
     try:
-        meta = from_json(str(archive.read(target, ["meta"])["meta"]))
+        held = archive.read(target, ["meta"])["meta"]
+        meta = None if held.shape else from_json(str(held))
     except (OSError, ValueError, KeyError):
         return None
     return meta.get(DIGEST) if isinstance(meta, dict) else None

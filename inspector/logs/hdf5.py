@@ -14,7 +14,9 @@ from inspector.logs.arrays import (
     COPY,
     EPISODE_ENDS,
     JOINT_STATES,
+    RATES,
     STATES,
+    STEPS,
     Episode,
     episodes_of,
     log_of,
@@ -118,8 +120,9 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
 
 
 def _single(attributes: Any) -> dict[str, Any]:
-    """Attributes that are one number; others may be of any size, and are not read."""
-    about = {name: attributes.get_id(name) for name in attributes}
+    """Attributes that state a rate or a step; others may be of any size, and are not read."""
+    names = [name for name in attributes if name.lower() in (*RATES, *STEPS)]
+    about = {name: attributes.get_id(name) for name in names}
     return {
         name: attributes[name]
         for name, each in about.items()
@@ -187,16 +190,17 @@ def _positive(rate: float) -> float | None:
 
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:
-    with h5py.File(path) as file:
-        group = file[f"{home}/{episodes[0]}"] if home else file
-        rows = [f"{len(episodes)} episodes: {listed(episodes)}"] if episodes[0] else []
-        group.visititems(
-            lambda name, each: (
-                rows.append(f"{name}  {each.dtype} {each.shape}")
-                if isinstance(each, h5py.Dataset)
-                else None
-            )
-        )
+    rows = [f"{len(episodes)} episodes: {listed(episodes)}"] if episodes[0] else []
+
+    def add(name: str, each: Any) -> None:
+        if isinstance(each, h5py.Dataset):
+            rows.append(f"{name}  {each.dtype} {each.shape}")
+
+    try:
+        with h5py.File(path) as file:
+            (file[f"{home}/{episodes[0]}"] if home else file).visititems(add)
+    except DAMAGE as error:
+        raise LogError(path, f"{episodes[0] or 'it'} is damaged ({_one_line(error)})") from error
     return tuple(rows)
 
 

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from inspector.errors import LogError
 from inspector.logs.log import Field, Log, LogReader
 from inspector.logs.options import ReadOptions
+from inspector.logs.parquetpages import unpacked_size
 from inspector.logs.signals import array_signal, column_signal, listed
 from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
-from noisemodel.archive import ArchiveError, check_unpacked
+from noisemodel.archive import ArchiveError, check_regular, check_unpacked
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
 """Errors that pyarrow raises for damaged files."""
@@ -50,7 +51,10 @@ def schema_of(path: Path) -> Any:
         LogError: If the file is damaged; the schema is at its end.
     """
     try:
+        check_regular(path)
         return pyarrow.parquet.read_schema(path)
+    except ArchiveError as error:
+        raise LogError(path, str(error)) from error
     except DAMAGE as error:
         raise LogError(path, f"damaged or cut off ({_one_line(error)})") from error
 
@@ -78,14 +82,7 @@ def table_of(paths: Sequence[Path], columns: Sequence[str], episode: str) -> Any
 
 def _check_size(path: Path, columns: Collection[str]) -> None:
     """Refuse columns that unpack to more than is read: a run of one value takes a few bytes."""
-    about = pyarrow.parquet.read_metadata(path)
-    groups = (about.row_group(group) for group in range(about.num_row_groups))
-    unpacked = sum(
-        max(part.total_uncompressed_size, 8 * part.num_values)
-        for group in groups
-        for part in (group.column(place) for place in range(group.num_columns))
-        if any(f"{part.path_in_schema}.".startswith(f"{name}.") for name in columns)
-    )
+    unpacked = unpacked_size(path, columns)
     try:
         check_unpacked(unpacked, path.stat().st_size)
     except ArchiveError as error:

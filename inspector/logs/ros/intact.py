@@ -8,6 +8,9 @@ from inspector.logs.ros import chunks
 from inspector.logs.ros.bag import Bag, Message, Topic, storage_of
 from noisemodel.archive import ArchiveError
 
+METADATA = 4 * 2**20
+"""Most bytes of a metadata.yaml: it has some hundred for each topic."""
+
 
 class DamagedError(Exception):
     """A bag that rosbags cannot read; parts of it may be readable."""
@@ -28,6 +31,9 @@ def open_bag(path: Path) -> Bag:
 
     chunks.bound_rosbags()
     chunks.begin(path)
+    about = (path if path.is_dir() else path.parent) / "metadata.yaml"
+    if about.is_file() and about.stat().st_size > METADATA:
+        raise DamagedError(f"metadata.yaml has more than {METADATA} bytes")
     ros1 = path.is_file() and storage_of(path) == "ROS 1"
     try:
         reader: Any = (Reader1 if ros1 else Reader2)(path)

@@ -1,0 +1,137 @@
+"""Laws of every reader: any bytes give a result or one typed error of one line."""
+
+import re
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzz import malformed
+from fuzz.bombs import Bomb
+from fuzz.damage import damaged
+from fuzz.readers import EXPECTED, READERS
+
+ROOT = Path(__file__).parents[1]
+LAWFUL = settings(
+    derandomize=True,
+    deadline=None,
+    database=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
+)
+LATE = ("baseline", "model, small", "resume state", "tune state")
+"""Readers whose whole files take seconds to make."""
+
+
+def read(name, path, data):
+    """The law: a result, or one error of one line."""
+    path.write_bytes(data)
+    try:
+        READERS[name].read(path)
+    except EXPECTED as error:
+        assert "\n" not in str(error)  # noqa: PT017
+
+
+@pytest.fixture
+def whole(tmp_path_factory, request):
+    """A whole file of a reader."""
+    name = request.getfixturevalue("name")
+    return READERS[name].make(tmp_path_factory.mktemp("whole"))
+
+
+def laws(name, whole, examples):
+    data = whole.read_bytes()
+
+    @settings(LAWFUL, max_examples=examples)
+    @given(st.one_of(st.binary(max_size=200), st.randoms(use_true_random=False)))
+    def holds(given):
+        kind = READERS[name].kind
+        read(name, whole, damaged(data, kind, given) if isinstance(given, Random) else given)
+
+    holds()
+
+
+@pytest.mark.parametrize("name", [each for each in READERS if each not in LATE])
+def test_any_bytes_give_a_result_or_one_error(name, whole):
+    laws(name, whole, examples=4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", READERS)
+def test_many_bytes_give_a_result_or_one_error(name, whole):
+    laws(name, whole, examples=150)
+
+
+def test_damage_is_of_every_kind_and_reproducible():
+    data = b'{"time": 0.25, "velocity": [1.0, 2.0]}\n' * 20
+    made = [damaged(data, "text", Random(seed)) for seed in range(60)]
+    assert made == [damaged(data, "text", Random(seed)) for seed in range(60)]
+    assert len(set(made)) > 50
+    assert made.count(data) < 5
+    assert any(b"[[[[" in each for each in made)
+    assert any(len(each) < len(data) / 2 for each in made)
+
+
+@pytest.mark.parametrize(
+    ("outcome", "status", "out", "err", "more"),
+    [
+        ("handled", 0, "a: ok", "", {}),
+        ("handled", 3, "", "inspector: a: damaged", {}),
+        ("nonsense", 0, "a: ok", "", {"refuse": True}),
+        ("nonsense", 0, "rms inf √W, peak 3 √W", "", {}),
+        ("traceback", 3, "", "", {}),
+        ("traceback", 70, "", "Traceback", {}),
+        ("traceback", -11, "", "", {}),
+        ("hang", -9, "", "", {}),
+        ("hang", 0, "a: ok", "", {"seconds": 21.0}),
+        ("memory", -9, "", "", {"peak": 2.1e9}),
+        ("raw text", 0, "a\n::error::b", "", {}),
+        ("raw text", 3, "", "inspector: \x1b[31m: damaged", {}),
+    ],
+)
+def test_a_command_is_judged_by_status_words_time_and_memory(outcome, status, out, err, more):
+    case = Bomb("x", b"", refuse=more.get("refuse", False))
+    found = malformed.judged(
+        "run", case, status, more.get("seconds", 0.1), more.get("peak", 10**8), out, err
+    )
+    assert found.outcome == outcome
+    assert re.search(r"\| run \| 1 \|.*\n\| all \| 1 \|.* 1 \|", malformed.table([found]), re.S)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_commands_handle_malformed_files(tmp_path):
+    names = ("run, stored noise", "labels, NoisyTest", "CSV", "HDF5", "URDF", "live rows, JSON")
+    chosen = [each for name in names for each in ("--only", name)]
+    done = subprocess.run(
+        [sys.executable, "-m", "fuzz.malformed", "--count", "5", *chosen],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+GROUPS = ("labels", "settings", "rows", "tables", "arrays", "models", "bags", "robots")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("atheris") is None, reason="needs atheris (the extra `fuzz`)")
+@pytest.mark.parametrize("group", GROUPS)
+def test_fuzzing_finds_nothing(tmp_path, group):
+    done = subprocess.run(
+        [sys.executable, "-m", "fuzz.run", "--group", group, "--seconds", "15"],
+        cwd=ROOT,
+        capture_output=True,
+        check=False,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr[-2000:]
+    counts = re.findall(r"^(.+): (\d+) executions$", done.stdout, re.M)
+    assert counts
+    assert sum(int(count) for _, count in counts) > 100
