@@ -141,7 +141,8 @@ def results(
     ):
         folder = scratch / "case"
         shutil.copytree(whole, folder, symlinks=True)
-        path = case.put(folder / place)
+        _forked(lambda: (scratch / "path").write_bytes(os.fsencode(case.put(folder / place))))  # noqa: B023
+        path = Path(os.fsdecode((scratch / "path").read_bytes()))
         result = judged(name, case, *_run(reader, folder, path))
         if keep and result.outcome != "handled" and path.is_file() and path.stat().st_size < 10**8:
             keep.mkdir(parents=True, exist_ok=True)
@@ -250,7 +251,7 @@ def judged(
         outcome = "raw text"
     elif status in (0, 1, 4) and (case.refuse or NOT_FINITE.search(out)):
         outcome = "nonsense"
-    elif status not in (0, 1, 2, 3, 4) or (status == 3 and not lines):
+    elif status not in (0, 1, 2, 3, 4, 5) or (status in (3, 5) and not lines):
         outcome = "traceback"
     else:
         outcome = "handled"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.analysis.status import Status
+from inspector.analysis.status import EXIT, Status, worst
 from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def expect(
     `classify` applies the nearest expect.toml: beside a run, or in a folder above it. Edit it:
     allow, require, forbid, waive until a date, or set a budget (docs/expectations.md).
 
-    The exit status is 3 if a run cannot be read; the others are written.
+    The exit status is 3 if a run cannot be read, 70 at a bug; the others are written.
     """
     from inspector import assets
     from inspector.analysis.verdict import classify_files
@@ -67,4 +67,4 @@ def expect(
     typer.echo(f"{path}: {findings} of {of} {became}; edit it, then")
     typer.echo(f"  inspector classify {' '.join(map(str, runs))}")
     if bad:
-        raise typer.Exit(3)
+        raise typer.Exit(worst(EXIT[each.status] for each in bad))

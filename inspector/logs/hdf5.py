@@ -95,7 +95,7 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
             group = _own(path, file[f"{home}/{episode}"], file) if home else file
             datasets, left_out = _wanted(group, options)
             arrays = dict(_values(path, [(n, _own(path, each, file)) for n, each in datasets]))
-            about = file.get(EPISODES, file).attrs.get("env_args")
+            about = _arguments(file.get(EPISODES, file).attrs)
             attributes = {**_single(file.attrs), **_single(group.attrs)}
     except LogError:
         raise
@@ -121,13 +121,20 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
 
 def _single(attributes: Any) -> dict[str, Any]:
     """Attributes that state a rate or a step; others may be of any size, and are not read."""
-    names = [name for name in attributes if name.lower() in (*RATES, *STEPS)]
-    about = {name: attributes.get_id(name) for name in names}
+    known = [written for name in (*RATES, *STEPS) for written in (name, name.upper(), name.title())]
+    about = {name: attributes.get_id(name) for name in known if name in attributes}
     return {
         name: attributes[name]
         for name, each in about.items()
         if each.dtype.kind in "iuf" and each.shape is not None and prod(each.shape) == 1
     }
+
+
+def _arguments(attributes: Any) -> Any:
+    """The environment's arguments of robomimic and Isaac Lab, unless they are larger than any."""
+    name = "env_args"
+    small = name in attributes and attributes.get_id(name).get_storage_size() <= SMALL
+    return attributes[name] if small else None
 
 
 def _own(path: Path, each: Any, file: Any) -> Any:
