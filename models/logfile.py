@@ -89,22 +89,22 @@ def _read_by_arrow(path: str | Path) -> Array | None:
     import pyarrow
     from pyarrow import csv
 
-    raw, start = Path(path).read_bytes(), 0
-    while raw.startswith(b"#", start):
-        start = raw.find(b"\n", start) + 1
-        if not start:
+    start = 0
+    with Path(path).open("rb") as stream:
+        while stream.readline(LONGEST_LINE).startswith(b"#"):
+            start = stream.tell()
+        stream.seek(start)
+        try:
+            table = csv.read_csv(
+                stream,
+                read_options=csv.ReadOptions(use_threads=False, column_names=["time", "noise"]),
+                parse_options=csv.ParseOptions(delimiter=" ", quote_char=False),
+                convert_options=csv.ConvertOptions(
+                    column_types=dict.fromkeys(("time", "noise"), pyarrow.float64()), null_values=[]
+                ),
+            )
+        except pyarrow.ArrowInvalid:
             return None
-    try:
-        table = csv.read_csv(
-            pyarrow.py_buffer(memoryview(raw)[start:]),
-            read_options=csv.ReadOptions(use_threads=False, column_names=["time", "noise"]),
-            parse_options=csv.ParseOptions(delimiter=" ", quote_char=False),
-            convert_options=csv.ConvertOptions(
-                column_types=dict.fromkeys(("time", "noise"), pyarrow.float64()), null_values=[]
-            ),
-        )
-    except pyarrow.ArrowInvalid:
-        return None
     return np.stack([column.to_numpy() for column in table.columns], axis=1)
 
 

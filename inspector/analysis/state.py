@@ -10,7 +10,6 @@ import fcntl
 import hashlib
 import json
 import os
-import stat
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -89,6 +88,8 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
         InspectorError: If another process is writing it.
         OutputError: If it cannot be written.
     """
+    if path.exists() and not path.is_file():
+        raise StateError(path, "is no regular file")
     try:
         file = path.open("a+b")
     except OSError as error:
@@ -100,9 +101,8 @@ def opened(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
             raise InspectorError(
                 f"{path}: is being written by another process; wait for it, or name another file"
             ) from error
-        about = os.fstat(file.fileno())
-        if not stat.S_ISREG(about.st_mode) or about.st_size > MAX_BYTES:
-            raise StateError(path, f"is no regular file of {MAX_BYTES} bytes or less")
+        if os.fstat(file.fileno()).st_size > MAX_BYTES:
+            raise StateError(path, f"is larger than {MAX_BYTES} bytes")
         file.seek(0)
         whole, end, torn = file.read().rpartition(b"\n")
         header = {"format": FORMAT, **settings}
