@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: view test test-slow check models clean
+.PHONY: view test test-slow check docs bench models clean
 
 view: $(VENV)/.installed
 	$(BIN)/inspector view
@@ -18,6 +18,13 @@ check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+docs: $(VENV)/.installed-dev
+	$(BIN)/python -m sphinx -W --keep-going -q -E docs build/site
+	@echo "build/site/index.html"
+
+bench: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks $(BENCH)
 
 models: $(VENV)/.installed-dev
 	$(BIN)/python assets/build.py

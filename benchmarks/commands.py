@@ -1,135 +1,100 @@
-"""Time commands of two checkouts in turns, each as a process of its own.
+"""Commands, each as a process of its own, beside real time, or beside an older checkout.
 
-    python -m benchmarks.commands --before OLD_CHECKOUT [--after .] [--repeats 7]
-        [--only help classify …] [--python-before PYTHON] [--python-after PYTHON]
-
-Commands: `inspector --help`, `classify` and `report` of 10 s of a simulated Panda at 10 kHz, and
-`view --save` of the demo. After a warm-up, which compiles modules and fills caches, the checkouts
-take turns (before, after, before, after …), so that a machine that slows down slows both. Each
-process has one thread for BLAS. Given are medians of CPU and wall time, and their ratios, after by
-before: below 1, the checkout AFTER takes less.
+The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints without a robot; both
+float32, with positions, velocities measured and desired. The log: 10 s of a noise in NoisyTest's
+two columns. With an older checkout (`--before`), both have the same input, caches and bytecode of
+their own, and take turns after a warm-up.
 """
 
-import argparse
-import resource
-import subprocess
-import time
-from collections.abc import Iterable, Mapping
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from functools import partial
 from pathlib import Path
-from statistics import median
-from typing import TypeAlias
 
-from benchmarks.checkouts import DEMO, ROOT, Checkout, simulated
+import numpy as np
 
-CASE = {"panda-10s": ("panda", "early-height", 1, 10.0)}
-"""The run that is classified and reported."""
-COMMANDS = ("--help", "classify", "report", "view")
+from benchmarks.checkouts import Checkout
+from benchmarks.table import ROOT, Given, Row, in_turns, of_process
+from noisemodel import Robot, Run, simplified
 
-Times: TypeAlias = tuple[float, float]
-"""CPU and wall time, in [s]."""
+REPEATS = 3
+RECORDINGS = {"view of 10 s, 10 kHz, 32 joints": 20.0}
+"""Most that a recording may have, in [MB]."""
 
 
-def arguments_of(command: str, run: Path, output: Path) -> list[str]:
-    """Arguments of `inspector` for a command.
-
-    Args:
-        command: One of `COMMANDS`.
-        run: The run file.
-        output: Folder of what is written.
-    """
-    page, recording = str(output / "report.html"), str(output / "demo.rrd")
+def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:
+    """Arguments of each command, the motion that it takes and the most CPU time, in [s]."""
+    save = ["--overwrite", "--save", str(folder / "out.rrd")]
+    page = ["--overwrite", "--output", str(folder / "out.html")]
+    short, long = str(folder / "short.npz"), str(folder / "long.npz")
     return {
-        "--help": ["--help"],
-        "classify": ["classify", str(run)],
-        "report": ["report", str(run), "--output", page, "--overwrite"],
-        "view": ["view", str(DEMO), "--save", recording, "--overwrite"],
-    }[command]
+        "`inspector --help`": (["--help"], 0.0, 0.5),
+        "classify 10 s, 10 kHz, 32 joints": (["classify", short], 10.0, None),
+        "classify 150 s, 1 kHz, 60 joints": (["classify", long], 150.0, None),
+        "classify 10 s of noise, 10 kHz": (["classify", str(folder / "noise.log")], 10.0, 1.5),
+        "view of 10 s, 10 kHz, 32 joints": (["view", short, *save], 10.0, 3.0),
+        "view of 150 s, 1 kHz, 60 joints": (["view", long, *save], 150.0, 5.0),
+        "report of 10 s, 10 kHz, 32 joints": (["report", short, *page], 10.0, None),
+    }
 
 
-def measure(checkout: Checkout, arguments: list[str]) -> Times:
-    """CPU and wall time of one call of `inspector`, in [s].
+def rows(given: Given) -> Iterator[Row]:
+    """CPU time of each command, and the size of a recording."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        write(folder)
+        ours = Checkout.of(ROOT, Path(sys.executable), folder / "ours")
+        sides = {"ours": ours}
+        if given.before:
+            sides["before"] = Checkout.of(given.before, None, folder / "before")
+        for title, (arguments, seconds, most) in cases(folder).items():
+            work = {side: partial(measure, each, arguments) for side, each in sides.items()}
+            if title == "`inspector --help`" and not given.before:
+                work["empty Python"] = partial(of_process, [sys.executable, "-c", "pass"])
+            times = in_turns(work, REPEATS, warm=1)
+            against, other = "real time", seconds or None
+            if len(times) > 1:
+                against, other = list(times.items())[1]
+            yield Row(title, times["ours"], against, other, most=most)
+            if title in RECORDINGS:
+                size = (folder / "out.rrd").stat().st_size / 1e6
+                yield Row(f"{title}: recording", size, most=RECORDINGS[title], unit="MB")
+
+
+def measure(checkout: Checkout, arguments: Sequence[str]) -> float:
+    """CPU time of one call of `inspector`, in [s].
 
     Raises:
         SystemExit: If the command failed; findings are no failure.
     """
-    before, start = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    done = subprocess.run(
-        [checkout.python, "-m", "inspector", *arguments],
-        cwd=checkout.folder,
-        env=checkout.environment,
-        capture_output=True,
-        text=True,
-        check=False,
+    command = [checkout.python, "-m", "inspector", *arguments]
+    return of_process(command, folder=checkout.folder, environment=checkout.environment)
+
+
+def write(folder: Path) -> None:
+    """Write the runs and the log."""
+    run = moving(10_000, 10.0, Robot.load("talos").joint_names, "talos")
+    run.save(folder / "short.npz")
+    many = tuple(f"joint_{number}" for number in range(60))
+    moving(1000, 150.0, many, None).save(folder / "long.npz")
+    noise = simplified(run.motion, run.velocity_desired)
+    np.savetxt(folder / "noise.log", np.column_stack((run.time, noise)), fmt="%.12f %.15e")
+
+
+def moving(rate: float, seconds: float, names: tuple[str, ...], robot: str | None) -> Run:
+    """Run with a smooth motion of every joint, and a vibration in the middle."""
+    generator = np.random.default_rng(0)
+    instants = np.arange(round(rate * seconds)) / rate
+    phase = 2 * np.pi * generator.uniform(0.1, 0.6, len(names)) * instants[:, None]
+    desired = 0.5 * np.cos(phase)
+    rattle = np.sin(2 * np.pi * 140 * instants) * np.exp(-((instants - seconds / 2) ** 2) / 0.1)
+    measured = desired + 0.01 * generator.normal(size=desired.shape) + 0.1 * rattle[:, None]
+    return Run(
+        time=instants,
+        velocity=measured.astype(np.float32),
+        velocity_desired=desired.astype(np.float32),
+        position=(0.3 * np.sin(phase)).astype(np.float32),
+        joint_names=names,
+        robot=robot,
     )
-    wall = time.perf_counter() - start
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    findings = done.returncode == 1 and done.stdout  # a module that is not there exits by 1, too
-    if done.returncode and not findings:
-        called = " ".join(arguments)
-        raise SystemExit(
-            f"inspector {called} failed in {checkout.folder} (exit {done.returncode}):\n"
-            f"{done.stderr[-2000:]}"
-        )
-    cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return cpu, wall
-
-
-def in_turns(
-    checkouts: Mapping[str, Checkout], arguments: Mapping[str, list[str]], repeats: int
-) -> dict[str, list[Times]]:
-    """Times of one command by checkout, measured in turns after a warm-up.
-
-    Args:
-        checkouts: The checkouts, by name.
-        arguments: Arguments of `inspector` in each.
-        repeats: How often each is measured.
-    """
-    found: dict[str, list[Times]] = {side: [] for side in checkouts}
-    for repeat in range(repeats + 1):
-        for side, checkout in checkouts.items():
-            times = measure(checkout, arguments[side])
-            if repeat:
-                found[side].append(times)
-    return found
-
-
-def row(command: str, before: Iterable[Times], after: Iterable[Times]) -> str:
-    """One line of the table: medians in [s], and their ratios."""
-    old, new = ([median(each) for each in zip(*times, strict=True)] for times in (before, after))
-    cells = [f"{each:.2f}" for each in (*old, *new)]
-    cells += [f"{mine / theirs:.2f}" for theirs, mine in zip(old, new, strict=True)]
-    return f"| {command} | {' | '.join(cells)} |"
-
-
-def main() -> None:
-    """Measure and print."""
-    arguments = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    arguments.add_argument("--before", type=Path, required=True, metavar="FOLDER")
-    arguments.add_argument("--after", type=Path, default=ROOT, metavar="FOLDER")
-    arguments.add_argument("--python-before", type=Path, metavar="PYTHON")
-    arguments.add_argument("--python-after", type=Path, metavar="PYTHON")
-    arguments.add_argument("--repeats", type=int, default=7)
-    arguments.add_argument("--only", nargs="+", choices=["help", *COMMANDS[1:]], metavar="COMMAND")
-    arguments.add_argument("--output", type=Path, default=ROOT / "build" / "checkouts")
-    given = arguments.parse_args()
-    folder = given.output.resolve()
-    sides = {
-        "before": Checkout.of(given.before, given.python_before, folder / "scratch" / "before"),
-        "after": Checkout.of(given.after, given.python_after, folder / "scratch" / "after"),
-    }
-    wanted = [name for name in COMMANDS if not given.only or name.strip("-") in given.only]
-    run = Path()
-    if {"classify", "report"} & set(wanted):
-        (run,) = simulated(sides["after"], folder / "runs", CASE).values()
-    print("| inspector … | before: CPU [s] | wall | after: CPU [s] | wall | CPU ratio | wall |")
-    print("|---" * 7 + "|", flush=True)
-    for command in wanted:
-        calls = {side: arguments_of(command, run, each.scratch) for side, each in sides.items()}
-        found = in_turns(sides, calls, given.repeats)
-        print(row(command, found["before"], found["after"]), flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,81 +1,53 @@
-"""Time the extended noise against a loop over Pinocchio, on TALOS with a floating base.
+"""The extended noise beside a loop over Pinocchio, on TALOS with a floating base."""
 
-Run from the checkout: ``python -m benchmarks.extended [samples]``. One process on one core; the
-variants take turns, so that a slower machine affects all of them; CPU time. The chunked
-variants follow with ten times the samples, which shows whether time is linear in their number.
-"""
-
-import argparse
-import os
-import time
 import tracemalloc
-from collections.abc import Callable
-from statistics import median
-from typing import TypeAlias
-
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy is there
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
-from benchmarks.twists import states
+from benchmarks.table import Given, Row, in_turns, used
+from benchmarks.twists import LOOP, states
 from noisemodel import Robot, Surface, extended
 from noisemodel.types import Array
 
+SAMPLES = 20_000
 REPEATS = 3
-KINDS = ("normal", "rms", "paper", "mean")
-LONG = ("normal", "paper")
-"""The kinds that are also timed with ten times the samples."""
-
-LOOP = "loop, normal"
+MOST = {"normal": 0.35, "paper": 1.5}
+"""Most CPU time of 100,000 states, in [s]."""
+MEMORY = 300.0
+"""Most memory above the inputs of 100,000 states, in [MB]."""
 IMPEDANCE = 1.204 * 343.2
 
-Variant: TypeAlias = Callable[[Array, Array], object]
 
-
-def main() -> None:
-    """Print medians, ratios and memory."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("samples", nargs="?", type=int, default=100_000, help="states of TALOS")
-    samples = parser.parse_args().samples
+def rows(_: Given) -> Iterator[Row]:
+    """Each kind of noise; ten times the samples, which shows whether time is linear; memory."""
     robot = Robot.load("talos")
-    for when in ("first", "again"):
-        start = time.process_time()
-        surface = Surface.of(robot)
-        print(f"surface of {robot.name}, {when}: {time.process_time() - start:.2f} s CPU")
-    q, v = states(robot, 10 * samples)
-    few = (q[:samples], v[:samples])
-    variants = {kind: variant_of(robot, surface, kind) for kind in KINDS}
-    times = race(variants | {LOOP: lambda q, v: loop(robot, surface, q, v)}, *few)
-    print(f"{samples} states, {len(surface.links)} links, median of {REPEATS}")
-    for name, seconds in times.items():
-        print(f"{name:24} {seconds:8.3f} s CPU {times[LOOP] / seconds:8.1f} x")
-    for kind, seconds in race({kind: variants[kind] for kind in LONG}, q, v).items():
-        print(
-            f"{kind + ', 10 times as many':24} {seconds:8.3f} s CPU: {seconds / times[kind]:.1f} x"
+    surface = Surface.of(robot)
+    q, v = states(robot, 10 * SAMPLES)
+    few = q[:SAMPLES], v[:SAMPLES]
+
+    def of(kind: str, q: Array, v: Array) -> object:
+        return extended(robot, surface, q, v, kind)
+
+    sides = {kind: partial(of, kind, *few) for kind in ("normal", "rms", "paper", "mean")}
+    sides[LOOP] = partial(loop, robot, surface, *few)
+    times = in_turns({name: partial(used, work) for name, work in sides.items()}, REPEATS)
+    for kind in ("normal", "rms", "paper", "mean"):
+        name = f"noise of TALOS, `{kind}`, {SAMPLES:,} states"
+        most = MOST[kind] * SAMPLES / 1e5 if kind in MOST else None
+        yield Row(name, times[kind], f"{LOOP}, `normal`", times[LOOP], most=most)
+    for kind in MOST:
+        long = in_turns({kind: partial(used, partial(of, kind, q, v))}, REPEATS)[kind]
+        yield Row(
+            f"`{kind}`, {10 * SAMPLES:,} states", long, "ten times the above", 10 * times[kind]
         )
-    for kind in LONG:
         tracemalloc.start()
-        variants[kind](*few)
+        of(kind, q[: 5 * SAMPLES], v[: 5 * SAMPLES])
         peak = tracemalloc.get_traced_memory()[1] / 1e6
         tracemalloc.stop()
-        print(f"{kind:24} {peak:8.1f} MB above the inputs at most")
-
-
-def variant_of(robot: Robot, surface: Surface, kind: str) -> Variant:
-    """`extended` with one kind."""
-    return lambda q, v: extended(robot, surface, q, v, kind)
-
-
-def race(variants: dict[str, Variant], q: Array, v: Array) -> dict[str, float]:
-    """Median CPU time of each variant, in [s]; they take turns."""
-    times: dict[str, list[float]] = {name: [] for name in variants}
-    for _ in range(REPEATS):
-        for name, variant in variants.items():
-            start = time.process_time()
-            variant(q, v)
-            times[name].append(time.process_time() - start)
-    return {name: median(seconds) for name, seconds in times.items()}
+        yield Row(f"`{kind}`, 100,000 states: memory", peak, most=MEMORY, unit="MB")
 
 
 def loop(robot: Robot, surface: Surface, q: Array, v: Array) -> Array:
@@ -87,7 +59,3 @@ def loop(robot: Robot, surface: Surface, q: Array, v: Array) -> Array:
         twists = np.array([motion.vector for motion in data.v])[surface.joint]
         power[sample] = np.einsum("li,lij,lj->l", twists, forms, twists)
     return IMPEDANCE * surface.area * power
-
-
-if __name__ == "__main__":
-    main()

@@ -1,17 +1,13 @@
-"""Time a live session: CPU per second of motion, of one core.
+"""A live session beside real time: CPU time per second of motion, without its start.
 
-    python benchmarks/live.py [--seconds 20] [--joints 32] [--rate 10000]
-
-Velocities, desired velocities and positions of TALOS's joints go through `LiveSession`, in chunks
-of 20 ms and one by one, and as CSV through `inspector live`, from a file and from a pipe into which
-20 ms are written at a time, in real time; into a file, and to a server that receives as a
-viewer does. The start-up time is left out: of a pipe by waiting, of a file by the difference to
-twice the motion, which has an error of a few percent on a busy machine.
+Velocities, desired velocities and positions of TALOS's 32 joints at 10 kHz go through `LiveSession`
+in chunks of 20 ms and one by one, and as CSV through `inspector live`: from a file, and from a pipe
+into which 20 ms are written at a time, in real time; into a recording, and to a server that
+receives as a viewer does. Of a file, the start is left out by the difference to half of the motion,
+which has an error of a few percent on a busy machine; of a pipe, by waiting.
 """
 
-import argparse
 import os
-import resource
 import signal
 import socket
 import subprocess
@@ -24,14 +20,37 @@ from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
-
 import numpy as np
 
 import noisemodel as nm
+from benchmarks.table import Given, Row, of_process, used
 from inspector import LiveSession
 
-ROBOT = "talos"
+ROBOT, RATE, SECONDS = "talos", 10_000.0, 6.0
+CHUNK = round(0.02 * RATE)
+WANTED = {"LiveSession": 4.0, "CSV": 2.5}
+"""Times real time: 25 % of a core, and 40 %."""
+
+
+def rows(_: Given) -> Iterator[Row]:
+    """Each way in, into a recording and to a server."""
+    names = nm.Robot.load(ROBOT).joint_names
+    signals = motion(SECONDS, RATE, len(names))
+    with tempfile.TemporaryDirectory() as name, receiver() as port:
+        folder = Path(name)
+        file = str(folder / "live.rrd")
+        for where, sink in (("a file", {"save": file}), ("a viewer", {"connect": port})):
+            for chunk in (CHUNK, 1):
+                more = {"overwrite": True} if where == "a file" else {}
+                spent = through_session(signals, names, chunk, **sink, **more)
+                how = "chunks of 20 ms" if chunk > 1 else "sample by sample"
+                wanted = WANTED["LiveSession"] if chunk > 1 else None
+                yield Row(f"`LiveSession`, {how}, to {where}", spent, "real time", 1.0, wanted)
+            flags = [item for key, value in sink.items() for item in (f"--{key}", value)]
+            flags += ["--overwrite"] if where == "a file" else []
+            for source, spent in through_csv(signals, names, folder, *flags):
+                title = f"`inspector live`, CSV from a {source}, to {where}"
+                yield Row(title, spent, "real time", 1.0, WANTED["CSV"])
 
 
 def motion(seconds: float, rate: float, joints: int) -> dict[str, np.ndarray]:
@@ -49,39 +68,37 @@ def motion(seconds: float, rate: float, joints: int) -> dict[str, np.ndarray]:
 
 
 def through_session(
-    signals: dict[str, np.ndarray], rate: float, names: tuple[str, ...], chunk: int, **sink: str
-) -> tuple[float, str]:
-    """CPU of one core per second of motion, and the summary of the session."""
-    with LiveSession(rate, robot=ROBOT, joint_names=names, **sink) as session:
-        first = {name: values[:chunk] for name, values in signals.items()}
-        session.push(**first)
-        start_time, samples = time.process_time(), len(signals["time"])
-        for start in range(chunk, samples, chunk):
-            piece = start if chunk == 1 else slice(start, start + chunk)
-            session.push(**{name: values[piece] for name, values in signals.items()})
-    return (time.process_time() - start_time) / (samples / rate), str(session.summary)
+    signals: dict[str, np.ndarray], names: tuple[str, ...], chunk: int, **sink: str | bool
+) -> float:
+    """CPU time per second of motion, in [s]."""
+    samples = len(signals["time"])
+    with LiveSession(RATE, robot=ROBOT, joint_names=names, **sink) as session:
+        session.push(**{name: values[:chunk] for name, values in signals.items()})
+
+        def rest() -> None:
+            for start in range(chunk, samples, chunk):
+                piece = start if chunk == 1 else slice(start, start + chunk)
+                session.push(**{name: values[piece] for name, values in signals.items()})
+
+        return used(rest) / (samples / RATE)
 
 
 def through_csv(
-    signals: dict[str, np.ndarray], rate: float, names: tuple[str, ...], folder: Path, *sink: str
+    signals: dict[str, np.ndarray], names: tuple[str, ...], folder: Path, *sink: str
 ) -> Iterator[tuple[str, float]]:
-    """CPU of one core per second of motion, from a file and from a pipe."""
+    """CPU time per second of motion from a file and from a pipe, in [s]."""
     kinds = [kind for kind in signals if kind != "time"]
     head = ",".join(["time", *(f"{name}.{kind}" for kind in kinds for name in names)])
-    command = [sys.executable, "-m", "inspector", "live", "--rate", str(rate)]
+    command = [sys.executable, "-m", "inspector", "live", "--rate", str(RATE)]
     command += ["--robot", ROBOT, *sink]
-    path, samples, used = folder / "motion.csv", len(signals["time"]), []
+    path, samples, spent = folder / "motion.csv", len(signals["time"]), []
     for rows in (samples // 2, samples):
         table = np.hstack([signals["time"][:rows, None], *(signals[kind][:rows] for kind in kinds)])
         np.savetxt(path, table, fmt="%.7g", delimiter=",", header=head, comments="")
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        with path.open("rb") as stream:
-            subprocess.run(command, stdin=stream, check=True, capture_output=True)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        used.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    yield "file", (used[1] - used[0]) / (samples / rate / 2)
+        spent.append(of_process(command, stdin=path))
+    yield "file", (spent[1] - spent[0]) / (samples / RATE / 2)
     with path.open("rb") as stream:
-        yield "pipe", feed(command, stream, round(0.02 * rate)) / (samples / rate)
+        yield "pipe", feed(command, stream, CHUNK) / (samples / RATE)
 
 
 def feed(command: list[str], stream: BinaryIO, rows: int) -> float:
@@ -102,20 +119,20 @@ def feed(command: list[str], stream: BinaryIO, rows: int) -> float:
         process.stdin.flush()
         due += 0.02
         time.sleep(max(0.0, due - time.monotonic()))
-    used = when_idle(process.pid) - start
+    spent = when_idle(process.pid) - start
     process.stdin.close()
     assert process.wait() == 0
-    return used
+    return spent
 
 
 def when_idle(process: int) -> float:
     """CPU time of a process once it is idle, in [s]."""
-    used = [-1, 0]
-    while used[-1] != used[-2] or used[-1] == 0:
+    spent = [-1, 0]
+    while spent[-1] != spent[-2] or spent[-1] == 0:
         time.sleep(1.0)
         fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-        used.append(int(fields[11]) + int(fields[12]))
-    return used[-1] / os.sysconf("SC_CLK_TCK")
+        spent.append(int(fields[11]) + int(fields[12]))
+    return spent[-1] / os.sysconf("SC_CLK_TCK")
 
 
 @contextmanager
@@ -134,31 +151,3 @@ def receiver() -> Iterator[str]:
     finally:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-
-
-def main() -> None:
-    """Measure and print."""
-    arguments = argparse.ArgumentParser(description=__doc__)
-    arguments.add_argument("--seconds", type=float, default=20.0)
-    arguments.add_argument("--joints", type=int, default=32)
-    arguments.add_argument("--rate", type=float, default=10_000.0)
-    options = arguments.parse_args()
-    rate, names = options.rate, nm.Robot.load(ROBOT).joint_names[: options.joints]
-    signals = motion(options.seconds, rate, len(names))
-    print(f"{len(names)} joints at {rate:g} Hz, {options.seconds:g} s: CPU of one core")
-    with tempfile.TemporaryDirectory() as name, receiver() as port:
-        file = str(Path(name) / "live.rrd")
-        for where, sink in (("file", {"save": file}), ("server", {"connect": port})):
-            for chunk in (round(0.02 * rate), 1):
-                more = {"overwrite": True} if where == "file" else {}
-                share, summary = through_session(signals, rate, names, chunk, **sink, **more)
-                print(f"LiveSession, {chunk:4} samples at a time, to a {where:7} {share:6.1%}")
-            print(summary)
-            flags = ["--overwrite"] if where == "file" else []
-            option = [item for key, value in sink.items() for item in (f"--{key}", value)]
-            for source, share in through_csv(signals, rate, names, Path(name), *option, *flags):
-                print(f"CSV from a {source} through `inspector live`, to a {where:7} {share:6.1%}")
-
-
-if __name__ == "__main__":
-    main()

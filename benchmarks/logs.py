@@ -1,63 +1,70 @@
-"""Time the import of a ROS 2 bag, and measure its memory: 60 joints at 1 kHz with jitter.
+"""The import of a ROS 2 bag beside rosbags alone: 60 joints at 1 kHz with jitter.
 
-Run from the checkout: ``python -m benchmarks.logs [megabytes]``. rosbags writes the bag
-first; a process of its own then reads it on one core; CPU time, and peak memory of the process.
+rosbags writes the bag. A process of its own then imports it, or lets rosbags deserialise each
+message: CPU time, and peak memory of the import.
 """
 
-import argparse
-import os
 import resource
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
-os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"  # before NumPy is there
-
 import numpy as np
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+
+from benchmarks.table import ROOT, Given, Row, in_turns
 
 JOINTS = tuple(f"left_joint_number_{number}" for number in range(60))
-STORAGES = {"mcap": StoragePlugin.MCAP, "sqlite3": StoragePlugin.SQLITE3}
-MESSAGE = 3100
-"""Approximate size of a message in a bag, in [bytes]."""
+STORAGES = ("MCAP", "SQLITE3")
+SIZE, MESSAGE = 60, 3100
+"""Size of a bag, in [MB], and approximately of a message in it, in [bytes]."""
+SPEED, MEMORY = 20.0, 1000.0
+"""Least speed, in [MB/s], and most memory, in [MB]."""
+REPEATS = 3
 
 
-def main() -> None:
-    """Print for each storage size, rate and memory of reading, and of the whole command."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("megabytes", nargs="?", type=int, default=150, help="size of the bag")
-    parser.add_argument("--read", type=Path, help="read this bag, and print CPU time and memory")
-    parser.add_argument("--save", action="store_true", help="also write a run file")
-    arguments = parser.parse_args()
-    if arguments.read:
-        read(arguments.read, save=arguments.save)
-        return
-    for storage, plugin in STORAGES.items():
+def rows(_: Given) -> Iterator[Row]:
+    """Time and memory by storage."""
+    for storage in STORAGES:
         with tempfile.TemporaryDirectory() as folder:
-            bag = Path(folder) / "bag"
-            write(bag, plugin, arguments.megabytes * 1_000_000 // MESSAGE)
+            bag, peaks = Path(folder) / "bag", []
+            write(bag, storage, SIZE * 1_000_000 // MESSAGE)
             size = sum(file.stat().st_size for file in bag.iterdir()) / 1e6
-            for save in ([], ["--save"]):
-                command = [sys.executable, "-m", "benchmarks.logs", "--read", str(bag), *save]
-                printed = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-                seconds, memory = map(float, printed.split())
-                what = "read and saved" if save else "read"
-                print(
-                    f"{storage:8} {size:6.0f} MB {what:15} {seconds:6.2f} s CPU"
-                    f" {size / seconds:6.1f} MB/s, peak {memory:5.0f} MB"
+
+            def spent(what: str, bag: Path = bag, peaks: list[float] = peaks) -> float:
+                code = f"from benchmarks import logs; logs.{what}({str(bag)!r})"
+                done = subprocess.run(
+                    [sys.executable, "-c", code],
+                    cwd=ROOT,
+                    check=True,
+                    capture_output=True,
+                    text=True,
                 )
+                seconds, memory = map(float, done.stdout.split())
+                peaks.append(memory if what == "imported" else 0.0)
+                return seconds
+
+            sides = {what: partial(spent, what) for what in ("imported", "deserialised")}
+            times = in_turns(sides, REPEATS)
+            name = f"import of a ROS 2 bag, {storage.lower()}, {size:.0f} MB"
+            ours, other = times["imported"], times["deserialised"]
+            yield Row(name, ours, "rosbags alone", other, most=size / SPEED)
+            yield Row(f"{name}: memory", max(peaks), most=MEMORY, unit="MB")
 
 
-def write(bag: Path, storage: StoragePlugin, samples: int) -> None:
+def write(bag: Path, storage: str, samples: int) -> None:
     """Write a bag of joint states, with a jitter of up to a tenth of a step."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
     store = get_typestore(Stores.ROS2_HUMBLE)
     header, stamp = store.types["std_msgs/msg/Header"], store.types["builtin_interfaces/msg/Time"]
     state = store.types["sensor_msgs/msg/JointState"]
     random = np.random.default_rng(0)
-    with Writer(bag, version=9, storage_plugin=storage) as writer:
+    with Writer(bag, version=9, storage_plugin=StoragePlugin[storage]) as writer:
         topic = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
         for sample in range(samples):
             at = 1_700_000_000 * 10**9 + sample * 10**6 + int(random.integers(-(10**5), 10**5))
@@ -72,16 +79,27 @@ def write(bag: Path, storage: StoragePlugin, samples: int) -> None:
             writer.write(topic, at + 50_000, store.serialize_cdr(message, state.__msgtype__))
 
 
-def read(bag: Path, *, save: bool) -> None:
+def imported(bag: str) -> None:
     """Import a bag; print the CPU time in [s] and the process's peak memory in [MB]."""
     from inspector import read_log
 
     start = time.process_time()
-    run = read_log(bag).run
-    if save:
-        run.save(bag.parent / "run.npz", overwrite=True)
+    read_log(bag)
+    report(start)
+
+
+def deserialised(bag: str) -> None:
+    """Let rosbags deserialise each message; print the same."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    start = time.process_time()
+    with AnyReader([Path(bag)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        for connection, _stamp, data in reader.messages():
+            reader.deserialize(data, connection.msgtype)
+    report(start)
+
+
+def report(start: float) -> None:
+    """Print what was used since."""
     print(time.process_time() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e3)
-
-
-if __name__ == "__main__":
-    main()

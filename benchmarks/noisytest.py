@@ -1,8 +1,9 @@
 """Time training, a file, a hop and a point of the grid beside NoisyTest 0.0.1, on the same files.
 
-    python benchmarks/noisytest.py FOLDER [--original PYTHON] [--repeats 5] [--json FILE]
+    python -m benchmarks noisytest --noisytest FOLDER [--original PYTHON]
 
-FOLDER holds NoisyTest's `training`, `validation` and `noisytest-config.json`. PYTHON is the
+FOLDER holds NoisyTest's `training`, `validation` and `noisytest-config.json`; unless given it is
+a stand-in for its data set, where `../shared/tools/standin_lola.py` is at hand. PYTHON is the
 interpreter of an environment with the original; without one, only our side is timed. The original
 requires a package that Python 3.7 and later cannot install, so that it is installed without its
 dependencies:
@@ -12,24 +13,28 @@ dependencies:
     original/bin/pip install tensorflow scikit-learn toml
 
 Each side is a process of its own, started anew for each repeat, and the two take turns at each
-task, so that a slower machine affects both. Printed are medians of CPU time, of all threads
-(TensorFlow chooses their number, BLAS has one), and of wall time; imports are separate. Both sides
-take their settings from the configuration, and their results are compared.
+task, so that a slower machine affects both. CPU time is that of all threads (TensorFlow chooses
+their number, BLAS has one); imports are separate. Both sides take their settings from the
+configuration, and their results are compared.
 """
 
-import argparse
 import json
 import os
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from statistics import median
 from typing import Any, TypeAlias
 
+from benchmarks.checkouts import standin
+from benchmarks.table import Given, LeftOutError, Row
+
 Found: TypeAlias = dict[str, dict[str, list[dict[str, Any]]]]
 """Results of each repeat, by side and task: ``cpu`` and ``wall``, in [s], and ``answer``."""
 
+REPEATS = 3
 SIDE = Path(__file__).resolve().parent / "noisytestside.py"
 TASKS = {
     "train": "train: read, learn, measure",
@@ -116,21 +121,21 @@ def race(pythons: dict[str, str], folder: Path, repeats: int) -> Found:
     return found
 
 
-def table(found: Found) -> str:
-    """Medians and their ratios, as a table in Markdown."""
-    lines = [
-        "| | NoisyTest 0.0.1: CPU | wall | ours: CPU | wall | ratio of CPU | of wall |",
-        "|---|---|---|---|---|---|---|",
-    ]
+def rows(given: Given) -> Iterator[Row]:
+    """CPU time of each task, beside that of NoisyTest where there is one."""
+    pythons = {"original": given.original} if given.original else {}
+    with tempfile.TemporaryDirectory() as name:
+        folder = given.noisytest or standin(Path(name) / "lola")
+        if folder is None:
+            raise LeftOutError("needs a data set in NoisyTest's form: --noisytest FOLDER")
+        found = race({**pythons, "ours": sys.executable}, folder, REPEATS)
+    there = found.get("original", {})
     for task, title in {"import": "import", **TASKS}.items():
-        mine = _medians(found["ours"][task])
-        cells = ["-", "-", *map(_time, mine), "-", "-"]
-        if there := found.get("original", {}).get(INSTEAD.get(task, task)):
-            theirs = _medians(there)
-            ratios = [f"{old / new:.3g}" for old, new in zip(theirs, mine, strict=True)]
-            cells = [*map(_time, theirs), *map(_time, mine), *ratios]
-        lines.append(f"| {title} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        theirs = there.get(INSTEAD.get(task, task))
+        name, other = f"NoisyTest's: {title}", theirs and _median(theirs)
+        yield Row(name, _median(found["ours"][task]), "NoisyTest 0.0.1", other or None)
+    if there:
+        print(agreement(found), file=sys.stderr)
 
 
 def agreement(found: Found) -> str:
@@ -145,34 +150,5 @@ def agreement(found: Found) -> str:
     )
 
 
-def _medians(repeats: list[dict[str, Any]]) -> list[float]:
-    return [median(each[what] for each in repeats) for what in ("cpu", "wall")]
-
-
-def _time(seconds: float) -> str:
-    return f"{seconds:.3g} s" if seconds >= 1.0 else f"{1e3 * seconds:.3g} ms"
-
-
-def main() -> None:
-    """Measure and print."""
-    arguments = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    arguments.add_argument("folder", type=Path)
-    arguments.add_argument("--original", help="Python of an environment with NoisyTest")
-    arguments.add_argument("--repeats", type=int, default=5)
-    arguments.add_argument("--json", type=Path, help="file for the results of each repeat")
-    given = arguments.parse_args()
-    pythons = {"original": given.original} if given.original else {}
-    found = race({**pythons, "ours": sys.executable}, given.folder, given.repeats)
-    if given.json:
-        given.json.write_text(json.dumps(found))
-    print(f"medians of {given.repeats}\n\n{table(found)}\n")
-    if given.original:
-        print(agreement(found))
-    else:
-        print("NoisyTest was not timed: --original takes a Python that has it, see --help")
-
-
-if __name__ == "__main__":
-    main()
+def _median(repeats: list[dict[str, Any]]) -> float:
+    return median(each["cpu"] for each in repeats)

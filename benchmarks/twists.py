@@ -1,45 +1,31 @@
-"""Time link_twists against the loop over Pinocchio that it replaces, on TALOS.
+"""Link twists beside the loop over Pinocchio that they replace, on TALOS."""
 
-Run from the checkout: ``python -m benchmarks.twists [samples]``. One process; the variants take
-turns, so that a slower machine affects all of them; CPU time.
-"""
-
-import argparse
-import time
-from collections.abc import Callable
-from statistics import median
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.table import Given, Row, in_turns, used
 from noisemodel import Robot, link_twists
 from noisemodel.types import Array
 
+SAMPLES = 20_000
 REPEATS = 5
+LOOP = "loop over Pinocchio"
 
 
-def main() -> None:
-    """Print medians and ratios."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("samples", nargs="?", type=int, default=100_000, help="states of TALOS")
-    samples = parser.parse_args().samples
+def rows(_: Given) -> Iterator[Row]:
+    """Twists of all links, beside a loop that reads them one by one, or sample by sample."""
     robot = Robot.load("talos")
-    q, v = states(robot, samples)
-    variants: dict[str, Callable[[Robot, Array, Array], Array]] = {
-        "link_twists": link_twists,
-        "loop, twist by twist": loop_by_twist,
-        "loop, sample by sample": loop_by_sample,
-    }
-    times: dict[str, list[float]] = {name: [] for name in variants}
-    for _ in range(REPEATS):
-        for name, variant in variants.items():
-            start = time.process_time()
-            variant(robot, q, v)
-            times[name].append(time.process_time() - start)
-    ours = median(times["link_twists"])
-    print(f"{samples} states of {robot.name}, nq {robot.nq}, nv {robot.nv}, median of {REPEATS}")
-    for name, seconds in times.items():
-        print(f"{name:24} {median(seconds):8.3f} s CPU {median(seconds) / ours:8.1f} x")
+    motion = states(robot, SAMPLES)
+    loops = {"twist by twist": loop_by_twist, "sample by sample": loop_by_sample}
+    sides = {name: partial(each, robot, *motion) for name, each in loops.items()}
+    sides["ours"] = partial(link_twists, robot, *motion)
+    times = in_turns({name: partial(used, work) for name, work in sides.items()}, REPEATS)
+    for name in loops:
+        what = f"twists of TALOS, {SAMPLES:,} states"
+        yield Row(what, times["ours"], f"{LOOP}, {name}", times[name], wanted=30.0)
 
 
 def states(robot: Robot, samples: int) -> tuple[Array, Array]:
@@ -69,7 +55,3 @@ def loop_by_sample(robot: Robot, q: Array, v: Array) -> Array:
         pin.forwardKinematics(model, data, q[sample], v[sample])
         twists[sample] = [motion.vector for motion in data.v]
     return twists
-
-
-if __name__ == "__main__":
-    main()

@@ -1,8 +1,9 @@
 """The tables of the benchmarks."""
 
-import json
+import importlib
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -135,21 +136,84 @@ def test_a_model_of_other_runs_is_refused(paper, data, tmp_path):
 
 
 @pytest.mark.slow
-def test_our_side_is_timed_without_the_original(lola, tmp_path):
-    report = tmp_path / "times.json"
-    command = [sys.executable, ROOT / "benchmarks" / "noisytest.py", lola, "--repeats", "1"]
-    done = subprocess.run([*command, "--json", report], capture_output=True, text=True, check=True)
-    assert "NoisyTest was not timed: --original takes a Python that has it" in done.stdout
-    found = json.loads(report.read_text())["ours"]
+def test_our_side_is_timed_without_the_original(lola, bench):
+    found = bench("noisytest").race({"ours": sys.executable}, lola, 1)["ours"]
     assert found["train"][0]["answer"] == pytest.approx(0.8743, abs=1e-4)  # the original's, golden
     assert all(each["cpu"] > 0.0 for task in found.values() for each in task)
 
 
 def test_a_python_without_the_original_is_refused(lola):
-    command = [sys.executable, ROOT / "benchmarks" / "noisytest.py", lola]
+    command = [sys.executable, "-m", "benchmarks", "noisytest", "--noisytest", lola]
     done = subprocess.run(
-        [*command, "--original", sys.executable], capture_output=True, text=True, check=False
+        [*command, "--original", sys.executable], cwd=ROOT, capture_output=True, text=True
     )
     assert done.returncode == 1
     assert "ended:" in done.stderr
     assert "No module named" in done.stderr
+
+
+@pytest.fixture(scope="module")
+def bench():
+    """Imports a module of the benchmarks by name."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(ROOT)
+        patch.setenv("OMP_NUM_THREADS", "1")
+        patch.setenv("OPENBLAS_NUM_THREADS", "1")
+        yield lambda name: importlib.import_module(f"benchmarks.{name}")
+
+
+def test_a_row_has_both_medians_and_the_ratio_of_the_other_to_ours(bench):
+    row = bench("table").Row("labels", 0.05, "real time", 10.0, wanted=100.0)
+    assert str(row) == "| labels | real time | 50 ms | 10 s | 200 | ≥ 100 |"
+
+
+@pytest.mark.parametrize(
+    ("limits", "text"),
+    [
+        ({"other": 10.0, "wanted": 4.0}, "| 10 s | 5 | ≥ 4 |"),
+        ({"other": 10.0, "wanted": 6.0}, "| 10 s | 5 | ≥ 6 (missed) |"),
+        ({"most": 2.0}, "| – | – | ≤ 2 s |"),  # noqa: RUF001
+        ({"most": 0.5}, "| – | – | ≤ 500 ms (missed) |"),  # noqa: RUF001
+        ({"wanted": 6.0}, "| – | – | ≥ 6 |"),  # noqa: RUF001
+    ],
+)
+def test_a_row_says_what_was_wanted_and_whether_it_was_missed(bench, limits, text):
+    assert str(bench("table").Row("labels", 2.0, **limits)).endswith(f"2 s {text}")
+
+
+def test_sides_take_turns_and_the_median_counts(bench):
+    calls, times = [], {"ours": iter([9.0, 1.0, 5.0, 3.0]), "other": iter([9.0, 2.0, 2.0, 8.0])}
+
+    def side(name):
+        return lambda: calls.append(name) or next(times[name])
+
+    found = bench("table").in_turns({name: side(name) for name in times}, 3, warm=1)
+    assert calls == ["ours", "other"] * 4
+    assert found == {"ours": 3.0, "other": 2.0}
+
+
+def test_an_unknown_benchmark_is_refused_and_one_without_its_data_left_out(bench, monkeypatch):
+    call = partial(subprocess.run, cwd=ROOT, capture_output=True, text=True)
+    done = call([sys.executable, "-m", "benchmarks", "nothing"])
+    assert done.returncode == 2
+    assert "no benchmark nothing; there are twists, extended" in done.stderr
+    table, noisytest = bench("table"), bench("noisytest")
+    monkeypatch.setattr(noisytest, "standin", lambda _: None)
+    with pytest.raises(table.LeftOutError, match="--noisytest FOLDER"):
+        next(noisytest.rows(table.Given()))
+
+
+def test_our_twists_are_those_of_the_loops_that_they_are_timed_with(bench):
+    import noisemodel as nm
+
+    twists, robot = bench("twists"), nm.Robot.load("talos")
+    motion = twists.states(robot, 3)
+    for loop in (twists.loop_by_twist, twists.loop_by_sample):
+        np.testing.assert_allclose(loop(robot, *motion), nm.link_twists(robot, *motion), atol=1e-12)
+
+
+def test_the_page_has_every_benchmark():
+    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
+    scripts = {path.stem for path in (ROOT / "benchmarks").glob("*.py")} | {"elsewhere"}
+    helpers = {"__init__", "__main__", "table", "noisytestside"}
+    assert [name for name in sorted(scripts - helpers) if f"`{name}`" not in page] == []

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tarfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -275,16 +276,17 @@ def checkout_of(checkouts, folder, script):
 def test_checkouts_are_timed_in_turns_after_a_warm_up(checkouts, commands, tmp_path):
     record = tmp_path / "calls.txt"
     script = f"import sys; open({str(record)!r}, 'a').write(' '.join(sys.argv[1:]) + '\\n')"
-    sides = {side: checkout_of(checkouts, tmp_path / side, script) for side in ("a", "b")}
-    found = commands.in_turns(sides, {"a": ["old", "run"], "b": ["new", "run"]}, 2)
+    sides = {side: checkout_of(checkouts, tmp_path / side, script) for side in ("old", "new")}
+    work = {side: partial(commands.measure, each, [side, "run"]) for side, each in sides.items()}
+    found = commands.in_turns(work, 2, warm=1)
     assert record.read_text().splitlines() == ["old run", "new run"] * 3
-    assert {side: len(times) for side, times in found.items()} == {"a": 2, "b": 2}
-    assert all(cpu > 0.0 and wall > 0.0 for times in found.values() for cpu, wall in times)
+    assert found.keys() == sides.keys()
+    assert all(spent > 0.0 for spent in found.values())
 
 
 def test_findings_are_no_failure_of_a_command(checkouts, commands, tmp_path):
     found = checkout_of(checkouts, tmp_path, "print('impact'); raise SystemExit(1)")
-    assert len(commands.measure(found, ["classify"])) == 2
+    assert commands.measure(found, ["classify"]) > 0.0
 
 
 @pytest.mark.parametrize(
@@ -294,10 +296,3 @@ def test_a_command_that_fails_is_not_timed(checkouts, commands, tmp_path, script
     broken = checkout_of(checkouts, tmp_path, script)
     with pytest.raises(SystemExit, match=text):
         commands.measure(broken, ["classify", "run.npz"])
-
-
-def test_a_row_has_medians_and_their_ratios(commands):
-    before, after = [(1.0, 2.0), (9.0, 9.0), (1.0, 2.0)], [(0.5, 4.0), (0.5, 4.0), (0.1, 0.1)]
-    assert commands.row("view", before, after) == (
-        "| view | 1.00 | 2.00 | 0.50 | 4.00 | 0.50 | 2.00 |"
-    )
