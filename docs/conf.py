@@ -1,0 +1,158 @@
+"""The site of these pages, built by Sphinx: `make docs`. They stay readable without it.
+
+Navigation is here, so that pages are plain Markdown. Nothing of the site comes from elsewhere:
+fonts are those of the reader's system, equations are MathML.
+"""
+
+import ast
+import os
+import re
+import sys
+from importlib import import_module
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing
+from docutils import nodes
+from docutils.utils.math import latex2mathml
+from sphinx.application import Sphinx
+from sphinx.pycode import ModuleAnalyzer
+from sphinx.util.docutils import SphinxTranslator
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT))
+
+
+class _Shown:
+    """What signatures show of an array: docstrings have shape and unit."""
+
+    def __class_getitem__(cls, _: Any) -> type:
+        return np.ndarray
+
+
+numpy.typing.NDArray = _Shown  # type: ignore[misc, assignment]
+
+NAVIGATION = {
+    "Start": ["Overview <overview>", "tutorial", "The first log, in pictures <first-log>"],
+    "How to": [
+        "Logs of robots <logs>",
+        "menagerie",
+        "Run it in CI <ci>",
+        "Expectations <expectations>",
+        "Regression <regression>",
+        "baseline",
+        "Smoothness <smoothness>",
+        "localisation",
+        "Evaluate a model <evaluation>",
+        "Simulate scenarios <scenarios>",
+        "Simulate wide domains <domains>",
+        "robots",
+    ],
+    "Theory": ["theory", "classifier", "noise-models"],
+    "API": ["api/inspector", "api/noisemodel", "api/models", "api/scenarios"],
+    "Reference": ["formats", "limits", "upgrading", "changelog", "contributing"],
+    "Measured": ["measured", "measured-robots", "elsewhere", "benchmarks"],
+    "Earlier versions": [
+        "The models of 0.3 <measured-0.3>",
+        "The models before 0.3 <classifier-measured>",
+    ],
+}
+"""Pages by part, in the order of the site's side bar; the text before <…> replaces their title."""
+PAGES = {"overview": "README.md", "changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md"}
+"""Pages that have the text of a file of the root."""
+
+project = "noise-inspector"
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+autodoc_default_options = {"members": True}
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+autodoc_typehints_format = "short"
+napoleon_use_ivar = True
+napoleon_use_rtype = False
+add_module_names = False
+default_role = "code"
+maximum_signature_line_length = 80
+highlight_language = "text"
+suppress_warnings = ["ref.python"]  # errors of one name in two packages
+html_theme = "furo"
+html_title = "noise-inspector"
+html_static_path = [
+    "site.css",
+    str(
+        files("ziamath").joinpath("fonts/STIXTwoMath-Regular.ttf")
+    ),  # by which equations are laid out
+]
+html_css_files = ["site.css"]
+html_math_renderer = "mathml"
+html_copy_source = False
+html_show_copyright = False
+
+
+def _page(_: Sphinx, name: str, text: list[str]) -> None:
+    """Take a file of the root in place of the page that names it; add the side bar.
+
+    Links to folders, which a site does not show, become their text.
+    """
+    folder = ROOT if name in PAGES else (ROOT / "docs" / name).parent
+    if name in PAGES:
+        text[0] = (ROOT / PAGES[name]).read_text(encoding="utf-8")
+    pages = {ROOT / file: ROOT / "docs" / f"{page}.md" for page, file in PAGES.items()}
+
+    def here(link: re.Match[str]) -> str:
+        path, hash_, anchor = link[2].partition("#")
+        target = (folder / path).resolve()
+        if target.is_dir():
+            return link[1]
+        path = os.path.relpath(pages.get(target, target), (ROOT / "docs" / name).parent)
+        return f"[{link[1]}]({path}{hash_}{anchor})"
+
+    text[0] = re.sub(r"\[([^]\[]*)\]\((?!\w+:|#)([^)\s]+)\)", here, text[0])
+    if name == "index":
+        for part, members in NAVIGATION.items():
+            lines = ("```{toctree}", ":hidden:", f":caption: {part}", "", *members, "```")
+            text[0] += "\n" + "\n".join(lines) + "\n"
+
+
+def _constant(
+    _: Sphinx, what: str, name: str, _object: Any, _options: Any, lines: list[str]
+) -> None:
+    """Document a constant of a package by the text below it in the module that it comes from."""
+    package, _, constant = name.rpartition(".")
+    if what != "data" or not hasattr(import_module(package), "__path__"):
+        return
+    source = Path(str(import_module(package).__file__)).read_text(encoding="utf-8")
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and constant in {each.name for each in node.names}:
+            docs = ModuleAnalyzer.for_module(str(node.module)).find_attr_docs()
+            found = docs.get(("", constant), lines)
+            lines[:] = [line.replace("|", r"\|") for line in found]
+
+
+def _signature(
+    _: Sphinx, _what: str, _name: str, _object: Any, _options: Any, given: str | None, found: str
+) -> tuple[str | None, str]:
+    """Show `...` for defaults that are made anew, which no signature can state."""
+    return given and given.replace("<factory>", "..."), found
+
+
+def _inline(self: SphinxTranslator, node: nodes.math) -> None:
+    self.body.append(latex2mathml.tex2mathml(node.astext()))
+    raise nodes.SkipNode
+
+
+def _block(self: SphinxTranslator, node: nodes.math_block) -> None:
+    formula = latex2mathml.tex2mathml(node.astext(), as_block=True)
+    self.body.append(f'<div class="math">{formula}</div>')
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Register what this file adds to Sphinx."""
+    app.add_html_math_renderer("mathml", (_inline, None), (_block, None))
+    app.connect("source-read", _page)
+    app.connect("autodoc-process-docstring", _constant)
+    app.connect("autodoc-process-signature", _signature)
