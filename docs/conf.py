@@ -1,7 +1,7 @@
 """The site of these pages, built by Sphinx: `make docs`. They stay readable without it.
 
-Navigation is here, so that pages are plain Markdown. Nothing of the site comes from elsewhere:
-fonts are those of the reader's system, equations are MathML.
+Navigation is here, so that pages are plain Markdown. Readers' browsers request nothing from
+elsewhere: equations are MathML, in a font that is part of the site.
 """
 
 import ast
@@ -63,6 +63,9 @@ NAVIGATION = {
 PAGES = {"overview": "README.md", "changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md"}
 """Pages that have the text of a file of the root."""
 
+FONT = files("ziamath").joinpath("fonts/STIXTwoMath-Regular.ttf")
+"""The font by which browsers lay equations out where the reader's system has none for that."""
+
 project = "noise-inspector"
 extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 myst_enable_extensions = ["dollarmath"]
@@ -75,17 +78,12 @@ napoleon_use_ivar = True
 napoleon_use_rtype = False
 add_module_names = False
 default_role = "code"
-maximum_signature_line_length = 80
+maximum_signature_line_length = 130
 highlight_language = "text"
 suppress_warnings = ["ref.python"]  # errors of one name in two packages
 html_theme = "furo"
 html_title = "noise-inspector"
-html_static_path = [
-    "site.css",
-    str(
-        files("ziamath").joinpath("fonts/STIXTwoMath-Regular.ttf")
-    ),  # by which equations are laid out
-]
+html_static_path = ["site.css", str(FONT)]
 html_css_files = ["site.css"]
 html_math_renderer = "mathml"
 html_copy_source = False
@@ -105,8 +103,8 @@ def _page(_: Sphinx, name: str, text: list[str]) -> None:
     def here(link: re.Match[str]) -> str:
         path, hash_, anchor = link[2].partition("#")
         target = (folder / path).resolve()
-        if target.is_dir():
-            return link[1]
+        if target.is_dir() or not target.exists():
+            return link[1] if target.is_dir() else link[0]
         path = os.path.relpath(pages.get(target, target), (ROOT / "docs" / name).parent)
         return f"[{link[1]}]({path}{hash_}{anchor})"
 
@@ -139,14 +137,21 @@ def _signature(
     return given and given.replace("<factory>", "..."), found
 
 
+def _mathml(formula: str, *, block: bool = False) -> str:
+    """MathML of a formula; docutils puts the index of a letter with an accent below the letter."""
+    accent = r'(<mo stretchy="false">[ˉ˙ˆ]</mo>)'  # noqa: RUF001
+    accented = rf"<munderover>\s*(<mi>\w</mi>)\s*(.*?)\s*{accent}\s*</munderover>"
+    beside = r'<msub><mover accent="true">\1\3</mover>\2</msub>'
+    return re.sub(accented, beside, latex2mathml.tex2mathml(formula, as_block=block), flags=re.S)
+
+
 def _inline(self: SphinxTranslator, node: nodes.math) -> None:
-    self.body.append(latex2mathml.tex2mathml(node.astext()))
+    self.body.append(_mathml(node.astext()))
     raise nodes.SkipNode
 
 
 def _block(self: SphinxTranslator, node: nodes.math_block) -> None:
-    formula = latex2mathml.tex2mathml(node.astext(), as_block=True)
-    self.body.append(f'<div class="math">{formula}</div>')
+    self.body.append(f'<div class="math">{_mathml(node.astext(), block=True)}</div>')
     raise nodes.SkipNode
 
 
