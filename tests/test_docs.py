@@ -97,7 +97,7 @@ def files(tmp_path_factory):
     kinds = ("position", "velocity", "velocity_desired")
     signals = {kind: getattr(demo, kind)[::10] for kind in kinds}
     run = replace(decimated(demo, 1000.0), **signals)
-    for place in ("run", "panda", "before", "after", "runs/one", "runs/two", "logs/one"):
+    for place in ("run", "before", "after", "runs/one", "runs/two", "logs/one"):
         save(run, folder / place)
     for number in range(1, 11):
         good = smooth(run, np.random.default_rng(number))
