@@ -42,6 +42,7 @@ NAVIGATION = {
         "Run it in CI <ci>",
         "Expectations <expectations>",
         "Regression <regression>",
+        "Other tools <export>",
         "baseline",
         "Smoothness <smoothness>",
         "localisation",
@@ -52,7 +53,7 @@ NAVIGATION = {
     ],
     "Theory": ["theory", "classifier", "noise-models"],
     "API": ["api/inspector", "api/noisemodel", "api/models", "api/scenarios"],
-    "Reference": ["formats", "limits", "upgrading", "changelog", "contributing"],
+    "Reference": ["formats", "limits", "security", "upgrading", "changelog", "contributing"],
     "Measured": ["measured", "measured-robots", "elsewhere", "benchmarks"],
     "Earlier versions": [
         "The models of 0.3 <measured-0.3>",
@@ -60,7 +61,12 @@ NAVIGATION = {
     ],
 }
 """Pages by part, in the order of the site's side bar; the text before <…> replaces their title."""
-PAGES = {"overview": "README.md", "changelog": "CHANGELOG.md", "contributing": "CONTRIBUTING.md"}
+PAGES = {
+    "overview": "README.md",
+    "changelog": "CHANGELOG.md",
+    "contributing": "CONTRIBUTING.md",
+    "security": "SECURITY.md",
+}
 """Pages that have the text of a file of the root."""
 
 FONT = files("ziamath").joinpath("fonts/STIXTwoMath-Regular.ttf")
