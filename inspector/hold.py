@@ -8,6 +8,7 @@ import numpy as np
 
 from models.types import Index
 from noisemodel import Run
+from noisemodel.ondemand import OnDemand, pieces
 from noisemodel.run import SAMPLED
 from noisemodel.types import Mask, Real
 
@@ -19,6 +20,9 @@ REGULAR = 0.8
 
 ALIGNED = 0.99
 """Least share of the jumps that come a multiple of the hold after each other."""
+
+EXAMINED = 100_000
+"""Jumps whose size is examined, evenly spread, or a few more."""
 
 LARGER = 1.5
 """Least ratio of median to smallest jump: jumps of one size are quantisation."""
@@ -34,7 +38,7 @@ def hold_length(signal: Real, valid: Mask) -> float:
     Returns:
         Samples from jump to jump, 1.0 without a hold.
     """
-    return _length(signal, _jumps(signal, valid))
+    return _length(signal, _changes(signal, valid))
 
 
 def updates(signal: Real, valid: Mask) -> Index | None:
@@ -49,10 +53,11 @@ def updates(signal: Real, valid: Mask) -> Index | None:
         the first may be negative, as the first value was set before the first sample. None
         without a hold.
     """
-    jumps = _jumps(signal, valid)
-    hold = _length(signal, jumps)
+    changed = _changes(signal, valid)
+    hold = _length(signal, changed)
     if hold <= 1:
         return None
+    jumps = np.flatnonzero(changed)
     first = jumps[0] + 1
     changes = [first - hold * np.ceil(first / hold), *(jumps + 1), len(signal)]
     found = [
@@ -72,11 +77,12 @@ def without_hold(run: Run) -> Run:
         The run itself unless its measured velocities have a zero-order hold of a whole number of
         samples throughout.
     """
-    jumps = _jumps(run.velocity, run.mask)
-    hold = _length(run.velocity, jumps)
+    changed = _changes(run.velocity, run.mask)
+    hold = _length(run.velocity, changed)
     count = round(hold)
     if count < 2 or abs(hold - count) > 1e-3:
         return run
+    jumps = np.flatnonzero(changed)
     phases = np.bincount((jumps + 1) % count, minlength=count)
     first = int(phases.argmax())
     if phases[first] < ALIGNED * len(jumps) or len(run.time) <= first + count:
@@ -84,26 +90,47 @@ def without_hold(run: Run) -> Run:
     own = slice(first, None, count)
     every = {name: getattr(run, name) for name in SAMPLED}
     fields: dict[str, Any] = {
-        name: None if each is None else np.ascontiguousarray(each[own])
-        for name, each in every.items()
+        name: None if each is None else _every(each, own) for name, each in every.items()
     }
-    return replace(run, **fields, stages={name: each[own] for name, each in run.stages.items()})
+    return replace(run, **fields, stages={name: _every(s, own) for name, s in run.stages.items()})
 
 
-def _jumps(signal: Real, valid: Mask) -> Index:
-    """Samples before each change of a signal, outside of gaps."""
-    changes = (signal[1:] != signal[:-1]).any(axis=1)
-    return np.flatnonzero(changes & valid[1:] & valid[:-1])
+def _every(signal: Any, own: slice) -> Any:
+    """Some rows of a signal; of one on demand, on demand."""
+    if not isinstance(signal, OnDemand):
+        return np.ascontiguousarray(signal[own])
+    start, stop, step = own.indices(len(signal))
+    kept = OnDemand(
+        (len(range(start, stop, step)), *signal.shape[1:]),
+        signal.dtype,
+        lambda first, last: signal[start + step * first : start + step * last : step],
+    )
+    kept.checked = signal.checked
+    return kept
 
 
-def _length(signal: Real, jumps: Index) -> float:
-    if len(jumps) < FEWEST:
+def _changes(signal: Real, valid: Mask) -> Mask:
+    """Whether the next sample of a signal is another one, outside of gaps, (samples - 1,)."""
+    changes = valid[1:] & valid[:-1]
+    for rows in pieces(signal):
+        part = signal[rows.start : rows.stop + 1]
+        changes[rows.start : rows.stop] &= (part[1:] != part[:-1]).any(axis=1)
+    return changes
+
+
+def _length(signal: Real, changed: Mask) -> float:
+    count = np.count_nonzero(changed)
+    if count < FEWEST:
         return 1.0
+    if 2 * np.count_nonzero(changed[1:] & changed[:-1]) >= count - 1:
+        return 1.0  # the median distance of two jumps is less than 2
+    jumps = np.flatnonzero(changed)
     distances = np.diff(jumps)
     middle = np.median(distances)
     regular = np.abs(distances - middle) <= max(1.0, 0.1 * middle)
-    if middle < 2 or regular.mean() < REGULAR:
+    if regular.mean() < REGULAR:
         return 1.0
+    jumps = jumps[:: max(1, len(jumps) // EXAMINED)]
     if _one_size(np.abs(signal[jumps + 1].astype(np.float64) - signal[jumps])):
         return 1.0
     return float(distances[regular].mean())

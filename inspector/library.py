@@ -4,12 +4,15 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+
 import models
 import noisemodel as nm
 from inspector import assets
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
 from models.profile import NOMINAL
+from noisemodel.run import pieces_of
 from noisemodel.types import Array, Real
 
 Library = Mapping[str, models.Model]
@@ -73,7 +76,7 @@ def _fits(model: models.Model, robot: str | None) -> bool:
     return not robots or robot in robots
 
 
-def label_run(run: nm.Run, library: Library) -> Labelled:
+def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) -> Labelled:
     """Label a run by the model of the nearest rate at or below its own whose signals it has.
 
     Where each value of a slower log is there several times (`hold.without_hold`), it is labelled as
@@ -82,6 +85,7 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
     Args:
         run: The run.
         library: Models to choose from.
+        slower: The run without the hold, if that is known.
 
     Returns:
         Labels on the time axis of the run.
@@ -91,24 +95,21 @@ def label_run(run: nm.Run, library: Library) -> Labelled:
             or has no frame without a gap.
         SignalError: If the run is too short for a frame.
     """
-    slower = without_hold(run)
-    signals = signals_of(slower)
+    slower = without_hold(run) if slower is None else slower
     try:
         own = for_robot(library, run.robot)
-        name, classifier = nearest(own, slower.rate, signals, logged=run.rate)
+        name, classifier = nearest(own, slower.rate, signal_names(slower), logged=run.rate)
     except models.ModelsError as error:
         held = "" if slower is run else "measured values are held: "
         raise CannotTellError(f"{held}{error}") from error
     rate, remark = classifier.rate, ""
-    if slower is not run and rate > slower.rate * (1 + NOMINAL):
-        signals = signals_of(run)
-    elif slower is not run:
+    if slower is not run and rate <= slower.rate * (1 + NOMINAL):
         run, remark = slower, f"Labelled at {slower.rate:g} Hz, the rate of its values."
     if not _close(run.rate, rate):
         run = nm.decimated(run, rate)
-        signals = signals_of(run)
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
-    labels = classifier.classify(signals, run.rate, start=float(run.time[0]), valid=run.mask)
+    pieces = ((_signals(piece), piece.mask) for piece in pieces_of(run))
+    labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]))
     if not len(labels):
         raise CannotTellError(
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
@@ -157,7 +158,33 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
         Norms by name, each of shape (samples,), and velocities joint by joint, shape
         (joints, samples), in [rad/s].
     """
-    return models.signals.without_zero_error({**nm.norms(run), **nm.by_joint(run)})
+    return models.signals.without_zero_error(_signals(run))
+
+
+def signal_names(run: nm.Run) -> tuple[str, ...]:
+    """Names of the signals of a run, as `signals_of` has them.
+
+    Args:
+        run: The run.
+    """
+    one = next(pieces_of(run, samples=1))
+    errors = any(_differs(piece) for piece in pieces_of(run))
+    return tuple(name for name in _signals(one) if errors or not name.startswith("error"))
+
+
+def _signals(run: nm.Run) -> dict[str, Real]:
+    return {**nm.norms(run), **nm.by_joint(run)}
+
+
+def _differs(run: nm.Run) -> bool:
+    """Whether the desired motion is not the measured one."""
+    desired = run.velocity_desired
+    names = [name for name in run.joint_names if name in run.desired_joint_names]
+    if desired is None or not names:
+        return False
+    measured = [run.joint_names.index(name) for name in names]
+    wanted = [run.desired_joint_names.index(name) for name in names]
+    return bool(np.any(desired[:, wanted] != run.velocity[:, measured]))
 
 
 def _counted(labelled: Labelled) -> Labelled:

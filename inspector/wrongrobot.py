@@ -12,6 +12,7 @@ import numpy as np
 
 from noisemodel import RobotError, Run, UnknownJointError, UnknownRobotError
 from noisemodel.limits import Limits, joint_limits
+from noisemodel.ondemand import pieces
 from noisemodel.types import Mask, Real
 
 FAR_POSITION = 0.25
@@ -83,8 +84,10 @@ def limit_warnings(run: Run) -> Iterator[str]:
         yield f"the joints are not checked: {problem}"
     if limits := _known(run.robot):
         watch = LimitWatch(run.joint_names, str(run.robot), limits)
-        position = None if run.position is None else run.position[run.mask]
-        watch.add(position, run.velocity[run.mask])
+        for rows in pieces(run.velocity):
+            valid = run.mask[rows]
+            position = None if run.position is None else run.position[rows][valid]
+            watch.add(position, run.velocity[rows][valid])
         yield from watch.warnings(min(LONG * run.rate, 0.1 * float(run.mask.sum())))
 
 

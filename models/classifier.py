@@ -1,6 +1,6 @@
 """The classifier: a profile, its estimator, and the training set of it."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from models.errors import DatasetError, MissingSignalError, ModelFileError, Rate
 from models.estimators.estimator import ESTIMATORS, Estimator
 from models.examples import CHUNK, Examples
 from models.features import features, standard
-from models.framefeatures import frame_features
+from models.framefeatures import frames_of
 from models.labels import UNKNOWN, Labels
 from models.profile import NOMINAL, Profile
 from models.reference import Reference, reference_of
@@ -184,10 +184,48 @@ class Classifier:
             SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
                 model needs another one.
         """
+        return self.classify_pieces([(signal, valid)], rate, start=start)
+
+    def classify_pieces(
+        self,
+        pieces: Iterable[tuple[Signals, Mask | None]],
+        rate: float,
+        *,
+        start: float = 0.0,
+    ) -> Labels:
+        """Label all frames of a signal that comes in pieces, the same as those of the whole one.
+
+        Memory does not grow with the signal, but for the labels.
+
+        Args:
+            pieces: The noise estimate, shape (samples,), or signals by name, each of that shape,
+                and False in gaps, shape (samples,); one piece or more.
+            rate: As `classify` takes it.
+            start: Time of the first sample, in [s].
+
+        Returns:
+            Start, stop, class and scores of each frame.
+
+        Raises:
+            RateError: If the model is of another rate.
+            SignalError: As `classify`.
+        """
         if not abs(rate / self.rate - 1.0) <= NOMINAL:
             raise RateError(rate, [self.rate], "lower the signal's rate, or take another model")
-        starts, plain = frame_features(signal, self.profile, valid, self.reference)
-        return self.labels(self.decide(plain), starts, rate, start=start)
+        starts: list[Index] = []
+        decisions: list[Array] = []
+        waiting = np.empty((0, len(self.mean)))
+        for first, plain in frames_of(pieces, self.profile, self.reference):
+            starts.append(first)
+            waiting = np.concatenate((waiting, plain)) if len(waiting) else plain
+            # The rounding of a decision depends on how many frames are decided at once.
+            if whole := len(waiting) // CHUNK * CHUNK:
+                decisions.append(self.decide(waiting[:whole]))
+                waiting = waiting[whole:]
+        if len(waiting) or not decisions:
+            decisions.append(self.decide(waiting))
+        found = np.concatenate(decisions)
+        return self.labels(found, np.concatenate(starts), rate, start=start)
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
         """Labels of frames from their decision values.

@@ -1,5 +1,6 @@
 """Features of the frames of a signal, whole or in chunks: each transform is computed once."""
 
+from collections.abc import Iterable, Iterator
 from typing import TypeAlias
 
 import numpy as np
@@ -41,13 +42,39 @@ def frame_features(
         SignalError: If the signal is too short for a frame, or not finite, or not 1-D, or the
             profile needs another one.
     """
-    samples = stacked(signal, profile.signals)
-    frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1, reference)
-    parts = [frames.push(samples, None if valid is None else np.asarray(valid, bool))]
+    return _joined([*frames_of([(signal, valid)], profile, reference)])
+
+
+def frames_of(
+    pieces: Iterable[tuple[Signals, Mask | None]],
+    profile: Profile,
+    reference: Reference | None = None,
+) -> Iterator[Frames]:
+    """Features of all frames of a signal that comes in pieces, the same as of the whole one.
+
+    Args:
+        pieces: The noise estimate, shape (samples,), or signals by name, and False in gaps, shape
+            (samples,); one piece or more.
+        profile: How it is framed, and what to compute.
+        reference: As `FrameFeatures` takes it.
+
+    Yields:
+        First sample of each frame that a piece completes, and its features.
+
+    Raises:
+        SignalError: As `frame_features`.
+    """
+    frames = None
+    for signal, valid in pieces:
+        samples = stacked(signal, profile.signals)
+        if frames is None:
+            frames = FrameFeatures(profile, len(samples) if samples.ndim > 1 else 1, reference)
+        yield frames.push(samples, None if valid is None else np.asarray(valid, bool))
+    assert frames is not None
     least = profile.drop_first_sample + profile.length
     if frames.count < least:
         raise SignalError(f"a signal of {frames.count} samples is too short: a frame takes {least}")
-    return _joined([*parts, frames.finish()])
+    yield frames.finish()
 
 
 class FrameFeatures:

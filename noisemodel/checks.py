@@ -9,6 +9,7 @@ import numpy as np
 from noisemodel.block import Block
 from noisemodel.bounds import beyond, limit
 from noisemodel.errors import RunError
+from noisemodel.ondemand import OnDemand, pieces
 from noisemodel.types import Array, Mask, Real
 
 UNIFORM = 1e-3
@@ -32,25 +33,33 @@ def check_time(time: Array) -> None:
     finite = np.isfinite(time)
     if not finite.all():
         raise RunError(f"time: {time[~finite][0]} in row {int(np.argmin(finite))}")
-    steps = np.diff(time)
-    if (steps <= 0).any():
-        row = int(np.argmax(steps <= 0)) + 1
-        how = "stands still" if steps[row - 1] == 0 else "runs backwards"
+    rising = time[1:] > time[:-1]
+    if not rising.all():
+        row = int(np.argmin(rising)) + 1
+        how = "stands still" if time[row] == time[row - 1] else "runs backwards"
         raise RunError(f"time: {how} in row {row} ({time[row - 1]:.9g} s, then {time[row]:.9g} s)")
-    step = np.median(steps)
+    step = median_step(time)
     if not SHORTEST <= step <= LONGEST:
         raise RunError(
             f"time: the median step is {step:g} s, expected {SHORTEST:g} s to {LONGEST:g} s"
         )
     # Stamps far from zero cannot be finer than their own spacing.
-    tolerance = max(UNIFORM * step, 2 * np.spacing(np.abs(time).max()))
-    uneven = np.abs(steps - step) > tolerance
-    if uneven.any():
-        row = int(np.argmax(uneven)) + 1
-        raise NotUniformError(
-            f"time: not uniform, the step to row {row} is {steps[row - 1]:.6g} s where the median"
-            f" is {step:.6g} s; `inspector import` resamples such logs (and float32 is too coarse)"
-        )
+    tolerance = max(UNIFORM * step, 2 * np.spacing(max(abs(time[0]), abs(time[-1]))))
+    for rows in pieces(time):
+        steps = np.diff(time[rows.start : rows.stop + 1])
+        uneven = np.abs(steps - step) > tolerance
+        if uneven.any():
+            row = int(np.argmax(uneven))
+            raise NotUniformError(
+                f"time: not uniform, the step to row {rows.start + row + 1} is {steps[row]:.6g} s"
+                f" where the median is {step:.6g} s; `inspector import` resamples such logs (and"
+                " float32 is too coarse)"
+            )
+
+
+def median_step(time: Array) -> float:
+    """Median of the steps of time, in [s]; time has shape (samples,)."""
+    return float(np.median(np.diff(time), overwrite_input=True))  # no second copy
 
 
 def check_words(array: str, words: Iterable[str]) -> None:
@@ -78,19 +87,21 @@ def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
         turned = signal.ndim == 2 and signal.shape[::-1][0] == shape[0] != signal.shape[0]
         hint = "; samples come first, is it transposed?" if turned else ""
         raise RunError(f"{name}: shape {signal.shape}, expected {shape}{hint}")
+    if isinstance(signal, OnDemand):
+        if signal.checked:
+            return
+        signal.checked = True
     largest = np.float64(LARGEST)  # no float16
-    finite = (signal > -largest) & (signal < largest)
-    if not finite.all():
+    for rows in pieces(signal):
+        part = signal[rows]
+        finite = (part > -largest) & (part < largest)
+        if finite.all():
+            continue
         row, column = np.argwhere(~finite)[0]
-        if np.isfinite(signal[row, column]):
-            raise RunError(
-                f"{name}: {signal[row, column]:g} in row {row}, column {column}; expected numbers"
-                f" below {LARGEST:g}"
-            )
-        raise RunError(
-            f"{name}: {signal[row, column]} in row {row}, column {column};"
-            " mark gaps with valid = false and zeros"
-        )
+        value, place = part[row, column], f"row {rows.start + row}, column {column}"
+        if np.isfinite(value):
+            raise RunError(f"{name}: {value:g} in {place}; expected numbers below {LARGEST:g}")
+        raise RunError(f"{name}: {value} in {place}; mark gaps with valid = false and zeros")
 
 
 def check_valid(valid: Mask, samples: int) -> None:
@@ -125,13 +136,14 @@ def check_blocks(blocks: Sequence[Block], time: Array) -> None:
             )
 
 
-def check_quaternions(quaternions: Real, valid: Mask) -> None:
-    """Refuse quaternions that are not of length 1 (in valid samples)."""
-    norm = np.linalg.norm(quaternions, axis=1)
-    wrong = (np.abs(norm - 1) > 0.01) & valid
-    if wrong.any():
-        row = int(np.argmax(wrong))
-        raise RunError(
-            f"base_pose: the quaternion in row {row} has norm {norm[row]:.3g},"
-            " expected 1 (order x, y, z, w)"
-        )
+def check_quaternions(pose: Real, valid: Mask) -> None:
+    """Refuse poses whose quaternions are not of length 1 (in valid samples)."""
+    for rows in pieces(pose):
+        norm = np.linalg.norm(pose[rows][:, 3:], axis=1)
+        wrong = (np.abs(norm - 1) > 0.01) & valid[rows]
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise RunError(
+                f"base_pose: the quaternion in row {rows.start + row} has norm {norm[row]:.3g},"
+                " expected 1 (order x, y, z, w)"
+            )

@@ -2,12 +2,15 @@
 
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise
+from typing import cast
 
 import numpy as np
 
 from noisemodel.errors import RunError
+from noisemodel.ondemand import OnDemand, rows_at_once
 from noisemodel.run import Run
-from noisemodel.types import Real
+from noisemodel.types import Array, Mask, Real
 
 EDGE = 10
 """Samples at the lower rate that the low-pass filter reaches to either side."""
@@ -39,22 +42,21 @@ def decimated(run: Run, rate: float) -> Run:
         return run
 
     def optional(signal: Real | None) -> Real | None:
-        return None if signal is None else _resampled(signal, ratio)[:samples]
+        return None if signal is None else _resampled(signal, ratio)
 
     time = run.time[0] + np.arange(samples) / rate
     valid = np.ones(samples, dtype=bool)
     for gap in np.flatnonzero(~run.mask).tolist():
         center = int(gap * ratio)
         valid[max(0, center - EDGE) : center + EDGE + 1] = False
-    velocity = _resampled(run.velocity, ratio)[:samples]
-    velocity[~valid] = 0.0
+    velocity = _without_gaps(_resampled(run.velocity, ratio), valid)
     return replace(
         run,
         time=time,
         velocity=velocity,
         velocity_desired=optional(run.velocity_desired),
         base_velocity=optional(run.base_velocity),
-        stages={name: _resampled(stage, ratio)[:samples] for name, stage in run.stages.items()},
+        stages={name: _resampled(stage, ratio) for name, stage in run.stages.items()},
         position=None,
         position_desired=None,
         effort=None,
@@ -66,7 +68,43 @@ def decimated(run: Run, rate: float) -> Run:
 def _resampled(signal: Real, ratio: Fraction) -> Real:
     from scipy.signal import resample_poly
 
-    resampled: Real = resample_poly(
-        signal.astype(np.float64), ratio.numerator, ratio.denominator, axis=0, padtype="line"
+    up, down = ratio.numerator, ratio.denominator
+    samples = int(len(signal) * ratio)
+    if not isinstance(signal, OnDemand):
+        exact = signal.astype(np.float64)
+        return np.asarray(resample_poly(exact, up, down, axis=0, padtype="line")[:samples])
+    # What "line" means: before and after the signal goes on as from its first to its last sample.
+    first, last = (signal[at : at + 1].astype(np.float64) for at in (0, len(signal) - 1))
+    slope = (last - first) / (len(signal) - 1)
+    reach = EDGE * max(up, down) // (up * down) + 2  # of the filter, in `down` samples
+
+    def block(start: int, stop: int) -> Array:
+        low, high = (start // up - reach) * down, (-(-stop // up) + reach) * down
+        before = first + slope * np.arange(low, 0)[:, None]
+        after = last + slope * np.arange(1, high - len(signal) + 1)[:, None]
+        inside = signal[max(0, low) : min(high, len(signal))].astype(np.float64)
+        part = np.concatenate((before, inside, after))
+        found = resample_poly(part, up, down, axis=0)
+        return np.asarray(found[start - low // down * up :][: stop - start])
+
+    def rows(start: int, stop: int) -> Array:
+        size = max(1, int(rows_at_once(signal) * ratio))
+        edges = [*range(start, stop, size), stop]
+        return np.concatenate([block(*each) for each in pairwise(edges)] or [block(start, stop)])
+
+    return cast(Real, OnDemand((samples, signal.shape[1]), np.float64, rows))
+
+
+def _without_gaps(signal: Real, valid: Mask) -> Real:
+    """A signal with zeros in gaps."""
+    if not isinstance(signal, OnDemand):
+        signal[~valid] = 0.0
+        return signal
+    return cast(
+        Real,
+        OnDemand(
+            signal.shape,
+            signal.dtype,
+            lambda first, stop: signal[first:stop] * valid[first:stop, None],
+        ),
     )
-    return resampled

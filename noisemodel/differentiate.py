@@ -1,13 +1,14 @@
 """Velocities from positions, where a log holds none."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import checks
+from noisemodel.ondemand import OnDemand
 from noisemodel.types import Array, Mask, Real
 
 WINDOW, ORDER = 7, 3
@@ -40,7 +41,7 @@ def fill_in(
     if "base_velocity" not in signals and "base_pose" in signals:
         pose = signals["base_pose"]
         checks.check_signal("base_pose", pose, (len(time), 7))
-        checks.check_quaternions(pose[:, 3:], valid)
+        checks.check_quaternions(pose, valid)
         filled["base_velocity"] = base_velocity(time, pose, valid)
     how = {name: METHOD for name in filled if name not in signals}
     return filled, how
@@ -58,12 +59,12 @@ def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Ar
         Velocities, shape (samples, joints), in [rad/s] or [m/s]; 0 in gaps and in stretches
         of a single sample.
     """
-    step = float(np.median(np.diff(time)))
-    velocity = np.zeros(position.shape)
-    for stretch in stretches(valid, len(time)):
-        angles = np.unwrap(position[stretch].astype(np.float64), axis=0)
-        velocity[stretch] = _slope(angles, step)
-    return velocity
+    step = checks.median_step(time)
+
+    def slope(part: Real) -> Array:
+        return _slope(np.unwrap(part.astype(np.float64), axis=0), step)
+
+    return _by_stretch(slope, position, position.shape[1], valid)
 
 
 def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
@@ -78,11 +79,30 @@ def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
         Linear, then angular velocity in the base's own axes, shape (samples, 6),
         in [m/s] and [rad/s].
     """
-    step = float(np.median(np.diff(time)))
-    velocity = np.zeros((len(time), 6))
-    for stretch in stretches(valid, len(time)):
-        velocity[stretch] = _body_twist(pose[stretch].astype(np.float64), step)
-    return velocity
+    step = checks.median_step(time)
+    return _by_stretch(lambda part: _body_twist(part.astype(np.float64), step), pose, 6, valid)
+
+
+def _by_stretch(
+    derivative: Callable[[Real], Array], signal: Real, width: int, valid: Mask | None
+) -> Array:
+    """Derivative of each stretch between gaps, on demand of a signal on demand."""
+
+    def whole(part: slice) -> Array:
+        found = np.zeros((part.stop - part.start, width))
+        values = signal[part]
+        for stretch in stretches(None if valid is None else valid[part], len(found)):
+            found[stretch] = derivative(values[stretch])
+        return found
+
+    def rows(first: int, stop: int) -> Array:
+        # The fit reaches three samples to each side, and a window at the end of a stretch.
+        low, high = max(0, first - WINDOW), min(len(signal), stop + WINDOW)
+        return whole(slice(low, high))[first - low : stop - low]
+
+    if isinstance(signal, OnDemand):
+        return cast(Array, OnDemand((len(signal), width), np.float64, rows))
+    return whole(slice(0, len(signal)))
 
 
 def stretches(valid: Mask | None, samples: int) -> Iterator[slice]:

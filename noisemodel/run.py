@@ -2,12 +2,12 @@
 
 import json
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Self
+from typing import Any, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from noisemodel import checks, differentiate, runfile
 from noisemodel.block import Block
 from noisemodel.catalog import is_file_name
 from noisemodel.errors import RunError, RunFileError
+from noisemodel.ondemand import OnDemand, rows_at_once
 from noisemodel.types import Array, Mask, Real
 
 SAMPLED = (
@@ -96,7 +97,7 @@ class Run:
         for name, signal, width in self._signals():
             checks.check_signal(name, signal, (len(self.time), width))
         if self.base_pose is not None:
-            checks.check_quaternions(self.base_pose[:, 3:], self.mask)
+            checks.check_quaternions(self.base_pose, self.mask)
         checks.check_blocks(self.blocks, self.time)
 
     def _signals(self) -> list[tuple[str, Real, int]]:
@@ -130,7 +131,7 @@ class Run:
     @cached_property
     def rate(self) -> float:
         """Nominal sample rate: the inverse of the median step, in [Hz]."""
-        return float(f"{1.0 / np.median(np.diff(self.time)):.9g}")
+        return float(f"{1.0 / checks.median_step(self.time):.9g}")
 
     @property
     def duration(self) -> float:
@@ -143,9 +144,18 @@ class Run:
 
         The simplified noise counts the base's six velocities too (paper, Sec. II-A: n = 30).
         """
-        if self.base_velocity is None:
-            return self.velocity
-        return np.hstack((self.base_velocity, self.velocity))
+        base, joints = self.base_velocity, self.velocity
+        if base is None:
+            return joints
+        if not isinstance(joints, OnDemand) and not isinstance(base, OnDemand):
+            return np.hstack((base, joints))
+        shape = len(joints), base.shape[1] + joints.shape[1]
+        both = OnDemand(
+            shape,
+            np.result_type(base.dtype, joints.dtype),
+            lambda first, stop: np.hstack((base[first:stop], joints[first:stop])),
+        )
+        return cast(Real, both)
 
     def cut(self, start: float, stop: float) -> "Run":
         """The part of the run with ``start <= time < stop``, and all that belongs to it.
@@ -192,12 +202,14 @@ class Run:
         runfile.write(path, _arrays(self, folder=path.parent), overwrite=overwrite)
 
     @classmethod
-    def load(cls, path: str | Path) -> Self:
+    def load(cls, path: str | Path, *, on_demand: bool = False) -> Self:
         """Read a run file; velocities that are missing are differentiated from positions.
 
         Args:
             path: A ``run.npz``, version 1. A robot that it names by a relative path is
                 looked for beside the file.
+            on_demand: Whether signals of 64 MB or more stay in the file. Their rows are read where
+                they are sliced; whatever else is done with them reads them whole.
 
         Returns:
             The run; what was differentiated is listed under ``differentiated`` in its ``meta``.
@@ -206,11 +218,43 @@ class Run:
             RunFileError: If the file is no run file, or holds a run that is wrong.
         """
         path = Path(path)
-        arrays = runfile.read(path)
+        arrays = runfile.read(path, on_demand=on_demand)
         try:
             return cls(**_fields(arrays, folder=path.parent))
         except RunError as error:
             raise RunFileError(path, str(error)) from error
+
+
+MOTION = ("velocity", "velocity_desired", "effort", "base_velocity")
+"""The fields of a run that a classifier takes signals of."""
+
+
+def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
+    """Take the motion of a run piece by piece, each of which fits into memory.
+
+    The pieces are not checked again: one may be a gap alone. They have the rate of the run.
+
+    Args:
+        run: The run.
+        samples: Of a piece; what is megabytes unless given.
+
+    Yields:
+        A piece, with the same names and the fields ``MOTION`` alone.
+    """
+    whole: dict[str, Any] = {
+        **{name: getattr(run, name) for name in ("joint_names", "desired_joint_names")},
+        **{name: getattr(run, name) for name in ("robot", "meta", "rate")},
+        "stages": MappingProxyType({}),
+        "blocks": (),
+    }
+    motion = {name: getattr(run, name) for name in ("time", *MOTION)} | {"valid": run.mask}
+    size = samples or rows_at_once(run.motion)
+    for first in range(0, len(run.time), size):
+        rows = slice(first, first + size)
+        fields = {name: None if each is None else each[rows] for name, each in motion.items()}
+        piece: Run = object.__new__(Run)
+        vars(piece).update(dict.fromkeys(SAMPLED) | whole | fields)
+        yield piece
 
 
 def part(run: Run, first: int, stop: int, **changes: Any) -> Run:

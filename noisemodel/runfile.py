@@ -3,6 +3,7 @@
 import zipfile
 import zlib
 from collections.abc import Mapping
+from math import inf
 from pathlib import Path
 from typing import IO, Any
 
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from noisemodel import archive
 from noisemodel.atomic import replacing
 from noisemodel.errors import OutputError, RunFileError, hint
+from noisemodel.ondemand import OnDemand
 
 FORMAT = "noise-run/1"
 STAGE = "stage_"
@@ -46,11 +48,16 @@ STAGE_ARRAY = ("f", ("samples", "joints"))
 KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
 
 
-def read(path: Path) -> dict[str, NDArray[Any]]:
+LARGE = 2**26
+"""Bytes from which an array can stay in the file."""
+
+
+def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
     """Read the arrays of a run file.
 
     Args:
         path: The file.
+        on_demand: Whether large arrays stay in the file, see `noisemodel.ondemand`.
 
     Returns:
         Its arrays by name; integers become floating-point where numbers are expected.
@@ -69,22 +76,42 @@ def read(path: Path) -> dict[str, NDArray[Any]]:
                     f" or position, and of {', '.join(ARRAYS)} and {STAGE}<name> what there is;"
                     " anything else belongs into meta",
                 )
-        found = {name: _plain(path, name, each) for name, each in archive.read(path).items()}
+        arrays = archive.read(path, on_demand=LARGE if on_demand else inf)
+        found = {name: _plain(path, name, _reading(path, each)) for name, each in arrays.items()}
     except archive.ObjectArrayError as error:
         raise RunFileError(
             path,
             f"not a run file: {error.name} holds a Python object, such as None; leave it out, or"
             f" save {_kind(error.name)}",
         ) from error
-    except OSError as error:
-        raise RunFileError(path, f"cannot be read ({error.strerror or error})") from error
-    except archive.ArchiveError as error:
-        csv = "; `inspector import` makes a run of a CSV log" if path.suffix == ".csv" else ""
-        raise RunFileError(path, f"not a run file: {error}{csv}") from error
+    except (OSError, archive.ArchiveError) as error:
+        raise _unread(path, error) from error
     version = str(found.get("format", FORMAT))
     if version != FORMAT:
         raise RunFileError(path, f"format {version!r}, expected {FORMAT!r}")
     return found
+
+
+def _unread(path: Path, error: OSError | archive.ArchiveError) -> RunFileError:
+    if isinstance(error, OSError):
+        return RunFileError(path, f"cannot be read ({error.strerror or error})")
+    csv = "; `inspector import` makes a run of a CSV log" if path.suffix == ".csv" else ""
+    return RunFileError(path, f"not a run file: {error}{csv}")
+
+
+def _reading(path: Path, array: Any) -> Any:
+    """An array that raises RunFileError where it is read from the file."""
+    if not isinstance(array, OnDemand):
+        return array
+    read = array.read
+
+    def rows(first: int, stop: int) -> NDArray[Any]:
+        try:
+            return read(first, stop)
+        except (OSError, archive.ArchiveError) as error:
+            raise _unread(path, error) from error
+
+    return OnDemand(array.shape, array.dtype, rows)
 
 
 def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:

@@ -150,7 +150,7 @@ def test_unknown_frames_that_are_ignored_raise_nothing_and_are_a_remark():
 def test_a_run_of_unknown_frames_alone_is_not_ok_when_they_are_ignored(monkeypatch):
     from inspector.analysis import analyse as module
 
-    def unknown(run, library):
+    def unknown(run, library, **_):
         labels = analysed("uuuu").labels
         return module.Labelled(
             labels, next(iter(library)), "4 of 4 frames are out of distribution."

@@ -19,6 +19,7 @@ from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
+from inspector.hold import without_hold
 from inspector.library import (
     CannotTellError,
     Labelled,
@@ -194,7 +195,7 @@ def analyse(
     """Label a run, and audit it; a log is opened first.
 
     The arrays of a run are read when they are needed, and only those that the models and the audit
-    need: an object that reads them from its file on demand can stand in for a `noisemodel.Run`.
+    need, piece by piece where they stay in their file (`noisemodel.Run.load`, ``on_demand``).
 
     Args:
         run: The run, a run file, or any log that `inspector import` reads.
@@ -218,7 +219,8 @@ def analyse(
         run, assumed = opened.run, opened.assumed
     library = load_library() if library is None else library
     run, left_out = without_placeholder(run)
-    seen = audit(run, library)
+    slower = without_hold(run)
+    seen = audit(run, library, slower=slower)
     notes = (left_out,) if left_out else ()
     empty = Analysis(
         name=name or "run",
@@ -231,7 +233,7 @@ def analyse(
         assumed=assumed,
     )
     try:
-        found = _labelled(empty, label_run(run, library), library)
+        found = _labelled(empty, label_run(run, library, slower=slower), library)
     except (CannotTellError, models.SignalError, nm.RunError) as error:
         return replace(empty, reason=str(error))
     if seen.observable or found.findings:

@@ -16,6 +16,7 @@ from inspector.hold import hold_length, without_hold
 from inspector.library import for_robot, signals_of
 from inspector.wrongrobot import check_joints, limit_warnings
 from noisemodel import Run
+from noisemodel.ondemand import pieces
 from noisemodel.run import part
 
 
@@ -76,7 +77,7 @@ class Audit:
         return any(each.observability is not Observability.CANNOT_TELL for each in self.classes)
 
 
-def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
+def audit(run: Run, library: Mapping[str, models.Model], *, slower: Run | None = None) -> Audit:
     """Audit a run.
 
     Gaps are counted in the whole run; signals are examined in an excerpt of it.
@@ -84,6 +85,7 @@ def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
     Args:
         run: The run.
         library: Models that might label it; their bands limit what is observable.
+        slower: The run at the rate of its values (`hold.without_hold`), if that is known.
 
     Returns:
         The audit.
@@ -109,7 +111,7 @@ def audit(run: Run, library: Mapping[str, models.Model]) -> Audit:
             run.mask,
             for_robot(library, run.robot),
             signals_of(part),
-            rate=without_hold(run).rate,
+            rate=(slower or without_hold(run)).rate,
         ),
     )
 
@@ -196,8 +198,12 @@ def excerpt(run: Run) -> Run:
     """
     if len(run.time) <= LONGEST:
         return run
-    speed = np.einsum("sj,sj->s", run.velocity, run.velocity)
-    fastest = int(np.argmax(np.where(run.mask, speed, -1.0)))
+    fastest, highest = 0, -1.0
+    for rows in pieces(run.velocity):
+        moving = run.velocity[rows]
+        speed = np.where(run.mask[rows], np.einsum("sj,sj->s", moving, moving), -1.0)
+        if speed.max() > highest:
+            fastest, highest = rows.start + int(speed.argmax()), float(speed.max())
     start = min(max(0, fastest - LONGEST // 2), len(run.time) - LONGEST)
     motion_alone: dict[str, Any] = {
         "effort": None,

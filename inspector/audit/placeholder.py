@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from inspector.audit.differentiation import SMOOTH, derived
-from inspector.audit.quantisation import step_of
+from inspector.audit.quantisation import SAMPLES, step_of
 from noisemodel import Run
+from noisemodel.ondemand import pieces
 
 MOVES = 0.1
 """Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below."""
@@ -16,6 +17,8 @@ SHARE = 0.75
 """Share of that time: a motion reverses now and then, a push is over sooner."""
 STEP = 1e-6
 """Change of a desired position from which it changes, in [rad] or [m]."""
+AT_ONCE = 1_000_000
+"""Samples that are counted at once."""
 FAINTEST = 0.05
 """Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there."""
 
@@ -38,7 +41,7 @@ def placeholder(run: Run) -> str:
     desired = run.velocity_desired
     if desired is None or not desired.size:
         return ""
-    if np.any(desired):
+    if any(np.any(desired[rows]) for rows in pieces(desired)):
         return _coarse(run)
     if _changes(run):
         return "the desired velocity is zero throughout while the desired position changes"
@@ -71,15 +74,22 @@ def _changes(run: Run) -> bool:
     """Whether the desired position changes."""
     if run.position_desired is None:
         return False
-    positions = run.position_desired[run.mask]
-    return len(positions) > 0 and bool(np.ptp(positions, axis=0).max() > STEP)
+    wanted = run.position_desired
+    low, high = np.full(wanted.shape[1], np.inf), np.full(wanted.shape[1], -np.inf)
+    for rows in pieces(wanted):
+        part = wanted[rows][run.mask[rows]]
+        low = np.minimum(low, part.min(axis=0, initial=np.inf))
+        high = np.maximum(high, part.max(axis=0, initial=-np.inf))
+    return bool((high - low).max() > STEP)
 
 
 def _coarse(run: Run) -> str:
     """Say that desired positions have steps too large to be differentiated; empty if not."""
     if not derived(run, "velocity_desired") or run.position_desired is None:
         return ""
-    step = max(step_of(position) for position in run.position_desired[run.mask].T)
+    valid = np.flatnonzero(run.mask)
+    thinned = valid[:: max(1, len(valid) // SAMPLES)]
+    step = max(step_of(position) for position in run.position_desired[thinned].T)
     # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
     noise = step / 12**0.5 * run.rate * float(np.linalg.norm(SMOOTH.weights))
     if noise <= FAINTEST:
@@ -95,6 +105,11 @@ def _moves(run: Run) -> bool:
     size = round(WINDOW * run.rate)
     if len(run.time) < size or not run.joint_names:
         return False
-    fast = (np.abs(run.velocity).max(axis=1) > MOVES) & run.mask
-    count = np.append(0, np.cumsum(fast))
-    return bool((count[size:] - count[:-size]).max() >= SHARE * size)
+    fast = run.mask.copy()
+    for rows in pieces(run.velocity):
+        fast[rows] &= np.abs(run.velocity[rows]).max(axis=1) > MOVES
+    for first in range(0, len(fast) - size + 1, AT_ONCE):
+        count = np.append(0, np.cumsum(fast[first : first + AT_ONCE + size]))
+        if (count[size:] - count[:-size]).max() >= SHARE * size:
+            return True
+    return False

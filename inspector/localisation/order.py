@@ -162,12 +162,14 @@ def _parts(run: Run, failure: Event | Block) -> list[slice]:
     return [part for part in parts if run.mask[part].all()]
 
 
-def _around(run: Run, part: slice, margin: int, signal: Real) -> Array:
+def _around(
+    run: Run, part: slice, margin: int, signal: Real, column: int | slice = slice(None)
+) -> Array:
     """A signal of a part and ``margin`` samples on each side, mirrored about gaps and ends."""
     before = run.mask[max(0, part.start - margin) : part.start][::-1]
     after = run.mask[part.stop : part.stop + margin]
     sides = [int(np.append(side, False).argmin()) for side in (before, after)]
-    inside = signal[part.start - sides[0] : part.stop + sides[1]].astype(np.float64)
+    inside = signal[part.start - sides[0] : part.stop + sides[1]][:, column].astype(np.float64)
     missing = [(margin - side, margin - side) for side in sides]
     pad = ((missing[0][0], missing[1][0]), *[(0, 0)] * (inside.ndim - 1))
     return np.pad(inside, pad, mode="reflect", reflect_type="odd")
@@ -211,11 +213,11 @@ def _motion(run: Run, part: slice, joint: int) -> tuple[Array, Array]:
     half = _half(run)
     inner = slice(4 * half, -4 * half)
     if run.position is None:
-        velocity = _around(run, part, 4 * half, run.velocity[:, joint])
+        velocity = _around(run, part, 4 * half, run.velocity, joint)
         speed = velocity[inner] - _fast(velocity, half)
         steps = (speed[1:] + speed[:-1]) / 2.0 / run.rate
         return np.concatenate(([0.0], np.cumsum(steps))), speed
-    wrapped = _around(run, part, 4 * half, run.position[:, joint])
+    wrapped = _around(run, part, 4 * half, run.position, joint)
     angle = np.unwrap(wrapped)
     angle = angle[inner] - _fast(angle, half)
     return angle, np.gradient(angle) * run.rate

@@ -30,9 +30,8 @@ def quiet_stretches(
     for failure in failures:
         first, last = np.searchsorted(run.time, (failure.start, failure.stop))
         free[first:last] = False
-    taken = np.concatenate(([0], np.cumsum(~free)))
-    starts = np.arange(0, len(free) - size + 1, size)
-    starts = starts[taken[starts + size] == taken[starts]]
+    count = len(free) // size
+    starts = size * np.flatnonzero(free[: count * size].reshape(count, size).all(axis=1))
     if len(starts) > most:
         starts = starts[np.linspace(0, len(starts) - 1, most).astype(int)]
     return [slice(start, start + size) for start in starts.tolist()]

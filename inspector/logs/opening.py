@@ -283,7 +283,7 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
         if "time" not in names or not names & {"velocity", "position"}:
             return None  # arrays of a simulator
     try:
-        return Run.load(path)
+        return Run.load(path, on_demand=True)
     except RunFileError as error:
         if isinstance(error.__cause__, NotUniformError):
             return None

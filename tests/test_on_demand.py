@@ -1,0 +1,268 @@
+"""Runs whose arrays stay in their file: the same as in memory, in little memory."""
+
+import io
+import struct
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.lib import format as npy
+
+import models
+from inspector.analysis.analyse import analyse
+from inspector.analysis.verdict import Verdict
+from inspector.hold import hold_length, without_hold
+from inspector.library import load_library, signal_names, signals_of
+from inspector.logs.opening import open_run
+from noisemodel import Run, RunFileError, archive, decimated, ondemand, runfile
+from noisemodel.ondemand import OnDemand, pieces
+from noisemodel.run import pieces_of
+
+LIBRARY = load_library()
+RATE = 1000.0
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    """Every signal stays in its file, and pieces are of some hundred samples."""
+    monkeypatch.setattr(runfile, "LARGE", 0)
+    monkeypatch.setattr(ondemand, "AT_ONCE", 2**13)
+
+
+def shaken(*, samples=4000, rate=RATE, joints=3, kind=np.float64, gap=True):
+    """A run that moves, with a vibration in its middle, a gap and all that a run can have."""
+    time = np.arange(samples) / rate
+    phase = np.arange(joints)
+    random = np.random.default_rng(1)
+    position = np.sin(2 * np.pi * 0.3 * time[:, None] + phase)
+    desired = 2 * np.pi * 0.3 * np.cos(2 * np.pi * 0.3 * time[:, None] + phase)
+    velocity = desired + 1e-3 * random.standard_normal(desired.shape)
+    during = (time > 1.5) & (time < 2.2)
+    velocity[during, 1] += np.sin(2 * np.pi * 90.0 * time[during])
+    signals = {"position": position, "velocity": velocity, "velocity_desired": desired}
+    signals |= {"effort": 1.0 + random.standard_normal(desired.shape)}
+    valid = np.ones(samples, dtype=bool)
+    if gap:
+        valid[3000:3100] = False
+    signals = {name: (each * valid[:, None]).astype(kind) for name, each in signals.items()}
+    names = tuple(f"j{number}" for number in range(joints))
+    return Run(time=time, joint_names=names, valid=valid, **signals)
+
+
+def packed(path, arrays, *, method, fortran=()):
+    """Write an archive by one method of compression, some arrays column by column."""
+    with zipfile.ZipFile(path, "w", method) as archive:
+        for name, array in arrays.items():
+            content = io.BytesIO()
+            turned = np.asfortranarray(array) if name in fortran else np.asanyarray(array)
+            npy.write_array(content, turned)
+            archive.writestr(f"{name}.npy", content.getvalue())
+
+
+def arrays_of(run):
+    names = ("time", "velocity", "position", "velocity_desired", "effort", "valid")
+    return {name: getattr(run, name) for name in names} | {"joint_names": np.array(run.joint_names)}
+
+
+METHODS = {"stored": zipfile.ZIP_STORED, "deflated": zipfile.ZIP_DEFLATED}
+
+
+@pytest.mark.parametrize("fortran", [(), ("velocity", "position")], ids=["rows", "columns"])
+@pytest.mark.parametrize("method", METHODS)
+@settings(deadline=None, max_examples=30)
+@given(data=st.data())
+def test_rows_on_demand_are_those_in_memory(tmp_path_factory, method, fortran, data):
+    path = tmp_path_factory.mktemp("runs") / "run.npz"
+    whole = shaken(samples=700, gap=False)
+    packed(path, arrays_of(whole), method=METHODS[method], fortran=fortran)
+    found = Run.load(path, on_demand=True).velocity
+    kept = not fortran or method == "stored"
+    assert isinstance(found, OnDemand) == kept
+    number = st.integers(-750, 750)
+    cut = slice(data.draw(number), data.draw(number), data.draw(st.sampled_from([None, 1, 3, -2])))
+    inside = st.integers(-700, 699)
+    rows = np.array(data.draw(st.lists(inside, max_size=20)), dtype=int)
+    keys = (cut, rows, data.draw(inside), (cut, [2, 0]), (rows, slice(1, 3)), whole.time > 0.3)
+    for key in keys:
+        np.testing.assert_array_equal(found[key], whole.velocity[key])
+
+
+def test_an_array_on_demand_computes_as_one_in_memory(tmp_path):
+    run = shaken()
+    run.save(tmp_path / "run.npz")
+    found = Run.load(tmp_path / "run.npz", on_demand=True)
+    ours, theirs = found.velocity, run.velocity
+    assert isinstance(ours, OnDemand)
+    assert (len(ours), ours.shape, ours.ndim) == (len(theirs), theirs.shape, theirs.ndim)
+    assert (ours.size, ours.nbytes, ours.dtype) == (theirs.size, theirs.nbytes, theirs.dtype)
+    np.testing.assert_array_equal(
+        2 * ours - found.velocity_desired, 2 * theirs - run.velocity_desired
+    )
+    np.testing.assert_array_equal(np.abs(ours).max(axis=0), np.abs(theirs).max(axis=0))
+    np.testing.assert_array_equal(ours.T, theirs.T)
+    assert ours.astype(np.float32)[5:9].dtype == np.float32
+    np.testing.assert_array_equal(np.asarray(ours.astype(np.float32)), theirs.astype(np.float32))
+
+
+def findings(analysis):
+    """All that an analysis says."""
+    verdict = Verdict.of(Path("run"), analysis, localise=True)
+    labels = analysis.labels
+    return (
+        replace(verdict, seconds=0.0, localisations={}, orders={}),
+        {event: str(each) for event, each in verdict.localisations.items()},
+        {event: str(each) for event, each in verdict.orders.items()},
+        analysis.audit,
+        analysis.remarks,
+        None if labels is None else labels.to_arrow().to_pydict(),
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("rate", [RATE, 4000.0])
+@pytest.mark.parametrize("kind", [np.float32, np.float64])
+def test_a_run_on_demand_has_the_labels_findings_and_audit_of_one_in_memory(
+    tmp_path, kind, rate, method
+):
+    path = tmp_path / "run.npz"
+    run = shaken(rate=rate, samples=int(4 * rate), kind=kind)
+    packed(path, arrays_of(run), method=METHODS[method])
+    there = open_run(path).run
+    assert isinstance(there.velocity, OnDemand)
+    assert len(list(pieces_of(there))) > 4
+    ours, theirs = analyse(there, LIBRARY), analyse(Run.load(path), LIBRARY)
+    assert theirs.findings
+    assert findings(ours) == findings(theirs)
+
+
+def held(run, count):
+    rows = np.arange(len(run.time)) // count * count
+    return replace(run, velocity=run.velocity[rows], velocity_desired=run.velocity_desired[rows])
+
+
+def without(name, run):
+    arrays = arrays_of(run)
+    del arrays[name]
+    return arrays
+
+
+VARIANTS = {
+    "held": lambda: arrays_of(held(shaken(gap=False), 5)),
+    "without velocities": lambda: without("velocity", shaken(gap=False)),
+    "no desired motion": lambda: arrays_of(replace(shaken(), velocity_desired=np.zeros((4000, 3)))),
+    "desired is measured": lambda: arrays_of(replace(shaken(), velocity_desired=shaken().velocity)),
+    "faster than the model": lambda: without("effort", shaken(rate=12_500.0, samples=25_000)),
+}
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_what_is_computed_before_labelling_is_the_same_on_demand(tmp_path, variant):
+    """The rounding differs where pieces are filtered: by far less than any threshold."""
+    path = tmp_path / "run.npz"
+    packed(path, VARIANTS[variant](), method=zipfile.ZIP_STORED)
+    ours, theirs = (analyse(Run.load(path, on_demand=each), LIBRARY) for each in (True, False))
+    assert (ours.status, ours.model, ours.remarks) == (theirs.status, theirs.model, theirs.remarks)
+    assert theirs.labels is not None
+    assert ours.labels.label.tolist() == theirs.labels.label.tolist()
+    np.testing.assert_allclose(ours.labels.scores, theirs.labels.scores, atol=1e-6)
+    assert [e.label for e in ours.findings] == [e.label for e in theirs.findings]
+    for mine, other in zip(ours.findings, theirs.findings, strict=True):
+        np.testing.assert_allclose((mine.start, mine.stop), (other.start, other.stop), atol=1e-9)
+
+
+@pytest.mark.parametrize(("up", "down"), [(1, 3), (2, 5), (1, 25), (4, 5)])
+def test_a_run_is_decimated_in_pieces_as_in_memory(tmp_path, up, down):
+    run = shaken(samples=5003)
+    run.save(tmp_path / "run.npz")
+    there = Run.load(tmp_path / "run.npz", on_demand=True)
+    ours, theirs = (decimated(each, RATE * up / down) for each in (there, run))
+    assert isinstance(ours.velocity, OnDemand)
+    np.testing.assert_allclose(np.asarray(ours.velocity), theirs.velocity, atol=1e-12)
+    np.testing.assert_allclose(ours.velocity[77:91], theirs.velocity[77:91], atol=1e-12)
+
+
+def test_velocities_are_differentiated_in_pieces_as_in_memory(tmp_path):
+    path = tmp_path / "run.npz"
+    packed(path, without("velocity", shaken(samples=3003)), method=zipfile.ZIP_STORED)
+    ours, theirs = (Run.load(path, on_demand=each).velocity for each in (True, False))
+    assert isinstance(ours, OnDemand)
+    for rows in pieces(ours):
+        np.testing.assert_allclose(ours[rows], theirs[rows], atol=1e-9)
+
+
+def test_a_signal_in_pieces_has_the_labels_of_the_whole_one_bit_for_bit():
+    run = shaken()
+    model = LIBRARY["general"].at(run.rate, signal_names(run))
+    whole = model.classify(signals_of(run), run.rate, valid=run.mask)
+    cut = ((signals_of(piece), piece.mask) for piece in pieces_of(run, samples=333))
+    ours = model.classify_pieces(cut, run.rate)
+    assert ours.to_arrow().equals(whole.to_arrow())
+
+
+def test_a_hold_is_found_in_pieces_and_left_out_on_demand(tmp_path):
+    path = tmp_path / "run.npz"
+    run = held(shaken(gap=False), 4)
+    run.save(path)
+    there = Run.load(path, on_demand=True)
+    assert hold_length(there.velocity, there.mask) == hold_length(run.velocity, run.mask) == 4.0
+    ours, theirs = without_hold(there), without_hold(run)
+    assert isinstance(ours.velocity, OnDemand)
+    assert ours.rate == theirs.rate == RATE / 4
+    np.testing.assert_array_equal(np.asarray(ours.velocity), theirs.velocity)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_value_that_is_not_finite_is_refused_in_any_piece(tmp_path, method):
+    arrays = arrays_of(shaken())
+    arrays["velocity"] = arrays["velocity"].copy()
+    arrays["velocity"][3777, 1] = np.nan
+    packed(tmp_path / "run.npz", arrays, method=METHODS[method])
+    errors = []
+    for on_demand in (True, False):
+        with pytest.raises(RunFileError, match="velocity: nan in row 3777, column 1") as caught:
+            Run.load(tmp_path / "run.npz", on_demand=on_demand)
+        errors.append(str(caught.value))
+    assert errors[0] == errors[1]
+
+
+def test_damaged_samples_are_refused_by_their_checksum(tmp_path):
+    path = tmp_path / "run.npz"
+    packed(path, arrays_of(shaken()), method=zipfile.ZIP_STORED)
+    content = bytearray(path.read_bytes())
+    place = content.index(struct.pack("<d", float(shaken().velocity[2000, 1])))
+    content[place] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(RunFileError, match="damaged: wrong checksum of velocity"):
+        Run.load(path, on_demand=True)
+
+
+def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path):
+    path = tmp_path / "run.npz"
+    shaken().save(path)
+    run = Run.load(path, on_demand=True)
+    shaken(samples=5000).save(path, overwrite=True)
+    with pytest.raises(RunFileError, match="was changed while it was read"):
+        analyse(run, LIBRARY)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_samples_that_are_cut_off_are_refused(tmp_path, method, monkeypatch):
+    monkeypatch.setattr(archive, "_identity", lambda _: ())
+    path = tmp_path / "run.npz"
+    packed(path, arrays_of(shaken()), method=METHODS[method])
+    run = Run.load(path, on_demand=True)
+    with path.open("r+b") as file:
+        file.truncate(path.stat().st_size // 8)
+    with pytest.raises(RunFileError, match="damaged: velocity.* is cut off"):
+        analyse(run, LIBRARY)
+
+
+def test_names_of_signals_are_those_of_the_signals():
+    for run in (shaken(), replace(shaken(), velocity_desired=shaken().velocity)):
+        assert set(signal_names(run)) == set(signals_of(run))
+    assert "error" not in signal_names(replace(shaken(), velocity_desired=shaken().velocity))
+    assert set(models.signals.JOINTS) < set(signal_names(shaken()))
