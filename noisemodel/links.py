@@ -1,12 +1,14 @@
 """The extended noise of a run, link by link, in bins of time."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from noisemodel.differentiate import stretches
 from noisemodel.linkpower import QUADRATIC, Index, by_moments, by_samples, second_moments
+from noisemodel.ondemand import AT_ONCE, pieces
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.surface import Surface
@@ -16,6 +18,8 @@ BIN = 0.01
 """Shortest bin, in [s]."""
 BINS = 4000
 """Most bins that a run is divided into."""
+BLOCK = 2**16
+"""Samples whose running mean is taken at once."""
 FAST = 10.0
 """Motion below this frequency moves the robot and does not vibrate, in [Hz]."""
 
@@ -84,12 +88,18 @@ def link_noise(
     middles = _middles(run, bins)
 
     q, wanted = robot.configuration(middles)[0], robot.desired(middles)
-    fast = _moments(robot, run, vibrating(run.motion, run.mask, run.rate), bins)
+    motion, wanted_motion = run.motion, run.velocity_desired
+
+    def fast_part(first: int, stop: int) -> Array:
+        return _vibrating_part(motion, run.mask, run.rate, first, stop)
+
+    fast = _moments(robot, run, fast_part, bins)
     motions, desired = [("normal", fast)], []
     if kind in QUADRATIC:
-        motions.append((kind, _moments(robot, run, run.motion, bins)))
-        if run.velocity_desired is not None:
-            desired = [(kind, _moments(robot, run, run.velocity_desired, bins, desired=True))]
+        motions.append((kind, _moments(robot, run, lambda a, b: motion[a:b], bins)))
+        if wanted_motion is not None:
+            by_part = lambda a, b: wanted_motion[a:b]  # noqa: E731
+            desired = [(kind, _moments(robot, run, by_part, bins, desired=True))]
     if run.position_desired is None:  # desired velocities at measured positions: one pose for all
         motions, desired = [*motions, *desired], []
     vibration, *power = by_moments(robot, surface, q, motions)
@@ -124,19 +134,51 @@ def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
         What vibrates at 10 Hz and above, and little of what is slower, shape (samples, nv).
     """
     fast = np.zeros(velocity.shape[::-1])
-    half = max(1, round(rate / FAST / 2))
+    half = _half(rate)
     for stretch in stretches(valid, len(velocity)):
-        centre = np.arange(stretch.stop - stretch.start)
-        # Towards the ends the mean is taken over less, so that it stays in the middle.
-        reach = np.minimum(np.minimum(centre, centre[::-1]), half)
-        first, last = centre - reach, centre + reach + 1
-        count = (last - first).astype(np.float64)
-        fast[:, stretch] = velocity[stretch].T
-        sums = np.zeros(len(centre) + 1)
-        for part in fast[:, stretch]:  # one by one they stay in the cache
-            np.cumsum(part, out=sums[1:])
-            part -= (sums[last] - sums[first]) / count
+        length = stretch.stop - stretch.start
+        for begin in range(0, length, BLOCK):
+            centre = np.arange(begin, min(begin + BLOCK, length))
+            # Towards the ends the mean is taken over less, so that it stays in the middle.
+            reach = np.minimum(np.minimum(centre, length - 1 - centre), half)
+            low, high = max(0, begin - half), min(begin + BLOCK + half, length)
+            first, last = centre - reach - low, centre + reach + 1 - low
+            count = (last - first).astype(np.float64)
+            sums = np.zeros(high - low + 1)
+            inside = velocity[stretch.start + low : stretch.start + high]
+            around = np.ascontiguousarray(inside.T, dtype=np.float64)
+            rows = slice(stretch.start + begin, stretch.start + begin + len(centre))
+            for part, found in zip(around, fast[:, rows], strict=True):  # each stays in the cache
+                np.cumsum(part, out=sums[1:])
+                found[:] = part[begin - low :][: len(centre)] - (sums[last] - sums[first]) / count
     return fast.T
+
+
+def vibrating_pieces(velocity: Real, valid: Mask, rate: float) -> Iterator[tuple[slice, Array]]:
+    """The fast part of a motion, see `vibrating`, piece by piece.
+
+    Args:
+        velocity: Shape (samples, nv); may stay in its file.
+        valid: False in gaps, shape (samples,).
+        rate: Samples per second, in [Hz].
+
+    Yields:
+        Samples of a piece, and what vibrates in it, shape (samples, nv).
+    """
+    for rows in pieces(velocity):
+        yield rows, _vibrating_part(velocity, valid, rate, rows.start, rows.stop)
+
+
+def _vibrating_part(velocity: Real, valid: Mask, rate: float, first: int, stop: int) -> Array:
+    half = _half(rate)
+    around = slice(max(0, first - half), stop + half)
+    found = vibrating(velocity[around], valid[around], rate)
+    return found[first - around.start :][: stop - first]
+
+
+def _half(rate: float) -> int:
+    """Samples on each side of the middle of the running mean."""
+    return max(1, round(rate / FAST / 2))
 
 
 def _edges(run: Run) -> Index:
@@ -172,18 +214,36 @@ def _middles(run: Run, bins: Index) -> Run:
 
 
 def _moments(
-    robot: Robot, run: Run, velocity: Real, bins: Index, *, desired: bool = False
+    robot: Robot,
+    run: Run,
+    motion: Callable[[int, int], Real],
+    bins: Index,
+    *,
+    desired: bool = False,
 ) -> Array:
-    """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
+    """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv).
+
+    ``motion`` gives them from a first sample to the one after the last.
+    """
     first = {joint.name: joint.first_v for joint in robot.joints}
     names = run.desired_joint_names if desired else run.joint_names
-    entries = [first[name] for name in names]
+    entries, chosen = [first[name] for name in names], slice(None)
     if not desired and run.base_velocity is not None:
         if robot.floating_base:
             entries = [*range(6), *entries]
         else:
-            velocity = velocity[:, 6:]
-    products = second_moments(velocity, run.mask, size=int(bins[1]))
+            chosen = slice(6, None)
+    size, width = int(bins[1]), len(entries) or 1
+    many = size * max(1, AT_ONCE // (8 * size * width))
+    # A bin that is shorter than the others is taken with those before it.
+    starts = [start for start in range(0, len(run.time), many) if len(run.time) - start >= size]
+    parts = pairwise([*starts, len(run.time)])
+    products = np.concatenate(
+        [
+            second_moments(motion(*part)[:, chosen], run.mask[slice(*part)], size=size)
+            for part in parts
+        ]
+    )
     moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
     moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
     return moments.transpose(2, 0, 1)

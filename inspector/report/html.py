@@ -15,7 +15,7 @@ from inspector.errors import InspectorError
 from inspector.report.markdown import LOCALISATION, localised, note
 from inspector.sound.clip import clip, worst_time
 from noisemodel.atomic import replacing
-from noisemodel.links import vibrating
+from noisemodel.links import vibrating_pieces
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
 
@@ -278,17 +278,22 @@ def parts(analysis: Analysis) -> Iterator[Table]:
             "Sound power of the measured motion above 10 Hz, normal to the surface.",
         )
     run = analysis.run
-    fast = vibrating(run.velocity.astype(np.float64), run.mask, run.rate)
-    power = np.square(fast)
-    peaks, when = np.abs(fast).max(axis=0), run.time[power.argmax(axis=0)]
+    energy, highest, places = (np.zeros(len(run.joint_names)) for _ in range(3))
+    for rows, fast in vibrating_pieces(run.velocity, run.mask, run.rate):
+        power = np.square(fast)
+        energy += power.sum(axis=0)
+        louder = power.max(axis=0) > highest
+        places = np.where(louder, rows.start + power.argmax(axis=0), places)
+        highest = np.maximum(highest, power.max(axis=0))
+    peaks, when = np.sqrt(highest), run.time[places.astype(int)]
     yield _ranked(
         "Joints",
         ("joint", "share", "rms [rad/s]", "peak [rad/s]", "at [s]"),
         run.joint_names,
-        power.sum(axis=0),
+        energy,
         [
             (f"{rms:.3g}", f"{peak:.3g}", f"{time:.3f}")
-            for rms, peak, time in zip(np.sqrt(power.mean(axis=0)), peaks, when, strict=True)
+            for rms, peak, time in zip(np.sqrt(energy / len(run.time)), peaks, when, strict=True)
         ],
         "Measured velocity above 10 Hz; of joints that slide in [m/s].",
     )
