@@ -17,6 +17,7 @@ from inspector import assets
 from inspector.library import label_run, load_library
 from inspector.live import LiveError
 from inspector.live.session import BATCH
+from inspector.live.sink import Sink
 from models.signals import JOINTS, MOTION, NOISE
 from noisemodel import OutputError, UnknownJointError
 
@@ -134,8 +135,13 @@ def test_no_peak_of_the_noise_is_lost(tmp_path, library):
     assert np.max(velocity) == pytest.approx(signals["velocity"].max())
 
 
+@pytest.mark.parametrize(("watched", "messages"), [(True, 10), (False, 1)])
 @pytest.mark.parametrize("seconds", [1.0, 0.97])
-def test_lines_are_drawn_every_tenth_of_a_second_and_none_is_left_out(tmp_path, library, seconds):
+def test_lines_are_drawn_every_tenth_of_a_second_for_a_viewer_and_none_is_left_out(
+    tmp_path, library, seconds, watched, messages, monkeypatch
+):
+    """In a file alone, a message has two seconds."""
+    monkeypatch.setattr(Sink, "watched", watched)
     signals = motion(seconds)
     path, _, _ = shown(tmp_path, signals, cuts=[7, 500, 501], library=library)
     time, values = read(path, "/noise/simplified", "Scalars:scalars")
@@ -143,7 +149,18 @@ def test_lines_are_drawn_every_tenth_of_a_second_and_none_is_left_out(tmp_path, 
     assert time == pytest.approx(signals["time"], abs=1e-9)
     assert np.ravel(values) == pytest.approx(noise, rel=1e-12)
     chunks = RrdReader(path).store().stream().filter(content="/joints/velocity/0").to_chunks()
-    assert sum(not chunk.is_static for chunk in chunks) == 10
+    assert sum(not chunk.is_static for chunk in chunks) == messages
+
+
+def test_a_file_without_a_viewer_has_few_messages(tmp_path, library):
+    """For each, rerun keeps some hundred bytes until the file is closed."""
+    signals = motion(20.0, 7)
+    path, _, _ = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
+    chunks = RrdReader(path).store().stream().to_chunks()
+    moving = [chunk for chunk in chunks if not chunk.is_static]
+    entities = {chunk.entity_path for chunk in moving}
+    assert {"/robot/motion", "/score", "/spectrogram/bands"} < entities
+    assert len(moving) <= 12 * len(entities)
 
 
 def test_the_robot_has_the_pose_of_its_joints(tmp_path, library):

@@ -21,6 +21,9 @@ JOINT_POINTS = 400.0
 NOISE_POINTS = 4000.0
 SEND_INTERVAL = 0.1
 """Lines are drawn at once for this time, in [s]: a message costs more than the points in it."""
+FILE_INTERVAL = 2.0
+"""The same for a file without a viewer: for each message, rerun keeps some hundred bytes until the
+file is closed."""
 NOISE = "noise"
 
 
@@ -33,6 +36,7 @@ class Drawing:
         signals: Which of velocity, velocity_desired and position there are.
         classes: What can be predicted; empty without a model.
         centres: Of the spectrogram's bands, shape (bands,), in [Hz].
+        watched: Whether a viewer shows the recording meanwhile; in a file, messages can be larger.
     """
 
     def __init__(
@@ -42,8 +46,13 @@ class Drawing:
         signals: Sequence[str],
         classes: tuple[str, ...],
         centres: Array,
+        *,
+        watched: bool = True,
     ) -> None:
-        self._recording, self._centres = recording, centres
+        self._recording, self._centres, self._watched = recording, centres, watched
+        self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
+        self._columns: list[Columns] = []
+        self._scores: list[tuple[Array, Array]] = []
         self._colours = colors.of_classes((*classes, UNKNOWN))
         self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
         self._slices = [
@@ -102,25 +111,37 @@ class Drawing:
             rows = slice(None) if finite.all() else finite
             self._keep(kind, time[rows], signals[kind][rows], seconds * JOINT_POINTS)
         self._held += seconds
-        if self._held >= SEND_INTERVAL:
+        if self._held >= self._interval:
             self.flush()
 
     def flush(self) -> None:
-        """Draw the lines that wait."""
+        """Draw what waits."""
         for kind, pieces in self._waiting.items():
             index = [at(np.concatenate([time for time, _ in pieces]))]
             values = np.concatenate([part for _, part in pieces])
             for path, columns in self._entities[kind]:
                 self._send(path, index, values[:, columns])
         self._waiting, self._held = {}, 0.0
+        self._send_spectrogram()
+        self._send_scores()
 
     def spectrogram(self, columns: Columns) -> None:
-        """Draw columns of the spectrogram."""
-        bands, count = columns.level.shape
-        rgba = colors.heat(columns.level.T).reshape(-1, 4)
+        """Draw columns of the spectrogram, at once if they are watched."""
+        self._columns.append(columns)
+        if self._watched:
+            self._send_spectrogram()
+
+    def _send_spectrogram(self) -> None:
+        if not self._columns:
+            return
+        time = np.concatenate([columns.time for columns in self._columns])
+        level = np.concatenate([columns.level for columns in self._columns], axis=1)
+        self._columns = []
+        bands, count = level.shape
+        rgba = colors.heat(level.T).reshape(-1, 4)
         self._recording.send_columns(
             "/spectrogram/bands",
-            indexes=[at(columns.time)],
+            indexes=[at(time)],
             columns=[
                 *scalars(np.tile(self._centres, (count, 1))),
                 *rr.SeriesLines.columns(colors=rgba).partition([bands] * count),
@@ -128,8 +149,16 @@ class Drawing:
         )
 
     def labels(self, labels: Labels) -> None:
-        """Draw the scores of frames, at their centres."""
-        self._send("/score", [at((labels.start + labels.stop) / 2)], labels.scores)
+        """Draw the scores of frames, at their centres, at once if they are watched."""
+        self._scores.append(((labels.start + labels.stop) / 2, labels.scores))
+        if self._watched:
+            self._send_scores()
+
+    def _send_scores(self) -> None:
+        if self._scores:
+            time, scores = (np.concatenate(each) for each in zip(*self._scores, strict=True))
+            self._send("/score", [at(time)], scores)
+            self._scores = []
 
     def changes(self, changes: Sequence[Change]) -> None:
         """Draw where the class changes, and list findings."""

@@ -23,6 +23,7 @@ class LiveRobot:
         robot: A robot's name, or the path of a URDF or an MJCF.
         joint_names: The joints that have positions.
         floating: Whether the base moves.
+        at_once: Poses that a message has.
 
     Attributes:
         root: Frame that the view follows.
@@ -41,6 +42,7 @@ class LiveRobot:
         joint_names: Sequence[str],
         *,
         floating: bool,
+        at_once: int = 1,
     ) -> None:
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
@@ -65,14 +67,14 @@ class LiveRobot:
         base = [(scene.WORLD, str(tree.root_link().name))] if floating else []
         links = [*((joint.parent_link, joint.child_link) for joint in joints), *base]
         self.children = [child for _, child in links]
-        self._frames = rr.Transform3D.columns(
-            parent_frame=[parent for parent, _ in links], child_frame=self.children
-        )
+        self._carriers = [parent for parent, _ in links]
+        self._at_once = at_once
+        self._waiting: list[tuple[float, Array, Array]] = []
         self._recording = recording
         self.root = scene.root(tree, floating=floating)
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
-        """Move the robot.
+        """Move the robot, once there are as many poses as a message has.
 
         Args:
             time: In [s].
@@ -84,13 +86,26 @@ class LiveRobot:
             places, turns = np.vstack((places, base_pose[:3])), np.vstack((turns, base_pose[3:]))
         if not len(places):
             return
+        self._waiting.append((time, places, turns))
+        if len(self._waiting) >= self._at_once:
+            self.flush()
+
+    def flush(self) -> None:
+        """Draw the poses that wait."""
+        if not self._waiting:
+            return
+        times, places, turns = (list(each) for each in zip(*self._waiting, strict=True))
+        self._waiting = []
+        count = len(times)
         self._recording.send_columns(
             "/robot/motion",
-            indexes=[series.at(np.full(len(places), time))],
-            columns=[
-                *rr.Transform3D.columns(translation=places, quaternion=turns),
-                *self._frames,
-            ],
+            indexes=[series.at(np.repeat(times, len(self.children)))],
+            columns=rr.Transform3D.columns(
+                translation=np.concatenate(places),
+                quaternion=np.concatenate(turns),
+                parent_frame=count * self._carriers,
+                child_frame=count * self.children,
+            ),
         )
 
     def transforms(self, position: Array) -> tuple[Array, Array]:

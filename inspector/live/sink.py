@@ -82,6 +82,11 @@ class Sink:
         """Whether any sink takes what is logged: a file does when its viewer is gone."""
         return self._file or not self.gone
 
+    @property
+    def watched(self) -> bool:
+        """Whether there is, or was, a viewer."""
+        return self._address is not None
+
     def check_viewer(self) -> bool:
         """Check once in a second that the viewer is there.
 

@@ -25,6 +25,8 @@ from inspector.wrongrobot import LONG, LimitWatch
 from models import Event
 from noisemodel.types import Array, Mask
 
+POSES = 40
+"""Poses of the robot in a message to a file without a viewer: 2 s."""
 MAX_DELAYS = 100_000
 """Delays that are kept, of the latest labels."""
 
@@ -77,13 +79,20 @@ class Worker:
         self._watch = watch
         if robot is not None:
             floating = "base_pose" in widths
-            self._robot = LiveRobot(sink.recording, robot, joint_names, floating=floating)
+            self._robot = LiveRobot(
+                sink.recording,
+                robot,
+                joint_names,
+                floating=floating,
+                at_once=1 if sink.watched else POSES,
+            )
         self._drawing = Drawing(
             sink.recording,
             joint_names,
             list(widths),
             self._labeller.classes,
             self._spectrogram.centres,
+            watched=sink.watched,
         )
         contents = Contents(
             joints=self._drawing.plots,
@@ -171,10 +180,12 @@ class Worker:
         if self._news is not None:
             self._news.update(self.findings.events, float("inf"))
         if self._sink.alive:
-            self._drawing.flush()
             self._drawing.changes(self._lane.end())
             if (columns := self._spectrogram.flush()) is not None:
                 self._drawing.spectrogram(columns)
+            self._drawing.flush()
+            if self._robot is not None:
+                self._robot.flush()
 
     def _skip(self, samples: int) -> None:
         if samples:
