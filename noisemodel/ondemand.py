@@ -20,7 +20,7 @@ class OnDemand(NDArrayOperatorsMixin):
     """An array of which rows are read when they are needed.
 
     It can stand in for a NumPy array. Slices and indices of rows read these; whatever else is done
-    with it reads it whole, and goes on with an array in memory.
+    with it reads it whole, once, and keeps it in memory.
 
     Args:
         shape: Its shape, rows first.
@@ -36,6 +36,7 @@ class OnDemand(NDArrayOperatorsMixin):
     ) -> None:
         self.shape, self.dtype, self.read = shape, np.dtype(dtype), read
         self.checked = False
+        self._whole: NDArray[Any] | None = None
 
     @property
     def ndim(self) -> int:
@@ -92,8 +93,10 @@ class OnDemand(NDArrayOperatorsMixin):
         return OnDemand(self.shape, dtype, lambda first, stop: self.read(first, stop).astype(dtype))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
-        whole = self.read(0, len(self))
-        return whole if dtype is None else whole.astype(dtype, copy=False)
+        if self._whole is None:
+            whole = self._whole = self.read(0, len(self))
+            self.read = lambda first, stop: whole[first:stop]
+        return self._whole if dtype is None else self._whole.astype(dtype, copy=False)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **settings: Any) -> Any:
         """Compute with the whole array."""

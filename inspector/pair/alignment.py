@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from noisemodel import Run
+from noisemodel.ondemand import pieces
 from noisemodel.types import Array
 
 CORRELATION = 0.6
@@ -93,7 +94,11 @@ def envelope(run: Run) -> Array:
     The desired motion is the better guide: a defect changes what is measured.
     """
     velocity = run.velocity if run.velocity_desired is None else run.velocity_desired
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", velocity, velocity, dtype=np.float64)))
+    power = np.empty(len(velocity))
+    for rows in pieces(velocity):
+        part = velocity[rows]
+        power[rows] = np.einsum("ij,ij->i", part, part, dtype=np.float64)
+    return np.sqrt(power)
 
 
 def _search(before: Run, after: Run) -> tuple[int, float, float]:

@@ -87,13 +87,14 @@ def log(
         Velocities, positions, efforts and stages of each limb.
     """
     found: list[Plot] = []
+    whole = bool(run.mask.all())  # then a signal can stay in its file
     for kind, group in groupby(signals(run), key=lambda signal: signal.kind):
         both = list(group)[::-1]  # the first is drawn below the other
         paths = [
             log_signal(
                 recording,
                 f"/joints/{kind.replace(' ', '_')}{'_desired' * signal.desired}",
-                replace(signal, values=signal.values[run.mask]),
+                signal if whole else replace(signal, values=signal.values[run.mask]),
                 run.time[run.mask],
                 limbs,
                 suffix=" desired" * signal.desired,

@@ -78,6 +78,7 @@ def levels(run: Run) -> Levels:
 
 def _power(velocity: Real, firsts: Array, window: Array) -> Array:
     """Periodograms of windows, shape (windows, joints, frequencies); they add up to the power."""
-    views = sliding_window_view(velocity, len(window), axis=0)[firsts].astype(np.float64)
+    part = velocity[firsts[0] : firsts[-1] + len(window)]
+    views = sliding_window_view(part, len(window), axis=0)[firsts - firsts[0]].astype(np.float64)
     amplitudes = np.fft.rfft((views - views.mean(axis=-1, keepdims=True)) * window, axis=-1)
     return np.asarray(2 * np.abs(amplitudes) ** 2 / (len(window) * np.sum(window**2)))
