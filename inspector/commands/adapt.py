@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import GoodRuns, InPart, Output, Overwrite, reads_logs
+from inspector.commands.options import (
+    Alarms,
+    GoodRuns,
+    InPart,
+    ModelRate,
+    Output,
+    Overwrite,
+    reads_logs,
+)
 from inspector.training.part import Part
 
 if TYPE_CHECKING:
@@ -17,9 +25,7 @@ if TYPE_CHECKING:
 def adapt(
     inputs: GoodRuns,
     output: Output,
-    alarms: Annotated[
-        float, typer.Option(help="False-alarm budget, per hour of good motion.")
-    ] = 1.0,
+    alarms: Alarms = 1.0,
     model: Annotated[
         Path | None,
         typer.Option(
@@ -28,14 +34,7 @@ def adapt(
             show_default=False,
         ),
     ] = None,
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            min=1.0,
-            help="Rate of the model in [Hz]; faster runs are decimated.",
-            show_default=False,
-        ),
-    ] = None,
+    rate: ModelRate = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
     *,

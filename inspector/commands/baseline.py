@@ -5,7 +5,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import GoodRuns, InPart, Output, Overwrite, reads_logs
+from inspector.commands.options import (
+    Alarms,
+    GoodRuns,
+    InPart,
+    ModelRate,
+    Output,
+    Overwrite,
+    reads_logs,
+)
 from inspector.training.part import Part
 
 if TYPE_CHECKING:
@@ -16,9 +24,7 @@ if TYPE_CHECKING:
 def baseline(
     inputs: GoodRuns,
     output: Output,
-    alarms: Annotated[
-        float, typer.Option(help="False-alarm budget, per hour of good motion.")
-    ] = 1.0,
+    alarms: Alarms = 1.0,
     profile: Annotated[
         str,
         typer.Option(
@@ -26,14 +32,7 @@ def baseline(
             " that the first run has the signals for."
         ),
     ] = "",
-    rate: Annotated[
-        float | None,
-        typer.Option(
-            min=1.0,
-            help="Rate of the model in [Hz]; faster runs are decimated.",
-            show_default=False,
-        ),
-    ] = None,
+    rate: ModelRate = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
     *,

@@ -40,6 +40,16 @@ Kind = Annotated[
     str,
     typer.Option("--kind", callback=_known, help=f"Extended noise, one of {', '.join(KINDS)}."),
 ]
+Alarms = Annotated[float, typer.Option(help="False-alarm budget, per hour of good motion.")]
+ModelRate = Annotated[
+    float | None,
+    typer.Option(
+        "--rate",
+        min=1.0,
+        help="Rate of the model in [Hz]; faster runs are decimated.",
+        show_default=False,
+    ),
+]
 InPart = Annotated[
     Part,
     typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),
