@@ -163,7 +163,7 @@ def ends(robot: Robot) -> tuple[str, ...]:
     return tuple(dict.fromkeys(robot.joints[index - 1].name for index in (near, far)))
 
 
-def _motion(time: Array, axes: int, random: np.random.Generator, rate: float) -> Array:
+def _motion(time: Array, axes: int, random: "np.random.Generator", rate: float) -> Array:
     """Slow sines, ripple and jerk of each axis at a nominal speed of 1, shape (samples, axes)."""
     slow = _sines(time, axes, random)
     ripple = RIPPLE * _ripple(len(time), axes, random, rate)
@@ -173,7 +173,7 @@ def _motion(time: Array, axes: int, random: np.random.Generator, rate: float) ->
     return velocity
 
 
-def _sines(time: Array, axes: int, random: np.random.Generator) -> Array:
+def _sines(time: Array, axes: int, random: "np.random.Generator") -> Array:
     """Sum slow sines, spread evenly over octaves, to a mean square of 1, shape (samples, axes)."""
     hertz = np.exp(random.uniform(np.log(SINES_HZ[0]), np.log(SINES_HZ[1]), (SINES, axes)))
     phase = random.uniform(0.0, 2.0 * np.pi, (SINES, axes))
@@ -181,7 +181,7 @@ def _sines(time: Array, axes: int, random: np.random.Generator) -> Array:
     return sines * float(np.sqrt(2.0 / SINES))
 
 
-def _ripple(samples: int, axes: int, random: np.random.Generator, rate: float) -> Array:
+def _ripple(samples: int, axes: int, random: "np.random.Generator", rate: float) -> Array:
     """Make noise with a mean square of 1, shape (samples, axes)."""
     hertz = np.fft.rfftfreq(samples, 1.0 / rate)
     white = np.fft.rfft(random.standard_normal((samples, axes)), axis=0)

@@ -18,7 +18,7 @@ ALLOWED = {
 HOMES = {"rerun": {"inspector"}, "typer": {"inspector"}, "mujoco": {"noisemodel", "scenarios"}}
 """The only packages of ours that may import a library."""
 
-SLOW = ["rerun", "typer", "sklearn", "mujoco", "pinocchio", "scipy.signal"]
+SLOW = ["typer", "rerun", "sklearn", "mujoco", "pinocchio", "scipy.signal"]
 
 
 def modules():
@@ -67,6 +67,8 @@ def test_nothing_is_pickled():
         ("models", [*SLOW, "noisemodel", "scenarios", "inspector"]),
         ("scenarios", ["rerun", "typer", "sklearn", "mujoco", "models", "inspector"]),
         ("inspector.cli", ["rerun", "sklearn", "mujoco", "pinocchio", "scipy", "numpy"]),
+        ("inspector.analysis.verdict", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
+        ("inspector.regression.measure", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
     ],
 )
 def test_importing_a_package_imports_no_more_than_it_should(package, never):

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import fft
 
 from inspector.logs.resample import TimedTrack
 from noisemodel.types import Array
@@ -159,6 +158,8 @@ def _search(
     measured_motion: _Motion, desired_motion: _Motion, rate: float
 ) -> tuple[float, float, float]:
     """Best offset in [s], its correlation, and that of the next best."""
+    from scipy import fft
+
     one, other = (
         motion.at(np.arange(motion.time[0], motion.time[-1], 1 / rate))
         for motion in (measured_motion, desired_motion)
@@ -224,6 +225,8 @@ def _residuals(
 
 def _match(segment: Array, longer: Array, rate: float) -> tuple[float, float]:
     """Offset in [s] of a segment within a longer one, and the correlation there."""
+    from scipy import fft
+
     scale = np.sqrt((segment**2).sum(axis=0) * (longer**2).sum(axis=0))
     moving = scale > 0
     if not moving.any():

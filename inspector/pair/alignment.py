@@ -9,7 +9,6 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from noisemodel import Run
 from noisemodel.ondemand import pieces
@@ -103,6 +102,8 @@ def envelope(run: Run) -> Array:
 
 def _search(before: Run, after: Run) -> tuple[int, float, float]:
     """Find the lag of the highest correlation, that, and the next best."""
+    from scipy import fft
+
     lags = np.arange(1 - len(after.time), len(before.time))
     length = fft.next_fast_len(len(lags), real=True)
     first, second = (_powers(run, length) for run in (before, after))
@@ -138,6 +139,8 @@ def _search(before: Run, after: Run) -> tuple[int, float, float]:
 
 def _powers(run: Run, length: int) -> list[NDArray[np.complex128]]:
     """Transform what is known of a run, its envelope, and the square of that."""
+    from scipy import fft
+
     speed, mask = envelope(run), run.mask
     size = float(np.sqrt(np.mean(speed[mask] ** 2))) if mask.any() else 0.0
     mean = float(speed[mask].mean()) if mask.any() else 0.0

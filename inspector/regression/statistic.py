@@ -235,7 +235,7 @@ def _all(sample: Sample) -> Array:
     return sides
 
 
-def _drawn(sample: Sample, random: np.random.Generator) -> Array:
+def _drawn(sample: Sample, random: "np.random.Generator") -> Array:
     if sample.within_pairs:
         signs = random.choice((1.0, -1.0), size=(EXCHANGES + 1, len(sample.candidate)))
         signs[0] = 1.0
