@@ -24,7 +24,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
@@ -35,7 +35,7 @@ from inspector.training import recordings, training
 from inspector.training.part import Part
 from models.evaluation.assessment import measure, number, percent
 from models.evaluation.predictions import Predictions, predict
-from noisemodel.parallel import each
+from noisemodel.parallel import DIED, in_order
 from scenarios.sample import Sample
 from scenarios.signals import WHOLE
 
@@ -116,9 +116,14 @@ def main() -> None:
     test, good = spread(fresh, given.limit), spread(files(given.good, Part.ALL), given.limit)
     given.output.mkdir(parents=True, exist_ok=True)
     work = partial(measured, known=known, test=test, good=good, folder=given.output)
-    found = list(each(work, [*given.models, *given.profiles], jobs=given.jobs))
+    found = list(in_order(work, [*given.models, *given.profiles], jobs=given.jobs, died=stop))
     print(tables(found[len(given.models) :] + found[: len(given.models)]))
     print(f"\nRuns trained on: {', '.join(f'{one.name} {one.trained_on}' for one in found)}.")
+
+
+def stop(task: Path | str) -> NoReturn:
+    """Give up: a table without this row is none."""
+    raise SystemExit(f"{task}: {DIED}")
 
 
 def files(folders: Sequence[Path], part: Part) -> list[Path]:

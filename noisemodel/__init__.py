@@ -12,6 +12,7 @@ from noisemodel.comparison import Comparison, RobotComparison
 from noisemodel.comparisons import Comparisons, LeftOut
 from noisemodel.decimation import decimated
 from noisemodel.errors import (
+    ClusterError,
     CornerError,
     GeometryError,
     MeshError,
@@ -42,6 +43,7 @@ __all__ = [
     "KINDS",
     "ROBOTS",
     "Block",
+    "ClusterError",
     "Comparison",
     "Comparisons",
     "CornerError",

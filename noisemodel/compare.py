@@ -14,7 +14,7 @@ from noisemodel.geometry import GEOMETRIES
 from noisemodel.links import vibrating
 from noisemodel.motions import EXCITATION, Motions, Moving, Source, Task, tasks
 from noisemodel.noise import check_positive, check_stretches, decibel
-from noisemodel.parallel import each
+from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot
 from noisemodel.speed import KINDS, check_motion
 from noisemodel.surface import Surface, check_surface
@@ -49,7 +49,7 @@ def compare(
     rate: float | None = ...,
     surface: Surface | str | None = ...,
     seed: int = ...,
-    jobs: int = ...,
+    jobs: Jobs = ...,
     progress: Progress | None = ...,
 ) -> Comparisons: ...
 
@@ -65,7 +65,7 @@ def compare(
     surface: Surface | str | None = None,
     events: Sequence[tuple[int, int]] = (),
     seed: int = 0,
-    jobs: int = 1,
+    jobs: Jobs = 1,
     progress: Progress | None = None,
 ) -> Comparison | Comparisons:
     """Comparison of kinds of noise estimates, on the motions of one robot or many.
@@ -99,7 +99,7 @@ def compare(
         events: With ``q`` and ``v``: first sample and the one after the last of what should stand
             out. The events of a run are its blocks that are not "ok".
         seed: Random seed of built-in motions.
-        jobs: How many robots to compare at once.
+        jobs: How many robots to compare at once, or the address of a Dask scheduler.
         progress: Shows the progress; takes an iterable and its length ``total``, and passes the
             items on, as ``tqdm`` does.
 
@@ -141,13 +141,14 @@ def compare(
         )
     if len(events):
         raise NoiseModelError("events are samples of q and v; those of a run are its blocks")
-    if jobs < 1:
+    if isinstance(jobs, int) and jobs < 1:
         raise NoiseModelError(f"jobs is {jobs}, expected 1 or more")
     todo = tasks(robots, EXCITATION if motion is None else motion, rate=rate, seed=seed)
     geometry = "auto" if surface is None else surface
     _check_geometry(geometry, len(todo))
     results: Iterable[RobotComparison | LeftOut]
-    results = each(partial(_attempt, kinds=kinds, surface=geometry), todo, jobs=jobs)
+    one = partial(_attempt, kinds=kinds, surface=geometry)
+    results = in_order(one, todo, jobs=jobs, died=_died)
     return Comparisons.of(results if progress is None else progress(results, total=len(todo)))
 
 
@@ -168,6 +169,10 @@ def _attempt(task: Task, kinds: Sequence[str], surface: Surface | str) -> RobotC
         raise MotionError(f"{task.name}: {error}") from error
     except NoiseModelError as error:
         return LeftOut(task.name, str(error).removeprefix(f"{task.name}: "))
+
+
+def _died(task: Task) -> LeftOut:
+    return LeftOut(task.name, DIED)
 
 
 def _compare(

@@ -30,6 +30,10 @@ class OutputError(NoiseModelError):
     """An output that exists already or cannot be written."""
 
 
+class ClusterError(NoiseModelError):
+    """A Dask cluster that cannot be reached, is lost, or has other software or files."""
+
+
 class RobotError(NoiseModelError):
     """A robot that cannot be found or read, or that moves in a way that is not supported."""
 

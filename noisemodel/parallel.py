@@ -1,53 +1,186 @@
-"""One call per item, several at once if requested; results come in order."""
+"""One call per item: here, in several processes, or on the workers of a Dask scheduler.
 
+A process that dies is replaced, and its item named; the others get their results.
+
+Processes are forked where that is safe: then they start at once, with all modules and models in
+place, and several are faster from a few items on. It is not safe with other threads in this
+process, of Python or of a library, nor on macOS, and does not exist on Windows. There joblib's loky
+starts fresh interpreters, which takes about `FRESH` seconds.
+"""
+
+import gc
+import multiprocessing
 import os
-import time
+import signal
+import sys
+import threading
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
-from threading import Thread
-from typing import TypeVar
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TypeAlias, TypeVar
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+Jobs: TypeAlias = int | str
+"""How many items to work on at once in this machine, or the address of a Dask scheduler."""
 
-def each(
-    function: Callable[[Item], Result], items: Sequence[Item], *, jobs: int = 1
+FRESH = 3.0
+"""Work in [s] below which two fresh interpreters are not faster than this one alone."""
+POLL = 0.5
+"""Time without a result after which `polled` yields None, in [s]."""
+DIED = "the worker died, of lack of memory or a crash"
+"""What there is to say of an item with which a worker died."""
+
+
+def in_order(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: Jobs,
+    died: Callable[[Item], Result],
+    work: float = float("inf"),
 ) -> Iterator[Result]:
-    """Call a function for each item.
+    """Results of a function, in the order of its arguments, see `as_done`."""
+    early: dict[int, Result] = {}
+    following = 0
+    for index, result in as_done(function, items, jobs=jobs, died=died, work=work):
+        early[index] = result
+        while following in early:
+            yield early.pop(following)
+            following += 1
 
-    The processes of several jobs end within a second or two if this one is killed.
+
+def as_done(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: Jobs,
+    died: Callable[[Item], Result],
+    work: float = float("inf"),
+) -> Iterator[tuple[int, Result]]:
+    """Results of a function as they are ready, from several processes if requested.
+
+    If a process dies, those of its items that may be the cause are tried again one by one, each
+    alone; the item with which a process dies then gets the result of ``died``.
 
     Args:
-        function: What to call; for several jobs it must be importable.
+        function: What to call; where processes cannot be forked it must be importable.
         items: Its arguments.
-        jobs: How many to work on at once.
+        jobs: Number of processes; 1 is this one, which nothing survives. Or the address of a Dask
+            scheduler, ``tcp://HOST:PORT``.
+        died: The result of an item with which a process died; it may raise.
+        work: About how long all items take one after the other, in [s].
 
     Yields:
-        The results, in the order of the items.
+        The index of an item, and its result.
+
+    Raises:
+        ClusterError: If the Dask scheduler cannot be reached, or is lost.
     """
-    if jobs == 1 or len(items) < 2:
-        yield from map(function, items)
+    for found in polled(function, items, jobs=jobs, died=died, work=work):
+        if found is not None:
+            yield found
+
+
+def polled(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    *,
+    jobs: Jobs,
+    died: Callable[[Item], Result],
+    work: float = float("inf"),
+) -> Iterator[tuple[int, Result] | None]:
+    """Results as `as_done` yields them, and None when there was none for `POLL` seconds."""
+    if isinstance(jobs, str):
+        from noisemodel.cluster import on_cluster
+
+        yield from on_cluster(function, items, address=jobs, died=died, poll=POLL)
         return
-    from joblib import Parallel, delayed
+    little = len(items) < 2 or work < FRESH
+    if jobs < 2 or (little and not _forks()):
+        yield from enumerate(map(function, items))
+        return
+    jobs = max(1, min(jobs, len(items)))
+    waiting = list(range(len(items)))[::-1]
+    suspects: list[int] = []
+    while waiting or suspects:
+        alone = bool(suspects)
+        todo, width = (suspects, 1) if alone else (waiting, 2 * jobs)
+        pool = _pool(function, 1 if alone else jobs)
+        running: dict[Future[Any], int] = {}
+        broken = False
+        try:
+            while (todo or running) and not broken:
+                try:
+                    while todo and len(running) < width:
+                        future = pool.submit(_call, items[todo[-1]])
+                        running[future] = todo.pop()
+                except BrokenProcessPool:
+                    broken = True
+                done, _ = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
+                if not done:
+                    yield None
+                for future in done:
+                    try:
+                        result = future.result()
+                    except BrokenProcessPool:
+                        broken = True
+                    else:
+                        yield running.pop(future), result
+        finally:
+            for future in running:
+                future.cancel()
+            pool.shutdown(wait=True)
+        if alone and broken:
+            for index in running.values():
+                yield index, died(items[index])
+        else:
+            suspects += sorted(running.values(), reverse=True)
 
-    calls = (delayed(_called)(function, item, os.getpid()) for item in items)
-    yield from Parallel(n_jobs=jobs, return_as="generator")(calls)
+
+def _forks() -> bool:
+    """Whether a fork is safe: of a process with other threads one may hold a lock for ever."""
+    return sys.platform == "linux" and len([*Path("/proc/self/task").iterdir()]) == 1
 
 
-def _called(function: Callable[[Item], Result], item: Item, parent: int) -> Result:
-    if os.getppid() == parent:
-        _end_with(parent)
-    return function(item)
+def _pool(function: Callable[..., Any], jobs: int) -> Executor:
+    threads = max(1, (os.cpu_count() or 1) // jobs)
+    if _forks():
+        return ProcessPoolExecutor(
+            jobs, multiprocessing.get_context("fork"), _begin, (function, threads)
+        )
+    from joblib.externals.loky import ProcessPoolExecutor as Fresh
+
+    pool: Executor = Fresh(jobs, timeout=60, initializer=_begin, initargs=(function, threads))
+    return pool
 
 
-@cache
-def _end_with(parent: int) -> None:
-    """End this process when its parent is gone, which may have been killed without a word."""
+_function: Callable[[Any], Any]
 
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
 
-    Thread(target=watch, daemon=True).start()
+def _begin(function: Callable[[Any], Any], threads: int) -> None:
+    """Prepare a worker: it has the function, and as many threads as there are cores for it."""
+    from threadpoolctl import threadpool_limits
+
+    global _function
+    _function = function
+    gc.freeze()  # a collection that visits what was forked would copy its pages
+    threadpool_limits(threads)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops its workers
+    parent = multiprocessing.parent_process()
+    if parent is not None and parent.sentinel is not None:  # of a fresh one loky takes care
+        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: Any) -> None:
+    """End this process with its parent, which may be killed at any moment."""
+    with suppress(OSError):
+        parent.join()
+    os._exit(1)
+
+
+def _call(item: Any) -> Any:
+    return _function(item)

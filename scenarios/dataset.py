@@ -1,11 +1,12 @@
 """Simulation of the missing runs of a data set, several at once."""
 
-import os
 import time
 from collections.abc import Iterator, Sequence
+from functools import partial
 from importlib.util import find_spec
 
 from noisemodel import NoiseModelError
+from noisemodel.parallel import DIED, Jobs, polled
 from scenarios.errors import (
     DatasetError,
     MissingSimulatorError,
@@ -15,11 +16,8 @@ from scenarios.errors import (
 from scenarios.folder import Folder
 from scenarios.tasks import Task, grouped_by_twin
 
-POLL = 0.5
-"""Time between two checks for runs of other processes, in [s]."""
 
-
-def make(folder: Folder, tasks: Sequence[Task], *, jobs: int = 1) -> Iterator[Task]:
+def make(folder: Folder, tasks: Sequence[Task], *, jobs: Jobs = 1) -> Iterator[Task]:
     """Simulate the missing runs of a data set.
 
     Each run is written at once, so that a killed process loses only the runs in work.
@@ -27,54 +25,58 @@ def make(folder: Folder, tasks: Sequence[Task], *, jobs: int = 1) -> Iterator[Ta
     Args:
         folder: The folder of the data set.
         tasks: The runs of the data set.
-        jobs: Number of parallel processes.
+        jobs: Number of parallel processes, or the address of a Dask scheduler.
 
     Yields:
         The runs in the order of completion, including those that fell.
 
     Raises:
         MissingSimulatorError: If MuJoCo is not installed.
-        DatasetError: If a run cannot be simulated or written.
+        DatasetError: If a run cannot be simulated or written, or a worker dies with it.
+        ClusterError: If the Dask scheduler cannot be reached, or is lost.
     """
     groups = grouped_by_twin(folder.missing(tasks), folder.format.motion)
     if groups and find_spec("mujoco") is None:
         raise MissingSimulatorError
-    if jobs == 1 or len(groups) < 2:
+    if jobs == 1:
         for group in groups:
             yield from _make(folder, group)
     else:
         yield from _make_at_once(folder, groups, jobs)
 
 
-def _make_at_once(folder: Folder, groups: Sequence[tuple[Task, ...]], jobs: int) -> Iterator[Task]:
+def _make_at_once(folder: Folder, groups: Sequence[tuple[Task, ...]], jobs: Jobs) -> Iterator[Task]:
     """Simulate each group in one process, so that its twin is simulated once."""
-    from concurrent.futures import wait
-
-    from joblib.externals.loky import get_reusable_executor
-
-    executor = get_reusable_executor(max_workers=jobs)
     pending = {task for group in groups for task in group}
-    try:
-        running = {executor.submit(_make_all, folder, group, os.getpid()) for group in groups}
-        while running:
-            done, running = wait(running, timeout=POLL)
-            for job in done:
-                job.result()
+    dead: list[Task] = []
+    while groups:
+        rest = []
+        for found in polled(partial(_make_all, folder), groups, jobs=jobs, died=_died):
             made = pending - set(folder.missing(pending))
             pending -= made
             yield from sorted(made)
-    finally:
-        executor.shutdown(kill_workers=True)
+            if found is not None and not found[1]:
+                first, *others = folder.missing(groups[found[0]])
+                dead.append(first)
+                rest.append(tuple(others))
+        groups = [group for group in rest if group]
+    if dead:
+        names = ", ".join(task.name for task in dead)
+        raise DatasetError(f"{names}: {DIED}; the same command tries again")
 
 
-def _make_all(folder: Folder, group: tuple[Task, ...], caller: int) -> None:
-    runs = _make(folder, group)
-    # If the caller was killed, stop: another process may have resumed the data set.
-    while os.getppid() == caller and next(runs, None):
+def _make_all(folder: Folder, group: Sequence[Task]) -> bool:
+    """Simulate a group, but for what was made of it by a worker that died."""
+    for _ in _make(folder, folder.missing(group)):
         pass
+    return True
 
 
-def _make(folder: Folder, group: tuple[Task, ...]) -> Iterator[Task]:
+def _died(_: Sequence[Task]) -> bool:
+    return False
+
+
+def _make(folder: Folder, group: Sequence[Task]) -> Iterator[Task]:
     for task in group:
         start = time.process_time()
         try:

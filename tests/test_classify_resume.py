@@ -11,13 +11,14 @@ from pathlib import Path
 import pytest
 from commandline import call
 
-from inspector import assets, workers
+from inspector import assets
 from inspector.analysis import state, verdict
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import Verdict
 from inspector.assets import demo_run
 from inspector.logs.opening import open_source
 from inspector.version import program_version
+from noisemodel import parallel
 
 ROOT = Path(__file__).parents[1]
 COUNT = 24
@@ -130,7 +131,7 @@ def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
 
 def test_a_run_that_kills_its_worker_is_named_and_the_others_are_classified(runs, monkeypatch):
     monkeypatch.setattr(verdict, "open_source", die_of_seven)
-    monkeypatch.setattr(workers, "_forks", lambda: True)  # as of the command line by itself
+    monkeypatch.setattr(parallel, "_forks", lambda: True)  # as of the command line by itself
     status, out, err = call("classify", runs, "-j", 2)
     assert status == 70
     assert out.splitlines()[-1].startswith(f"{COUNT} runs: 1 internal error, {COUNT - 1} with")

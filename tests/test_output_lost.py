@@ -131,11 +131,11 @@ def alive(pid):
 
 SLOW = """
 import sys, time
-from noisemodel.parallel import each
+from noisemodel.parallel import in_order
 def wait(seconds):
     open(f"{sys.argv[1]}/{seconds}", "w").close()
     time.sleep(seconds)
-list(each(wait, [50, 51, 52], jobs=2))
+list(in_order(wait, [50, 51, 52], jobs=2, died=None))
 """
 
 

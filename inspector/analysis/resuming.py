@@ -11,7 +11,7 @@ from inspector.analysis.verdict import Verdict, classify_file, died, work_of
 from inspector.library import Library
 from inspector.logs.opening import Reading, Source
 from inspector.version import program_version
-from inspector.workers import as_done
+from noisemodel.parallel import Jobs, as_done
 
 
 def classify_resumed(
@@ -23,7 +23,7 @@ def classify_resumed(
     unknown: Unknown = Unknown.FINDING,
     localise: bool = False,
     draw: Callable[[Analysis, Path], Path] | None = None,
-    jobs: int = 1,
+    jobs: Jobs = 1,
 ) -> Iterator[Verdict]:
     """Classify the runs that a state file has no verdict on; see `verdict.classify_files`.
 
@@ -35,7 +35,7 @@ def classify_resumed(
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         localise: Whether to localise each finding.
         draw: Draws a picture of an analysis.
-        jobs: How many to work on at once.
+        jobs: How many to work on at once, or the address of a Dask scheduler.
 
     Yields:
         A verdict per run, in no order: first those of the file.

@@ -19,8 +19,8 @@ from inspector.analysis.status import EXIT, Status, Unknown, worst
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.opening import Reading, Source, open_source
-from inspector.workers import in_order
 from models import Event
+from noisemodel.parallel import DIED, Jobs, in_order
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
@@ -248,7 +248,7 @@ def classify_files(
     unknown: Unknown = Unknown.FINDING,
     localise: bool = False,
     draw: Callable[[Analysis, Path], Path] | None = None,
-    jobs: int = 1,
+    jobs: Jobs = 1,
 ) -> Iterator[Verdict]:
     """Classify many files; one bad file never stops the rest.
 
@@ -259,7 +259,8 @@ def classify_files(
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         localise: Whether to localise each finding.
         draw: Draws a picture of an analysis, see `classify_file`; importable for several jobs.
-        jobs: How many to work on at once. A run with which a worker dies is an internal error.
+        jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
+            worker dies is an internal error.
 
     Returns:
         A verdict per file, in their order.
@@ -278,7 +279,7 @@ def classify_files(
 def died(path: Path | Source, unknown: Unknown) -> Verdict:
     """The verdict on a run with which a worker died."""
     shown = path.shown if isinstance(path, Source) else path
-    message = "the worker died, of lack of memory or a crash; classify this run alone to see why"
+    message = f"{DIED}; classify this run alone to see why"
     return Verdict(shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
 
 

@@ -11,7 +11,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inspector.analysis.status import OUTPUT_LOST, Status, Unknown, worst
-from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
+from inspector.commands.options import (
+    Dask,
+    ModelFiles,
+    Overwrite,
+    jobs_or_dask,
+    reads_logs,
+    say_assumed,
+)
 from inspector.commands.outputs import BadInput, files_of, tried, written
 
 if TYPE_CHECKING:
@@ -50,6 +57,7 @@ def classify(
     ],
     format: Annotated[Format, _of_output("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    dask: Dask = "",
     model: ModelFiles = None,
     labels_to: Annotated[
         Path | None, _of_output(help="Write the findings to this folder, one file per run.")
@@ -110,7 +118,7 @@ def classify(
       0  ok: no run has a finding that counts
       1  findings: at least one run has one, or lacks one that is required
       2  wrong usage
-      3  bad input: a file cannot be read
+      3  bad input: a file cannot be read; the cluster of --dask cannot be reached, or is lost
       4  cannot tell: say, the rate is too low for every model
       5  output lost: an output could not be written
      70  internal error: a bug, with its traceback on standard error
@@ -155,7 +163,7 @@ def classify(
         "unknown": unknown,
         "localise": localise or any(each.by_joint for each in expected.values()),
         "draw": draw,
-        "jobs": jobs,
+        "jobs": jobs_or_dask(jobs, dask),
     }
     if resume is None:
         classified = classify_files(found, library, **settings)

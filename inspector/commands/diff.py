@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from inspector.analysis.status import OUTPUT_LOST, Unknown, worst
-from inspector.commands.options import ModelFiles, Overwrite
+from inspector.commands.options import Dask, ModelFiles, Overwrite, jobs_or_dask
 from inspector.commands.outputs import BadInput, files_of, tried, written
 
 
@@ -68,6 +68,7 @@ def diff(
         typer.Option("--on-bad-input", help="A file that cannot be read: fails, or ignored."),
     ] = BadInput.FAIL,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    dask: Dask = "",
     model: ModelFiles = None,
     robot: Annotated[
         bool, typer.Option("--robot/--no-robot", help="Compare the links of known robots.")
@@ -88,7 +89,7 @@ def diff(
       0  nothing that --fail-on names
       1  worse, or new findings
       2  wrong usage
-      3  bad input: a file cannot be read, or nothing can be paired
+      3  bad input: a file cannot be read, nothing can be paired, or no cluster is reached
       4  cannot tell: too few repetitions of every scenario
       5  output lost: an output could not be written
      70  internal error: a bug, with its traceback on standard error
@@ -105,6 +106,7 @@ def diff(
     from inspector.regression.pairing import Pairing, files_in, paired
     from inspector.report.cases import published
 
+    where = jobs_or_dask(jobs, dask)
     files = files_of(write or [], list(Format), overwrite=overwrite)
     if report:
         reporting.prepare(report, overwrite=overwrite)
@@ -113,7 +115,7 @@ def diff(
     runs = [*sides[0], *sides[1]]
     measured = list(
         progress(
-            measure_files(runs, library, links=robot, unknown=unknown, jobs=jobs),
+            measure_files(runs, library, links=robot, unknown=unknown, jobs=where),
             "diff",
             total=len(runs),
         )

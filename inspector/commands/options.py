@@ -14,6 +14,7 @@ from inspector.training.part import Part
 if TYPE_CHECKING:
     from inspector.logs.opening import Opened, Reading
     from noisemodel import Run
+    from noisemodel.parallel import Jobs
 
 RunFile = Annotated[
     Path, typer.Argument(help="A run file, or any log: CSV, bag, ...", show_default=False)
@@ -26,6 +27,28 @@ ModelFiles = Annotated[
         "--model", help="Use this model only: a file, or the name of a shipped one; repeatable."
     ),
 ]
+
+
+Dask = Annotated[
+    str,
+    typer.Option(
+        "--dask",
+        metavar="ADDRESS",
+        help="Work on the workers of this Dask scheduler, tcp://HOST:PORT, instead of --jobs.",
+        show_default=False,
+    ),
+]
+
+
+def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
+    """Where to work: the number of processes, or the address of a Dask scheduler.
+
+    Raises:
+        BadParameter: If both are given.
+    """
+    if dask and jobs > 1:
+        raise typer.BadParameter("--jobs and --dask exclude each other")
+    return dask or jobs
 
 
 def _known(kind: str) -> str:

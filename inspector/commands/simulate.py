@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from inspector.commands.options import Overwrite
+from inspector.commands.options import Dask, Overwrite, jobs_or_dask
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -119,6 +119,7 @@ def dataset(
         float | None, typer.Option(help="Of each run, in seconds; by default that of its motion.")
     ] = None,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    dask: Dask = "",
     overwrite: Annotated[
         bool, typer.Option("--overwrite", help="Replace damaged files; intact files stay.")
     ] = False,
@@ -134,12 +135,13 @@ def dataset(
     from scenarios.statistics import Statistics
     from scenarios.tasks import DatasetSpec, choose
 
+    where = jobs_or_dask(jobs, dask)
     choice = choose(_listed(robots), _listed(scenarios), healthy=only is Only.OK)
     spec = DatasetSpec(choice=choice, first=first_seed, seeds=seeds, hours=hours)
     folder = Folder.opened(output, format_name=form, duration=duration)
     folder.clear(overwrite=overwrite)
     while missing := folder.missing(spec.tasks(duration=duration, fallen=folder.fallen())):
-        for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
+        for _ in progress(make(folder, missing, jobs=where), "simulate", total=len(missing)):
             pass
     if form is Form.NOISYTEST:
         noisytest.write_config(output)

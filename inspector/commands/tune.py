@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import InPart, Inputs, Overwrite
+from inspector.commands.options import Dask, InPart, Inputs, Overwrite, jobs_or_dask
 from inspector.training.part import Part
 
 
@@ -64,6 +64,7 @@ def tune(
     rows: Annotated[int, typer.Option(min=1, help="Number of points to print.")] = 10,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")] = 1,
+    dask: Dask = "",
     overwrite: Overwrite = False,
 ) -> None:
     """Tune a profile's settings by grid search; resumes if killed."""
@@ -83,7 +84,8 @@ def tune(
         rate=rate,
         grid=grid or ("paper",),
     )
-    tuned = tune_profile(search, output, model=train, jobs=jobs, overwrite=overwrite)
+    where = jobs_or_dask(jobs, dask)
+    tuned = tune_profile(search, output, model=train, jobs=where, overwrite=overwrite)
     report = dumps(tuned.as_dict(criterion.value, rows=rows), indent=2)
     typer.echo(report if as_json else tuned.table(criterion.value, rows=rows))
     if train:

@@ -10,7 +10,7 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis, analyse, with_links
 from inspector.analysis.status import Status, Unknown
-from inspector.analysis.verdict import EXPECTED
+from inspector.analysis.verdict import EXPECTED, work_of
 from inspector.library import Library
 from inspector.logs.opening import open_run
 from inspector.pair.alignment import envelope
@@ -19,7 +19,7 @@ from models import Event
 from noisemodel import Run
 from noisemodel.links import LinkNoise, vibrating
 from noisemodel.noise import decibel
-from noisemodel.parallel import each
+from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.types import Array
 
 ENVELOPE = 200.0
@@ -120,7 +120,7 @@ def measure_files(
     *,
     links: bool = True,
     unknown: Unknown = Unknown.FINDING,
-    jobs: int = 1,
+    jobs: Jobs = 1,
 ) -> Iterator[Measured | Unreadable]:
     """Measure many files; one that cannot be read never stops the rest.
 
@@ -129,13 +129,18 @@ def measure_files(
         library: Models to choose from.
         links: Whether to compute the noise of links where the robot is known.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
-        jobs: How many to work on at once.
+        jobs: How many to work on at once, or the address of a Dask scheduler. A file with which a
+            worker dies is one that cannot be read.
 
     Returns:
         What was measured of each file, in their order.
     """
     one = partial(measure_file, library=library, links=links, unknown=unknown)
-    return each(one, paths, jobs=jobs)
+    return in_order(one, paths, jobs=jobs, died=_died, work=work_of(paths))
+
+
+def _died(path: Path) -> Unreadable:
+    return Unreadable(path, DIED)
 
 
 def measure_file(

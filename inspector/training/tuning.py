@@ -7,7 +7,7 @@ from functools import partial
 from itertools import groupby
 from math import isnan
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import models
 from inspector.errors import InspectorError
@@ -22,10 +22,13 @@ from models.tuning.grid import ESTIMATOR_SETTINGS, Grid, Point
 from models.tuning.search import Criterion, Measures, Validation, measure, order, validate
 from models.tuning.trial import Trial
 from noisemodel.atomic import refuse_existing
-from noisemodel.parallel import each
+from noisemodel.parallel import DIED, Jobs, in_order
 
 BATCHES = 4
 """Least number of batches per job: a stopped job loses one; all end at nearly the same time."""
+
+WORKERS = 16
+"""For how many workers of a cluster there should be enough batches."""
 
 HEADS = {
     "balanced_accuracy": ("balanced", "accuracy"),
@@ -208,7 +211,7 @@ def tune(
     output: Path,
     *,
     model: Path | None = None,
-    jobs: int = 1,
+    jobs: Jobs = 1,
     overwrite: bool = False,
 ) -> Tuned:
     """Measure the points of a grid that a results file does not have yet.
@@ -217,14 +220,14 @@ def tune(
         search: The settings of the search.
         output: The results file; the search resumes if it exists.
         model: A model file to write afterwards; if it exists, it is refused before the work.
-        jobs: Number of parallel processes.
+        jobs: Number of parallel processes, or the address of a Dask scheduler.
         overwrite: Whether to discard the results in the file.
 
     Returns:
         The measures of all points.
 
     Raises:
-        InspectorError: If there is no such profile, or the file has other results.
+        InspectorError: If there is no such profile, the file has other results, or a worker dies.
         GridError: If the grid cannot be searched.
         ModelsError: If the recordings cannot be trained on, or some are in both sets.
     """
@@ -246,8 +249,10 @@ def tune(
     reference = validate([base], trial)  # first: data that cannot be trained on leave no file
     with opened(output, facts, points, overwrite=overwrite) as results:
         done = len(results.measures)
-        batches = _batches(points[done:], profiles[done:], BATCHES * jobs)
-        found = each(partial(measure, trial=trial), batches, jobs=jobs)
+        least = BATCHES * (jobs if isinstance(jobs, int) else WORKERS)
+        batches = _batches(points[done:], profiles[done:], least)
+        one, names = partial(measure, trial=trial), list(grid.axes)
+        found = in_order(one, batches, jobs=jobs, died=partial(_died, names=names))
         for measures in progress(found, "tune", total=len(batches)):
             results.add(measures)
     return Tuned(search, grid, profiles, results.measures, base, reference, trial)
@@ -291,6 +296,12 @@ def _batches(
         if len(found) >= least:
             break
     return found
+
+
+def _died(batch: Sequence[models.Profile], names: Sequence[str]) -> NoReturn:
+    first = ", ".join(f"{name}={getattr(batch[0], name)}" for name in names)
+    others = f" and {len(batch) - 1} more" if len(batch) > 1 else ""
+    raise InspectorError(f"{first}{others}: {DIED}; the same command resumes there")
 
 
 def _digests(found: Sequence[models.Recording]) -> Mapping[str, Any]:

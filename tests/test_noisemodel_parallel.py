@@ -5,14 +5,14 @@ import time
 
 import pytest
 
-from inspector import workers
-from inspector.workers import as_done, in_order
+from noisemodel import parallel
+from noisemodel.parallel import as_done, in_order
 
 
 @pytest.fixture(params=[True, False], ids=["forked", "fresh"])
 def start(request, monkeypatch):
     """Both ways to start a process."""
-    monkeypatch.setattr(workers, "_forks", lambda: request.param)
+    monkeypatch.setattr(parallel, "_forks", lambda: request.param)
 
 
 def square_or_die(number):
@@ -44,7 +44,7 @@ def test_results_come_as_they_are_ready_and_in_order_if_requested(start):
 
 
 def test_little_work_starts_no_fresh_interpreters(monkeypatch):
-    monkeypatch.setattr(workers, "_forks", lambda: False)
+    monkeypatch.setattr(parallel, "_forks", lambda: False)
     found = list(in_order(square_or_die, [1, 2], jobs=2, died=dead, work=0.5))
     assert {process for *_, process in found} == {os.getpid()}
 
