@@ -10,6 +10,7 @@ with the client's settings, so that the results are those of the client's own ma
 
 import logging
 import os
+import re
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -125,11 +126,14 @@ def _connected(address: str) -> Iterator[Any]:
             "a Dask cluster needs distributed, which is not installed;"
             " run `pip install 'noise-inspector[cluster]'`"
         )
+    if not re.fullmatch(r"\w+://.+:\d+", address):
+        raise ClusterError(f"{address!r} is no address of a Dask scheduler, tcp://HOST:PORT")
     from distributed import Client
 
-    logger = logging.getLogger("distributed")
-    level = logger.level
-    logger.setLevel(logging.CRITICAL + 1)
+    loggers = [logging.getLogger(name) for name in ("distributed", "distributed.client")]
+    levels = [logger.level for logger in loggers]
+    for logger in loggers:
+        logger.setLevel(logging.CRITICAL + 1)
     try:
         try:
             client = Client(address, timeout=REACHED, set_as_default=False)
@@ -148,7 +152,8 @@ def _connected(address: str) -> Iterator[Any]:
                 ) from error
             yield client
     finally:
-        logger.setLevel(level)
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
 
 
 def _check_software(client: Any, address: str) -> None:

@@ -1,0 +1,198 @@
+"""Speed-up of two processes over one, and memory of workers over a batch.
+
+    python -m benchmarks.batch [--runs 200] [--rate 1000] [--joints 7] [--seconds 10] [--repeats 5]
+    python -m benchmarks.batch --memory --runs 1000 --rate 10000 --joints 32 [--jobs 2]
+
+The batch is a folder of links to eight files of simulated motion: position, velocity and desired
+velocity of joints that follow slow sines, with noise and a few impacts.
+
+Speed: `inspector classify FOLDER` with one process, with two, and as two commands at the same time
+with half of the runs each, which is what two cores can do at best. They take turns after a warm-up.
+Given are medians of wall and CPU time, and the median of the ratios of the turns.
+
+Memory: of each worker, every 0.2 s, by /proc. RSS counts what a worker has in memory, USS what it
+alone has (what was forked and not changed is its parent's too), PSS shares that among those who
+have it. Given are the peaks, and the median USS in each quarter of the batch: a leak grows.
+"""
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+
+from noisemodel import Run
+
+ROOT = Path(__file__).parents[1]
+FILES = 8
+"""Number of files that links lead to."""
+EVERY = 0.2
+"""Time between two samples of memory, in [s]."""
+
+
+def motion(seed: int, *, rate: float, joints: int, seconds: float) -> Run:
+    """Joints that follow slow sines, with noise and an impact every two seconds."""
+    random = np.random.default_rng(seed)
+    time = np.arange(round(rate * seconds)) / rate
+    hertz, phase = random.uniform(0.1, 0.6, joints), random.uniform(0.0, 6.0, joints)
+    angle = 2 * np.pi * hertz * time[:, None] + phase
+    desired = 0.5 * np.cos(angle)
+    velocity = desired + 0.002 * random.standard_normal(desired.shape)
+    for hit in random.uniform(0.0, seconds, max(1, round(seconds / 2))):
+        after = np.maximum(time - hit, 0.0)
+        ringing = 0.1 * np.exp(-after / 0.02) * np.sin(2 * np.pi * 0.1 * rate * after)
+        velocity[:, random.integers(joints)] += ringing
+    return Run(
+        time=time,
+        position=0.25 / (np.pi * hertz) * np.sin(angle),
+        velocity=velocity,
+        velocity_desired=desired,
+        joint_names=tuple(f"joint{number}" for number in range(1, joints + 1)),
+    )
+
+
+def make(
+    folder: Path, links: Path, *, runs: int, rate: float, joints: int, seconds: float
+) -> tuple[Path, ...]:
+    """Write the files, and links to them: a folder of all runs, and two with half of them each."""
+    files = []
+    for seed in range(FILES):
+        path = folder / f"{seed}-{rate:g}-{joints}-{seconds:g}.npz"
+        if not path.exists():
+            motion(seed, rate=rate, joints=joints, seconds=seconds).save(path)
+        files.append(path)
+    places = tuple(links / name for name in ("all", "even", "odd"))
+    for place in places:
+        place.mkdir()
+    for number in range(runs):
+        for place in (places[0], places[1 + number % 2]):
+            (place / f"{number:04d}.npz").symlink_to(files[number % FILES])
+    return places
+
+
+def command(folder: Path, jobs: int) -> "subprocess.Popen[bytes]":
+    """Start `inspector classify`, with the bytecode that an installation has."""
+    unset = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(ROOT)}
+    kept = {"PYTHONPYCACHEPREFIX": str(folder.parents[1] / "bytecode")}
+    return subprocess.Popen(
+        [sys.executable, "-m", "inspector", "classify", str(folder), "-j", str(jobs)],
+        cwd=ROOT,
+        env=os.environ | unset | kept,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def timed(folders: Sequence[Path], jobs: int) -> tuple[float, float]:
+    """Wall and CPU time of commands at the same time, in [s].
+
+    Raises:
+        SystemExit: If one of them failed; findings are no failure.
+    """
+    before, begun = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    for status in [process.wait() for process in [command(each, jobs) for each in folders]]:
+        if status not in (0, 1):
+            raise SystemExit(f"inspector classify failed (exit {status})")
+    wall = time.perf_counter() - begun
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return wall, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def speed(places: tuple[Path, ...], repeats: int) -> None:
+    """Print times of one process, of two, and of two commands with half of the runs."""
+    ways = {
+        "one process": (places[:1], 1),
+        "two processes": (places[:1], 2),
+        "two commands, half of the runs each": (places[1:], 1),
+    }
+    found: dict[str, list[tuple[float, float]]] = {way: [] for way in ways}
+    for repeat in range(repeats + 1):
+        for way, (folders, jobs) in ways.items():
+            times = timed(folders, jobs)
+            if repeat:
+                found[way].append(times)
+    print("| | wall [s] | CPU [s] | times as fast |\n|---|---|---|---|")
+    for way, all_times in found.items():
+        wall, cpu = (median(each) for each in zip(*all_times, strict=True))
+        pairs = zip(found["one process"], all_times, strict=True)
+        ratio = median(one[0] / other[0] for one, other in pairs)
+        print(f"| {way} | {wall:.2f} | {cpu:.2f} | {ratio:.2f} |")
+
+
+def memory(folder: Path, jobs: int, runs: int) -> None:
+    """Print the memory of each worker of a batch."""
+    samples: dict[int, list[tuple[float, float, float]]] = {}
+    peaks: dict[int, float] = {}
+    begun = time.perf_counter()
+    with command(folder, jobs) as process:
+        while process.poll() is None:
+            time.sleep(EVERY)
+            for worker in children(process.pid) if jobs > 1 else [process.pid]:
+                try:
+                    shares = fields(worker, "smaps_rollup")
+                    peaks[worker] = fields(worker, "status")["VmHWM"]
+                except (OSError, KeyError):  # it has just ended
+                    continue
+                own = shares["Private_Clean"] + shares["Private_Dirty"]
+                samples.setdefault(worker, []).append((shares["Rss"], shares["Pss"], own))
+        if process.returncode not in (0, 1):
+            raise SystemExit(f"inspector classify failed (exit {process.returncode})")
+    wall = time.perf_counter() - begun
+    print(f"{runs} runs in {wall:.0f} s, {jobs} at once; memory of each worker in [MB]\n")
+    print("| worker | peak RSS | peak PSS | peak USS | USS by quarter of the batch |")
+    print("|---|---|---|---|---|")
+    for number, (worker, rows) in enumerate(samples.items(), start=1):
+        _, pss, uss = (max(each) for each in zip(*rows, strict=True))
+        quarters = [median(row[2] for row in part) for part in np.array_split(rows, 4) if len(part)]
+        trend = " ".join(f"{each:.0f}" for each in quarters)
+        print(f"| {number} | {peaks[worker]:.0f} | {pss:.0f} | {uss:.0f} | {trend} |")
+
+
+def children(process: int) -> list[int]:
+    """Processes that a process has started."""
+    try:  # any thread may have started them
+        tasks = [each.read_text() for each in Path(f"/proc/{process}/task").glob("*/children")]
+    except OSError:  # it has just ended
+        return []
+    return [int(each) for task in tasks for each in task.split()]
+
+
+def fields(process: int, name: str) -> dict[str, float]:
+    """Sizes in a file of /proc, in [MB]."""
+    rows = (line.split() for line in Path(f"/proc/{process}/{name}").read_text().splitlines())
+    return {row[0].rstrip(":"): int(row[1]) / 1000 for row in rows if row[-1] == "kB"}
+
+
+def main() -> None:
+    """Make the batch, measure and print."""
+    arguments = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    arguments.add_argument("--runs", type=int, default=200)
+    arguments.add_argument("--rate", type=float, default=1000.0, help="in [Hz]")
+    arguments.add_argument("--joints", type=int, default=7)
+    arguments.add_argument("--seconds", type=float, default=10.0, help="of each run")
+    arguments.add_argument("--repeats", type=int, default=5)
+    arguments.add_argument("--jobs", type=int, default=2, help="whose memory is measured")
+    arguments.add_argument("--memory", action="store_true", help="measure memory, not speed")
+    arguments.add_argument("--output", type=Path, default=ROOT / "build" / "batch")
+    given = arguments.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
+    size = {"rate": given.rate, "joints": given.joints, "seconds": given.seconds}
+    with tempfile.TemporaryDirectory(dir=given.output) as links:
+        places = make(given.output, Path(links), runs=given.runs, **size)
+        if given.memory:
+            memory(places[0], given.jobs, given.runs)
+        else:
+            speed(places, given.repeats)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,281 @@
+"""Runs on the workers of a Dask scheduler: a real one, on this machine."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from commandline import call
+from test_inspector_tune import OPTIONS, write_log
+
+from inspector.assets import demo_run
+from noisemodel import ClusterError, cluster
+from noisemodel.parallel import DIED, in_order
+
+ROOT = Path(__file__).parents[1]
+PATH = os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
+COUNT = 24
+SLOW = 120.0
+"""Most time that a process of the cluster may take to start, or an answer to arrive, in [s]."""
+
+
+def until(condition):
+    deadline = time.monotonic() + SLOW
+    while not (found := condition()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return found
+
+
+class Cluster:
+    """A scheduler and its workers, each in a folder of its own and with a nanny."""
+
+    def __init__(self, folder):
+        self.folder, self.file, self.processes = folder, folder / "scheduler.json", []
+        self.scheduler = self.start("scheduler", "--port", "0", "--scheduler-file", self.file)
+        self.address = until(self._address)
+
+    def start(self, what, *arguments, path=PATH):
+        place = self.folder / str(len(self.processes))
+        place.mkdir()
+        allowed = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
+        with (place / "log").open("w") as log:
+            module = f"distributed.cli.dask_{what}"
+            common = ("--host", "127.0.0.1", "--no-dashboard")
+            process = subprocess.Popen(
+                [sys.executable, "-m", module, *common, *map(str, arguments)],
+                cwd=place,
+                env=os.environ | {"PYTHONPATH": path} | allowed,
+                stdout=log,
+                stderr=log,
+            )
+        self.processes.append(process)
+        return process
+
+    def add_worker(self, **settings):
+        return self.start("worker", self.address, "--nthreads", "1", **settings)
+
+    def _address(self):
+        return self.file.exists() and json.loads(self.file.read_text() or "{}").get("address")
+
+    def workers(self):
+        """Process of each worker, by its address."""
+        from distributed import Client
+
+        with Client(self.address, set_as_default=False) as client:
+            return client.run(os.getpid)
+
+    def stop(self):
+        for process in reversed(self.processes):
+            process.terminate()
+            process.wait()
+
+
+@contextmanager
+def running(folder, workers):
+    pytest.importorskip("distributed")
+    cluster = Cluster(folder)
+    try:
+        for _ in range(workers):
+            cluster.add_worker()
+        until(lambda: len(cluster.workers()) == workers)
+        yield cluster
+    finally:
+        cluster.stop()
+
+
+@pytest.fixture(scope="module")
+def two(tmp_path_factory):
+    """A cluster of two workers."""
+    with running(tmp_path_factory.mktemp("two"), 2) as cluster:
+        yield cluster
+
+
+@pytest.fixture
+def runs(tmp_path):
+    folder = tmp_path / "runs"
+    folder.mkdir()
+    for number in range(COUNT):
+        shutil.copy(demo_run(), folder / f"{number:02d}.npz")
+    return folder
+
+
+def rows(state):
+    return [json.loads(line) for line in state.read_bytes().split(b"\n")[1:-1]]
+
+
+def start(folder, *arguments):
+    return subprocess.Popen(
+        [sys.executable, "-m", "inspector", *map(str, arguments)],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": PATH},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.slow
+def test_of_two_workers_one_is_killed_and_nothing_is_lost_or_done_twice(two, runs, monkeypatch):
+    monkeypatch.chdir(runs.parent)
+    alone = call("classify", "runs")
+    state = runs.parent / "state.jsonl"
+    process = start(runs.parent, "classify", "runs", "--dask", two.address, "--resume", state)
+    until(lambda: state.exists() and len(rows(state)) > 2)
+    os.kill(next(iter(two.workers().values())), signal.SIGKILL)
+    out, err = process.communicate(timeout=SLOW)
+    assert (process.returncode, out) == alone[:2], err
+    assert sorted(row["run"] for row in rows(state)) == [f"runs/{n:02d}.npz" for n in range(COUNT)]
+    until(lambda: len(two.workers()) == 2)
+
+
+def square_or_die(number):
+    if number in (3, 7):
+        os._exit(1)
+    return number**2
+
+
+@pytest.mark.slow
+def test_an_item_that_kills_every_worker_is_named_and_the_others_are_not(two):
+    found = list(in_order(square_or_die, range(8), jobs=two.address, died=lambda item: DIED))
+    assert found == [DIED if number in (3, 7) else number**2 for number in range(8)]
+    until(lambda: len(two.workers()) == 2)
+
+
+def invert(number):
+    return 1 / number
+
+
+@pytest.mark.slow
+def test_an_error_on_a_worker_is_raised_here(two):
+    with pytest.raises(ZeroDivisionError, match="division by zero"):
+        list(in_order(invert, [1, 0, 2], jobs=two.address, died=invert))
+
+
+@pytest.mark.slow
+def test_a_worker_without_the_files_is_named(two, monkeypatch):
+    monkeypatch.setattr(Path, "cwd", lambda: Path("/elsewhere"))
+    with pytest.raises(ClusterError, match="no folder /elsewhere; it must see the same files"):
+        list(in_order(invert, [1], jobs=two.address, died=invert))
+
+
+@pytest.mark.slow
+def test_diff_and_tune_print_and_write_the_same_on_a_cluster(two, runs, monkeypatch):
+    monkeypatch.chdir(runs.parent)
+    for number in range(2):
+        write_log(runs.parent / "logs", number)
+    for number in range(2, 20):
+        (runs / f"{number:02d}.npz").unlink()
+    shutil.copytree(runs, "after")
+    tune = ("tune", "logs", *OPTIONS, "--folds", 2, "--grid", "C=1,10", "--grid", "stride=25,50")
+    for command in (
+        ("diff", "runs", "after", "--format", "json", "--no-robot"),
+        (*tune, "-o", "{}.jsonl"),
+    ):
+        here, there = (
+            call(*(str(each).format(place) for each in command), *more)[:2]
+            for place, more in (("here", ()), ("there", ("--dask", two.address)))
+        )
+        assert there == here
+    assert Path("there.jsonl").read_bytes() == Path("here.jsonl").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_data_set_is_the_same_from_a_cluster(two, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    data = ("simulate", "dataset", "--robots", "panda", "--scenarios", "2,3", "--seeds", 1)
+    for place, more in (("here", ()), ("there", ("--dask", two.address))):
+        status, _, err = call(*data, "--duration", 3, "-o", place, *more)
+        assert status == 0, err
+    here, there = (
+        {path.name: path.read_bytes() for path in Path(place).rglob("*.npz")}
+        for place in ("here", "there")
+    )
+    assert len(here) == 2
+    assert there == here
+
+
+@pytest.mark.slow
+def test_a_cluster_without_workers_with_others_and_one_that_vanishes(tmp_path, runs, monkeypatch):
+    monkeypatch.setattr(cluster, "STAFFED", 1.0)
+    (tmp_path / "cluster").mkdir()
+    with running(tmp_path / "cluster", 0) as small:
+        status, out, err = call("classify", runs, "--dask", small.address)
+        assert (status, out) == (3, "")
+        assert err.startswith(f"inspector: {small.address}: the Dask scheduler has no worker after")
+        assert err.count("\n") == 1
+        old = tmp_path / "old" / "noise_inspector-0.0.1.dist-info"
+        old.mkdir(parents=True)
+        (old / "METADATA").write_text("Name: noise-inspector\nVersion: 0.0.1\n")
+        worker = small.add_worker(path=os.pathsep.join([str(old.parent), PATH]))
+        until(small.workers)
+        status, out, err = call("classify", runs, "--dask", small.address)
+        assert (status, out) == (3, "")
+        assert " has noise-inspector 0.0.1, here is " in err
+        assert err.endswith("; install the same on all\n")
+        assert err.count("\n") == 1
+        worker.terminate()
+        worker.wait()
+        small.add_worker()
+        until(small.workers)
+        state = tmp_path / "state.jsonl"
+        process = start(tmp_path, "classify", runs, "--dask", small.address, "--resume", state)
+        until(lambda: state.exists() and len(rows(state)) > 2)
+        small.scheduler.kill()
+        out, err = process.communicate(timeout=SLOW)
+        assert (process.returncode, out) == (3, "")
+        said = [line for line in err.splitlines() if not line.startswith("classify: ")]
+        assert said == [f"inspector: {small.address}: the connection to the Dask scheduler is lost"]
+        assert 2 < len(rows(state)) < COUNT
+
+
+def test_a_scheduler_that_does_not_answer_is_one_line(monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cluster, "REACHED", 0.2)
+    status, out, err = call("classify", demo_run(), "--dask", "tcp://127.0.0.1:1")
+    assert (status, out) == (3, "")
+    assert err == (
+        "inspector: tcp://127.0.0.1:1: no Dask scheduler answers there; start one with"
+        " `dask scheduler`, and name the address that it prints\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("classify", demo_run()),
+        ("diff", demo_run(), demo_run()),
+        ("simulate", "dataset", "--robots", "panda", "--seeds", "1", "-o", "data"),
+    ],
+    ids=["classify", "diff", "simulate"],
+)
+def test_without_the_extra_and_with_no_address_it_is_one_line(command, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(cluster, "find_spec", lambda name: None)
+    status, out, err = call(*command, "--dask", "tcp://127.0.0.1:1")
+    assert (status, out) == (3, "")
+    assert err == (
+        "inspector: a Dask cluster needs distributed, which is not installed;"
+        " run `pip install 'noise-inspector[cluster]'`\n"
+    )
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    status, out, err = call(*command, "--dask", "somewhere")
+    assert (status, out) == (3, "")
+    assert err in (
+        "inspector: 'somewhere' is no address of a Dask scheduler, tcp://HOST:PORT\n",
+        "inspector: a Dask cluster needs distributed, which is not installed;"
+        " run `pip install 'noise-inspector[cluster]'`\n",
+    )
+
+
+def test_processes_here_and_a_cluster_exclude_each_other():
+    status, _, err = call("classify", demo_run(), "-j", 2, "--dask", "tcp://127.0.0.1:1")
+    assert status == 2
+    assert "--jobs and --dask exclude each other" in err
