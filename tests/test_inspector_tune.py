@@ -11,6 +11,7 @@ from commandline import call
 
 import inspector.training.tuning
 import models
+from noisemodel import parallel
 
 GRID = ("--grid", "stride=25,50", "--grid", "gamma=0.001,0.01", "--grid", "C=0.1,1,10")
 OPTIONS = ("--profile", "logbands", "--rate", "1000")
@@ -161,6 +162,32 @@ def test_an_interrupted_search_resumes_to_the_same_bytes(data, whole, tmp_path, 
 def test_two_jobs_give_the_same_results(data, whole, tmp_path):
     output = tmp_path / "tuned.jsonl"
     assert tune(data, output, "-j", 2)[0] == 0
+    assert lines(output) == lines(whole[0])
+
+
+def test_a_point_that_kills_its_worker_is_named_and_the_search_resumes(
+    data, whole, tmp_path, monkeypatch
+):
+    output, measure = tmp_path / "tuned.jsonl", inspector.training.tuning.measure
+
+    def die(profiles, trial):
+        if profiles[0].stride == 50:
+            os._exit(137)
+        return measure(profiles, trial)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(inspector.training.tuning, "measure", die)
+        patch.setattr(parallel, "_forks", lambda: True)
+        status, _, err = tune(data, output, "-j", 2)
+    assert status == 3
+    point = "stride=50, gamma=0.001, regularization=0.1"
+    resumes = "the same command resumes there\n"
+    assert err.splitlines(keepends=True)[-1] in (
+        f"inspector: {point} and 2 more: {parallel.DIED}; {resumes}",
+        f"inspector: {point.replace('0.001', '0.01')} and 2 more: {parallel.DIED}; {resumes}",
+        f"inspector: {point}: {parallel.DIED}; {resumes}",
+    )
+    assert tune(data, output)[0] == 0
     assert lines(output) == lines(whole[0])
 
 

@@ -1,5 +1,7 @@
 import dataclasses
+import os
 import pickle
+import sys
 from collections import Counter
 from pathlib import Path
 
@@ -21,6 +23,7 @@ from noisemodel import (
     UnknownMotionError,
     compare,
     estimates,
+    parallel,
 )
 from noisemodel.comparison import BANDS
 from noisemodel.comparisons import medians
@@ -287,6 +290,20 @@ def test_each_kind_is_evaluated_once(urdfs, monkeypatch):
     monkeypatch.setattr("noisemodel.estimates.chunk_speeds", counted)
     samples = len(alone(urdfs[0], ("simplified", "C", "paper", "mean", "normal")).time)
     assert calls == dict.fromkeys(("A", "B", "C", "mean", "normal"), samples)
+
+
+def test_a_robot_that_kills_its_worker_is_left_out(tmp_path, monkeypatch):
+    comparing = sys.modules["noisemodel.compare"]
+
+    def die(name, *others):
+        return os._exit(137) if name == "ur5" else compare_one(name, *others)
+
+    compare_one = comparing._compare
+    monkeypatch.setattr(comparing, "_compare", die)
+    monkeypatch.setattr(parallel, "_forks", lambda: True)
+    found = compare([arm(tmp_path, *ARM), "ur5"], kinds=FEW, jobs=2)
+    assert len(found) == 1
+    assert [(each.name, each.reason) for each in found.left_out] == [("ur5", parallel.DIED)]
 
 
 def test_robots_are_compared_many_at_once_and_alike(tmp_path):

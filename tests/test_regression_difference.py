@@ -1,4 +1,5 @@
 import json
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -6,11 +7,13 @@ import pytest
 from commandline import call
 
 from inspector.library import load_library
+from inspector.logs.opening import open_run
+from inspector.regression import measure as measuring
 from inspector.regression.difference import Verdict, difference
 from inspector.regression.measure import Measured, measure_file
 from inspector.regression.pairing import Pairing, PairingError, Scenario, files_in, paired
 from inspector.regression.statistic import ALPHA
-from noisemodel import Run
+from noisemodel import Run, parallel
 from noisemodel.limits import joint_limits
 
 RATE, SECONDS = 1000.0, 4.0
@@ -129,6 +132,21 @@ def test_too_few_repetitions_are_inconclusive_and_say_how_many_it_takes(tmp_path
     status, out, _ = diff(before, after)
     assert status == 4
     assert "3 and 3 runs cannot show more, at least 5 and 5 can (10 beside 3" in out
+
+
+def test_a_run_that_kills_its_worker_is_named_and_the_others_are_compared(sides, monkeypatch):
+    def die_of_one(path):
+        if path == sides / "same" / "walk-1.npz":
+            os._exit(137)
+        return open_run(path)
+
+    monkeypatch.setattr(measuring, "open_run", die_of_one)
+    monkeypatch.setattr(parallel, "_forks", lambda: True)
+    status, out, err = diff(sides / "reference", sides / "same", "-j", 2)
+    assert status == 3
+    assert err.endswith(f"inspector: {sides}/same/walk-1.npz: {parallel.DIED}\n")
+    assert err.count(parallel.DIED) == 1
+    assert "1 scenario" in out.splitlines()[0]
 
 
 def test_new_findings_fail_from_one_run_on_if_they_are_to(tmp_path):

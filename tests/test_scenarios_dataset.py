@@ -2,6 +2,7 @@
 
 import errno
 import json
+import os
 import sys
 from dataclasses import replace
 from itertools import islice
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import scenarios
-from noisemodel import Block, Run, runfile
+from noisemodel import Block, Run, parallel, runfile
 from scenarios import formats
 from scenarios.dataset import make
 from scenarios.folder import Folder
@@ -337,6 +338,22 @@ def test_several_processes_make_the_same_files_as_one(tmp_path):
     one, two = ((place.file(task).read_bytes() for task in tasks) for place in places)
     assert list(one) == list(two)
     assert set(places[1].times()) == set(tasks)
+
+
+def test_a_run_that_kills_its_worker_is_named_and_all_others_are_made(tmp_path, monkeypatch):
+    place, deadly = Folder.opened(tmp_path), ALL[1]
+    monkeypatch.setattr(parallel, "_forks", lambda: True)
+    monkeypatch.setattr(
+        formats,
+        "simulate",
+        lambda *task, duration: os._exit(137) if Task(*task) == deadly else stub(Task(*task), 7.0),
+    )
+    made = []
+    with pytest.raises(
+        scenarios.DatasetError, match=f"{deadly.name}: {parallel.DIED}; the same command"
+    ):
+        made.extend(make(place, ALL, jobs=2))
+    assert place.missing(ALL) == [deadly]
 
 
 @pytest.mark.slow
