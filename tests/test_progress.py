@@ -1,5 +1,9 @@
 """Progress where there is no terminal."""
 
+import io
+import sys
+import time
+
 from inspector import progress as module
 from inspector.progress import progress
 
@@ -10,6 +14,27 @@ def test_a_line_every_ten_seconds_says_how_many_are_left(capsys, monkeypatch):
     assert list(progress("abcd", "classify", total=4)) == list("abcd")
     out, err = capsys.readouterr()
     assert (out, err) == ("", "classify: 2 of 4, 10 s left\n")
+
+
+class Terminal(io.StringIO):
+    """Standard error that says that it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+def test_on_a_terminal_there_is_a_bar_and_nothing_is_left_of_it(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    found = []
+    for each in progress("abcd", "classify", total=4):
+        found.append(each)
+        time.sleep(0.15)  # the bar is drawn ten times a second
+    assert found == list("abcd")
+    shown = sys.stderr.getvalue()
+    assert "classify" in shown
+    assert "━" in shown
+    assert shown.endswith("\x1b[1A\x1b[2K")  # one line up, and cleared
 
 
 def test_a_short_task_says_nothing(capsys):
