@@ -142,11 +142,13 @@ def test_a_run_that_kills_its_worker_is_named_and_the_others_are_compared(sides,
 
     monkeypatch.setattr(measuring, "open_run", die_of_one)
     monkeypatch.setattr(parallel, "_forks", lambda: True)
-    status, out, err = diff(sides / "reference", sides / "same", "-j", 2)
-    assert status == 3
+    given = sides / "reference", sides / "same", "-j", 2
+    status, out, err = diff(*given, "--on-bad-input", "ignore")
+    assert status == 70
     assert err.endswith(f"inspector: {sides}/same/walk-1.npz: {parallel.DIED}\n")
     assert err.count(parallel.DIED) == 1
     assert "1 scenario" in out.splitlines()[0]
+    assert "files: 1 internal error" in out
 
 
 def test_new_findings_fail_from_one_run_on_if_they_are_to(tmp_path):

@@ -240,7 +240,8 @@ class Difference:
 
     def ignored(self, file: Unreadable) -> bool:
         """Whether a file that cannot be read is left out of the exit status."""
-        return not (self.gate.unreadable or file.trace) and bool(self.scenarios)
+        harmless = file.status is Status.BAD_INPUT and not self.gate.unreadable
+        return harmless and bool(self.scenarios)
 
     @property
     def exit_status(self) -> int:

@@ -96,22 +96,19 @@ class Measured:
 
 @dataclass(frozen=True)
 class Unreadable:
-    """A file that is no run, or shows a bug.
+    """A file that is no run, shows a bug, or with which a worker died.
 
     Attributes:
         path: The file.
         problem: Why, in one line.
+        status: Bad input, or an internal error.
         trace: The traceback of a bug; empty without.
     """
 
     path: Path
     problem: str
+    status: Status = Status.BAD_INPUT
     trace: str = ""
-
-    @property
-    def status(self) -> Status:
-        """Bad input, or an internal error."""
-        return Status.INTERNAL_ERROR if self.trace else Status.BAD_INPUT
 
 
 def measure_files(
@@ -130,7 +127,7 @@ def measure_files(
         links: Whether to compute the noise of links where the robot is known.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         jobs: How many to work on at once, or the address of a Dask scheduler. A file with which a
-            worker dies is one that cannot be read.
+            worker dies is an internal error.
 
     Returns:
         What was measured of each file, in their order.
@@ -140,7 +137,7 @@ def measure_files(
 
 
 def _died(path: Path) -> Unreadable:
-    return Unreadable(path, DIED)
+    return Unreadable(path, DIED, Status.INTERNAL_ERROR)
 
 
 def measure_file(
@@ -152,7 +149,8 @@ def measure_file(
     except EXPECTED as error:
         return Unreadable(path, str(error).removeprefix(f"{path}: "))
     except Exception as error:  # a bug that one run shows must not hide the changes of others
-        return Unreadable(path, f"{type(error).__name__}: {error}", traceback.format_exc())
+        problem = f"{type(error).__name__}: {error}"
+        return Unreadable(path, problem, Status.INTERNAL_ERROR, traceback.format_exc())
 
 
 def measure(

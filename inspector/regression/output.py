@@ -101,7 +101,7 @@ def counts(found: Difference) -> dict[str, dict[str, int]]:
     verdicts = Counter(row.verdict for row in found.scenarios)
     kinds = Counter(each.kind for row in found.scenarios for each in row.findings)
     compared = sum(len(row.reference) + len(row.candidate) for row in found.scenarios)
-    bugs = sum(bool(each.trace) for each in found.unreadable)
+    bugs = sum(each.status is Status.INTERNAL_ERROR for each in found.unreadable)
     return {
         "scenarios": {verdict.value: verdicts[verdict] for verdict in Verdict},
         "findings": {kind: kinds[kind] for kind in (NEW, LOUDER, RESOLVED)},
