@@ -165,9 +165,9 @@ def children(process: int) -> list[int]:
 
 
 def fields(process: int, name: str) -> dict[str, float]:
-    """Sizes in a file of /proc, in [MB]."""
+    """Sizes in a file of /proc, in [MB]; its kB are 1024 bytes."""
     rows = (line.split() for line in Path(f"/proc/{process}/{name}").read_text().splitlines())
-    return {row[0].rstrip(":"): int(row[1]) / 1000 for row in rows if row[-1] == "kB"}
+    return {row[0].rstrip(":"): int(row[1]) * 1024e-6 for row in rows if row[-1] == "kB"}
 
 
 def main() -> None:
