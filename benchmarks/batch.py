@@ -33,6 +33,8 @@ from noisemodel import Run
 ROOT = Path(__file__).parents[1]
 FILES = 8
 """Number of files that links lead to."""
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+"""What `benchmarks` sets for its own process."""
 EVERY = 0.2
 """Time between two samples of memory, in [s]."""
 
@@ -78,13 +80,14 @@ def make(
 
 
 def command(folder: Path, jobs: int) -> "subprocess.Popen[bytes]":
-    """Start `inspector classify`, with the bytecode that an installation has."""
-    unset = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(ROOT)}
-    kept = {"PYTHONPYCACHEPREFIX": str(folder.parents[1] / "bytecode")}
+    """Start `inspector classify`, with the bytecode and the threads that a user has."""
+    ours = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPATH": str(ROOT)}
+    ours["PYTHONPYCACHEPREFIX"] = str(folder.parents[1] / "bytecode")
+    users = {name: value for name, value in os.environ.items() if name not in THREADS}
     return subprocess.Popen(
         [sys.executable, "-m", "inspector", "classify", str(folder), "-j", str(jobs)],
         cwd=ROOT,
-        env=os.environ | unset | kept,
+        env=users | ours,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
