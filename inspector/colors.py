@@ -1,4 +1,11 @@
-"""One colour scheme everywhere; the classes stay apart for the colour-blind (Okabe and Ito)."""
+"""One colour scheme everywhere; the classes stay apart for the colour-blind.
+
+Each class has a contrast of at least 3:1 (WCAG 2.2, 1.4.11) against the backgrounds of the viewer
+and against the white of reports. Any two of NoisyTest's own, `anomaly` and `unknown` differ by a
+CIEDE2000 of at least 15 as deuteranopes and protanopes see them (Machado, Oliveira and Fernandes
+2009); found by search under these conditions. No class is told by its colour alone: each has a row
+or a name.
+"""
 
 from typing import TypeAlias
 
@@ -9,16 +16,22 @@ from models import ANOMALY, UNKNOWN
 
 Color: TypeAlias = tuple[int, int, int]
 
+BACKGROUNDS: tuple[Color, ...] = ((13, 13, 13), (24, 26, 30), (255, 255, 255))
+"""Of the viewer's plots, of its robot, and of reports."""
+
 CLASSES: dict[str, Color] = {
-    "ok": (0, 158, 115),
-    "impact": (213, 94, 0),
-    "highaccelerations": (240, 228, 66),
-    "oscillations": (86, 180, 233),
-    ANOMALY: (115, 45, 165),
-    UNKNOWN: (60, 60, 60),
+    "ok": (48, 114, 96),
+    "impact": (180, 63, 25),
+    "highaccelerations": (221, 124, 11),
+    "oscillations": (90, 144, 252),
+    ANOMALY: (132, 84, 150),
+    UNKNOWN: (144, 144, 150),
 }
-OTHERS: tuple[Color, ...] = ((204, 121, 167), (230, 159, 0), (0, 114, 178), (190, 190, 190))
+OTHERS: tuple[Color, ...] = ((162, 144, 114), (24, 84, 252), (198, 30, 90), (138, 138, 180))
 NOISE: Color = (160, 196, 255)
+LEVEL: Color = (240, 228, 140)
+THRESHOLD: Color = (235, 235, 235)
+"""Alarm threshold, ticks and gaps."""
 SERIES: tuple[Color, ...] = (
     (86, 180, 233),
     (230, 159, 0),
@@ -54,14 +67,14 @@ LEVELS: dict[str, Color] = {
 """States of a link's level. The louder, the lighter: the order is visible to the colour-blind."""
 
 HEAT = np.array(
-    [[13, 8, 45], [66, 10, 104], [147, 38, 103], [221, 81, 58], [252, 165, 10], [252, 255, 164]],
+    [[50, 54, 68], [92, 56, 118], [164, 60, 112], [224, 92, 70], [250, 165, 40], [252, 250, 180]],
     dtype=np.float64,
 )
-"""Dark to bright through purple and orange, of evenly rising lightness."""
+"""Slate, which is quiet, through purple and orange to pale yellow, of rising lightness."""
 
 
 def heat(level: NDArray[np.floating]) -> NDArray[np.uint8]:
-    """Colour levels from 0 to 1.
+    """Colour levels from 0 to 1; `inspector.levels` has the scales in decibels.
 
     Args:
         level: Any shape.

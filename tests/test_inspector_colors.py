@@ -39,35 +39,105 @@ def lab(rgb, eyes):
     return np.stack((116 * y - 16, 500 * (x - y), 200 * (y - z)), axis=1)
 
 
+def difference(one, other):
+    """CIEDE2000 of colours in L*a*b*, shape (..., 3) (Sharma, Wu and Dalal 2005)."""
+    (l1, a1, b1), (l2, a2, b2) = np.moveaxis(one, -1, 0), np.moveaxis(other, -1, 0)
+    chroma = (np.hypot(a1, b1) + np.hypot(a2, b2)) / 2
+    grey = 0.5 * (1 - np.sqrt(chroma**7 / (chroma**7 + 25.0**7)))
+    a1, a2 = (1 + grey) * a1, (1 + grey) * a2
+    c1, c2 = np.hypot(a1, b1), np.hypot(a2, b2)
+    h1, h2 = np.degrees(np.arctan2(b1, a1)) % 360, np.degrees(np.arctan2(b2, a2)) % 360
+    turn = np.where(c1 * c2 == 0, 0, (h2 - h1 + 180) % 360 - 180)
+    hue = np.where(c1 * c2 == 0, h1 + h2, h1 + turn / 2) % 360
+    light, chroma = (l1 + l2) / 2, (c1 + c2) / 2
+    delta = 2 * np.sqrt(c1 * c2) * np.sin(np.radians(turn) / 2)
+    t = (
+        1
+        - 0.17 * np.cos(np.radians(hue - 30))
+        + 0.24 * np.cos(np.radians(2 * hue))
+        + 0.32 * np.cos(np.radians(3 * hue + 6))
+        - 0.20 * np.cos(np.radians(4 * hue - 63))
+    )
+    blue = 60 * np.exp(-(((hue - 275) / 25) ** 2))
+    turned = -2 * np.sqrt(chroma**7 / (chroma**7 + 25.0**7)) * np.sin(np.radians(blue))
+    lightness = (l2 - l1) / (1 + 0.015 * (light - 50) ** 2 / np.sqrt(20 + (light - 50) ** 2))
+    saturation = (c2 - c1) / (1 + 0.045 * chroma)
+    hues = delta / (1 + 0.015 * chroma * t)
+    return np.sqrt(lightness**2 + saturation**2 + hues**2 + turned * saturation * hues)
+
+
 def nearest(rgb, eyes):
-    """Distance of the two colours that are nearest to each other; 2.3 is just noticeable."""
+    """CIEDE2000 of the two colours that are nearest to each other."""
     places = lab(rgb, eyes)
-    apart = np.linalg.norm(places[:, None] - places, axis=2)
-    return apart[~np.eye(len(places), dtype=bool)].min()
+    first, second = np.triu_indices(len(places), 1)
+    return difference(places[first], places[second]).min()
+
+
+def luminance(rgb):
+    """Relative luminance of colours, between 0 and 1."""
+    share = np.asarray(rgb, dtype=float) / 255
+    linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
+    return linear @ XYZ[1]
+
+
+def contrast(one, other):
+    """Contrast of two colours by WCAG 2.2, from 1 to 21."""
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+# Sharma, Wu and Dalal 2005, Table 1: pairs that tell wrong implementations, and their difference.
+PAIRS = [
+    ((50.0, 2.6772, -79.7751), (50.0, 0.0, -82.7485), 2.0425),
+    ((50.0, 0.0, 0.0), (50.0, -1.0, 2.0), 2.3669),
+    ((50.0, 2.49, -0.001), (50.0, -2.49, 0.0009), 7.1792),
+    ((50.0, 2.5, 0.0), (73.0, 25.0, -18.0), 27.1492),
+    ((60.2574, -34.0099, 36.2677), (60.4626, -34.1751, 39.4387), 1.2644),
+    ((63.0109, -31.0961, -5.8663), (62.8187, -29.7946, -4.0864), 1.2630),
+    ((22.7233, 20.0904, -46.694), (23.0331, 14.973, -42.5619), 2.0373),
+]
+
+
+@pytest.mark.parametrize(("one", "other", "expected"), PAIRS)
+def test_the_difference_of_published_pairs(one, other, expected):
+    assert difference(np.array(one), np.array(other)) == pytest.approx(expected, abs=1e-4)
 
 
 def test_the_measure_separates_red_from_green_except_for_the_colour_blind():
     red, green = (200, 60, 0), (105, 105, 0)
-    assert nearest([red, green], "all cones") > 60
-    assert nearest([red, green], "no green cones") < 30
+    assert nearest([red, green], "all cones") > 30
+    assert nearest([red, green], "no green cones") < 10
     np.testing.assert_allclose(lab([(255, 255, 255)], "all cones")[0], [100, 0, 0], atol=0.1)
+    assert contrast((0, 0, 0), (255, 255, 255)) == pytest.approx(21)
 
 
 @pytest.mark.parametrize("eyes", EYES)
 def test_classes_stay_apart(eyes):
-    assert nearest(list(colors.CLASSES.values()), eyes) > 30
+    assert nearest(list(colors.CLASSES.values()), eyes) > 15
+
+
+@pytest.mark.parametrize("background", colors.BACKGROUNDS)
+def test_classes_stand_out_from_every_background(background):
+    shown = [*colors.CLASSES.values(), *colors.OTHERS]
+    assert min(contrast(shade, background) for shade in shown) >= 3
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_further_classes_stay_apart(eyes):
+    assert nearest([*colors.CLASSES.values(), colors.OTHERS[0]], eyes) > 15
+    assert nearest([*colors.CLASSES.values(), *colors.OTHERS], eyes) > 12
 
 
 @pytest.mark.parametrize("eyes", EYES)
 def test_levels_stay_apart_and_the_louder_is_the_lighter(eyes):
     levels = list(colors.LEVELS.values())
-    assert nearest(levels, eyes) > 30
+    assert nearest(levels, eyes) > 15
     assert (np.diff(lab(levels, eyes)[:, 0]) > 5).all()
 
 
 @pytest.mark.parametrize("eyes", EYES)
 def test_lines_of_a_plot_stay_apart(eyes):
-    assert nearest(list(colors.SERIES), eyes) > 15
+    assert nearest(list(colors.SERIES), eyes) > 10
 
 
 @pytest.mark.parametrize("eyes", EYES)

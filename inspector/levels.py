@@ -1,0 +1,109 @@
+"""Levels above 10 Hz in decibels, in steps of 50 ms, and the scales that all pictures share.
+
+The scales are absolute: a colour means the same level in every run, recording, pair and report, so
+that a quiet run looks quiet.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspector import colors
+from noisemodel.links import LinkNoise, vibrating
+from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.types import Array, Mask, Real
+
+STEP = 0.05
+"""Time over which a level is taken, in [s]."""
+FLOOR_DB = -100.0
+"""Least level of a velocity, below that of any encoder, in [dB re 1 rad/s]; less is raised."""
+
+
+@dataclass(frozen=True)
+class Scale:
+    """Levels that colours show.
+
+    Attributes:
+        low: Level of the darkest colour, in [dB].
+        high: Level of the lightest one, in [dB].
+        unit: Such as "dB re 1 rad/s".
+        step: From one tick to the next, in [dB].
+    """
+
+    low: float
+    high: float
+    unit: str
+    step: float = 20.0
+
+    def place(self, level: Array) -> Array:
+        """Levels as shares of the scale: 0 at its low end and 1 at its high end, not clipped."""
+        return np.asarray((level - self.low) / (self.high - self.low))
+
+    def colours(self, level: Array, *, shades: int = 0) -> NDArray[np.uint8]:
+        """Colour levels: the louder, the lighter.
+
+        Args:
+            level: Any shape, in [dB]; -inf is the darkest.
+            shades: Number of colours; as many as there are levels if 0. Few change rarely.
+
+        Returns:
+            Red, green, blue and opacity, shape (…, 4).
+        """
+        place = np.clip(self.place(level), 0.0, 1.0)
+        return colors.heat(np.round(place * (shades - 1)) / (shades - 1) if shades else place)
+
+    @property
+    def ticks(self) -> tuple[float, ...]:
+        """Levels to be labelled, in [dB], from low to high."""
+        return tuple(np.arange(self.low, self.high + self.step / 2, self.step).tolist())
+
+
+JOINTS = Scale(-40.0, 20.0, "dB re 1 rad/s")
+"""Velocity of a joint above 10 Hz; of joints that slide re 1 m/s."""
+LINKS = Scale(80.0, 140.0, "dB re 1 pW")
+"""Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s."""
+
+
+def velocity_levels(
+    velocity: Real, valid: Mask, rate: float, *, start: float = 0.0
+) -> tuple[Array, Array]:
+    """The level of velocities above 10 Hz over time: that of a noise, or of each joint.
+
+    Args:
+        velocity: Shape (samples, joints), in [rad/s]; a noise is a single column.
+        valid: False in gaps, shape (samples,).
+        rate: Samples per second, in [Hz].
+        start: Time of the first sample, in [s].
+
+    Returns:
+        Starts of the steps of 50 ms, shape (steps,), in [s], and levels of the root mean square of
+        what is valid in each, shape (steps, joints), in [dB re 1 rad/s], at least -100; NaN in
+        steps that lie in a gap.
+    """
+    fast = vibrating(velocity, valid, rate)
+    firsts = np.arange(0, len(fast), max(1, round(STEP * rate)))
+    count = np.add.reduceat(valid.astype(np.float64), firsts)[:, None]
+    power = np.add.reduceat(np.square(fast), firsts, axis=0) / np.maximum(count, 1.0)
+    level = np.maximum(decibel(power), FLOOR_DB)
+    return start + firsts / rate, np.asarray(np.where(count > 0.0, level, np.nan))
+
+
+def link_levels(noise: LinkNoise) -> tuple[Array, Array]:
+    """The level of each link's vibration above 10 Hz over time.
+
+    The whole motion would not do: a link that moves fast and smoothly would be the loudest.
+
+    Args:
+        noise: The links' power.
+
+    Returns:
+        Starts of the steps of 50 ms (or of the bins, if these are longer), shape (steps,), in [s],
+        and levels of the mean power in each, shape (steps, links), in [dB re 1 pW]; silence is at
+        -inf.
+    """
+    width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else STEP
+    firsts = np.arange(0, len(noise.time), max(1, round(STEP / width)))
+    counts = np.diff(np.append(firsts, len(noise.time)))
+    mean = np.add.reduceat(noise.vibration, firsts, axis=0) / counts[:, None]
+    return noise.time[firsts] - width / 2, decibel(mean / REFERENCE_POWER)

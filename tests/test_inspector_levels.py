@@ -1,0 +1,86 @@
+"""Levels in decibels and the colours that show them."""
+
+import numpy as np
+import pytest
+
+from inspector import colors
+from inspector.levels import FLOOR_DB, JOINTS, LINKS, STEP, link_levels, velocity_levels
+from noisemodel.links import LinkNoise
+
+RATE = 1000.0
+
+
+def everywhere(signal):
+    return np.ones(len(signal), dtype=bool)
+
+
+def tone(amplitude, seconds=2.0, hertz=100.0):
+    time = np.arange(round(seconds * RATE)) / RATE
+    return amplitude * np.sin(2 * np.pi * hertz * time)[:, None]
+
+
+def links(vibration, width=0.01):
+    count = len(vibration)
+    return LinkNoise(
+        kind="normal",
+        links=tuple("abc"[: vibration.shape[1]]),
+        movers=tuple(frozenset() for _ in range(vibration.shape[1])),
+        time=width * (np.arange(count) + 0.5),
+        power=vibration,
+        vibration=vibration,
+        terms={},
+        remarks=(),
+    )
+
+
+def test_a_tone_of_one_rad_per_second_effective_is_at_zero_decibels():
+    time, level = velocity_levels(tone(np.sqrt(2)), everywhere(tone(1.0)), RATE, start=3.0)
+    assert time[0] == 3.0
+    np.testing.assert_allclose(np.diff(time), STEP)
+    np.testing.assert_allclose(level[2:-2], 0.0, atol=0.2)
+
+
+def test_twice_the_amplitude_is_six_decibels_more():
+    valid = everywhere(tone(1.0))
+    _, one = velocity_levels(tone(0.1), valid, RATE)
+    _, two = velocity_levels(tone(0.2), valid, RATE)
+    np.testing.assert_allclose(two - one, 20 * np.log10(2))
+
+
+def test_slow_motion_and_standstill_have_no_level():
+    slow = tone(1.0, hertz=0.5)
+    _, level = velocity_levels(np.hstack((slow, 0 * slow)), everywhere(slow), RATE)
+    assert level[2:-2, 0].max() < -35.0
+    assert (level[:, 1] == FLOOR_DB).all()
+
+
+def test_a_step_in_a_gap_has_no_level_and_one_beside_it_has_that_of_its_samples():
+    signal, valid = tone(np.sqrt(2)), everywhere(tone(1.0))
+    valid[1000:1125] = False
+    _, level = velocity_levels(signal, valid, RATE)
+    assert np.flatnonzero(np.isnan(level[:, 0])).tolist() == [20, 21]
+    assert level[22, 0] == pytest.approx(0.0, abs=1.0)
+
+
+def test_a_link_of_one_watt_is_at_120_decibels():
+    time, level = link_levels(links(np.tile([1.0, 0.0], (100, 1))))
+    assert time[0] == pytest.approx(0.0)
+    np.testing.assert_allclose(np.diff(time), STEP)
+    np.testing.assert_allclose(level[:, 0], 120.0)
+    assert np.isneginf(level[:, 1]).all()
+
+
+@pytest.mark.parametrize("scale", [JOINTS, LINKS])
+@pytest.mark.parametrize("shades", [0, 16])
+def test_what_is_louder_is_never_darker(scale, shades):
+    level = np.concatenate(([-np.inf], np.linspace(scale.low - 20, scale.high + 20, 200)))
+    shown = scale.colours(level, shades=shades)[:, :3].astype(float)
+    lightness = shown @ [0.2126, 0.7152, 0.0722]
+    assert (np.diff(lightness) >= 0).all()
+    assert tuple(shown[0]) == tuple(colors.HEAT[0])
+    assert tuple(shown[-1]) == tuple(colors.HEAT[-1])
+
+
+def test_ticks_span_a_scale():
+    assert JOINTS.ticks == (-40.0, -20.0, 0.0, 20.0)
+    assert LINKS.ticks == (80.0, 100.0, 120.0, 140.0)
