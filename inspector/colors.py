@@ -58,14 +58,6 @@ def of_series(count: int, *, dim: bool = False) -> list[Color]:
     return [(int(r * shade), int(g * shade), int(b * shade)) for r, g, b in colors]
 
 
-LEVELS: dict[str, Color] = {
-    "quiet": (84, 94, 114),
-    "elevated": (205, 92, 72),
-    "high": (250, 170, 40),
-    "critical": (255, 248, 180),
-}
-"""States of a link's level. The louder, the lighter: the order is visible to the colour-blind."""
-
 HEAT = np.array(
     [[50, 54, 68], [92, 56, 118], [164, 60, 112], [224, 92, 70], [250, 165, 40], [252, 250, 180]],
     dtype=np.float64,

@@ -59,10 +59,12 @@ class Scale:
         return tuple(np.arange(self.low, self.high + self.step / 2, self.step).tolist())
 
 
-JOINTS = Scale(-40.0, 20.0, "dB re 1 rad/s")
+JOINTS = Scale(-50.0, 10.0, "dB re 1 rad/s")
 """Velocity of a joint above 10 Hz; of joints that slide re 1 m/s."""
 LINKS = Scale(80.0, 140.0, "dB re 1 pW")
 """Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s."""
+SPECTRUM = Scale(-70.0, 0.0, "dB re 1 rad/s")
+"""Amplitude of the noise in a spectrogram; its low end can be chosen."""
 
 
 def velocity_levels(

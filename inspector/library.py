@@ -31,11 +31,13 @@ class Labelled:
         labels: One label per frame.
         model: The model's name.
         remark: What was done to the run before, a sentence; empty if nothing was.
+        alarm: Alarm threshold, a probability of any failure; None of a model without one.
     """
 
     labels: models.Labels
     model: str
     remark: str = ""
+    alarm: float | None = None
 
 
 def load_library(paths: Sequence[str | Path] = ()) -> Library:
@@ -115,7 +117,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
             " requires"
         )
-    return _counted(Labelled(labels, name, remark))
+    return _counted(Labelled(labels, name, remark, _alarm(classifier, labels)))
 
 
 def nearest(
@@ -187,6 +189,10 @@ def _differs(run: nm.Run) -> bool:
     return bool(np.any(desired[:, wanted] != run.velocity[:, measured]))
 
 
+def _alarm(classifier: models.Classifier, labels: models.Labels) -> float | None:
+    return None if labels.above_threshold is None else classifier.profile.alarm
+
+
 def _counted(labelled: Labelled) -> Labelled:
     """Add a remark on how many frames are out of distribution."""
     labels = labelled.labels
@@ -224,7 +230,7 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
             f" model {name} without joint velocities"
         )
     labels = classifier.classify(noise, rate, start=float(time[0]))
-    return _counted(Labelled(labels, name))
+    return _counted(Labelled(labels, name, alarm=_alarm(classifier, labels)))
 
 
 def _close(rate: float, other: float) -> bool:

@@ -63,6 +63,28 @@ def spectrogram(signal: Array, rate: float, *, start: float, valid: Mask) -> Spe
     )
 
 
+def in_bands(frequency: Array, amplitude: Array, edges: Array) -> Array:
+    """The largest amplitude in each of several bands, such as those of a logarithmic axis.
+
+    Args:
+        frequency: In order, shape (bins,).
+        amplitude: Shape (bins, columns).
+        edges: Of the bands, in order, in the unit of the frequency, shape (bands + 1,).
+
+    Returns:
+        Shape (bands, columns); a band that is narrower than the bins has that of the nearest one.
+    """
+    firsts = np.searchsorted(frequency, edges[:-1])
+    lasts = np.searchsorted(frequency, edges[1:])
+    middles = np.sqrt(edges[:-1] * edges[1:])
+    nearest = np.abs(frequency[:, None] - middles).argmin(axis=0)
+    rows = [
+        amplitude[first:last].max(axis=0) if last > first else amplitude[near]
+        for first, last, near in zip(firsts, lasts, nearest, strict=True)
+    ]
+    return np.stack(rows)
+
+
 def window_length(rate: float) -> int:
     """Length of a window, in samples; at least 8."""
     return max(round(WINDOW * rate), 8)

@@ -129,13 +129,6 @@ def test_further_classes_stay_apart(eyes):
 
 
 @pytest.mark.parametrize("eyes", EYES)
-def test_levels_stay_apart_and_the_louder_is_the_lighter(eyes):
-    levels = list(colors.LEVELS.values())
-    assert nearest(levels, eyes) > 15
-    assert (np.diff(lab(levels, eyes)[:, 0]) > 5).all()
-
-
-@pytest.mark.parametrize("eyes", EYES)
 def test_lines_of_a_plot_stay_apart(eyes):
     assert nearest(list(colors.SERIES), eyes) > 10
 

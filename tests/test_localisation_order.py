@@ -196,7 +196,7 @@ def analysed(vibration, **changed):
 def test_report_page_and_list_of_events_say_it_beside_the_band():
     analysis = analysed(ripple(0.05))
     assert PHRASE in sentence(analysis, FINDING)
-    assert f"; {PHRASE} |" in report(analysis)
+    assert f"; {PHRASE}\n" in report(analysis)
     (findings,) = found(analysis)
     assert PHRASE in findings.rows[0][6]
     assert PHRASE not in sentence(analysed(tone(0.05)), FINDING)

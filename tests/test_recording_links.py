@@ -1,44 +1,34 @@
 import numpy as np
 
-from inspector.recording.links import STATES, levels, shades, states
-from noisemodel import Robot, Run
-from noisemodel.links import link_noise
+from inspector.analysis.analyse import Analysis, Status
+from inspector.recording.links import SHOWN, chosen
+from models import Event
+from noisemodel import Run
+
+TIME = np.arange(100) * 0.05
 
 
-def rattling():
-    """A UR5 moves slowly; its last joint rattles at 100 Hz from 2 s to 2.5 s."""
-    time = np.arange(4000) / 1000
-    position = np.sin(np.outer(time, np.linspace(0.5, 1.5, 6)))
-    velocity = 0.5 * np.cos(np.outer(time, np.linspace(0.5, 1.5, 6)))
-    during = (time >= 2.0) & (time < 2.5)
-    velocity[during, 5] += 0.2 * np.sin(2 * np.pi * 100 * time[during])
-    names = Robot.load("ur5").joint_names
-    return Run(time=time, velocity=velocity, position=position, joint_names=names, robot="ur5")
+def analysed(*findings):
+    run = Run(time=np.arange(10) / 100, velocity=np.zeros((10, 1)), joint_names=("a",))
+    return Analysis(name="a", status=Status.OK, run=run, findings=findings)
 
 
-def test_levels_are_relative_to_the_loudest_peak():
-    found = levels(link_noise(rattling()))
-    assert found.level.max() == 0.0
-    assert 2.0 <= found.time[np.unravel_index(found.level.argmax(), found.level.shape)[0]] < 2.5
+def test_rows_are_the_loudest_during_findings_in_the_order_of_the_robot():
+    level = np.full((100, 20), -60.0)
+    level[10, :10] = 20.0  # loud while nothing is wrong
+    level[60, [17, 12]] = -10.0
+    found = chosen(analysed(Event("impact", 3.0, 3.1, 0.9)), TIME, level)
+    assert len(found) == SHOWN == len(set(found))
+    assert found == sorted(found)
+    assert {12, 17} <= set(found)
 
 
-def test_states_do_not_flicker_around_a_threshold():
-    level = np.array([-30.0, -19.9, -20.1, -19.9, -20.1, -22.9, -23.1, -5.0, -8.0, -9.1])
-    assert states(level) == [
-        "quiet",
-        *["elevated"] * 5,
-        "quiet",
-        "critical",
-        "critical",
-        "high",
-    ]
-    assert states(np.array([-np.inf])) == ["quiet"]
+def test_rows_of_a_run_without_findings_are_the_loudest_at_any_time():
+    level = np.full((100, 20), -60.0)
+    level[10, 5:9] = 20.0
+    level[20] = np.nan  # a gap
+    assert set(range(5, 9)) <= set(chosen(analysed(), TIME, level))
 
 
-def test_shades_go_from_quiet_to_critical_in_few_steps():
-    rgba = shades(np.linspace(-60, 0, 1000))
-    assert rgba[0].tolist() == [*STATES["quiet"], 255]
-    assert rgba[-1].tolist() == [*STATES["critical"], 255]
-    assert len(np.unique(rgba, axis=0)) <= 16
-    assert shades(np.array([-np.inf]))[0].tolist() == [*STATES["quiet"], 255]
-    assert list(STATES) == ["quiet", "elevated", "high", "critical"]
+def test_a_robot_of_few_joints_has_a_row_for_each():
+    assert chosen(analysed(), TIME, np.full((100, 3), -np.inf)) == [0, 1, 2]

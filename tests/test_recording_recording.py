@@ -5,13 +5,29 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rerun as rr
-from recordings import LANE, LINE, MOTION, check_columns, entities, read
+from recordings import (
+    BAND,
+    LABELS,
+    LINE,
+    MOTION,
+    POINTS,
+    ROW,
+    STRIP,
+    check_columns,
+    entities,
+    read,
+)
 from rerun.chunk import RrdReader
 
+from inspector import colors
 from inspector.analysis.analyse import Analysis, Status, analyse_file
-from inspector.colors import LEVELS
 from inspector.errors import InspectorError
-from inspector.recording.recording import NOISE_POINTS, linked, write
+from inspector.levels import velocity_levels
+from inspector.recording import axes
+from inspector.recording.noise import POINTS as NOISE_POINTS
+from inspector.recording.noise import scaled
+from inspector.recording.recording import linked, write
+from inspector.recording.spectrogram import HEIGHT
 from models import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
 
@@ -49,7 +65,13 @@ def inspected(run, tmp_path, labels=None, **options) -> Analysis:
     found = analyse_file(path, {}, **options)
     status = Status.FINDINGS if events else found.status
     return dataclasses.replace(
-        found, status=status, labels=labels, findings=events, spans=events, model="a model"
+        found,
+        status=status,
+        labels=labels,
+        findings=events,
+        spans=events,
+        model="a model",
+        alarm=None if labels is None else 0.25,
     )
 
 
@@ -72,17 +94,24 @@ def whole(tmp_path_factory):
 
 
 COLUMNS = {
-    r"/class/(found|annotated)": LANE,
-    r"/level/panda_(link\d|leftfinger|rightfinger)": LANE,
+    r"/class/(found|annotated)/(ok|impact|oscillations)": BAND,
+    r"/class/mark/impact": POINTS,
+    r"/(noise|level|probability)/finding/impact": BAND,
+    r"/strips/(joints/0[0-6]|links/0[0-7])": ROW,
     r"/score/(ok|impact|highaccelerations|oscillations)": LINE,
     r"/noise/simplified": LINE,
+    r"/level/noise": LINE,
+    r"/probability/(failure|alarm)": LINE,
+    r"/span": LINE,
     r"/power/(total|terms/[ABC]|links/panda_\w+)": LINE,
     r"/joints/(velocity|velocity_desired|position)/0": LINE,
     r"/detail/0/(noise|velocity)": LINE,
-    r"/spectrogram/bands/\d\d": LINE | {"SeriesLines:interpolation_mode"},
-    r"/spectrogram/levels": {"Tensor:data"},
-    r"/spectrogram/now": {"BarChart:values", "BarChart:abscissa", "BarChart:color"}
+    r"/(spectrogram|orders)/bands/\d\d": ROW,
+    r"/spectrum/now": {"BarChart:values", "BarChart:abscissa", "BarChart:color"}
     | {"BarChart:widths"},
+    r"/axis/(class|noise|level|probability|spectrogram|orders|joints|links)/(left|right)": LABELS,
+    r"/axis/key/right": LABELS,
+    r"/axis/(spectrogram|orders|joints|links|key)/right/scale": STRIP,
     r"/sound": {"AssetAudio:blob", "AssetAudio:media_type"},
     r"/robot/motion/panda_joint\d": MOTION,
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
@@ -113,20 +142,174 @@ def test_the_noise_is_logged_sample_by_sample_and_drawn_by_its_extremes(whole):
     assert policy == [[5]]  # MinMax: the default would hide vibration
 
 
-def test_lanes_hold_changes_only_and_end_where_the_labels_end(whole):
+def stretches(path, entity):
+    """Start and stop of the bands that a plot shades, in [s]."""
+    time, values = read(path, entity, "Measurements:values")
+    ends = np.flatnonzero(np.isnan([value[0] for value in values]))
+    return [(time[end - 2], time[end - 1]) for end in ends]
+
+
+def test_rows_of_classes_last_as_long_as_what_was_found_and_annotated(whole):
     path, _ = whole
-    time, states = read(path, "/class/found", "StateChange:state")
-    assert [state[0] for state in states] == ["ok", "impact", "ok", ""]
-    np.testing.assert_allclose(time, [0.0, 0.5, 1.0, 2.9], atol=1e-6)
-    time, states = read(path, "/class/annotated", "StateChange:state")
-    assert [state[0] for state in states] == ["ok", "oscillations", ""]
-    np.testing.assert_allclose(time, [0.2, 1.0, 1.5], atol=1e-9)
+    np.testing.assert_allclose(stretches(path, "/class/found/impact"), [(0.5, 1.0)], atol=1e-6)
+    ok = [(0.0, 0.5), (1.0, 2.9)]
+    np.testing.assert_allclose(stretches(path, "/class/found/ok"), ok, atol=1e-6)
+    blocks = {"ok": [(0.2, 1.0)], "oscillations": [(1.0, 1.5)]}
+    for name, block in blocks.items():
+        np.testing.assert_allclose(stretches(path, f"/class/annotated/{name}"), block, atol=1e-9)
+
+
+@pytest.mark.parametrize("panel", ["noise", "level", "probability"])
+def test_findings_are_shaded_from_onset_to_end_over_the_whole_panel(whole, panel):
+    path, _ = whole
+    entity = f"/{panel}/finding/impact"
+    np.testing.assert_allclose(stretches(path, entity), [(0.5, 1.0)], atol=1e-6)
+    _, values = read(path, entity, "Measurements:values")
+    _, variances = read(path, entity, "Measurements:variances")
+    half = np.sqrt(variances[0][0])
+    low, high = ranges(path)[f"/{panel}"]
+    assert (values[0][0] - half, values[0][0] + half) == (pytest.approx(low), pytest.approx(high))
+
+
+def test_no_two_classes_share_a_row_or_a_marker(whole):
+    path, _ = whole
+    _, values = read(path, "/class/found/ok", "Measurements:values")
+    _, others = read(path, "/class/found/impact", "Measurements:values")
+    assert abs(values[0][0] - others[0][0]) > 1.0
+    _, (names,) = read(path, "/axis/class/left", "Points2D:labels")
+    assert names == ["impact", "high accelerations", "oscillations", "ok"]
+
+
+def views(path):
+    """Origin and contents of the plots over time of a layout, and their other settings."""
+    reader, found = RrdReader(path), {}
+    (blueprint,) = reader.blueprints()
+    for chunk in reader.store(store=blueprint).stream():
+        batch = chunk.to_record_batch()
+        parts = str(chunk.entity_path).split("/")
+        if parts[1] == "view":
+            for name in (each for each in batch.schema.names if ":" in each):
+                found.setdefault(parts[2], {})[name] = batch.column(name).to_pylist()[0]
+    return found.values()
+
+
+def over_time(path):
+    """Settings of the plots whose time axes are linked, by their origin."""
+    return {
+        view["ViewBlueprint:space_origin"][0]: view
+        for view in views(path)
+        if view["ViewBlueprint:class_identifier"] == ["TimeSeries"] and view["TimeAxis:link"] == [2]
+    }
+
+
+def ranges(path):
+    """Lower and upper ends of the plots' axes that are set, by the plots' origin."""
+    known = over_time(path).items()
+    return {o: v["ScalarAxis:range"][0] for o, v in known if "ScalarAxis:range" in v}
+
+
+def test_all_plots_over_time_reach_from_the_start_of_the_run_to_its_end(whole):
+    path, run = whole
+    time, values = read(path, "/span", "Scalars:scalars")
+    np.testing.assert_allclose(time, run.time[[0, -1]], atol=1e-9)
+    assert np.isnan(values).all()
+    known = over_time(path)
+    assert {"/class", "/noise", "/level", "/probability", "/spectrogram"} <= set(known)
+    assert {"/orders", "/strips/joints", "/strips/links", "/score", "/power"} <= set(known)
+    assert all("/span" in v["ViewContents:query"] for v in known.values())
+
+
+def test_left_edges_coincide_since_labels_of_axes_have_one_digit(whole):
+    path, _ = whole
+    first = ["/class", "/noise", "/level", "/probability", "/spectrogram", "/strips/joints"]
+    for origin in first:
+        low, high = ranges(path)[origin]
+        assert low <= 0.0 <= high  # each has the label 0
+        if origin != "/level":  # has no other in a panel of 200 points: it takes 20 to the next
+            assert 1.0 <= high - low < 10.0
+        else:
+            assert 10.0 / (high - low) * 150.0 < 20.0
+
+
+def test_the_noise_of_a_fast_robot_is_scaled_to_one_digit():
+    assert scaled(np.array([0.0, 9.9])) == (1.0, "rad/s")
+    assert scaled(np.array([0.0, 30.3, np.nan])) == (10.0, "10 rad/s")
+    assert scaled(np.array([0.02])) == (0.01, "0.01 rad/s")
+    assert scaled(np.zeros(3)) == (1.0, "rad/s")
+
+
+def test_the_probability_of_a_failure_stands_beside_the_alarm_threshold(whole):
+    path, run = whole
+    time, values = read(path, "/probability/failure", "Scalars:scalars")
+    np.testing.assert_allclose(time, some_labels().start + 0.2, atol=1e-9)
+    np.testing.assert_allclose(values, 0.3)
+    time, values = read(path, "/probability/alarm", "Scalars:scalars")
+    np.testing.assert_allclose(time, run.time[[0, -1]], atol=1e-9)
+    np.testing.assert_allclose(values, 0.25)
+    _, (labels,) = read(path, "/axis/probability/right", "Points2D:labels")
+    assert labels == ["alarm 0.25"]
+
+
+def test_the_level_is_that_of_the_noise_above_10_hz(whole):
+    path, run = whole
+    time, values = read(path, "/level/noise", "Scalars:scalars")
+    noise = np.sqrt(2 * (run.velocity**2).sum(axis=1))[:, None]
+    starts, level = velocity_levels(noise, run.mask, run.rate)
+    np.testing.assert_allclose(time, starts, atol=1e-9)
+    np.testing.assert_allclose(values, level, rtol=1e-9)
+
+
+def shades(path, entity):
+    """Times and colours, shape (times, 3), of the first line of a row."""
+    time, colours = read(path, entity, "SeriesLines:colors")
+    return time, np.array([[c >> 24, c >> 16 & 255, c >> 8 & 255] for c, *_ in colours])
+
+
+def brightest(path, entity):
+    """Greatest lightness of a row."""
+    return (shades(path, entity)[1] @ [0.2126, 0.7152, 0.0722]).max()
+
+
+def test_a_louder_fault_never_has_a_darker_cell(tmp_path):
+    bright = []
+    for factor in (1.0, 8.0, 100.0):
+        run = panda_run(robot=None, blocks=())
+        velocity = run.velocity.copy()
+        during = (run.time >= 1.0) & (run.time < 1.5)
+        velocity[during, 2] += 0.01 * factor * np.sin(2 * np.pi * 90.0 * run.time[during])
+        path = tmp_path / "out.rrd"
+        run = dataclasses.replace(run, velocity=velocity)
+        write(inspected(run, tmp_path), path, overwrite=True)
+        bright.append(brightest(path, "/strips/joints/02"))
+    assert bright == sorted(bright)
+    assert bright[-1] > bright[0] + 50
+
+
+def test_a_standstill_has_the_darkest_colour_only(tmp_path):
+    run = panda_run(robot=None, blocks=())
+    write(inspected(dataclasses.replace(run, velocity=0 * run.velocity), tmp_path), tmp_path / "o")
+    for row in range(7):
+        _, rgb = shades(tmp_path / "o", f"/strips/joints/{row:02d}")
+        assert len(rgb) == 2  # one segment
+        assert (rgb == colors.HEAT[0]).all()
+
+
+def test_the_colours_of_a_row_change_where_the_joint_begins_to_vibrate(tmp_path):
+    run = panda_run(robot=None, blocks=())
+    velocity = 0 * run.velocity
+    during = (run.time >= 1.0) & (run.time < 1.5)
+    velocity[during, 4] = np.sin(2 * np.pi * 90.0 * run.time[during])
+    write(inspected(dataclasses.replace(run, velocity=velocity), tmp_path), tmp_path / "o")
+    time, rgb = shades(tmp_path / "o", "/strips/joints/04")
+    loud = time[(rgb != colors.HEAT[0]).any(axis=1)]  # ends of segments
+    assert loud.min() == pytest.approx(1.05, abs=0.051)
+    assert loud.max() == pytest.approx(1.5, abs=0.051)
 
 
 def test_the_spectrum_at_the_cursor_is_that_of_the_noise(whole):
     path, _ = whole
-    _, (hertz,) = read(path, "/spectrogram/now", "BarChart:abscissa")
-    time, bars = read(path, "/spectrogram/now", "BarChart:values")
+    _, (hertz,) = read(path, "/spectrum/now", "BarChart:abscissa")
+    time, bars = read(path, "/spectrum/now", "BarChart:values")
     heights = np.array([bar[0]["buffer"] for bar in bars])
     hertz = np.array(hertz[0]["buffer"])
     rattling = np.abs(time - 0.75) < 0.1
@@ -136,12 +319,61 @@ def test_the_spectrum_at_the_cursor_is_that_of_the_noise(whole):
     assert heights.min() >= 0.0
 
 
-def test_the_bands_lie_at_their_frequencies(whole):
-    path, _ = whole
-    _, low = read(path, "/spectrogram/bands/00", "Scalars:scalars")
-    _, high = read(path, "/spectrogram/bands/47", "Scalars:scalars")
-    assert low[0][0] < 50.0
-    assert 1900.0 < high[0][0] < 2000.0
+def test_a_tone_is_brightest_at_its_tick(tmp_path):
+    run = panda_run(robot=None, blocks=())
+    tone = 0.1 * np.sin(2 * np.pi * 200.0 * run.time)[:, None]
+    velocity = 1.0 + tone * np.eye(7)[0]
+    path = tmp_path / "out.rrd"
+    write(
+        inspected(dataclasses.replace(run, velocity=velocity, velocity_desired=None), tmp_path),
+        path,
+    )
+    light = [brightest(path, f"/spectrogram/bands/{row:02d}") for row in range(48)]
+    _, values = read(path, f"/spectrogram/bands/{np.argmax(light):02d}", "Scalars:scalars")
+    place = values[0][0] / axes.TOP
+    _, (labels,) = read(path, "/axis/spectrogram/left", "Points2D:labels")
+    _, (points,) = read(path, "/axis/spectrogram/left", "Points2D:positions")
+    y = points[labels.index("200 Hz")][1]
+    panel = axes.Panel("spectrogram", HEIGHT)
+    assert y == pytest.approx(panel.y(place), abs=0.02)
+    assert labels[1:] == ["10 Hz", "20 Hz", "50 Hz", "100 Hz", "200 Hz", "500 Hz", "1 kHz", "2 kHz"]
+
+
+def test_a_lower_floor_is_never_darker(tmp_path):
+    bright = []
+    for floor in (-40.0, None, -100.0):
+        write(
+            inspected(panda_run(robot=None), tmp_path), tmp_path / "o", floor=floor, overwrite=True
+        )
+        bright.append(
+            sum(brightest(tmp_path / "o", f"/spectrogram/bands/{r:02d}") for r in (20, 30, 40))
+        )
+        _, (labels,) = read(tmp_path / "o", "/axis/spectrogram/right", "Points2D:labels")
+        low = -70.0 if floor is None else floor
+        assert labels[0] == f"{low:.0f}".replace("-", "\u2212")
+    assert bright == sorted(bright)
+
+
+def test_gaps_are_hatched_and_named_in_every_panel(tmp_path):
+    run = panda_run(robot=None, blocks=())
+    valid = np.ones(len(run.time), dtype=bool)
+    valid[12_000:14_000] = False
+    path = tmp_path / "out.rrd"
+    write(inspected(dataclasses.replace(run, valid=valid), tmp_path, some_labels()), path)
+    for panel in ("class", "noise", "level", "probability", "spectrogram"):
+        time, values = read(path, f"/{panel}/gap", "Scalars:scalars")
+        strokes = np.ravel(values)[:-1]
+        assert (time[0], time[-1]) == (pytest.approx(1.2), pytest.approx(1.4))
+        assert len(set(strokes)) == 2  # up and down
+        assert (np.diff(strokes) != 0).all()
+    _, (names,) = read(path, "/axis/class/left", "Points2D:labels")
+    assert names[-1] == "gap: no samples"
+    _, (names,) = read(path, "/noise/gap", "SeriesLines:names")
+    assert names == ["gap: no samples"]
+    time, rgb = shades(path, "/spectrogram/bands/40")
+    end = np.flatnonzero((rgb == colors.BACKGROUNDS[0]).all(axis=1))[-1]  # of a segment
+    assert time[end] == pytest.approx(1.45, abs=0.03)
+    assert time[end - 1] == pytest.approx(1.15, abs=0.03)
 
 
 def test_details_hold_raw_samples_around_the_worst_moment(whole):
@@ -196,9 +428,9 @@ def test_events_list_failures_found_and_annotated_by_time(whole):
     _, level = read(path, "/events", "TextLog:level")
     assert time.tolist() == [0.5, 1.0]
     assert level == [["WARN"], ["INFO"]]
-    assert text[0][0].startswith("found: impact, 0.50 s to 1.00 s: first in `desired` by panda")
-    assert "; panda_link" in text[0][0]
-    assert text[1][0].startswith("annotated: oscillations, 1.00 s to 1.50 s")
+    assert text[0][0].startswith("found: impact 0.50 s to 1.00 s, panda_joint")
+    assert ", panda_link" in text[0][0]
+    assert text[1][0].startswith("annotated: oscillations 1.00 s to 1.50 s")
 
 
 def test_properties_name_the_run_and_its_hash(whole):
@@ -283,11 +515,11 @@ def one_legged(folder: Path) -> Path:
 def test_the_report_states_what_was_found(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
-    assert "**findings: 1 impact**" in text[0]
-    assert "| impact | 0.50 | 1.00 | `desired` | " in text[0]
+    assert "### findings: 1 impact" in text[0]
+    assert "- **impact**, 0.50 s to 1.00 s, score 0.90: first in `desired` by panda" in text[0]
     assert "](recording://robot/panda/visual_geometries/panda_link" in text[0]
-    assert "| scenario | made up |" in text[0]
-    assert "| ok | 0.20 | 1.00 |  |  |  |" in text[0]
+    assert "scenario made up" in text[0]
+    assert "- **oscillations**, 1.00 s to 1.50 s, not found: first in" in text[0]
 
 
 def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
@@ -295,7 +527,7 @@ def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):
     np.savez(tmp_path / "bare.npz", time=np.arange(300) / 250, velocity=np.ones((300, 2)))
     write(analyse_file(tmp_path / "bare.npz", {}), path)
     found = entities(path)
-    assert {"/noise/simplified", "/spectrogram/levels", "/joints/velocity/0"} <= found
+    assert {"/noise/simplified", "/spectrum/now", "/joints/velocity/0"} <= found
     assert {f"/spectrogram/bands/{band:02d}" for band in range(48)} <= found
     assert not any(entity.startswith(("/robot", "/class")) for entity in found)
     _, (text,) = read(path, "/report", "TextDocument:text")
@@ -313,7 +545,8 @@ def test_a_run_of_few_samples_is_shown_too(tmp_path, samples, rate):
     )
     write(inspected(run, tmp_path), tmp_path / "out.rrd")
     _, noise = read(tmp_path / "out.rrd", "/noise/simplified", "Scalars:scalars")
-    assert np.ravel(noise).tolist() == list(range(samples))
+    unit = 10.0 ** np.floor(np.log10(samples - 1))
+    np.testing.assert_allclose(np.ravel(noise) * unit, range(samples))
 
 
 def test_an_unknown_robot_is_remarked_on_and_the_rest_is_shown(tmp_path):
@@ -341,9 +574,9 @@ def test_a_long_run_has_no_more_points_than_a_short_one(tmp_path):
     run = Run(time=time, velocity=velocity, joint_names=("a",))
     path = tmp_path / "out.rrd"
     write(inspected(run, tmp_path), path)
-    _, noise = read(path, "/noise/simplified", "Scalars:scalars")
-    assert len(noise) <= NOISE_POINTS
-    assert max(noise)[0] == pytest.approx(np.abs(velocity).max())
+    _, values = read(path, "/noise/simplified", "Scalars:scalars")
+    assert len(values) <= NOISE_POINTS
+    assert max(values)[0] == pytest.approx(np.abs(velocity).max())
 
 
 def test_gaps_are_not_drawn(tmp_path):
@@ -415,14 +648,24 @@ def test_links_made_of_boxes_are_coloured_too(tmp_path):
     assert len({colour[0] for colour in colours}) > 1
 
 
-def test_the_loudest_links_have_lanes_and_the_power_is_beside_the_noise(whole):
+def test_the_loudest_links_have_rows_and_the_power_is_beside_the_noise(whole):
     path, _ = whole
     found = entities(path)
     assert "/power/total" in found
-    assert len([entity for entity in found if entity.startswith("/level/")]) == 5
+    assert len([entity for entity in found if entity.startswith("/strips/links/")]) == 8
     time, level = read(path, "/power/total", "Scalars:scalars")
     assert len(time) == 300  # every 10 ms
     assert 60 < np.median(level) < 160
+
+
+def test_the_scale_is_the_same_beside_the_robot_and_the_links(whole):
+    path, _ = whole
+    _, (robot,) = read(path, "/axis/key/right", "Points2D:labels")
+    _, (links,) = read(path, "/axis/links/right", "Points2D:labels")
+    assert robot[:-1] == links[:-1] == ["80", "100", "120", "140"]
+    _, (robot,) = read(path, "/axis/key/right/scale", "LineStrips2D:colors")
+    _, (links,) = read(path, "/axis/links/right/scale", "LineStrips2D:colors")
+    assert robot == links
 
 
 def test_the_base_of_an_arm_is_drawn_as_quiet_as_it_is(whole):
@@ -430,7 +673,7 @@ def test_the_base_of_an_arm_is_drawn_as_quiet_as_it_is(whole):
     mesh = "/robot/panda/visual_geometries/panda_link0/visual_0"
     time, (colour,) = read(path, mesh, "Asset3D:albedo_factor")
     assert time is None
-    assert colour == [int.from_bytes([*LEVELS["quiet"], 255], "big")]
+    assert colour == [int.from_bytes([*colors.HEAT[0].astype(int).tolist(), 255], "big")]
 
 
 def test_the_papers_terms_are_shown_on_demand(tmp_path):

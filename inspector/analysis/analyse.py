@@ -62,6 +62,7 @@ class Analysis:
         links: Noise link by link; None unless it was asked for and the run has a robot.
         missing: What the run lacks to show the robot, and why, a sentence each.
         assumed: What was assumed when its log was read, in a line; empty of a run file.
+        alarm: Alarm threshold of the model, a probability of any failure; None without one.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Analysis:
     links: "LinkNoise | None" = None
     missing: tuple[str, ...] = ()
     assumed: str = ""
+    alarm: float | None = None
 
     @cached_property
     def noise(self) -> Array:
@@ -349,6 +351,7 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
         labels=labels,
         model=labelled.model,
         model_sha256=library[labelled.model].sha256,
+        alarm=labelled.alarm,
         spans=spans,
         findings=findings,
         notes=(*empty.notes, *([labelled.remark] if labelled.remark else [])),

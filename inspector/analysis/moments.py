@@ -6,13 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspector.analysis.analyse import Analysis
+from inspector.levels import FLOOR_DB, STEP, velocity_levels
 from models import Event
 from noisemodel import Block
-from noisemodel.links import vibrating
 from noisemodel.types import Array
 
-STEP = 0.05
-"""Time over which a level is taken, in [s]."""
 MOST = 3
 LOUDEST = "loudest"
 
@@ -70,10 +68,11 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
 
 
 def _level(analysis: Analysis) -> tuple[Array, Array]:
-    """Mean square of the noise above 10 Hz, every 50 ms: middles of the steps and values."""
+    """Level of the noise above 10 Hz, every 50 ms: middles of the steps and values, in [dB]."""
     run = analysis.run
-    fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]
-    size = max(1, round(STEP * run.rate))
-    firsts = np.arange(0, len(fast), size)
-    counts = np.diff(np.append(firsts, len(fast)))
-    return run.time[firsts] + counts / 2 / run.rate, np.add.reduceat(fast**2, firsts) / counts
+    starts, level = velocity_levels(
+        analysis.noise[:, None], run.mask, run.rate, start=float(run.time[0])
+    )
+    stop = float(run.time[-1]) + 1.0 / run.rate
+    middles = (starts + np.append(starts[1:], stop)) / 2
+    return middles, np.nan_to_num(level[:, 0], nan=FLOOR_DB)

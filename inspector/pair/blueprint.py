@@ -7,7 +7,7 @@ from rerun.blueprint import Blueprint
 
 from inspector.pair.colors import RANGE_DB
 from inspector.recording import unstable
-from inspector.recording.blueprint import limbs, text
+from inspector.recording.blueprint import limbs
 from inspector.recording.joints import Plot
 from inspector.recording.series import TIMELINE
 from inspector.recording.spectrogram import TOP_HZ
@@ -55,7 +55,9 @@ def layout(contents: Contents) -> Blueprint:
     if contents.links:
         over_time.append((_links(contents), 2.8))
     over_time.append((unstable.tabs(*limbs(contents.joints)), 2.8))
-    left = text(events=contents.events)
+    left = unstable.text("Report", "/report")
+    if contents.events:
+        left = unstable.tabs(left, unstable.events("Events", "/events"))
     if contents.root is not None:
         title = "Robot after: orange is louder than before, blue quieter"
         robot = unstable.robot(title, "/robot", contents.root)

@@ -1,16 +1,23 @@
-"""How a recording is laid out: robot and report at the left, everything over time at the right."""
+"""How a recording is laid out: findings, robot and details at the left, time at the right."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector.recording import unstable
+from inspector.recording import axes, unstable
+from inspector.recording.axes import Panel
 from inspector.recording.details import Detail
 from inspector.recording.joints import Plot
+from inspector.recording.noise import Curve
 from inspector.recording.series import TIMELINE
 from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
+
+TITLES = 28.0
+"""Height of a row of tabs, in points."""
+SPAN = "/span"
+"""What makes every plot reach from the start of the run to its end."""
 
 
 @dataclass(frozen=True)
@@ -18,25 +25,33 @@ class Contents:
     """What a recording holds that the layout depends on.
 
     Attributes:
+        classes: Panel of classes; None if nothing was found or annotated.
+        curves: Noise, level and probability.
+        spectrogram: Panel of the spectrogram.
+        orders: Joint and panel of the order spectrogram; None without.
+        strips: Title and panel of the levels of joints and links, those that there are.
         joints: Plots of joint signals.
         details: Moments that were logged sample by sample.
         root: Frame that the view follows; None without a robot.
         links: Whether there is noise of links.
         terms: Whether there are the paper's terms A, B and C.
-        lanes: How many lanes of classes there are, found and annotated.
-        events: Whether any of them is listed.
+        events: Whether any failure is listed.
         scores: Whether there are scores.
         sound: Whether there is a sound.
         rate: Samples per second, in [Hz].
         loop: Stretch of time that playing repeats, in [s].
     """
 
+    classes: Panel | None
+    curves: Sequence[Curve]
+    spectrogram: Panel
+    orders: tuple[str, Panel] | None
+    strips: Sequence[tuple[str, Panel]]
     joints: Sequence[Plot]
     details: Sequence[Detail]
     root: str | None
     links: bool
     terms: bool
-    lanes: int
     events: bool
     scores: bool
     sound: bool
@@ -54,65 +69,79 @@ def layout(contents: Contents) -> Blueprint:
         The blueprint; all time axes are linked but those of the details.
     """
     over_time: list[tuple[Part, float]] = []
-    if contents.lanes:
-        over_time.append((unstable.lanes("Classes", "/class"), 0.8 + 0.8 * contents.lanes))
-    over_time += [(_noise(contents), 2.4), (_spectrogram(contents), 2.8)]
-    if contents.links:
-        over_time.append((_links(), 4.4))
-    over_time.append((_joints(contents), 2.8))
-    left = text(events=contents.events)
-    if contents.root is not None:
-        title = "Robot, coloured by vibration" if contents.links else "Robot"
-        robot = unstable.robot(title, "/robot", contents.root)
-        left = unstable.above((robot, 3.0), (left, 2.0))
-    whole = unstable.beside((left, 2.0), (unstable.above(*over_time), 3.0))
+    if contents.classes is not None:
+        over_time.append((_rows(contents.classes, "/class"), contents.classes.height))
+    over_time += [(_curve(curve), curve.panel.height) for curve in contents.curves]
+    over_time.append((_spectrogram(contents), contents.spectrogram.height + TITLES))
+    lowest = max((panel.height for _, panel in contents.strips), default=160.0)
+    over_time.append((_strips(contents), lowest + TITLES))
+    whole = unstable.beside((_left(contents), 36.0), (unstable.above(*over_time), 64.0))
     return unstable.blueprint(whole, TIMELINE, contents.loop)
 
 
-def text(*, events: bool) -> Part:
-    """The report, and behind it the list of events if there are some."""
-    report = unstable.text("Report", "/report")
-    return unstable.tabs(report, unstable.events("Events", "/events")) if events else report
-
-
-def _noise(contents: Contents) -> Part:
-    parts = [unstable.plot("Noise, simplified estimate [rad/s]", "/noise")]
-    if contents.links:
+def _left(contents: Contents) -> Part:
+    """Findings above, the robot with its scale, and samples of the worst moments below."""
+    parts: list[tuple[Part, float]] = [(unstable.text("Findings", "/report", titled=False), 196.0)]
+    if contents.events:
         parts.append(
-            unstable.plot("Sound power, extended [dB re 1 pW]", "/power", ["/power/total"])
+            (unstable.events("Found, annotated: click a time to go there", "/events"), 128.0)
         )
+    if contents.root is not None:
+        title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
+        robot = unstable.robot(title, "/robot", contents.root)
+        if contents.links:
+            key = unstable.drawing("/axis/key/right")
+            robot = unstable.beside((robot, 88.0), (key, 12.0))
+        parts.append((robot, 300.0))
+    parts.append(
+        (unstable.tabs(*(each for one in contents.details for each in _detail(one))), 190.0)
+    )
+    return unstable.above(*parts)
+
+
+def _rows(panel: Panel, path: str, *, name: str | None = None) -> Part:
+    """A panel of rows."""
+    plot = unstable.plot(
+        panel.name, path, ["$origin/**", SPAN], between=(0.0, axes.TOP), fixed=True, titled=False
+    )
+    return axes.part(panel, plot, name=name)
+
+
+def _curve(curve: Curve) -> Part:
+    panel, paths = curve.panel, ["$origin/**", SPAN]
+    plot = unstable.plot(panel.name, curve.path, paths, between=curve.between, titled=False)
+    return axes.part(panel, plot)
+
+
+def _spectrogram(contents: Contents) -> Part:
+    parts = [_rows(contents.spectrogram, "/spectrogram", name="Spectrogram of the noise")]
+    if contents.orders is not None:
+        joint, panel = contents.orders
+        parts.append(_rows(panel, "/orders", name=f"Orders of {joint}"))
+    top = min(TOP_HZ, contents.rate / 2)
+    parts.append(unstable.bars(f"At the cursor, 0-{top:.0f} Hz [dB]", "/spectrum/now"))
+    if contents.links:
+        paths = ["/power/total", SPAN]
+        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", paths))
     if contents.terms:
-        terms = ["/power/terms/**", "/power/total"]
-        parts.append(unstable.plot("terms A, B, C", "/power", terms, legend=True))
+        terms = ["/power/terms/**", "/power/total", SPAN]
+        parts.append(unstable.plot("Terms A, B, C", "/power", terms, legend=True))
     if contents.sound:
         parts.append(unstable.audio("Listen", "/sound"))
     return unstable.tabs(*parts)
 
 
-def _spectrogram(contents: Contents) -> Part:
-    top = min(TOP_HZ, contents.rate / 2)
-    bands = unstable.plot(
-        f"Spectrogram of the noise, 0-{top:.0f} Hz",
-        "/spectrogram/bands",
-        between=(0.0, top),
-        fixed=True,
-    )
-    whole = unstable.tensor(f"to {contents.rate / 2:.0f} Hz [dB]", "/spectrogram/levels")
-    now = unstable.bars(f"Spectrum at the cursor, 0-{top:.0f} Hz [dB]", "/spectrogram/now")
-    return unstable.tabs(bands, whole, now)
-
-
-def _links() -> Part:
-    levels = unstable.lanes("Loudest links, above 10 Hz", "/level")
-    power = unstable.plot("Their sound power [dB re 1 pW]", "/power/links", legend=True)
-    return unstable.tabs(levels, power)
-
-
-def _joints(contents: Contents) -> Part:
-    """Scores, then each limb's signals, then the details."""
-    parts = [unstable.plot("Scores", "/score", legend=True)] if contents.scores else []
+def _strips(contents: Contents) -> Part:
+    """Levels of joints and links, then scores, then each limb's signals."""
+    parts = [_rows(panel, f"/strips/{panel.name}", name=name) for name, panel in contents.strips]
+    if contents.scores:
+        parts.append(unstable.plot("Scores", "/score", ["$origin/**", SPAN], legend=True))
+    if contents.links:
+        paths = ["$origin/**", SPAN]
+        parts.append(
+            unstable.plot("Power of links [dB re 1 pW]", "/power/links", paths, legend=True)
+        )
     parts += limbs(contents.joints)
-    parts += [_detail(detail) for detail in contents.details]
     return unstable.tabs(*parts)
 
 
@@ -121,7 +150,7 @@ def limbs(plots: Sequence[Plot]) -> list[Part]:
     return [
         unstable.tabs(
             *(
-                unstable.plot(plot.title, "/joints", plot.paths, legend=True)
+                unstable.plot(plot.title, "/joints", (*plot.paths, SPAN), legend=True)
                 for plot in plots
                 if plot.limb == limb
             ),
@@ -131,9 +160,9 @@ def limbs(plots: Sequence[Plot]) -> list[Part]:
     ]
 
 
-def _detail(detail: Detail) -> Part:
-    noise = unstable.plot("noise, raw [rad/s]", f"{detail.path}/noise", during=detail.during)
-    velocity = unstable.plot(
-        "velocity, raw [rad/s]", f"{detail.path}/velocity", legend=True, during=detail.during
-    )
-    return unstable.tabs(noise, velocity, name=detail.title)
+def _detail(detail: Detail) -> tuple[Part, Part]:
+    """Samples of joints, and of the noise."""
+    title = f"Velocities [rad/s], {detail.title}"
+    velocity = unstable.plot(title, f"{detail.path}/velocity", legend=True, during=detail.during)
+    noise = unstable.plot("Noise [rad/s]", f"{detail.path}/noise", during=detail.during)
+    return velocity, noise

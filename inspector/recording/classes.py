@@ -1,36 +1,80 @@
-"""Found and annotated classes in a recording: lanes, scores, events."""
+"""Found and annotated classes in a recording: a row for each class, scores, events."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TypeAlias
 
+import numpy as np
 import rerun as rr
+from rerun.components import MarkerShapeLike
 
 from inspector import colors
 from inspector.analysis.analyse import Analysis
-from inspector.recording import series
-from inspector.report.markdown import sentence
+from inspector.recording import axes, series, unstable
+from inspector.recording.axes import Label, Panel
+from inspector.recording.gaps import gaps, log_gaps
+from inspector.report.markdown import brief, classes_of, spoken
 from models import Event, Labels
 from noisemodel import Block, Run
 
 Lane: TypeAlias = Sequence[tuple[float, float, str]]
 """Start and stop in [s] and class of stretches in order of time."""
+ROW = 20.0
+"""Height of a class, in points."""
+FOUND, ANNOTATED = (0.10, 0.62), (0.68, 0.88)
+"""From where to where in its row each is drawn, from above."""
+MARKERS: tuple[MarkerShapeLike, ...] = (
+    "Diamond",
+    "Square",
+    "Up",
+    "Circle",
+    "Cross",
+    "Plus",
+    "Down",
+    "Asterisk",
+)
+"""Of the classes, so that a finding shorter than a pixel is seen."""
 
 
-def log(recording: rr.RecordingStream, analysis: Analysis) -> None:
+def log(recording: rr.RecordingStream, analysis: Analysis) -> Panel | None:
     """Log the classes that a model found, and those that are annotated.
 
     Args:
         recording: Where to.
         analysis: The run with its labels and blocks.
+
+    Returns:
+        The panel of the rows; None if nothing was found or annotated.
     """
     run, labels = analysis.run, analysis.labels
     colours = colours_of(analysis)
     if labels is not None:
-        series.log_lane(recording, "/class/found", analysis.lane, colours)
         _log_scores(recording, labels, colours)
-    if run.blocks:
-        series.log_lane(recording, "/class/annotated", annotated(run), colours)
     _log_events(recording, analysis, colours)
+    names = classes_of(analysis)
+    if not names:
+        return None
+    lost = gaps(run)
+    count = len(names) + bool(lost)
+    panel = Panel("class", ROW * count + axes.AXIS)
+    for row, name in enumerate(names):
+        found = _found(analysis, name)
+        blocks = [(block.start, block.stop) for block in run.blocks if block.label == name]
+        _log_row(recording, "found", name, found, colours[name], (row, count), FOUND)
+        _log_row(recording, "annotated", name, blocks, axes.INK, (row, count), ANNOTATED)
+    _log_marks(recording, analysis, names, colours, count)
+    if lost:
+        log_gaps(recording, "/class", run, (0.1 * axes.TOP / count, 0.9 * axes.TOP / count))
+    shown = [(spoken(name), readable(colours[name])) for name in names]
+    shown += [("gap: no samples", axes.INK)] * bool(lost)
+    places = axes.rows([name for name, _ in shown])
+    named = [replace(at, color=shade) for at, (_, shade) in zip(places, shown, strict=True)]
+    axes.log_left(recording, panel, named)
+    both = labels is not None and bool(run.blocks)
+    told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
+    only = "found" if labels is not None else "annotated"
+    axes.log_right(recording, panel, told or [Label(0.5, only)])
+    return panel
 
 
 def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
@@ -46,15 +90,99 @@ def annotated(run: Run) -> Lane:
     return [(block.start, block.stop, block.label) for block in run.blocks]
 
 
+def readable(color: colors.Color) -> colors.Color:
+    """A colour that text is legible in on a dark background: half as far from white."""
+    red, green, blue = (round((channel + 255) / 2) for channel in color)
+    return red, green, blue
+
+
+def log_shades(
+    recording: rr.RecordingStream, path: str, analysis: Analysis, between: tuple[float, float]
+) -> None:
+    """Shade the findings in a plot, each in the colour of its class.
+
+    Args:
+        recording: Where to.
+        path: Entity path below which each class has its own.
+        analysis: The run.
+        between: Lower and upper end of the plot.
+    """
+    colours = colours_of(analysis)
+    for name in dict.fromkeys(event.label for event in analysis.findings):
+        unstable.log_stretches(
+            recording,
+            f"{path}/{name}",
+            series.TIMELINE,
+            [(event.start, event.stop) for event in analysis.findings if event.label == name],
+            between=between,
+            name=f"found: {spoken(name)}",
+            color=colours[name],
+        )
+
+
+def _found(analysis: Analysis, name: str) -> list[tuple[float, float]]:
+    """When a class was found: findings as they are reported, and what else frames cover."""
+    events = [(event.start, event.stop) for event in analysis.findings if event.label == name]
+    return events + [(start, stop) for start, stop, label in analysis.lane if label == name]
+
+
+def _log_row(
+    recording: rr.RecordingStream,
+    how: str,
+    name: str,
+    stretches: Sequence[tuple[float, float]],
+    color: colors.Color,
+    place: tuple[int, int],
+    between: tuple[float, float],
+) -> None:
+    if stretches:
+        row, count = place
+        upper, lower = (axes.TOP * (1.0 - (row + share) / count) for share in between)
+        unstable.log_stretches(
+            recording,
+            f"/class/{how}/{name}",
+            series.TIMELINE,
+            stretches,
+            between=(lower, upper),
+            name=f"{how}: {spoken(name)}",
+            color=color,
+            opaque=True,
+        )
+
+
+def _log_marks(
+    recording: rr.RecordingStream,
+    analysis: Analysis,
+    names: Sequence[str],
+    colours: Mapping[str, colors.Color],
+    count: int,
+) -> None:
+    for row, name in enumerate(names):
+        events = [event for event in analysis.findings if event.label == name]
+        if events:
+            place = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
+            points = rr.SeriesPoints(
+                names=[spoken(name)],
+                colors=[colours[name]],
+                markers=[MARKERS[row % len(MARKERS)]],
+                marker_sizes=[4.0],
+            )
+            recording.log(f"/class/mark/{name}", points, static=True)
+            recording.send_columns(
+                f"/class/mark/{name}",
+                indexes=[series.at(np.array([event.start for event in events]))],
+                columns=series.scalars(np.full(len(events), place)),
+            )
+
+
 def _log_scores(
     recording: rr.RecordingStream, labels: Labels, colours: dict[str, colors.Color]
 ) -> None:
     centres = (labels.start + labels.stop) / 2
     for index, name in enumerate(labels.classes):
         score = labels.scores[:, index : index + 1]
-        series.log_lines(
-            recording, f"/score/{name}", centres, score, names=[name], colours=[colours[name]]
-        )
+        names, shade = [spoken(name)], [colours[name]]
+        series.log_lines(recording, f"/score/{name}", centres, score, names=names, colours=shade)
 
 
 def _log_events(
@@ -63,12 +191,12 @@ def _log_events(
     """List the failures that were found and annotated, by time: findings are warnings."""
     rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
     rows += [("annotated", block) for block in analysis.run.blocks if block.label != "ok"]
-    rows.sort(key=lambda row: row[1].start)
+    rows.sort(key=lambda row: (row[1].start, row[0] != "found"))
     if rows:
         series.log_events(
             recording,
             [event.start for _, event in rows],
-            [f"{how}: {sentence(analysis, event)}" for how, event in rows],
-            [colours[event.label] for _, event in rows],
+            [f"{how}: {brief(analysis, event)}" for how, event in rows],
+            [readable(colours[event.label]) for _, event in rows],
             warnings=[how == "found" for how, _ in rows],
         )

@@ -1,118 +1,71 @@
-"""The noise of links in a recording: lanes, sound power, and the robot's colours."""
+"""Which joints and links vibrate, in a recording: their levels as colours, and the robot's."""
 
-from dataclasses import dataclass
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.urdf import UrdfTree
 
-from inspector import colors
-from inspector.recording import robot, series
+from inspector import colors, levels
+from inspector.analysis.analyse import Analysis
+from inspector.levels import Scale
+from inspector.recording import axes, robot, rows, series
+from inspector.recording.axes import Panel
 from noisemodel.links import LinkNoise
 from noisemodel.noise import REFERENCE_POWER
 from noisemodel.types import Array
 
-STATES = colors.LEVELS
-"""From below -20 dB to above -6 dB of the loudest link's peak."""
-THRESHOLDS_DB = (-20.0, -12.0, -6.0)
-HYSTERESIS_DB = 3.0
-RANGE_DB = 30.0
-STEP = 0.05
-"""Time over which a level is taken, in [s]."""
+SHOWN = 8
+"""Joints and links that have a row."""
+ROW = 20.0
+"""Height of a row, in points; what is drawn is lower, so that rows are told apart."""
+WIDTH, STROKES = 6.0, 3
+"""Of the lines of a row, in points, and how many there are."""
 SHADES = 16
-
-
-@dataclass(frozen=True, eq=False)
-class Levels:
-    """Levels of all links, relative to the loudest peak of any.
-
-    Attributes:
-        time: Starts of the steps, shape (steps,), in [s].
-        level: Shape (steps, links), in [dB], at most 0.
-    """
-
-    time: Array
-    level: Array
-
-
-def levels(noise: LinkNoise) -> Levels:
-    """Levels of the links' vibration every 50 ms (or bin, if that is longer).
-
-    The whole motion would not do: a link that moves fast and smoothly would be the loudest.
-
-    Args:
-        noise: The links' power.
-
-    Returns:
-        Their levels; silence is at -inf.
-    """
-    width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else STEP
-    size = max(1, round(STEP / width))
-    firsts = np.arange(0, len(noise.time), size)
-    counts = np.diff(np.append(firsts, len(noise.time)))
-    mean = np.add.reduceat(noise.vibration, firsts, axis=0) / counts[:, None]
-    peak = mean.max(initial=0.0) or 1.0
-    with np.errstate(divide="ignore"):
-        return Levels(noise.time[firsts] - width / 2, 10 * np.log10(mean / peak))
-
-
-def states(level: Array) -> list[str]:
-    """States of a link, with hysteresis so that they do not flicker.
-
-    A state is entered at its threshold and left 3 dB below.
-
-    Args:
-        level: Of one link, shape (steps,), in [dB].
-
-    Returns:
-        A name of ``STATES`` per step.
-    """
-    names = list(STATES)
-    entered = np.searchsorted(THRESHOLDS_DB, level, side="right")
-    held = np.searchsorted(np.array(THRESHOLDS_DB) - HYSTERESIS_DB, level, side="right")
-    state, found = 0, []
-    for up, stay in zip(entered.tolist(), held.tolist(), strict=True):
-        state = max(up, min(state, stay))
-        found.append(names[state])
-    return found
-
-
-def shades(level: Array) -> NDArray[np.uint8]:
-    """Colour levels from slate over amber to pale yellow, in few shades: few changes are logged.
-
-    Args:
-        level: Any shape, in [dB].
-
-    Returns:
-        Red, green, blue and opacity, shape (…, 4).
-    """
-    place = np.clip(1.0 + level / RANGE_DB, 0.0, 1.0)
-    place = np.round(place * (SHADES - 1)) / (SHADES - 1)
-    scale = np.array(list(STATES.values()), dtype=np.float64)
-    places = np.linspace(0.0, 1.0, len(scale))
-    channels = [np.interp(place, places, scale[:, channel]) for channel in range(3)]
-    return np.stack([*channels, np.full(place.shape, 255.0)], axis=-1).astype(np.uint8)
-
-
-LANES = 5
+"""Colours of the robot."""
 LINES = 8
 FLOOR_DB = -20.0
 """Sound power below this is drawn at it, in [dB re 1 pW]."""
+KEY = Panel("key", 340.0)
+"""The scale beside the robot."""
 
 
-def log(recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise) -> None:
-    """Log the noise of a robot's links.
+def log_joints(recording: rr.RecordingStream, analysis: Analysis) -> Panel | None:
+    """Log the levels of the joints that vibrate most.
+
+    Args:
+        recording: Where to.
+        analysis: The run.
+
+    Returns:
+        Their panel; None without joints.
+    """
+    run = analysis.run
+    if not run.joint_names:
+        return None
+    start = float(run.time[0])
+    time, level = levels.velocity_levels(run.velocity, run.mask, run.rate, start=start)
+    stop = float(run.time[-1]) + 1.0 / run.rate
+    return _log_strips(
+        recording, "joints", analysis, np.append(time, stop), level, run.joint_names, levels.JOINTS
+    )
+
+
+def log(
+    recording: rr.RecordingStream, tree: UrdfTree, analysis: Analysis, noise: LinkNoise
+) -> Panel:
+    """Log the noise of a robot's links: levels of those that vibrate most, power, colours.
 
     Args:
         recording: Where to.
         tree: The robot.
+        analysis: The run.
         noise: Its links' power.
+
+    Returns:
+        The panel of the levels.
     """
-    found = levels(noise)
-    for index in sorted(noise.loudest[:LANES]):
-        _log_lane(recording, noise.links[index], found, index)
+    time, level = levels.link_levels(noise)
     _log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
     for place, index in enumerate(noise.loudest[:LINES]):
         color = colors.of_series(LINES)[place]
@@ -120,17 +73,55 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise) -> None
         _log_power(recording, path, noise, noise.power[:, index], color)
     for place, (term, power) in enumerate(noise.terms.items()):
         _log_power(recording, f"/power/terms/{term}", noise, power, colors.of_series(3)[place])
-    rgba = shades(found.level)
+    rgba = levels.LINKS.colours(level, shades=SHADES)
     colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
-    robot.log_colours(recording, tree, found.time, colours, rest=shades(np.array([-np.inf])))
+    quiet = levels.LINKS.colours(np.array([-np.inf]))
+    robot.log_colours(recording, tree, time, colours, rest=quiet)
+    axes.log_scale(recording, KEY, levels.LINKS, "dB re\n1 pW")
+    width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
+    edges = np.append(time, noise.time[-1] + width / 2)
+    return _log_strips(recording, "links", analysis, edges, level, noise.links, levels.LINKS)
 
 
-def _log_lane(recording: rr.RecordingStream, link: str, found: Levels, index: int) -> None:
-    step = found.time[1] - found.time[0] if len(found.time) > 1 else 0.0
-    edges = [*found.time.tolist(), float(found.time[-1] + step)]
-    named = states(found.level[:, index])
-    stretches = [(*edge, state) for edge, state in zip(pairwise(edges), named, strict=True)]
-    series.log_lane(recording, f"/level/{link}", stretches, STATES)
+def chosen(analysis: Analysis, time: Array, level: Array) -> list[int]:
+    """Columns of those that are loudest during findings, or at any time of a run without.
+
+    Args:
+        analysis: The run.
+        time: Starts of the steps, shape (steps,), in [s].
+        level: Shape (steps, columns), in [dB]; NaN in gaps.
+
+    Returns:
+        Up to eight, in the order of the columns.
+    """
+    inside = np.zeros(len(time), dtype=bool)
+    for event in analysis.findings:
+        inside |= (time > event.start - levels.STEP) & (time < event.stop)
+    shown = level[inside] if inside.any() else level
+    peaks = np.where(np.isnan(shown), -np.inf, shown).max(axis=0, initial=-np.inf)
+    return sorted(np.argsort(-peaks, kind="stable")[:SHOWN].tolist())
+
+
+def _log_strips(
+    recording: rr.RecordingStream,
+    name: str,
+    analysis: Analysis,
+    edges: Array,
+    level: Array,
+    names: Sequence[str],
+    scale: Scale,
+) -> Panel:
+    which = chosen(analysis, edges[:-1], level)
+    own = [names[index] for index in which]
+    panel = Panel(name, ROW * len(own) + axes.AXIS)
+    shown = level[:, which].T
+    rgba = scale.colours(np.nan_to_num(shown, nan=-np.inf), shades=rows.SHADES)
+    rgba = rows.blank(rgba, np.asarray(~np.isnan(shown).all(axis=0)))
+    called = [f"{each} [{scale.unit}]" for each in own]
+    rows.log(recording, f"/strips/{name}", edges, rgba, names=called, width=WIDTH, lines=STROKES)
+    axes.log_left(recording, panel, axes.rows(own))
+    axes.log_scale(recording, panel, scale)
+    return panel
 
 
 def _log_power(

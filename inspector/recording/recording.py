@@ -2,29 +2,36 @@
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import rerun as rr
 from rerun.urdf import UrdfTree
 
-from inspector import colors
+from inspector import levels
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
-from inspector.recording import classes, details, joints, robot, series, unstable
-from inspector.recording import links as link_lanes
+from inspector.recording import classes, details, joints, noise, robot, series, unstable
+from inspector.recording import links as strip_rows
+from inspector.recording import spectrogram as spectrograms
 from inspector.recording.blueprint import Contents, layout
 from inspector.recording.limbs import limbs
-from inspector.recording.spectrogram import log_bands, log_bars, log_tensor
+from inspector.recording.spectrogram import log_bars
 from inspector.recording.stream import log_report, writing
 from inspector.report.markdown import report
 from inspector.spectrogram import spectrogram
-from inspector.thinning import extremes
-
-NOISE_POINTS = 100_000
+from noisemodel.links import vibrating
 
 
-def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: bytes = b"") -> None:
+def write(
+    analysis: Analysis,
+    path: Path,
+    *,
+    overwrite: bool = False,
+    sound: bytes = b"",
+    floor: float | None = None,
+) -> None:
     """Write the recording of an inspected run, whole or not at all.
 
     The same input makes a recording of the same id: opened again, it replaces itself.
@@ -34,6 +41,7 @@ def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: byt
         path: The file to write, by convention ``*.rrd``.
         overwrite: Whether a file that exists may be replaced.
         sound: The run made audible, a WAV file that starts with the run; none if empty.
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; -70 unless given.
 
     Raises:
         OutputError: If the file exists or cannot be written.
@@ -43,19 +51,31 @@ def write(analysis: Analysis, path: Path, *, overwrite: bool = False, sound: byt
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
         tree = robot.of_run(analysis.run, Path(folder)) if analysis.links is not None else None
-        contents = _log(recording, analysis, tree, sound)
+        contents = _log(recording, analysis, tree, sound, floor)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
 
 
 def _log(
-    recording: rr.RecordingStream, analysis: Analysis, tree: UrdfTree | None, sound: bytes
+    recording: rr.RecordingStream,
+    analysis: Analysis,
+    tree: UrdfTree | None,
+    sound: bytes,
+    floor: float | None,
 ) -> Contents:
     run, links, moments = analysis.run, analysis.links, worst(analysis)
+    noise.log_span(recording, run)
+    strips = []
+    if (panel := strip_rows.log_joints(recording, analysis)) is not None:
+        strips.append(("Joints above 10 Hz", panel))
     if tree is not None and links is not None:
         robot.log(recording, tree, run, coloured=True)
-        link_lanes.log(recording, tree, links)
-    classes.log(recording, analysis)
-    _log_noise(recording, analysis)
+        strips.append(("Links above 10 Hz", strip_rows.log(recording, tree, analysis, links)))
+    shown_classes = classes.log(recording, analysis)
+    curves = noise.log(recording, analysis)
+    scale = levels.SPECTRUM if floor is None else replace(levels.SPECTRUM, low=floor)
+    fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]
+    spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
+    log_bars(recording, "/spectrum/now", spectrum)
     if sound:
         unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
     limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
@@ -63,35 +83,22 @@ def _log(
     _log_text(recording, analysis, {} if tree is None else robot.entities(tree))
     failures = [moment for moment in moments if moment.failure]
     return Contents(
+        classes=shown_classes,
+        curves=curves,
+        spectrogram=spectrograms.log(recording, analysis, spectrum, scale),
+        orders=spectrograms.log_orders(recording, analysis, scale),
+        strips=strips,
         joints=limb_plots,
         details=shown,
         root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         links=links is not None,
         terms=links is not None and bool(links.terms),
-        lanes=(analysis.labels is not None) + bool(run.blocks),
         events=any(moment.failure for moment in moments),
         scores=analysis.labels is not None,
         sound=bool(sound),
         rate=run.rate,
         loop=(failures[0].start, failures[0].stop) if failures else None,
     )
-
-
-def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> None:
-    run, noise = analysis.run, analysis.noise
-    time, values = extremes(run.time[run.mask], noise[run.mask, None], points=NOISE_POINTS)
-    series.log_lines(
-        recording,
-        "/noise/simplified",
-        time,
-        values,
-        names=["simplified [rad/s]"],
-        colours=[colors.NOISE],
-    )
-    spectrum = spectrogram(noise, run.rate, start=float(run.time[0]), valid=run.mask)
-    log_bands(recording, "/spectrogram/bands", spectrum)
-    log_bars(recording, "/spectrogram/now", spectrum)
-    log_tensor(recording, "/spectrogram/levels", spectrum)
 
 
 def _log_text(

@@ -1,15 +1,21 @@
 """Spectrograms in a recording: bands as coloured lines, bars at the time cursor, a tensor."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
 from inspector import colors
-from inspector.recording import unstable
+from inspector.analysis.analyse import Analysis
+from inspector.levels import Scale
+from inspector.orders import orders
+from inspector.recording import axes, rows, unstable
+from inspector.recording.axes import Label, Panel
+from inspector.recording.gaps import log_gaps
 from inspector.recording.series import at, scalars
-from inspector.spectrogram import RANGE_DB, Spectrogram
+from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands
+from noisemodel.noise import decibel
 from noisemodel.types import Array
 
 TOP_HZ = 2000.0
@@ -17,6 +23,92 @@ TOP_HZ = 2000.0
 BANDS = 48
 BARS = 60
 LINE_WIDTH = 5.0
+HEIGHT = 176.0
+"""Of a spectrogram, in points."""
+
+
+def log(
+    recording: rr.RecordingStream, analysis: Analysis, spectrum: Spectrogram, scale: Scale
+) -> Panel:
+    """Log a spectrogram on a logarithmic axis, as rows of colours.
+
+    Args:
+        recording: Where to.
+        analysis: The run.
+        spectrum: Of its noise.
+        scale: Of its levels.
+
+    Returns:
+        Its panel.
+    """
+    panel = Panel("spectrogram", HEIGHT)
+    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
+    title = Label(0.5, "noise\nspectrum", -22.0)
+    _log_axis(recording, panel, low, high, title, axes.hertz)
+    _log_rows(recording, panel, spectrum, (low, high), scale, "Hz")
+    log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
+    return panel
+
+
+def log_orders(
+    recording: rr.RecordingStream, analysis: Analysis, scale: Scale
+) -> tuple[str, Panel] | None:
+    """Log an order spectrogram: what goes with the speed of a joint is level in it.
+
+    Args:
+        recording: Where to.
+        analysis: The run.
+        scale: Of its levels.
+
+    Returns:
+        The joint and the panel; None where no joint moves for long enough.
+    """
+    found = orders(analysis)
+    if found is None:
+        return None
+    joint, spectrum = found
+    panel = Panel("orders", HEIGHT)
+    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
+    title = Label(0.5, "periods\nper turn", -22.0)
+    _log_axis(recording, panel, low, high, title, "{:g}".format)
+    _log_rows(recording, panel, spectrum, (low, high), scale, "periods per turn")
+    log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
+    return joint, panel
+
+
+def _log_axis(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    low: float,
+    high: float,
+    title: Label,
+    written: Callable[[float], str],
+) -> None:
+    span = np.log(max(high / low, 1.01))
+    marks = [
+        Label(float(np.log(tick / low) / span), written(tick), 40.0)
+        for tick in axes.ticks(low, max(high, 1.01 * low), panel)
+    ]
+    axes.log_left(recording, panel, [title, *marks])
+
+
+def _log_rows(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    spectrum: Spectrogram,
+    ends: tuple[float, float],
+    scale: Scale,
+    unit: str,
+) -> None:
+    edges = np.geomspace(ends[0], max(ends[1], 1.01 * ends[0]), BANDS + 1)
+    level = 2 * decibel(in_bands(spectrum.frequency, spectrum.amplitude, edges))[::-1]
+    rgba = rows.blank(scale.colours(level, shades=rows.SHADES), spectrum.valid)
+    half = np.diff(spectrum.time).min(initial=WINDOW) / 2
+    times = np.append(spectrum.time - half, spectrum.time[-1] + half)
+    names = [f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1]]
+    path = f"/{panel.name}/bands"
+    rows.log(recording, path, times, rgba, names=names, width=LINE_WIDTH)
+    axes.log_scale(recording, panel, scale)
 
 
 def log_bands(recording: rr.RecordingStream, path: str, spectrum: Spectrogram) -> None:

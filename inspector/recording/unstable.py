@@ -7,6 +7,7 @@ What changes between versions, as of 0.41:
 - ``AudioView`` and ``AssetAudio`` are new. Audio has to lie on a timeline to be played, from the
   time that it is logged at; a static asset is not played;
 - ``ViewCoordinates``;
+- ``Measurements``, whose band shades findings;
 - ``rerun.experimental``, by which a viewer returns pictures and what its views report;
 - the end of a recording's file;
 - columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
@@ -25,6 +26,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
+from inspector import colors
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
@@ -33,7 +35,7 @@ if TYPE_CHECKING:
 Part: TypeAlias = rrb.View | rrb.Container
 """A view, or views that are arranged."""
 
-BACKGROUND = (24, 26, 30)
+PLOTS, BACKGROUND = colors.BACKGROUNDS[:2]
 GRID = (70, 74, 82, 130)
 
 
@@ -54,6 +56,7 @@ def plot(
     fixed: bool = False,
     during: tuple[float, float] | None = None,
     last: float | None = None,
+    titled: bool = True,
 ) -> Part:
     """Plot scalars over time.
 
@@ -66,6 +69,7 @@ def plot(
         fixed: Whether zooming leaves that range alone.
         during: Stretch of time that is shown, in [s]; unless given, that of all other views.
         last: Time up to the cursor that is shown in place of that, in [s].
+        titled: Whether the title is shown, above the plot.
     """
     corner = (
         rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop
@@ -77,6 +81,17 @@ def plot(
         plot_legend=rrb.PlotLegend(corner, visible=legend),
         axis_x=_over(last) if during is None else _alone(*during),
         axis_y=None if between is None else rrb.ScalarAxis(range=between, zoom_lock=fixed),
+        titlebar=None if titled else False,
+    )
+
+
+def drawing(origin: str) -> Part:
+    """Draw points and lines beside a plot: 0 is at its top and 1 at its bottom."""
+    return rrb.Spatial2DView(
+        origin=origin,
+        visual_bounds=rrb.VisualBounds2D(x_range=(-0.001, 0.001), y_range=(0.0, 1.0)),
+        background=rrb.Background(color=PLOTS),
+        titlebar=False,
     )
 
 
@@ -112,14 +127,14 @@ def robot(name: str, origin: str, frame: str) -> Part:
     )
 
 
-def text(name: str, origin: str) -> Part:
+def text(name: str, origin: str, *, titled: bool = True) -> Part:
     """Show a document."""
-    return rrb.TextDocumentView(origin=origin, name=name)
+    return rrb.TextDocumentView(origin=origin, name=name, titlebar=None if titled else False)
 
 
 def events(name: str, origin: str) -> Part:
     """List log lines; a click on the time of one goes there."""
-    columns = rrb.TextLogColumns(text_log_columns=["LogLevel", "Body"])
+    columns = rrb.TextLogColumns(text_log_columns=["Body"])
     return rrb.TextLogView(origin=origin, name=name, columns=columns)
 
 
@@ -139,9 +154,10 @@ def above(*parts: tuple[Part, float], name: str | None = None) -> Part:
     return rrb.Vertical(*(part for part, _ in parts), row_shares=shares, name=name)
 
 
-def beside(*parts: tuple[Part, float]) -> Part:
+def beside(*parts: tuple[Part, float], name: str | None = None) -> Part:
     """Put parts beside each other, each with its share of the width."""
-    return rrb.Horizontal(*(part for part, _ in parts), column_shares=[share for _, share in parts])
+    shares = [share for _, share in parts]
+    return rrb.Horizontal(*(part for part, _ in parts), column_shares=shares, name=name)
 
 
 def blueprint(
@@ -226,6 +242,59 @@ def log_bars(
     lasting = [batch for batch in batches if batch.component_descriptor() != changing]
     recording.log(path, lasting, static=True)
     recording.send_columns(path, indexes=[index], columns=rr.BarChart.columns(values=heights))
+
+
+COPIES = 12
+"""Bands upon each other that are all but opaque."""
+
+
+def log_stretches(
+    recording: rr.RecordingStream,
+    path: str,
+    timeline: str,
+    stretches: Sequence[tuple[float, float]],
+    *,
+    between: tuple[float, float],
+    name: str,
+    color: tuple[int, int, int],
+    opaque: bool = False,
+) -> None:
+    """Shade stretches of time in a plot; rerun 0.41 cannot annotate them.
+
+    The band of a measurement, one standard deviation to either side, is filled to its exact edges;
+    a thick line has round ends. It is translucent, and several of them are opaque.
+
+    Args:
+        recording: Where to.
+        path: Entity path.
+        timeline: Along which time runs.
+        stretches: Start and stop of each, in [s].
+        between: Lower and upper end on the axis of the plot.
+        name: What they are.
+        color: Of all.
+        opaque: Whether nothing shines through.
+    """
+    copies = COPIES if opaque else 1
+    middle, half = (between[0] + between[1]) / 2, (between[1] - between[0]) / 2
+    apart: list[tuple[int, int]] = []
+    for start, stop in sorted(
+        (_nanoseconds(start), _nanoseconds(stop)) for start, stop in stretches
+    ):
+        if apart and start <= apart[-1][1] + 1:
+            start, stop = apart[-1][0], max(stop, apart.pop()[1])
+        apart.append((start, stop))
+    # A value that is none ends a band.
+    times = np.array([(start, stop, stop + 1) for start, stop in apart], dtype=np.int64).ravel()
+    values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
+    style = rr.Measurements.from_fields(
+        names=[name] * copies, colors=[color] * copies, widths=[0.0] * copies
+    )
+    recording.log(path, style, static=True)
+    recording.send_columns(
+        path,
+        indexes=[rr.TimeColumn(timeline, duration=times.astype("timedelta64[ns]"))],
+        columns=rr.Measurements.columns(values=values, variances=np.full_like(values, half**2)),
+    )
 
 
 def log_tensor(

@@ -1,0 +1,161 @@
+"""Panels over time that share their edges, and what stands beside them: names, ticks, scales.
+
+Rerun 0.41 labels a plot's axis with plain numbers, and makes room for the widest of them, so that
+plots of other numbers have other edges. It has no colour bar and no names of rows. Here, every
+panel has an axis on which rerun writes one digit if anything: rows lie between 0 and `TOP`, and
+curves are scaled by powers of ten. Everything else is drawn in a narrow view at either side.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import rerun as rr
+
+from inspector import colors
+from inspector.levels import Scale
+from inspector.recording import unstable
+from inspector.recording.unstable import Part
+
+TOP = 9.99
+"""Upper end of the axis of rows."""
+INK = (205, 208, 214)
+AXIS = 18.0
+"""Height of a panel's time axis, in points."""
+TEXT = 13.0
+"""Rerun writes a label below its point: from there to the label's middle, in points."""
+HALF = 10.0
+"""Half of the height of a label, in points: none is cut by the upper edge."""
+LEFT, MIDDLE, RIGHT = 14.0, 78.0, 8.0
+"""Shares of the width: names and ticks, the panel, its scale."""
+STEPS = 24
+"""Colours of a scale."""
+APART = 17.0
+"""Least distance of two ticks, in points."""
+
+
+@dataclass(frozen=True)
+class Panel:
+    """A panel over time.
+
+    Attributes:
+        name: Entity path of what is beside it, below ``/axis``.
+        height: With its time axis, in points, in a window of 1440 x 900; it grows with the window.
+    """
+
+    name: str
+    height: float
+
+    def y(self, place: float) -> float:
+        """Where a label is put in the view beside the panel, so that it stands at a place in it."""
+        middle = max((1.0 - place) * (self.height - AXIS), HALF)
+        return (middle - TEXT) / self.height
+
+
+@dataclass(frozen=True)
+class Label:
+    """A text beside a panel.
+
+    Attributes:
+        place: Its height in the panel, from 0 at the bottom to 1 at the top.
+        text: A line or several.
+        shift: From the middle of the view beside the panel to the right, in points.
+        color: Of the text.
+    """
+
+    place: float
+    text: str
+    shift: float = 0.0
+    color: colors.Color = INK
+
+
+def log_left(recording: rr.RecordingStream, panel: Panel, labels: Sequence[Label]) -> None:
+    """Log what stands at the left of a panel: its title, names of rows, ticks."""
+    _log_labels(recording, f"/axis/{panel.name}/left", panel, labels)
+
+
+def log_right(recording: rr.RecordingStream, panel: Panel, labels: Sequence[Label]) -> None:
+    """Log what stands at the right of a panel."""
+    _log_labels(recording, f"/axis/{panel.name}/right", panel, labels)
+
+
+def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: str = "") -> None:
+    """Log a scale of colours at the right of a panel, with its ticks in decibels.
+
+    Args:
+        recording: Where to.
+        panel: The panel.
+        scale: The scale.
+        title: Above it; "dB" without one.
+    """
+    path, shift = f"/axis/{panel.name}/right", -22.0 / panel.height
+    lowest, highest = (panel.y(place) + TEXT / panel.height for place in (0.04, 0.86))
+    edges = np.linspace(lowest, highest, STEPS + 1)
+    shades = scale.colours(np.linspace(scale.low, scale.high, STEPS))
+    strips = [[[shift, low], [shift, high]] for low, high in pairwise(edges.tolist())]
+    bar = rr.LineStrips2D(strips, colors=shades, radii=rr.Radius.ui_points(6.0))
+    recording.log(f"{path}/scale", bar, static=True)
+    ticks = [
+        Label(0.04 + 0.82 * float(scale.place(np.array(tick))), written(tick), 8.0)
+        for tick in scale.ticks
+    ]
+    log_right(recording, panel, [*ticks, Label(0.99, title or "dB")])
+
+
+def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:
+    """A panel with what stands beside it."""
+    left, right = (unstable.drawing(f"/axis/{panel.name}/{side}") for side in ("left", "right"))
+    return unstable.beside((left, LEFT), (plot, MIDDLE), (right, RIGHT), name=name)
+
+
+def rows(names: Sequence[str]) -> list[Label]:
+    """Names of rows, the first at the top."""
+    return [Label(1.0 - (row + 0.5) / len(names), name) for row, name in enumerate(names)]
+
+
+def middles(count: int) -> list[float]:
+    """Where rows lie on their axis, the first at the top."""
+    return [TOP * (1.0 - (row + 0.5) / count) for row in range(count)]
+
+
+def written(level: float) -> str:
+    """A level in a label, in [dB]."""
+    return f"{level:.0f}".replace("-", "\u2212")
+
+
+def ticks(low: float, high: float, panel: Panel) -> list[float]:
+    """Round values on a logarithmic axis, as close as their labels allow: 1, 2, 5, 10, ...
+
+    Args:
+        low: Lower end, positive.
+        high: Upper end.
+        panel: The panel.
+    """
+    decade = (panel.height - AXIS) / np.log10(high / low)
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    for factors in ((1, 2, 5), (1, 3), (1,)):
+        gaps = np.log10(np.append(factors[1:], 10) / np.array(factors))
+        if gaps.min() * decade >= APART or factors == (1,):
+            break
+    values = np.outer(powers, factors).ravel()
+    top = high / 10.0 ** (HALF / 2 / decade)  # so that it is not above its place
+    return [float(value) for value in values if low * 0.999 <= value <= top]
+
+
+def hertz(value: float) -> str:
+    """A frequency, such as "20 Hz" or "1 kHz"."""
+    return f"{value:g} Hz" if value < 1000 else f"{value / 1000:g} kHz"
+
+
+def _log_labels(
+    recording: rr.RecordingStream, path: str, panel: Panel, labels: Sequence[Label]
+) -> None:
+    points = rr.Points2D(
+        [[label.shift / panel.height, panel.y(label.place)] for label in labels],
+        labels=[label.text for label in labels],
+        colors=[label.color for label in labels],
+        radii=rr.Radius.ui_points(0.0),
+        show_labels=True,
+    )
+    recording.log(path, points, static=True)

@@ -1,0 +1,46 @@
+import numpy as np
+import pytest
+
+from inspector.recording import axes
+from inspector.recording.axes import AXIS, TEXT, Panel
+
+PANEL = Panel("a", 118.0)
+
+
+def test_a_label_stands_where_its_place_is_in_the_plot():
+    for place in (0.0, 0.5, 0.8):
+        middle = PANEL.y(place) * PANEL.height + TEXT
+        assert middle == pytest.approx((1 - place) * (PANEL.height - AXIS))
+    assert PANEL.y(1.0) * PANEL.height + TEXT >= 10.0  # none is cut by the upper edge
+
+
+def test_rows_and_their_names_are_at_the_same_heights():
+    names = ["a", "b", "c"]
+    places = [label.place for label in axes.rows(names)]
+    np.testing.assert_allclose(np.array(axes.middles(3)) / axes.TOP, places)
+    assert places == sorted(places, reverse=True)  # the first at the top
+
+
+@pytest.mark.parametrize(
+    ("low", "high"), [(9.8, 5000.0), (9.8, 500.0), (2.4, 40.0), (10.0, 3000.0)]
+)
+@pytest.mark.parametrize("height", [120.0, 176.0, 400.0])
+def test_ticks_are_round_apart_and_within_the_axis(low, high, height):
+    found = axes.ticks(low, high, Panel("a", height))
+    assert len(found) >= 1
+    assert low * 0.999 <= found[0]
+    assert found[-1] <= high
+    decade = (height - AXIS) / np.log10(high / low)
+    if len(found) > 1 and not all(np.log10(tick) % 1 == 0 for tick in found):
+        assert np.diff(np.log10(found)).min() * decade >= axes.APART
+    assert all(f"{tick:.0e}"[0] in "1235" for tick in found)
+
+
+def test_frequencies_and_levels_are_written_briefly():
+    assert [axes.hertz(value) for value in (10.0, 500.0, 1000.0, 2000.0)] == [
+        "10 Hz",
+        "500 Hz",
+        "1 kHz",
+        "2 kHz",
+    ]
+    assert axes.written(-20.0) == "\u221220"
