@@ -59,11 +59,11 @@ class Scale:
         return tuple(np.arange(self.low, self.high + self.step / 2, self.step).tolist())
 
 
-JOINTS = Scale(-50.0, 10.0, "dB re 1 rad/s")
+JOINTS = Scale(-60.0, 20.0, "dB re 1 rad/s")
 """Velocity of a joint above 10 Hz; of joints that slide re 1 m/s."""
 LINKS = Scale(80.0, 140.0, "dB re 1 pW")
 """Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s."""
-SPECTRUM = Scale(-70.0, 0.0, "dB re 1 rad/s")
+SPECTRUM = Scale(-70.0, 10.0, "dB re 1 rad/s")
 """Amplitude of the noise in a spectrogram; its low end can be chosen."""
 
 
@@ -83,11 +83,16 @@ def velocity_levels(
         what is valid in each, shape (steps, joints), in [dB re 1 rad/s], at least -100; NaN in
         steps that lie in a gap.
     """
-    fast = vibrating(velocity, valid, rate)
-    firsts = np.arange(0, len(fast), max(1, round(STEP * rate)))
+    fast = vibrating(velocity, valid, rate).T  # joint by joint in memory
+    size = max(1, round(STEP * rate))
+    firsts = np.arange(0, len(valid), size)
+    whole = len(valid) // size * size
+    steps = fast[:, :whole].reshape(len(fast), -1, size)
+    energy = np.einsum("jsk,jsk->sj", steps, steps)
+    if whole < len(valid):
+        energy = np.vstack((energy, np.square(fast[:, whole:]).sum(axis=1)))
     count = np.add.reduceat(valid.astype(np.float64), firsts)[:, None]
-    power = np.add.reduceat(np.square(fast), firsts, axis=0) / np.maximum(count, 1.0)
-    level = np.maximum(decibel(power), FLOOR_DB)
+    level = np.maximum(decibel(energy / np.maximum(count, 1.0)), FLOOR_DB)
     return start + firsts / rate, np.asarray(np.where(count > 0.0, level, np.nan))
 
 

@@ -7,7 +7,6 @@ Each window is resampled to equal steps of the joint's angle (Fyfe & Munck 1997,
 import numpy as np
 
 from inspector.analysis.analyse import Analysis
-from inspector.levels import velocity_levels
 from inspector.localisation.order import SLOWEST
 from inspector.spectrogram import Spectrogram, amplitudes, in_bands
 from noisemodel.links import vibrating
@@ -66,7 +65,7 @@ def _joint(analysis: Analysis) -> int:
     run = analysis.run
     for known in analysis.orders.values():
         return run.joint_names.index(known.joint)
-    _, level = velocity_levels(run.velocity, run.mask, run.rate)
+    _, level = analysis.joint_levels
     moving = np.abs(run.velocity).max(axis=0) > SLOWEST
     power = np.nansum(10.0 ** (level / 10.0), axis=0)
     return int(np.argmax(np.where(moving, power, -1.0)))

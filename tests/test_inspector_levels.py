@@ -82,5 +82,5 @@ def test_what_is_louder_is_never_darker(scale, shades):
 
 
 def test_ticks_span_a_scale():
-    assert JOINTS.ticks == (-50.0, -30.0, -10.0, 10.0)
+    assert JOINTS.ticks == (-60.0, -40.0, -20.0, 0.0, 20.0)
     assert LINKS.ticks == (80.0, 100.0, 120.0, 140.0)

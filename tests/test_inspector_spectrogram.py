@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from inspector.spectrogram import COLUMNS, RANGE_DB, spectrogram
+from inspector.spectrogram import COLUMNS, RANGE_DB, in_bands, spectrogram
 
 
 def everywhere(signal):
@@ -55,3 +55,15 @@ def test_times_are_those_of_the_run():
     signal[5000:5010] = 1.0
     shown = spectrogram(signal, 10_000.0, start=7.0, valid=everywhere(signal))
     assert shown.time[shown.level.max(axis=0).argmax()] == pytest.approx(7.5, abs=0.03)
+
+
+def test_a_band_has_the_largest_amplitude_within_it():
+    frequency, amplitude = np.arange(1.0, 11.0), np.arange(20.0).reshape(10, 2)
+    found = in_bands(frequency, amplitude, np.array([1.0, 4.0, 11.0]))
+    np.testing.assert_allclose(found, [[4.0, 5.0], [18.0, 19.0]])
+
+
+def test_a_band_narrower_than_the_bins_has_that_of_the_nearest():
+    frequency, amplitude = np.array([10.0, 20.0, 30.0]), np.array([[1.0], [5.0], [2.0]])
+    found = in_bands(frequency, amplitude, np.array([11.0, 12.0, 18.5, 19.0]))
+    np.testing.assert_allclose(found[[0, 2], 0], [1.0, 5.0])

@@ -25,9 +25,15 @@ def test_the_viewer_draws_the_demo_and_reports_no_error(tmp_path):
     assert struct.unpack(">II", png[16:24]) >= (1000, 500)
     shown = {view.name for view in state.views}
     assert {
-        "Robot, coloured by vibration",
-        "Classes",
-        "Noise, simplified estimate [rad/s]",
+        "Findings",
+        "Robot, links coloured by level above 10 Hz",
+        "class",
+        "noise",
+        "level",
+        "probability",
+        "spectrogram",
+        "joints",
+        "links",
     } <= shown
     assert not [report for view in state.views for report in view.reports]
     assert not errors

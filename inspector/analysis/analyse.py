@@ -20,6 +20,7 @@ from inspector.audit import Audit, audit, shortcomings, summary
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
+from inspector.levels import velocity_levels
 from inspector.library import (
     CannotTellError,
     Labelled,
@@ -87,6 +88,19 @@ class Analysis:
     def noise(self) -> Array:
         """Simplified noise of the run, shape (samples,), in [rad/s]."""
         return nm.simplified(self.run.motion, self.run.velocity_desired)
+
+    @cached_property
+    def noise_level(self) -> tuple[Array, Array]:
+        """Level of the noise above 10 Hz, see `inspector.levels.velocity_levels`."""
+        run = self.run
+        start = float(run.time[0])
+        return velocity_levels(self.noise[:, None], run.mask, run.rate, start=start)
+
+    @cached_property
+    def joint_levels(self) -> tuple[Array, Array]:
+        """Level of each joint above 10 Hz, see `inspector.levels.velocity_levels`."""
+        run = self.run
+        return velocity_levels(run.velocity, run.mask, run.rate, start=float(run.time[0]))
 
     @cached_property
     def localisations(self) -> "dict[Event | nm.Block, Localisation]":

@@ -7,7 +7,6 @@ import rerun as rr
 
 from inspector import colors
 from inspector.analysis.analyse import Analysis
-from inspector.levels import velocity_levels
 from inspector.recording import axes, classes, series
 from inspector.recording.axes import Label, Panel
 from inspector.recording.gaps import log_gaps
@@ -16,7 +15,8 @@ from noisemodel import Run
 from noisemodel.types import Array
 
 POINTS = 100_000
-NOISE, LEVEL, PROBABILITY = Panel("noise", 104.0), Panel("level", 104.0), Panel("probability", 76.0)
+NOISE, LEVEL = Panel("noise", 128.0), Panel("level", 120.0)
+PROBABILITY = Panel("probability", 92.0)
 LOW_DB, HIGH_DB = -80.0, 20.0
 """Ends of the level's axis, in [dB re 1 rad/s]."""
 
@@ -90,9 +90,8 @@ def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
 
 
 def _log_level(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
-    run, between = analysis.run, (LOW_DB, HIGH_DB)
-    start = float(run.time[0])
-    time, level = velocity_levels(analysis.noise[:, None], run.mask, run.rate, start=start)
+    between = (LOW_DB, HIGH_DB)
+    time, level = analysis.noise_level
     classes.log_shades(recording, "/level/finding", analysis, between)
     names = ["noise above 10 Hz [dB re 1 rad/s]"]
     path = "/level/noise"

@@ -23,7 +23,7 @@ TOP_HZ = 2000.0
 BANDS = 48
 BARS = 60
 LINE_WIDTH = 5.0
-HEIGHT = 176.0
+HEIGHT = 160.0
 """Of a spectrogram, in points."""
 
 
