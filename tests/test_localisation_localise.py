@@ -130,5 +130,5 @@ def test_a_run_without_desired_velocities_has_one_remark_on_missing_stages(tmp_p
 
 def test_the_page_has_the_same_columns_without_marks(tmp_path):
     (annotated,) = tables(inspected(shaken_run(), tmp_path))
-    assert annotated.head[3:6] == ("shows first in", "by joints", "band")
-    assert annotated.rows[0][3] == "measured"
+    assert annotated.head[3:7] == ("found", "shows first in", "by joints", "band")
+    assert annotated.rows[0][4] == "measured"

@@ -212,7 +212,7 @@ def test_the_picture_has_a_line_for_each_order(vibration, monkeypatch):
     monkeypatch.setattr(Axes, "set_title", lambda self, text, **_: titles.append(text))
     picture(analysed(vibration))
     wanted = [f"at 0.30 s: {PHRASE}"] if analysed(vibration).orders else []
-    assert titles == ["\n".join(["filled: found", *wanted])]
+    assert titles[0] == "\n".join(["filled: found", *wanted])
 
 
 def test_a_scalar_noise_and_a_run_without_findings_have_no_orders():

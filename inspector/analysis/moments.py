@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from inspector.analysis.analyse import Analysis
-from inspector.levels import FLOOR_DB, STEP, velocity_levels
+from inspector.levels import FLOOR_DB, STEP
 from models import Event
-from noisemodel import Block
+from noisemodel import Block, Run
 from noisemodel.types import Array
 
 MOST = 3
@@ -35,6 +35,16 @@ class Moment:
     def failure(self) -> bool:
         """Whether it was found, or annotated, to be one."""
         return self.label != LOUDEST
+
+
+def gaps(run: Run) -> list[tuple[float, float]]:
+    """Start and stop of each gap, in [s]."""
+    lost = np.concatenate(([False], ~run.mask, [False]))
+    edges = np.flatnonzero(lost[1:] != lost[:-1]).reshape(-1, 2)
+    last = len(run.time) - 1
+    return [
+        (float(run.time[first]), float(run.time[min(stop, last)])) for first, stop in edges.tolist()
+    ]
 
 
 def worst(analysis: Analysis) -> tuple[Moment, ...]:
@@ -70,9 +80,7 @@ def worst(analysis: Analysis) -> tuple[Moment, ...]:
 def _level(analysis: Analysis) -> tuple[Array, Array]:
     """Level of the noise above 10 Hz, every 50 ms: middles of the steps and values, in [dB]."""
     run = analysis.run
-    starts, level = velocity_levels(
-        analysis.noise[:, None], run.mask, run.rate, start=float(run.time[0])
-    )
+    starts, level = analysis.noise_level
     stop = float(run.time[-1]) + 1.0 / run.rate
     middles = (starts + np.append(starts[1:], stop)) / 2
     return middles, np.nan_to_num(level[:, 0], nan=FLOOR_DB)

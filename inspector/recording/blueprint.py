@@ -35,7 +35,7 @@ class Contents:
         root: Frame that the view follows; None without a robot.
         links: Whether there is noise of links.
         terms: Whether there are the paper's terms A, B and C.
-        events: Whether any failure is listed.
+        events: How many failures are listed.
         scores: Whether there are scores.
         sound: Whether there is a sound.
         rate: Samples per second, in [Hz].
@@ -52,7 +52,7 @@ class Contents:
     root: str | None
     links: bool
     terms: bool
-    events: bool
+    events: int
     scores: bool
     sound: bool
     rate: float
@@ -84,7 +84,10 @@ def _left(contents: Contents) -> Part:
     parts: list[tuple[Part, float]] = [(unstable.text("Findings", "/report", titled=False), 196.0)]
     if contents.events:
         parts.append(
-            (unstable.events("Found, annotated: click a time to go there", "/events"), 128.0)
+            (
+                unstable.events("Click a time to go there", "/events"),
+                72.0 + 21.0 * min(contents.events, 4),
+            )
         )
     if contents.root is not None:
         title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"

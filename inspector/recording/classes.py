@@ -10,10 +10,11 @@ from rerun.components import MarkerShapeLike
 
 from inspector import colors
 from inspector.analysis.analyse import Analysis
+from inspector.analysis.moments import gaps
 from inspector.recording import axes, series, unstable
 from inspector.recording.axes import Label, Panel
-from inspector.recording.gaps import gaps, log_gaps
-from inspector.report.markdown import brief, classes_of, spoken
+from inspector.recording.gaps import log_gaps
+from inspector.report.markdown import brief, classes_of, finding_of, spoken
 from models import Event, Labels
 from noisemodel import Block, Run
 
@@ -185,13 +186,23 @@ def _log_scores(
         series.log_lines(recording, f"/score/{name}", centres, score, names=names, colours=shade)
 
 
+def events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
+    """List findings, and annotated failures that were not found, by time."""
+    rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
+    missed = "annotated" if analysis.labels is None else "not found"
+    rows += [
+        (missed, block)
+        for block in analysis.run.blocks
+        if block.label != "ok" and finding_of(analysis, block) is None
+    ]
+    return sorted(rows, key=lambda row: row[1].start)
+
+
 def _log_events(
     recording: rr.RecordingStream, analysis: Analysis, colours: dict[str, colors.Color]
 ) -> None:
-    """List the failures that were found and annotated, by time: findings are warnings."""
-    rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
-    rows += [("annotated", block) for block in analysis.run.blocks if block.label != "ok"]
-    rows.sort(key=lambda row: (row[1].start, row[0] != "found"))
+    """List events: findings are warnings."""
+    rows = events(analysis)
     if rows:
         series.log_events(
             recording,

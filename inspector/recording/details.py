@@ -10,6 +10,7 @@ from inspector import colors
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import Moment
 from inspector.recording import series
+from inspector.report.markdown import spoken
 from inspector.thinning import extremes
 from noisemodel.links import vibrating
 
@@ -65,5 +66,5 @@ def log(
             one = [colors.NOISE] if kind == "noise" else colors.of_series(len(lines))
             thin = extremes(time, values[kind][valid], points=POINTS)
             series.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=one)
-        found.append(Detail(f"{moment.label} at {moment.peak:.2f} s", path, edges))
+        found.append(Detail(f"{spoken(moment.label)} at {moment.peak:.2f} s", path, edges))
     return found

@@ -4,21 +4,12 @@ import numpy as np
 import rerun as rr
 
 from inspector import colors
+from inspector.analysis.moments import gaps
 from inspector.recording import series
 from noisemodel import Run
 
 HATCHES = 6
 """Strokes of a gap."""
-
-
-def gaps(run: Run) -> list[tuple[float, float]]:
-    """Start and stop of each gap, in [s]."""
-    lost = np.concatenate(([False], ~run.mask, [False]))
-    edges = np.flatnonzero(lost[1:] != lost[:-1]).reshape(-1, 2)
-    last = len(run.time) - 1
-    return [
-        (float(run.time[first]), float(run.time[min(stop, last)])) for first, stop in edges.tolist()
-    ]
 
 
 def log_gaps(

@@ -8,6 +8,7 @@ from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
 from inspector.analysis.analyse import Analysis
+from inspector.analysis.loudest import chosen
 from inspector.levels import Scale
 from inspector.recording import axes, robot, rows, series
 from inspector.recording.axes import Panel
@@ -15,8 +16,6 @@ from noisemodel.links import LinkNoise
 from noisemodel.noise import REFERENCE_POWER
 from noisemodel.types import Array
 
-SHOWN = 8
-"""Joints and links that have a row."""
 ROW = 20.0
 """Height of a row, in points; what is drawn is lower, so that rows are told apart."""
 WIDTH, STROKES = 6.0, 3
@@ -43,8 +42,7 @@ def log_joints(recording: rr.RecordingStream, analysis: Analysis) -> Panel | Non
     run = analysis.run
     if not run.joint_names:
         return None
-    start = float(run.time[0])
-    time, level = levels.velocity_levels(run.velocity, run.mask, run.rate, start=start)
+    time, level = analysis.joint_levels
     stop = float(run.time[-1]) + 1.0 / run.rate
     return _log_strips(
         recording, "joints", analysis, np.append(time, stop), level, run.joint_names, levels.JOINTS
@@ -81,25 +79,6 @@ def log(
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
     return _log_strips(recording, "links", analysis, edges, level, noise.links, levels.LINKS)
-
-
-def chosen(analysis: Analysis, time: Array, level: Array) -> list[int]:
-    """Columns of those that are loudest during findings, or at any time of a run without.
-
-    Args:
-        analysis: The run.
-        time: Starts of the steps, shape (steps,), in [s].
-        level: Shape (steps, columns), in [dB]; NaN in gaps.
-
-    Returns:
-        Up to eight, in the order of the columns.
-    """
-    inside = np.zeros(len(time), dtype=bool)
-    for event in analysis.findings:
-        inside |= (time > event.start - levels.STEP) & (time < event.stop)
-    shown = level[inside] if inside.any() else level
-    peaks = np.where(np.isnan(shown), -np.inf, shown).max(axis=0, initial=-np.inf)
-    return sorted(np.argsort(-peaks, kind="stable")[:SHOWN].tolist())
 
 
 def _log_strips(

@@ -93,7 +93,7 @@ def _log(
         root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
         links=links is not None,
         terms=links is not None and bool(links.terms),
-        events=any(moment.failure for moment in moments),
+        events=len(classes.events(analysis)),
         scores=analysis.labels is not None,
         sound=bool(sound),
         rate=run.rate,

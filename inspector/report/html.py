@@ -12,7 +12,7 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
-from inspector.report.markdown import LOCALISATION, localised, note
+from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
 from inspector.sound.clip import clip, worst_time
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating_pieces
@@ -51,7 +51,14 @@ def require() -> None:
         raise InspectorError('a report needs matplotlib; `pip install "noise-inspector[report]"`')
 
 
-def write(analysis: Analysis, path: Path, *, audit: str = "", overwrite: bool = False) -> None:
+def write(
+    analysis: Analysis,
+    path: Path,
+    *,
+    audit: str = "",
+    overwrite: bool = False,
+    floor: float | None = None,
+) -> None:
     """Write the page of an inspected run, whole or not at all.
 
     Args:
@@ -59,43 +66,45 @@ def write(analysis: Analysis, path: Path, *, audit: str = "", overwrite: bool = 
         path: The file to write, by convention ``*.html``.
         audit: What the log can show, in lines.
         overwrite: Whether a file that exists may be replaced.
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; -70 unless given.
 
     Raises:
         InspectorError: If matplotlib is not installed.
         OutputError: If the file exists or cannot be written.
     """
     require()
-    text = page(analysis, audit=audit)
+    text = page(analysis, audit=audit, floor=floor)
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(text, encoding="utf-8")
 
 
-def page(analysis: Analysis, *, audit: str = "") -> str:
+def page(analysis: Analysis, *, audit: str = "", floor: float | None = None) -> str:
     """Write the page of an inspected run.
 
     Args:
         analysis: A run with what was found in it.
         audit: What the log can show, in lines.
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s].
 
     Returns:
         HTML.
     """
     from inspector.report.picture import picture
 
-    html, body = document(f"{analysis.name}: {analysis.headline}", STYLE, POLICY)
+    html, body = document(f"{analysis.name}: {spoken(analysis.headline)}", STYLE, POLICY)
     add_text(body, "h1", analysis.name)
-    add_text(body, "p", analysis.headline, "verdict")
+    add_text(body, "p", spoken(analysis.headline), "verdict")
     _add_table(body, facts(analysis))
     for table in found(analysis):
         _add_table(body, table)
     add_text(body, "h2", "Over time")
-    image = f"data:image/png;base64,{_encoded(picture(analysis))}"
+    image = f"data:image/png;base64,{_encoded(picture(analysis, floor=floor))}"
     ET.SubElement(body, "img", src=image, alt=_described(analysis))
     _add_sound(body, analysis)
     for table in parts(analysis):
         _add_table(body, table)
     _add_list(body, "What the log can show", audit.splitlines())
-    _add_list(body, "Remarks", analysis.remarks)
+    _add_list(body, "Remarks", [spoken(remark) for remark in analysis.remarks])
     add_text(
         body,
         "p",
@@ -196,8 +205,9 @@ def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
 
 def _described(analysis: Analysis) -> str:
     """What the picture shows, for readers without it."""
-    rows = ["classes", "noise", "spectrogram of the noise"]
-    rows += ["loudest links"] if analysis.links is not None else []
+    rows = ["classes", "noise", "its level above 10 Hz", "probability of a failure"]
+    rows += ["spectrogram of the noise", "levels of joints"]
+    rows += ["levels of links"] if analysis.links is not None else []
     return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
 
 
@@ -236,7 +246,7 @@ def found(analysis: Analysis) -> Iterator[Table]:
     if analysis.findings:
         rows = [
             (
-                f"{event.label}{event.novelty}",
+                f"{spoken(event.label)}{event.novelty}",
                 f"{event.start:.2f}",
                 f"{event.stop:.2f}",
                 f"{event.score:.2f}",
@@ -249,16 +259,21 @@ def found(analysis: Analysis) -> Iterator[Table]:
     if analysis.run.blocks:
         annotated = [
             (
-                block.label,
+                spoken(block.label),
                 f"{block.start:.2f}",
                 f"{block.stop:.2f}",
+                matched(analysis, block),
                 *localised(analysis, block),
             )
             for block in analysis.run.blocks
         ]
         remark = "" if analysis.findings else remark
         yield Table(
-            "Annotated", ("class", "from [s]", "to [s]", *LOCALISATION), annotated, (1, 2), remark
+            "Annotated",
+            ("class", "from [s]", "to [s]", "found", *LOCALISATION),
+            annotated,
+            (1, 2),
+            remark,
         )
 
 

@@ -14,9 +14,11 @@ SPOKEN = {"highaccelerations": "high accelerations"}
 """Classes of NoisyTest whose names people read as two words."""
 
 
-def spoken(label: str) -> str:
-    """A class as people read it."""
-    return SPOKEN.get(label, label)
+def spoken(text: str) -> str:
+    """A class as people read it, or a text with classes in it."""
+    for name, said in SPOKEN.items():
+        text = text.replace(name, said)
+    return text
 
 
 def report(analysis: Analysis) -> str:
@@ -38,7 +40,11 @@ def report(analysis: Analysis) -> str:
         *(f"{key} {run.meta[key]}" for key in ("scenario", "seed") if key in run.meta),
     ]
     found = [f"- {sentence(analysis, event, bold='**')}" for event in analysis.findings]
-    parts = [f"### {analysis.headline}", "\n".join(found), f"{analysis.name}: {', '.join(facts)}"]
+    parts = [
+        f"### {spoken(analysis.headline)}",
+        "\n".join(found),
+        f"{analysis.name}: {', '.join(facts)}",
+    ]
     if run.blocks:
         failures = [block for block in run.blocks if block.label != "ok"]
         lines = [f"- {_annotation(analysis, block)}" for block in failures]
@@ -46,7 +52,7 @@ def report(analysis: Analysis) -> str:
     if note(analysis):
         parts += [note(analysis)]
     if analysis.remarks:
-        parts += ["**Remarks**", "\n".join(f"- {remark}" for remark in analysis.remarks)]
+        parts += ["**Remarks**", "\n".join(f"- {spoken(remark)}" for remark in analysis.remarks)]
     return "\n\n".join(filter(None, parts)) + "\n"
 
 

@@ -1,7 +1,7 @@
 import numpy as np
 
 from inspector.analysis.analyse import Analysis, Status
-from inspector.recording.links import SHOWN, chosen
+from inspector.analysis.loudest import SHOWN, chosen
 from models import Event
 from noisemodel import Run
 
