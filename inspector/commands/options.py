@@ -73,6 +73,14 @@ ModelRate = Annotated[
         show_default=False,
     ),
 ]
+Floor = Annotated[
+    float | None,
+    typer.Option(
+        "--floor",
+        help="Darkest level of spectrograms, in dB re 1 rad/s; by default -70.",
+        max=0.0,
+    ),
+]
 InPart = Annotated[
     Part,
     typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inspector.commands.options import (
+    Floor,
     Kind,
     ModelFiles,
     Output,
@@ -27,6 +28,7 @@ def report(
         bool, typer.Option("--no-robot", help="Do not draw the robot and the noise of its links.")
     ] = False,
     kind: Kind = "normal",
+    floor: Floor = None,
     overwrite: Overwrite = False,
     *,
     reading: "Reading",
@@ -45,5 +47,5 @@ def report(
     found = analyse_file(opened(run, reading), library, links=not no_robot, kind=kind)
     assert found.audit is not None
     seen = text(found.name, found.audit)
-    html.write(found, output, audit=seen, overwrite=overwrite)
+    html.write(found, output, audit=seen, overwrite=overwrite, floor=floor)
     typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")

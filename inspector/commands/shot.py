@@ -6,7 +6,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Kind, ModelFiles, Output, Overwrite, opened, reads_logs
+from inspector.commands.options import (
+    Floor,
+    Kind,
+    ModelFiles,
+    Output,
+    Overwrite,
+    opened,
+    reads_logs,
+)
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
@@ -25,6 +33,7 @@ def shot(
     size: Annotated[str, typer.Option("--size", help="Width and height in pixels.")] = "1440x900",
     model: ModelFiles = None,
     kind: Kind = "normal",
+    floor: Floor = None,
     overwrite: Overwrite = False,
     *,
     reading: "Reading",
@@ -51,7 +60,7 @@ def shot(
             found = analyse_file(opened(run, reading), library, kind=kind)
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
-            write(found, recording)
+            write(found, recording, floor=floor)
         complaints = shooting.shoot(recording, output, seconds, size=points, overwrite=overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
     for complaint in complaints:

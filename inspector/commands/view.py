@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inspector.commands.options import (
+    Floor,
     Kind,
     ModelFiles,
     Overwrite,
@@ -45,6 +46,7 @@ def view(
         bool, typer.Option("--no-robot", help="Do not draw the robot and the noise of its links.")
     ] = False,
     kind: Kind = "normal",
+    floor: Floor = None,
     terms: Annotated[
         bool, typer.Option("--terms", help="Show the terms A, B and C of the paper separately.")
     ] = False,
@@ -80,6 +82,8 @@ def view(
         raise typer.BadParameter("--align takes two runs")
     if terms and after:
         raise typer.BadParameter("--terms takes one run")
+    if floor is not None and after:
+        raise typer.BadParameter("--floor takes one run")
     if port:
         from inspector.recording import web as browser
 
@@ -92,8 +96,12 @@ def view(
     library = load_library(assets.model_files(model))
     robot = not no_robot
     run_of = opened(path, reading, said=False)  # the remarks say it
+    seconds = None
     if after is None:
-        _one(run_of, target, library, robot=robot, kind=kind, terms=terms, overwrite=overwrite)
+        links = kind if robot else ""
+        seconds = _one(
+            run_of, target, library, links, terms=terms, floor=floor, overwrite=overwrite
+        )
     else:
         both_runs, how = (run_of, opened(after, reading, said=False)), align or Aligned.AUTO
         _two(both_runs, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
@@ -103,7 +111,7 @@ def view(
         browser.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
         return
     if save is None and viewer.has_display():
-        problem = viewer.open_window(target)
+        problem = viewer.open_window(target, seconds)
         if not problem:
             return
         typer.echo(problem, err=True)
@@ -115,24 +123,26 @@ def _one(
     run: "Opened",
     target: Path,
     library: "Library",
-    *,
-    robot: bool,
     kind: str,
+    *,
     terms: bool,
+    floor: float | None,
     overwrite: bool,
-) -> None:
+) -> float:
+    """Write the recording of a run; returns the time of its worst moment, in [s]."""
     from inspector.analysis.analyse import analyse_file
     from inspector.recording.recording import write
     from inspector.report.markdown import sentence
-    from inspector.sound.clip import of_recording
+    from inspector.sound.clip import of_recording, worst_time
 
-    found = analyse_file(run, library, links=robot, kind=kind, terms=terms)
-    write(found, target, overwrite=overwrite, sound=of_recording(found))
+    found = analyse_file(run, library, links=bool(kind), kind=kind, terms=terms)
+    write(found, target, overwrite=overwrite, sound=of_recording(found), floor=floor)
     typer.echo(f"{run.source.shown}: {found.headline}")
     for event in found.findings:
         typer.echo(f"  {sentence(found, event)}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")
+    return worst_time(found)
 
 
 def _two(

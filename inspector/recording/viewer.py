@@ -155,11 +155,13 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
         yield Process(process, stderr)
 
 
-def open_window(recording: Path) -> str:
+def open_window(recording: Path, seconds: float | None = None) -> str:
     """Show a recording in the viewer that runs, or start one and do not wait for it to end.
 
     Args:
         recording: A ``*.rrd`` file.
+        seconds: Where the time cursor is put, in [s], if nothing else takes the viewer's port; a
+            layout cannot say that.
 
     Returns:
         The error, empty if there is none.
@@ -168,8 +170,25 @@ def open_window(recording: Path) -> str:
         ViewerError: If the viewer is not installed.
     """
     if not _started(recording, PORT):
+        if seconds is not None:
+            _put_cursor(f"rerun+http://{HOST}:{PORT}/proxy", seconds)
         return ""
     return _started(recording, "auto")  # another program listens where viewers do
+
+
+def _put_cursor(address: str, seconds: float) -> None:
+    """Put the time cursor of a viewer somewhere, once it has a recording; else leave it."""
+    from inspector.recording import unstable
+
+    until = time.monotonic() + SETTLE
+    while time.monotonic() < until:
+        with suppress(Exception):  # the client raises what it likes until the viewer is up
+            client = unstable.client(address)
+            state = client.get_state()
+            if state.recordings and not state.loading:
+                client.set_time("time", duration=seconds)
+                return
+        time.sleep(0.1)
 
 
 def _started(recording: Path, port: str) -> str:
