@@ -4,6 +4,7 @@ The scales are absolute: a colour means the same level in every run, recording, 
 that a quiet run looks quiet.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,12 +30,14 @@ class Scale:
         high: Level of the lightest one, in [dB].
         unit: Such as "dB re 1 rad/s".
         step: From one tick to the next, in [dB].
+        palette: Colours of places from 0 to 1.
     """
 
     low: float
     high: float
     unit: str
     step: float = 20.0
+    palette: Callable[[Array], NDArray[np.uint8]] = colors.heat
 
     def place(self, level: Array) -> Array:
         """Levels as shares of the scale: 0 at its low end and 1 at its high end, not clipped."""
@@ -51,7 +54,7 @@ class Scale:
             Red, green, blue and opacity, shape (…, 4).
         """
         place = np.clip(self.place(level), 0.0, 1.0)
-        return colors.heat(np.round(place * (shades - 1)) / (shades - 1) if shades else place)
+        return self.palette(np.round(place * (shades - 1)) / (shades - 1) if shades else place)
 
     @property
     def ticks(self) -> tuple[float, ...]:

@@ -7,6 +7,7 @@ from rerun.blueprint import Blueprint
 
 from inspector.live.spectrogram import FLOOR_DB
 from inspector.recording import unstable
+from inspector.recording.camera import Camera
 from inspector.recording.series import TIMELINE
 from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
@@ -21,13 +22,13 @@ class Contents:
 
     Attributes:
         joints: Title and entity paths of each plot of joint signals.
-        root: Frame that the view follows; None without a robot.
+        camera: From where the robot is seen; None without one.
         classes: Whether there are classes.
         rate: Samples per second, in [Hz].
     """
 
     joints: Sequence[tuple[str, Sequence[str]]]
-    root: str | None
+    camera: Camera | None
     classes: bool
     rate: float
 
@@ -48,8 +49,8 @@ def layout(contents: Contents) -> Blueprint:
     if contents.classes:
         right.insert(0, (unstable.lanes("Classes", "/class", last=SHOWN), 1.6))
     left = unstable.events("Events", "/events")
-    if contents.root is not None:
-        left = unstable.above((unstable.robot("Robot", "/robot", contents.root), 3), (left, 2))
+    if contents.camera is not None:
+        left = unstable.above((unstable.robot("Robot", "/robot", contents.camera), 3), (left, 2))
     content = unstable.beside((left, 2), (unstable.above(*right), 3))
     return unstable.blueprint(content, TIMELINE, following=True)
 

@@ -8,11 +8,14 @@ import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfJoint
 
+from inspector.recording import framing, series
 from inspector.recording import robot as scene
-from inspector.recording import series
+from inspector.recording.camera import Camera, fitted
 from noisemodel.types import Array
 
 SLIDING = "prismatic"
+ROOM = 1.3
+"""What the camera sees, by the size of the robot as it stands at first."""
 
 
 class LiveRobot:
@@ -26,7 +29,6 @@ class LiveRobot:
         at_once: Poses that a message has.
 
     Attributes:
-        root: Frame that the view follows.
         children: Links that move, in the order of `transforms`; the base, if it moves, is last.
 
     Raises:
@@ -46,7 +48,9 @@ class LiveRobot:
     ) -> None:
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
+            self._outermost = framing.outermost(scene.drawn_file(robot, Path(folder)))
             scene.log_shapes(recording, tree, coloured=False)
+        self._tree = tree
         movable = {joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"}
         leaders = {
             name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
@@ -70,8 +74,26 @@ class LiveRobot:
         self._carriers = [parent for parent, _ in links]
         self._at_once = at_once
         self._waiting: list[tuple[float, Array, Array]] = []
+        self._names = [joint.name for joint in joints]
         self._recording = recording
-        self.root = scene.root(tree, floating=floating)
+        self._followed: tuple[Camera, Array] | None = None
+
+    def camera(self, position: Array, base_pose: Array | None) -> Camera:
+        """Place the camera by the first pose, with room to move: what will come is not known.
+
+        Args:
+            position: Of the named joints, shape (joints,), in [rad] or [m].
+            base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
+        """
+        angle = self._factor * np.nan_to_num(position)[self._columns] + self._offset
+        angles = dict(zip(self._names, angle[:, None], strict=True))
+        pose = None if base_pose is None else _known(base_pose)[None]
+        reached = framing.reached(self._tree, self._outermost, angles, pose)
+        seen = framing.standing(fitted(reached, room=ROOM), self._tree, pose)
+        if base_pose is not None:
+            self._followed = seen, _known(base_pose)
+            framing.begin_to_follow(self._recording, seen)
+        return seen
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
         """Move the robot, once there are as many poses as a message has.
@@ -97,6 +119,10 @@ class LiveRobot:
         times, places, turns = (list(each) for each in zip(*self._waiting, strict=True))
         self._waiting = []
         count = len(times)
+        if self._followed is not None:  # the base is the last of the links
+            seen, first = self._followed
+            base = np.array([[*at[-1], *turn[-1]] for at, turn in zip(places, turns, strict=True)])
+            framing.follow(self._recording, seen, np.array(times), base, first)
         self._recording.send_columns(
             "/robot/motion",
             indexes=[series.at(np.repeat(times, len(self.children)))],
@@ -123,6 +149,11 @@ class LiveRobot:
         # turn (axis sin half, cos half), with what does not change multiplied once
         turned = np.sin(half) * self._spin + np.cos(half) * self._turn
         return self._place + angle * self._slide, turned
+
+
+def _known(pose: Array) -> Array:
+    """A pose, or that of a base in the origin where it is not known."""
+    return pose if np.isfinite(pose).all() else np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
 
 
 def _quaternion(joint: UrdfJoint) -> Array:

@@ -94,13 +94,7 @@ class Worker:
             self._spectrogram.centres,
             watched=sink.watched,
         )
-        contents = Contents(
-            joints=self._drawing.plots,
-            root=self._robot.root if self._robot else None,
-            classes=bool(self._labeller.classes),
-            rate=rate,
-        )
-        sink.recording.send_blueprint(layout(contents))
+        self._laid_out = False
         if self._labeller.remark:
             warnings.emit(self._labeller.remark)
 
@@ -142,6 +136,8 @@ class Worker:
         time, received = buffer.time[chosen], buffer.received[chosen]
         signals = {name: values[chosen] for name, values in buffer.signals.items()}
         self._now = float(time[-1])
+        if not self._laid_out:
+            self._lay_out(signals)
         motion = np.hstack([signals[name] for name in self._noisy])
         valid = np.asarray(np.isfinite(motion).all(axis=1))
         self._note_unknown(time, valid)
@@ -186,6 +182,21 @@ class Worker:
             self._drawing.flush()
             if self._robot is not None:
                 self._robot.flush()
+
+    def _lay_out(self, signals: Mapping[str, Array]) -> None:
+        """Send the layout, with the camera placed for the first pose."""
+        self._laid_out, camera = True, None
+        if self._robot is not None:
+            pose = signals.get("base_pose")
+            first = None if pose is None else pose[0]
+            camera = self._robot.camera(signals["position"][0], first)
+        contents = Contents(
+            joints=self._drawing.plots,
+            camera=camera,
+            classes=bool(self._labeller.classes),
+            rate=self._rate,
+        )
+        self._sink.recording.send_blueprint(layout(contents))
 
     def _skip(self, samples: int) -> None:
         if samples:

@@ -7,6 +7,7 @@ from rerun.blueprint import Blueprint
 
 from inspector.recording import axes, unstable
 from inspector.recording.axes import Panel
+from inspector.recording.camera import Camera
 from inspector.recording.details import Detail
 from inspector.recording.joints import Plot
 from inspector.recording.noise import Curve
@@ -32,7 +33,7 @@ class Contents:
         strips: Title and panel of the levels of joints and links, those that there are.
         joints: Plots of joint signals.
         details: Moments that were logged sample by sample.
-        root: Frame that the view follows; None without a robot.
+        camera: From where the robot is seen; None without one.
         links: Whether there is noise of links.
         terms: Whether there are the paper's terms A, B and C.
         events: How many failures are listed.
@@ -49,7 +50,7 @@ class Contents:
     strips: Sequence[tuple[str, Panel]]
     joints: Sequence[Plot]
     details: Sequence[Detail]
-    root: str | None
+    camera: Camera | None
     links: bool
     terms: bool
     events: int
@@ -89,9 +90,9 @@ def _left(contents: Contents) -> Part:
                 72.0 + 21.0 * min(contents.events, 4),
             )
         )
-    if contents.root is not None:
+    if contents.camera is not None:
         title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
-        robot = unstable.robot(title, "/robot", contents.root)
+        robot = unstable.robot(title, "/robot", contents.camera)
         if contents.links:
             key = unstable.drawing("/axis/key/right")
             robot = unstable.beside((robot, 88.0), (key, 12.0))

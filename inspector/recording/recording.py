@@ -12,7 +12,7 @@ from rerun.urdf import UrdfTree
 from inspector import levels
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
-from inspector.recording import classes, details, joints, noise, robot, series, unstable
+from inspector.recording import classes, details, framing, joints, noise, robot, series, unstable
 from inspector.recording import links as strip_rows
 from inspector.recording import spectrogram as spectrograms
 from inspector.recording.blueprint import Contents, layout
@@ -22,6 +22,9 @@ from inspector.recording.stream import log_report, writing
 from inspector.report.markdown import report
 from inspector.spectrogram import spectrogram
 from noisemodel.links import vibrating
+
+ASPECT = 1.3
+"""Least width of the robot's view by its height."""
 
 
 def write(
@@ -51,7 +54,7 @@ def write(
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
         tree = robot.of_run(analysis.run, Path(folder)) if analysis.links is not None else None
-        contents = _log(recording, analysis, tree, sound, floor)
+        contents = _log(recording, analysis, tree, Path(folder), sound, floor)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
 
 
@@ -59,16 +62,20 @@ def _log(
     recording: rr.RecordingStream,
     analysis: Analysis,
     tree: UrdfTree | None,
+    folder: Path,
     sound: bytes,
     floor: float | None,
 ) -> Contents:
-    run, links, moments = analysis.run, analysis.links, worst(analysis)
+    run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
     noise.log_span(recording, run)
     strips = []
     if (panel := strip_rows.log_joints(recording, analysis)) is not None:
         strips.append(("Joints above 10 Hz", panel))
     if tree is not None and links is not None:
+        assert run.robot is not None
         robot.log(recording, tree, run, coloured=True)
+        urdf = robot.drawn_file(run.robot, folder)
+        (seen,) = framing.log(recording, [(tree, run)], urdf, aspect=ASPECT)
         strips.append(("Links above 10 Hz", strip_rows.log(recording, tree, analysis, links)))
     shown_classes = classes.log(recording, analysis)
     curves = noise.log(recording, analysis)
@@ -90,7 +97,7 @@ def _log(
         strips=strips,
         joints=limb_plots,
         details=shown,
-        root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
+        camera=seen,
         links=links is not None,
         terms=links is not None and bool(links.terms),
         events=len(classes.events(analysis)),

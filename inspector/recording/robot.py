@@ -2,14 +2,14 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
-from rerun.urdf import UrdfTree
+from rerun.urdf import UrdfJoint, UrdfTree
 
 import noisemodel
 from inspector.errors import InspectorError
@@ -35,7 +35,7 @@ COLOURED = {
 """The shapes that a URDF becomes, and what colours each."""
 
 
-def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
+def load(name: str, folder: Path, joint_names: Sequence[str] = (), *, side: str = "") -> UrdfTree:
     """Read the robot that a run names, for drawing.
 
     Args:
@@ -43,6 +43,7 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
         folder: Takes what rerun reads in place of the robot's own files, as late as when the tree
             is logged: it has to stay until then.
         joint_names: Joints that the robot has to have.
+        side: Which of several robots in a recording this is; empty if there is one.
 
     Returns:
         Rerun's tree of its links and joints.
@@ -52,8 +53,8 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
         MeshError: If one of its meshes cannot be read.
         UnknownJointError: If the robot lacks one of the joints, naming the first.
     """
-    path = robot.locate(name)
-    copy = folder / path.with_suffix(".urdf").name
+    path, copy = robot.locate(name), drawn_file(name, folder)
+    place = f"robot_{side}" if side else "robot"
     if is_mjcf(path):
         text = drawable_mjcf(Robot.load(path), folder)
     else:
@@ -61,7 +62,10 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
         text = drawable(path, robot.package_roots(name), folder)
     copy.write_text(text, encoding="utf-8")
     tree = UrdfTree.from_file_path(
-        copy, entity_path_prefix="robot", static_transform_entity_path="/robot/fixed"
+        copy,
+        entity_path_prefix=place,
+        frame_prefix=f"{place}/" if side else None,
+        static_transform_entity_path=f"/{place}/fixed",
     )
     known = [joint.name for joint in tree.joints() if joint.joint_type != "fixed"]
     for joint in joint_names:
@@ -70,15 +74,30 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = ()) -> UrdfTree:
     return tree
 
 
-def of_run(run: Run, folder: Path) -> UrdfTree:
+def drawn_file(name: str, folder: Path) -> Path:
+    """The URDF that `load` writes into a folder for rerun to read."""
+    return folder / robot.locate(name).with_suffix(".urdf").name
+
+
+def of_run(run: Run, folder: Path, *, side: str = "") -> UrdfTree:
     """Read the robot of a run that names one; see `load`."""
     assert run.robot is not None
-    return load(run.robot, folder, (*run.joint_names, *run.desired_joint_names))
+    return load(run.robot, folder, (*run.joint_names, *run.desired_joint_names), side=side)
+
+
+def origin(tree: UrdfTree) -> str:
+    """Entity path that all of a robot lies under."""
+    return f"/{tree.frame_prefix or 'robot'}".rstrip("/")
+
+
+def frame(tree: UrdfTree, link: str) -> str:
+    """Name of a link's frame of transforms, or of the world's."""
+    return f"{tree.frame_prefix or ''}{link}"
 
 
 def root(tree: UrdfTree, *, floating: bool) -> str:
-    """The frame that the view follows: the robot's base, or the world if that floats."""
-    return WORLD if floating else str(tree.root_link().name)
+    """The frame that the robot is drawn in: that of its base, or of the world if that floats."""
+    return frame(tree, WORLD if floating else tree.root_link().name)
 
 
 def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
@@ -88,15 +107,21 @@ def moving_links(tree: UrdfTree) -> dict[str, list[str]]:
     """
     groups = {tree.root_link().name: [tree.root_link().name]}
     carrier = {tree.root_link().name: tree.root_link().name}
-    waiting = list(tree.joints())
-    while waiting:
-        ready = [joint for joint in waiting if joint.parent_link in carrier]
-        for joint in ready:
-            fixed = joint.joint_type == "fixed"
-            carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
-            groups.setdefault(carrier[joint.child_link], []).append(joint.child_link)
-        waiting = [joint for joint in waiting if joint not in ready]
+    for joint in outwards(tree):
+        fixed = joint.joint_type == "fixed"
+        carrier[joint.child_link] = carrier[joint.parent_link] if fixed else joint.child_link
+        groups.setdefault(carrier[joint.child_link], []).append(joint.child_link)
     return groups
+
+
+def outwards(tree: UrdfTree) -> Iterator[UrdfJoint]:
+    """The joints of a robot, each after those that carry it."""
+    reached, waiting = {tree.root_link().name}, list(tree.joints())
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent_link in reached]
+        yield from ready
+        reached |= {joint.child_link for joint in ready}
+        waiting = [joint for joint in waiting if joint not in ready]
 
 
 def entities(tree: UrdfTree) -> dict[str, str]:
@@ -130,26 +155,47 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
         coloured: Whether colours over time will follow, see `log_shapes`.
     """
     log_shapes(recording, tree, coloured=coloured)
-    assert run.position is not None
+    frames = shown(run)
+    moved = angles(tree, run, frames)
+    for joint in tree.joints():
+        if joint.name in moved:
+            recording.send_columns(
+                f"{origin(tree)}/motion/{joint.name}",
+                indexes=[series.at(run.time[frames])],
+                columns=joint.compute_transform_columns(moved[joint.name].tolist(), clamp=False),
+            )
+    if run.base_pose is not None:
+        _log_base(recording, tree, run, frames)
+
+
+def shown(run: Run) -> NDArray[np.intp]:
+    """The samples that are drawn, at most 50 a second and 2000 in all; none in a gap."""
     step = max(1, round(run.rate / FRAMES_PER_SECOND), -(-len(run.time) // MAX_FRAMES))
-    shown = np.arange(0, len(run.time), step)
-    shown = shown[run.mask[shown]]
-    columns = {name: run.position[shown, i] for i, name in enumerate(run.joint_names)}
+    frames = np.arange(0, len(run.time), step)
+    return frames[run.mask[frames]]
+
+
+def angles(tree: UrdfTree, run: Run, frames: NDArray[np.intp]) -> dict[str, Array]:
+    """Positions of all joints that move, those that mimic another one included.
+
+    Args:
+        tree: The robot.
+        run: A run with positions.
+        frames: Samples of it.
+
+    Returns:
+        By joint, shape (frames,), in [rad] or [m].
+    """
+    assert run.position is not None
+    columns = {name: run.position[frames, i] for i, name in enumerate(run.joint_names)}
+    found = {}
     for joint in tree.joints():
         follows = joint.mimic
         if follows is not None and follows.joint in columns:
-            angles = columns[follows.joint] * follows.multiplier + follows.offset
+            found[joint.name] = columns[follows.joint] * follows.multiplier + follows.offset
         elif joint.name in columns:
-            angles = columns[joint.name]
-        else:
-            continue
-        recording.send_columns(
-            f"/robot/motion/{joint.name}",
-            indexes=[series.at(run.time[shown])],
-            columns=joint.compute_transform_columns(angles.tolist(), clamp=False),
-        )
-    if run.base_pose is not None:
-        _log_base(recording, tree, run, shown)
+            found[joint.name] = columns[joint.name]
+    return found
 
 
 def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool) -> None:
@@ -206,17 +252,19 @@ def _log_base(
     assert run.base_pose is not None
     pose = run.base_pose[shown]
     recording.send_columns(
-        "/robot/motion/base",
+        f"{origin(tree)}/motion/base",
         indexes=[series.at(run.time[shown])],
         columns=rr.Transform3D.columns(
             translation=pose[:, :3],
             quaternion=pose[:, 3:],
-            parent_frame=[WORLD] * len(pose),
-            child_frame=[tree.root_link().name] * len(pose),
+            parent_frame=[frame(tree, WORLD)] * len(pose),
+            child_frame=[frame(tree, tree.root_link().name)] * len(pose),
         ),
     )
 
 
+STICK = 0.1
+"""Size of the balls of a robot without shapes, by the distance from joint to joint."""
 DRAWN = {".stl", ".dae", ".obj", ".glb", ".gltf"}
 FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -232,8 +280,9 @@ class MeshError(InspectorError):
 def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     """Rewrite a URDF for drawing.
 
-    Collision shapes, textures and simulator extensions are left out, addresses of meshes become
-    absolute: rerun refuses empty textures and needs an environment variable for ``package://``.
+    Textures and simulator extensions are left out, addresses of meshes become absolute: rerun
+    refuses empty textures and needs an environment variable for ``package://``. Of a link without
+    visual shapes the collision shapes are drawn; a robot without any shape is drawn as sticks.
 
     Args:
         urdf: A URDF that has been checked.
@@ -247,6 +296,12 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
         MeshError: If a mesh is missing, lies elsewhere, or is empty or cut off.
     """
     tree = ET.parse(urdf).getroot()  # noqa: S314
+    for link in tree.iter("link"):
+        if link.find("visual") is None:
+            for shape in link.findall("collision"):
+                shape.tag = "visual"
+    if tree.find("link/visual") is None:
+        _add_sticks(tree)
     for parent in list(tree.iter()):
         for child in list(parent):
             empty = child.tag == "texture" and not child.get("filename")
@@ -255,6 +310,38 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     for mesh in tree.iter("mesh"):
         mesh.set("filename", f"file://{_checked(mesh.get('filename', ''), urdf, roots, folder)}")
     return ET.tostring(tree, encoding="unicode")
+
+
+def _add_sticks(tree: ET.Element) -> None:
+    """Give a URDF without shapes a ball at each joint, and a stick from each to the next."""
+    joints = []
+    for joint in tree.iter("joint"):
+        origin, parent = joint.find("origin"), joint.find("parent")
+        if parent is not None:
+            xyz = "0 0 0" if origin is None else origin.get("xyz", "0 0 0")
+            joints.append((parent.get("link"), np.array(xyz.split(), dtype=np.float64)))
+    lengths = [length for _, place in joints if (length := float(np.linalg.norm(place))) > 0.0]
+    thickness = STICK * (float(np.median(lengths)) if lengths else 1.0)
+    for link in tree.iter("link"):
+        _add_visual(link, ET.Element("sphere", radius=repr(thickness)))
+        for parent_link, place in joints:
+            length = float(np.linalg.norm(place))
+            if parent_link == link.get("name") and length > 0.0:
+                x, y, z = place
+                turn = (0.0, np.arctan2(np.hypot(x, y), z), np.arctan2(y, x))
+                sizes = {"radius": repr(thickness / 2), "length": repr(length)}
+                _add_visual(link, ET.Element("cylinder", sizes), xyz=place / 2, rpy=turn)
+
+
+def _add_visual(
+    link: ET.Element,
+    shape: ET.Element,
+    xyz: Iterable[float] = (0.0, 0.0, 0.0),
+    rpy: Iterable[float] = (0.0, 0.0, 0.0),
+) -> None:
+    visual = ET.SubElement(link, "visual")
+    ET.SubElement(visual, "origin", xyz=_numbers(xyz), rpy=_numbers(rpy))
+    ET.SubElement(visual, "geometry").append(shape)
 
 
 def drawable_mjcf(moved: Robot, folder: Path) -> str:

@@ -27,6 +27,7 @@ import rerun.blueprint as rrb
 from numpy.typing import NDArray
 
 from inspector import colors
+from inspector.recording.camera import Camera
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:
@@ -115,15 +116,32 @@ def tensor(name: str, origin: str) -> Part:
     )
 
 
-def robot(name: str, origin: str, frame: str) -> Part:
-    """Draw what moves, in a view that follows a frame of transforms."""
+def robot(name: str, origin: str, camera: Camera) -> Part:
+    """Draw what moves, on its floor, from where a camera stands.
+
+    Args:
+        name: Title.
+        origin: Entity path that all of it lies under.
+        camera: From where, and in which frame of transforms.
+    """
     return rrb.Spatial3DView(
         origin="/",
         contents=[f"{origin}/**"],
         name=name,
-        spatial_information=rrb.SpatialInformation(target_frame=frame),
+        spatial_information=rrb.SpatialInformation(target_frame=camera.frame),
         background=rrb.Background(color=BACKGROUND),
-        line_grid=rrb.LineGrid3D(visible=True, spacing=0.5, color=GRID),
+        line_grid=rrb.LineGrid3D(
+            visible=True,
+            spacing=camera.spacing,
+            plane=rr.components.Plane3D.XY.with_distance(camera.floor),
+            color=GRID,
+        ),
+        eye_controls=rrb.EyeControls3D(
+            position=camera.eye,
+            look_target=camera.target,
+            eye_up=(0.0, 0.0, 1.0),
+            tracking_entity=camera.follows or None,
+        ),
     )
 
 

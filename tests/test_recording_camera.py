@@ -1,0 +1,186 @@
+"""The robot is in view: laws of the camera, with the mesh and the kinematics of the noise model."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio
+import pytest
+import rerun as rr
+from chains import BAR
+from recordings import read
+from rerun.chunk import RrdReader
+from test_noisemodel_mjcf import ARM, LEGS, written
+
+from inspector.analysis.analyse import analyse_file
+from inspector.recording import framing
+from inspector.recording import robot as scene
+from inspector.recording.camera import FIELD_OF_VIEW, fitted
+from inspector.recording.recording import write
+from noisemodel import Robot, Run
+from noisemodel.geometry import pieces
+
+
+def run_of(robot, name, seconds=1.0):
+    """Every joint swings; what floats walks in a circle, turns, and bobs."""
+    time = np.arange(round(seconds * 1000)) / 1000
+    names = robot.joint_names
+    phase = 2 * np.pi * (np.linspace(0.3, 0.9, len(names)) * time[:, None] + np.arange(len(names)))
+    reach = np.array([0.1 if j.kind == "prismatic" else 0.6 for j in robot.joints if j.nv == 1])
+    fields = {
+        "time": time,
+        "velocity": reach * np.cos(phase),
+        "position": reach * np.sin(phase),
+        "joint_names": names,
+        "robot": name,
+    }
+    if robot.floating_base:
+        yaw = time
+        pose = np.zeros((len(time), 7))
+        pose[:, 0], pose[:, 1] = 4 * np.cos(time), 4 * np.sin(time)
+        pose[:, 2] = 1.0 + 0.2 * np.sin(9 * time)
+        pose[:, 5], pose[:, 6] = np.sin(yaw / 2), np.cos(yaw / 2)
+        fields["base_pose"] = pose
+    return Run(**fields)
+
+
+def eye_of(recording):
+    """What the blueprint says of the eye, by component."""
+    reader = RrdReader(recording)
+    (blueprint,) = reader.blueprints()
+    found = {}
+    for chunk in reader.store(store=blueprint).stream():
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if name.startswith(("EyeControls3D:", "LineGrid3D:", "SpatialInformation:")):
+                found[name.partition(":")[2]] = batch.column(name).to_pylist()[0][0]
+    return found
+
+
+def in_picture(points, eye, target, aspect):
+    """Where points are in the picture: -1 to 1 from edge to edge, in both directions."""
+    ahead = target - eye
+    ahead /= np.linalg.norm(ahead)
+    right = np.cross(ahead, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, ahead)
+    offset = points - eye
+    depth = offset @ ahead
+    assert (depth > 0).all()
+    slope = np.tan(FIELD_OF_VIEW / 2)
+    return (
+        np.stack([offset @ right / (aspect * slope), offset @ up / slope], axis=1) / depth[:, None]
+    )
+
+
+def placed(robot, run, samples):
+    """All corners of all triangles of a robot, sample by sample, by Pinocchio."""
+    corners = {}
+    for joint, _, triangles in pieces(robot):
+        corners.setdefault(joint, []).append(triangles.reshape(-1, 3))
+    corners = {joint: np.concatenate(parts)[::7] for joint, parts in corners.items()}
+    q, _ = robot.configuration(run)
+    data = robot.model.createData()
+    for sample in samples:
+        pinocchio.forwardKinematics(robot.model, data, q[sample])
+        poses = [data.oMi[joint] for joint in corners]
+        yield np.concatenate(
+            [
+                points @ pose.rotation.T + pose.translation
+                for pose, points in zip(poses, corners.values(), strict=True)
+            ]
+        )
+
+
+@pytest.fixture(scope="module", params=["panda", "arm.xml", "legs.xml"])
+def filmed(request, tmp_path_factory):
+    """A robot, its run, and its recording: from a URDF, and from MJCFs on a base and floating."""
+    folder = tmp_path_factory.mktemp("filmed")
+    text = {"arm.xml": ARM, "legs.xml": LEGS}.get(request.param)
+    name = request.param if text is None else str(written(folder, text, request.param))
+    robot = Robot.load(name)
+    run = run_of(robot, name)
+    run.save(folder / "run.npz")
+    rr.set_strict_mode(True)
+    write(analyse_file(folder / "run.npz", {}, links=True), folder / "run.rrd")
+    return robot, run, folder / "run.rrd"
+
+
+def test_every_link_is_in_the_picture_at_every_time(filmed):
+    robot, run, recording = filmed
+    eye = eye_of(recording)
+    position, target = np.array(eye["position"]), np.array(eye["look_target"])
+    samples = range(0, len(run.time), 20)
+    moved = np.zeros((len(samples), 3))
+    if robot.floating_base:
+        time, centre = read(recording, eye["tracking_entity"], "Points3D:positions")
+        np.testing.assert_allclose(time, run.time[::20], atol=1e-9)
+        moved = np.array(centre)[:, 0] - centre[0][0]
+        np.testing.assert_allclose(centre[0][0], target, atol=1e-6)
+        assert np.ptp(moved, axis=0)[:2].min() > 1.0  # it walks far out of the first picture
+    most = 0.0
+    for points, shift in zip(placed(robot, run, samples), moved, strict=True):
+        seen = in_picture(points, position + shift, target + shift, 1.0)
+        most = max(most, np.abs(seen).max())
+    assert 0.7 < most < 1.0  # all of it is seen, and it fills the picture
+
+
+def test_the_floor_is_below_the_robot_at_all_times(filmed):
+    robot, run, recording = filmed
+    plane = eye_of(recording)["plane"]
+    assert plane[:3] == [0.0, 0.0, 1.0]
+    lowest = min(points[:, 2].min() for points in placed(robot, run, range(0, len(run.time), 20)))
+    assert lowest == pytest.approx(plane[3], abs=0.02)
+
+
+def test_a_nearer_camera_would_not_see_all():
+    points = np.random.default_rng(3).standard_normal((50, 3))
+    for aspect in (0.6, 1.0, 2.0):
+        camera = fitted([points], aspect=aspect)
+        seen = np.abs(in_picture(points, camera.eye, camera.target, aspect))
+        assert seen.max() == pytest.approx(0.84)  # the margin is kept, and touched
+        ahead = camera.target - camera.eye
+        nearer = camera.eye + 0.1 * ahead
+        assert np.abs(in_picture(points, nearer, camera.target, aspect)).max() > 0.86
+
+
+def test_a_robot_of_twice_the_size_is_the_same_picture():
+    points = np.random.default_rng(3).standard_normal((50, 3))
+    one, two = (fitted([scale * points]) for scale in (1.0, 2.0))
+    np.testing.assert_allclose(two.eye, 2 * one.eye)
+    np.testing.assert_allclose(two.target, 2 * one.target)
+    assert two.floor == pytest.approx(2 * one.floor)
+
+
+def urdf(folder: Path, shape: str) -> Path:
+    path = folder / "bare.urdf"
+    path.write_text(
+        f"""<robot name="bare"><link name="a">{shape}</link><link name="b">{shape}</link>
+        <joint name="j" type="revolute"><parent link="a"/><child link="b"/>
+        <origin xyz="0 0.3 0.4"/><axis xyz="1 0 0"/>
+        <limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>"""
+    )
+    return path
+
+
+def test_a_robot_without_shapes_is_drawn_as_sticks_from_joint_to_joint(tmp_path):
+    path = urdf(tmp_path, "")
+    (tmp_path / "out").mkdir()
+    tree = scene.load(str(path), tmp_path / "out")
+    assert set(scene.shapes(tree).values()) == {"Ellipsoids3D", "Cylinders3D"}
+    outermost = framing.outermost(scene.drawn_file(str(path), tmp_path / "out"))
+    stick = outermost["a"]
+    assert (stick @ [0.0, 0.6, 0.8]).max() == pytest.approx(0.5)  # ends at the next joint
+
+
+def test_a_link_without_visual_shapes_is_drawn_as_it_collides(tmp_path):
+    (tmp_path / "out").mkdir()
+    tree = scene.load(str(urdf(tmp_path, BAR.replace("visual", "collision"))), tmp_path / "out")
+    assert set(scene.shapes(tree).values()) == {"Boxes3D"}
+    assert set(scene.entities(tree)) == {"a", "b"}
+
+
+def test_what_has_no_extent_is_in_the_middle_of_the_picture():
+    camera = fitted([np.array([[1.0, 2.0, 3.0]])])
+    assert np.isfinite(camera.eye).all()
+    np.testing.assert_allclose(camera.target, [1.0, 2.0, 3.0], atol=0.01)
+    assert camera.floor == 3.0
