@@ -169,11 +169,13 @@ def _failed(error: Exception) -> int:
         import models
         import noisemodel
         from inspector.analysis.verdict import EXPECTED
+        from inspector.recording.viewer import DisplayError
         from scenarios import ScenarioError
 
         if isinstance(error, (*EXPECTED, ScenarioError)):
             typer.echo(f"inspector: {printable(str(error))}", err=True)
             output = isinstance(error, (noisemodel.OutputError, models.OutputError))
-            return OUTPUT_LOST if output and isinstance(error.__cause__, OSError) else 3
+            lost = output and isinstance(error.__cause__, OSError)
+            return OUTPUT_LOST if lost or isinstance(error, DisplayError) else 3
     traceback.print_exception(error)
     return EXIT[Status.INTERNAL_ERROR]  # Python's own would be that of a finding

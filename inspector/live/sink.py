@@ -151,6 +151,11 @@ def _viewer(connect: str | None) -> tuple[str, int]:
             f"no viewer runs at {host}:{port}, and there is no display to open one on;"
             " use --connect HOST:PORT or --save FILE.rrd"
         )
+    if problem := viewer.display_problem():
+        raise SinkError(
+            f"no viewer runs at {host}:{port}, and {problem};"
+            " use --connect HOST:PORT or --save FILE.rrd"
+        )
     return HOST, _opened(free_port() if taken else PORT)
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import noisemodel as nm
-from inspector.recording.viewer import ViewerError
+from inspector.recording.viewer import DisplayError, ViewerError
 
 SIZE = ("auto", 760)
 """Width and height of a notebook's viewer, in pixels; it is as wide as its cell."""
@@ -75,7 +75,7 @@ def show(
         )
     problem = viewer.open_window(recording)
     if problem:
-        raise ViewerError(f"{problem}; the recording is in {recording}")
+        raise DisplayError(f"{problem}; the recording is in {recording}")
 
 
 def in_notebook() -> bool:

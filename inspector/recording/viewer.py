@@ -5,11 +5,12 @@ import os
 import re
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -19,7 +20,11 @@ from typing import IO
 from inspector.errors import InspectorError
 
 SETTLE = 2.0
-"""Time within which a viewer that cannot start ends, in [s]."""
+"""Time within which a viewer that listens and cannot open its window ends, in [s]."""
+START_TIMEOUT = 20.0
+"""Time within which a viewer listens, in [s]."""
+CONNECT_TIMEOUT = 2.0
+"""Time within which a display on another machine has to respond, in [s]."""
 PORT = "9876"
 """Where rerun's viewer listens; one that does already takes the recording over."""
 HOST = "127.0.0.1"
@@ -38,11 +43,66 @@ class ViewerError(InspectorError):
     """A viewer that is missing, cannot start, or does not respond."""
 
 
+class DisplayError(ViewerError):
+    """A display on which no window can be opened."""
+
+
 def has_display() -> bool:
     """Whether a window can be opened here."""
     if sys.platform.startswith(("darwin", "win")):
         return True
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+
+
+def display_problem() -> str:
+    """Why the display that is set cannot be opened, in a line; empty if it can or none is set."""
+    if sys.platform.startswith(("darwin", "win")):
+        return ""
+    problems = [problem for problem in (_wayland_problem(), _x_problem()) if problem is not None]
+    return problems[0] if problems and all(problems) else ""
+
+
+def _wayland_problem() -> str | None:
+    """Why the Wayland display cannot be opened, empty if it can; None if none is set."""
+    name = os.environ.get("WAYLAND_DISPLAY")
+    if not name:
+        return None
+    socket_ = Path(os.environ.get("XDG_RUNTIME_DIR", "")) / name
+    reason = _unreachable([str(socket_)]) if socket_.is_absolute() else "XDG_RUNTIME_DIR is not set"
+    return reason and f"the display {name} cannot be opened ({reason})"
+
+
+def _x_problem() -> str | None:
+    """Why the X display cannot be opened, empty if it can; None if none is set."""
+    name = os.environ.get("DISPLAY")
+    if not name:
+        return None
+    parts = re.fullmatch(r"(?:unix/)?(?P<host>[^/]*):(?P<number>\d{1,4})(?:\.\d+)?", name)
+    if parts is None:
+        reason = "expected [HOST]:NUMBER, such as :0"
+    elif parts["host"] in ("", "unix"):
+        path = f"/tmp/.X11-unix/X{parts['number']}"  # noqa: S108  # where X servers listen
+        reason = _unreachable([path, f"\0{path}"])
+    else:
+        reason = _unreachable([(parts["host"], 6000 + int(parts["number"]))])
+    return reason and f"the display {name} cannot be opened ({reason})"
+
+
+def _unreachable(addresses: Sequence[str | tuple[str, int]]) -> str:
+    """Why no server can be reached at any of some addresses; empty if one can."""
+    problem = ""
+    for address in addresses:
+        try:
+            if isinstance(address, str):
+                with socket.socket(socket.AF_UNIX) as probe:
+                    probe.connect(address)
+            else:
+                socket.create_connection(address, CONNECT_TIMEOUT).close()
+        except OSError as error:
+            problem = problem or f"nothing listens there: {error.strerror or error}"
+        else:
+            return ""
+    return problem
 
 
 def scratch_path(run: Path) -> Path:
@@ -111,6 +171,8 @@ class Process:
         text = re.sub(r"\x1b\[[0-9;]*m", "", self.stderr.read().decode(errors="replace"))
         errors = [line for line in text.splitlines() if re.search(r"\b(Error|ERROR|WARN)\b", line)]
         reason = re.sub(r"^.*?(Error|ERROR|WARN)[: ]+", "", errors[-1]).strip() if errors else ""
+        if re.search(r"winit|X server|wayland", reason, re.IGNORECASE):
+            reason = f"no window can be opened on this display: {reason.rpartition(': ')[2]}"
         return f"the viewer ended with status {code}{reason and f' ({reason})'}"
 
     def kill(self) -> None:
@@ -143,10 +205,13 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
     Raises:
         ViewerError: If the viewer is not installed.
     """
+    given = NO_ANALYTICS | dict(os.environ if env is None else env)
+    if _wayland_problem() and _x_problem() == "":
+        del given["WAYLAND_DISPLAY"]  # the viewer would try it alone
     with tempfile.TemporaryFile() as stderr:
         process = subprocess.Popen(
             command(*arguments),
-            env=NO_ANALYTICS | dict(os.environ if env is None else env),
+            env=given,
             start_new_session=True,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
@@ -164,11 +229,13 @@ def open_window(recording: Path, seconds: float | None = None) -> str:
             layout cannot say that.
 
     Returns:
-        The error, empty if there is none.
+        Why no window opened, in a line; empty if one did.
 
     Raises:
         ViewerError: If the viewer is not installed.
     """
+    if problem := display_problem():
+        return problem
     if not _started(recording, PORT):
         if seconds is not None:
             _put_cursor(f"rerun+http://{HOST}:{PORT}/proxy", seconds)
@@ -192,7 +259,14 @@ def _put_cursor(address: str, seconds: float) -> None:
 
 
 def _started(recording: Path, port: str) -> str:
+    taken = port.isdigit() and not _unreachable([(HOST, int(port))])
     with started("--port", port, "--hide-welcome-screen", str(recording)) as viewer:
+        until = time.monotonic() + START_TIMEOUT
+        # It listens before it opens its window; if another one does already, it only passes on.
+        while port.isdigit() and viewer.process.poll() is None and time.monotonic() < until:
+            if not taken and not _unreachable([(HOST, int(port))]):
+                break
+            time.sleep(0.05)
         try:
             code = viewer.process.wait(timeout=SETTLE)
         except subprocess.TimeoutExpired:
