@@ -7,10 +7,12 @@ from io import BytesIO
 import numpy as np
 import pytest
 import rerun as rr
-from recordings import LANE, LINE, MOTION, check_columns, entities, read
+from recordings import BAND, LABELS, LINE, MOTION, ROW, STRIP, check_columns, entities, read
 from rerun.chunk import RrdReader
 
 from inspector.cli import main
+from inspector.levels import LINKS as LINK_SCALE
+from inspector.levels import link_levels
 from inspector.pair import colors, compare
 from inspector.pair.recording import write
 from models import Event, Labels
@@ -80,16 +82,19 @@ def scalars(path, entity):
 
 SIGNALS = "velocity|desired_velocity|position|effort|stage_planned"
 COLUMNS = {
-    r"/class/(before|after)/(found|annotated)": LANE,
-    r"/class/change": LANE,
+    r"/class/(before|after)/(found|annotated)/(impact|oscillations)": BAND,
+    r"/(level/change|change/finding)/new": BAND,
     r"/(noise|level|power)/(before|after)": LINE,
-    r"/change/noise": LINE,
-    rf"/change/links/{LINKS}": LINE,
+    r"/change/(noise|none)": LINE,
+    r"/span": LINE,
+    r"/change/links/\d\d": ROW,
     rf"/links/{LINKS}/(before|after)": LINE,
     rf"/joints/({SIGNALS})/(before|after|change)/0": LINE,
-    r"/spectrogram/(before|after|change)/\d\d": LINE | {"SeriesLines:interpolation_mode"},
+    r"/spectrogram/(before|after|change)/\d\d": ROW,
     r"/sound/(before|after)": {"AssetAudio:blob", "AssetAudio:media_type"},
-    r"/robot/motion/panda_joint\d": MOTION,
+    r"/robot_(before|after)/motion/panda_joint\d": MOTION,
+    r"/axis/\w+/(left|right)": LABELS,
+    r"/axis/\w+/right/scale": STRIP,
     r"/events": {"TextLog:text", "TextLog:level", "TextLog:color"},
     r"/report": {"TextDocument:text", "TextDocument:media_type"},
 }
@@ -108,7 +113,8 @@ def test_both_noises_lie_over_each_other_in_two_colours(whole):
         ("after", pair.after, colors.AFTER),
     ):
         time, noise = scalars(path, f"/noise/{name}")
-        np.testing.assert_allclose(noise[:, 0], side.noise, rtol=1e-12)
+        scale = side.noise[5] / noise[5, 0]
+        np.testing.assert_allclose(scale * noise[:, 0], side.noise, rtol=1e-12)
         np.testing.assert_allclose(time, pair.time, atol=1e-9)
         _, drawn = read(path, f"/noise/{name}", "SeriesLines:colors")
         assert drawn == [[int.from_bytes([*color, 255], "big")]]
@@ -124,10 +130,12 @@ def test_twice_the_motion_is_6_db_in_all_that_is_drawn(whole):
     time, change = scalars(path, "/change/noise")
     rattling = (time > 0.55) & (time < 0.95)
     np.testing.assert_allclose(change[rattling], 20 * np.log10(2), rtol=1e-9)
-    lines = [entity for entity in entities(path) if entity.startswith("/change/links/")]
-    assert len(lines) == 8
-    for line in lines:
-        assert scalars(path, line)[1].max() == pytest.approx(20 * np.log10(2))
+    rows = [entity for entity in entities(path) if entity.startswith("/change/links/")]
+    assert len(rows) == 8
+    for row in rows:
+        _, shades = read(path, row, "SeriesLines:colors")
+        drawn = {shade[0].to_bytes(4, "big") for shade in shades}
+        assert bytes(colors.CHANGE.colours(np.array(20 * np.log10(2)), shades=25)) in drawn
 
 
 def test_a_links_power_before_and_after_is_that_of_its_vibration(whole):
@@ -155,18 +163,22 @@ def test_joints_differ_by_the_added_motion(whole):
     assert names == [f"{joint} before" for joint in pair.before.run.joint_names]
 
 
-def test_lanes_show_the_classes_of_both_and_what_changed(whole):
+def stretches(path, entity):
+    """Starts and stops of what is shaded, in [s]."""
+    time, values = read(path, entity, "Measurements:values")
+    known = np.array([np.isfinite(value).all() for value in values])
+    return time[known].reshape(-1, 2).round(3).tolist()
+
+
+def test_rows_show_the_classes_of_both_and_plots_what_changed(whole):
     path, _ = whole
-    time, states = read(path, "/class/after/found", "StateChange:state")
-    assert [state[0] for state in states] == ["ok", "impact", "ok", ""]
-    np.testing.assert_allclose(time, [0.0, 0.5, 1.0, 2.9], atol=1e-3)
-    _, states = read(path, "/class/before/found", "StateChange:state")
-    assert [state[0] for state in states] == ["ok", ""]
-    time, states = read(path, "/class/after/annotated", "StateChange:state")
-    assert [state[0] for state in states] == ["ok", "oscillations", ""]
-    time, states = read(path, "/class/change", "StateChange:state")
-    assert [state[0] for state in states] == ["new", ""]
-    np.testing.assert_allclose(time, [0.5, 1.0], atol=1e-9)
+    assert stretches(path, "/class/after/found/impact") == [[0.5, 1.0]]
+    assert stretches(path, "/class/after/annotated/oscillations") == [[1.0, 1.5]]
+    assert stretches(path, "/class/before/annotated/oscillations") == [[1.0, 1.5]]
+    assert not [entity for entity in entities(path) if entity.startswith("/class/before/found")]
+    assert stretches(path, "/level/change/new") == [[0.5, 1.0]]
+    _, (labels,) = read(path, "/axis/class/left", "Points2D:labels")
+    assert labels == ["impact", "oscillations"]
 
 
 def test_changes_are_listed_and_the_new_one_is_looped(whole):
@@ -189,34 +201,54 @@ def test_changes_are_listed_and_the_new_one_is_looped(whole):
 
 def test_both_spectrograms_have_one_scale_and_the_difference_its_own(whole):
     path, _ = whole
-    _, before = read(path, "/spectrogram/before/03", "SeriesLines:colors")
-    _, after = read(path, "/spectrogram/after/03", "SeriesLines:colors")
+    _, before = read(path, "/spectrogram/before/28", "SeriesLines:colors")
+    _, after = read(path, "/spectrogram/after/28", "SeriesLines:colors")
     assert max(sum(row[0].to_bytes(4, "big")[:3]) for row in after) > max(
         sum(row[0].to_bytes(4, "big")[:3]) for row in before
     )
-    _, change = read(path, "/spectrogram/change/05", "SeriesLines:colors")  # 240 Hz
-    shade = colors.diverging(np.array([20 * np.log10(2)]))[0]
-    drawn = [row[0].to_bytes(4, "big") for row in change]
-    assert bytes(shade) in drawn
-    assert 1900.0 < scalars(path, "/spectrogram/change/47")[1][0, 0] < 2000.0
+    shade = colors.CHANGE.colours(np.array(20 * np.log10(2)), shades=25)
+    named = {
+        read(path, row, "SeriesLines:names")[1][0][0]: row
+        for row in entities(path)
+        if row.startswith("/spectrogram/change/")
+    }
+    row = min(named, key=lambda name: abs(float(name.removesuffix(" Hz")) - 120.0))
+    _, change = read(path, named[row], "SeriesLines:colors")
+    assert bytes(shade) in [each[0].to_bytes(4, "big") for each in change]
 
 
-def test_the_robot_is_coloured_by_what_became_louder(whole):
+def test_both_robots_are_coloured_by_one_scale_of_levels(whole):
+    path, pair = whole
+    for side, noise in zip(("before", "after"), pair.links, strict=True):
+        mesh = f"/robot_{side}/panda/visual_geometries/panda_link5/visual_0"
+        time, rgba = read(path, mesh, "Asset3D:albedo_factor")
+        steps, level = link_levels(noise)
+        column = int(np.searchsorted(steps, 0.7, side="right")) - 1
+        wanted = LINK_SCALE.colours(level[column, noise.links.index("panda_link5")], shades=16)
+        at = int(np.searchsorted(time, 0.7, side="right")) - 1
+        assert rgba[at][0].to_bytes(4, "big") == bytes(wanted)
+        base = f"/robot_{side}/panda/visual_geometries/panda_link0/visual_0"
+        time, (still,) = read(path, base, "Asset3D:albedo_factor")
+        assert time is None
+        assert still[0].to_bytes(4, "big") == bytes(LINK_SCALE.colours(np.array(-np.inf)))
+
+
+def test_both_robots_are_seen_from_one_place(whole):
     path, _ = whole
-    mesh = "/robot/panda/visual_geometries/panda_link5/visual_0"
-    time, rgba = read(path, mesh, "Asset3D:albedo_factor")
-    shades = {round(t, 2): row[0].to_bytes(4, "big") for t, row in zip(time, rgba, strict=True)}
-    at = max(t for t in shades if t <= 0.7)
-    assert shades[at] == bytes(colors.diverging(np.array([20 * np.log10(2)]))[0])
-    time, (still,) = read(
-        path, "/robot/panda/visual_geometries/panda_link0/visual_0", "Asset3D:albedo_factor"
-    )
-    assert time is None
-    assert still == [int.from_bytes([*colors.SAME, 255], "big")]
+    reader = RrdReader(path)
+    (blueprint,) = reader.blueprints()
+    eyes = []
+    for chunk in reader.store(store=blueprint).stream():
+        batch = chunk.to_record_batch()
+        if "EyeControls3D:position" in batch.schema.names:
+            eyes += batch.column("EyeControls3D:position").to_pylist()
+    assert len(eyes) == 2
+    assert eyes[0] == eyes[1]
 
 
 def test_colours_distinguish_louder_from_quieter_and_grow_with_the_change():
-    quieter, same, louder, much = colors.diverging(np.array([-12.0, 0.0, 3.0, 40.0]))[:, :3]
+    levels = np.array([-12.0, 0.0, 3.0, 40.0])
+    quieter, same, louder, much = colors.CHANGE.colours(levels, shades=25)[:, :3]
     assert tuple(quieter) == colors.BEFORE
     assert tuple(same) == colors.SAME
     assert tuple(much) == colors.AFTER
@@ -238,14 +270,11 @@ def test_both_sound_at_one_gain(whole):
 def test_the_report_states_what_changed(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
-    assert text[0].startswith("# before → after\n")
-    assert (
-        "cannot-tell → cannot-tell; findings: 1 new, 0 resolved, 0 unchanged; vibration +6.0 dB"
-        in text[0]
-    )
-    assert re.search(
-        r"\| new \| impact \| 0.50 \| 1.00 \| -\d+\.\d \| -\d+\.\d \| \+6.0 \|", text[0]
-    )
+    assert text[0].startswith("### before → after\n")
+    assert "cannot-tell → cannot-tell; findings: 1 new; vibration +6.0 dB" in text[0]
+    row = r"\| \*\*new\*\* \| impact \| 0.50 to 1.00 \| -\d+\.\d \| -\d+\.\d \| \+6.0 \|"
+    assert re.search(row, text[0])
+    assert re.search(r"Largest change of level: \*\*\+6 dB at \d\.\d\d s\*\*; panda_", text[0])
     assert re.search(r"\| 256 Hz \| .* \| \+6.0 \|", text[0])
     assert re.search(r"\| panda_link5 \| .* \| \+6.0 \|", text[0])
 
@@ -269,14 +298,21 @@ def test_properties_name_both_runs_and_their_hashes(whole):
 
 def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
     write(compared(tmp_path, panda(), panda()), tmp_path / "out.rrd")
-    lines = [e for e in entities(tmp_path / "out.rrd") if "/change" in e and "/class" not in e]
-    assert len(lines) == 48 + 1 + 8 + 5
+    path = tmp_path / "out.rrd"
+    lines = [e for e in entities(path) if e.startswith(("/joints", "/change/n")) and "change" in e]
+    assert len(lines) == 2 + 5
     for line in lines:
-        if "/spectrogram/" not in line:
-            assert not scalars(tmp_path / "out.rrd", line)[1].any(), line
-    rgba = read(tmp_path / "out.rrd", "/spectrogram/change/**", "SeriesLines:colors")[1]
-    assert {row[0] for row in rgba} == {int.from_bytes([*colors.SAME, 255], "big")}
-    assert read(tmp_path / "out.rrd", "/class/change", "StateChange:state")[1][0] == ["unchanged"]
+        assert not scalars(path, line)[1].any(), line
+    for rows, count in (("/spectrogram/change", 48), ("/change/links", 8)):
+        found = [entity for entity in entities(path) if entity.startswith(f"{rows}/")]
+        assert len(found) == count
+        rgba = read(path, f"{rows}/**", "SeriesLines:colors")[1]
+        assert {row[0] for row in rgba} == {int.from_bytes([*colors.SAME, 255], "big")}
+    assert [e for e in entities(path) if e.startswith("/level/change/")] == [
+        "/level/change/unchanged"
+    ]
+    _, (text,) = read(path, "/report", "TextDocument:text")
+    assert "The level is the same at all times." in text[0]
 
 
 def test_the_same_two_runs_make_the_same_recording_id_and_others_do_not(tmp_path):
@@ -320,7 +356,8 @@ def test_different_joints_are_shown_each_and_the_shared_ones_compared(tmp_path):
         "change": ["b"],
     }
     assert not any(
-        entity.startswith(("/robot", "/links")) for entity in entities(tmp_path / "out.rrd")
+        entity.startswith(("/robot", "/links", "/change/links"))
+        for entity in entities(tmp_path / "out.rrd")
     )
 
 
@@ -349,7 +386,7 @@ def test_the_command_shows_two_runs_and_prints_how_they_were_aligned(capsys, mon
     assert status == 0
     assert "vibration +6.0 dB" in out
     assert "aligned by the motion: after starts +0.0000 s from before (correlation 1.00" in out
-    assert "/class/after/annotated" in entities(tmp_path / "ab.rrd")
+    assert "/class/after/annotated/oscillations" in entities(tmp_path / "ab.rrd")
     status, out, _ = inspector(
         capsys, monkeypatch, "view", *runs, *save, "--align", "start", "--overwrite"
     )
@@ -392,11 +429,11 @@ def test_the_viewer_draws_a_comparison_and_reports_no_error(whole):
     assert png.startswith(b"\x89PNG")
     shown = {view.name for view in state.views}
     assert {
-        "Robot after: orange is louder than before, blue quieter",
-        "Classes",
-        "Noise, simplified estimate [rad/s]",
-        "Spectrogram, change, 0-2000 Hz, -12 to +12 dB",
-        "Change of links above 10 Hz [dB]",
+        "Before → after",
+        "Robot before",
+        "Robot after",
+        "Level",
+        "Change",
     } <= shown
     assert not [report for view in state.views for report in view.reports]
     assert not errors

@@ -1,17 +1,31 @@
-"""How a comparison is laid out: as one run is, with both runs in each view."""
+"""How a comparison is laid out: before at the left, after at the right, what differs below."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector.pair.colors import RANGE_DB
-from inspector.recording import unstable
+from inspector.pair import links
+from inspector.pair.noise import CHANGED, DETAILS, LEVEL, NOISE, SPAN_DB
+from inspector.recording import axes, unstable
+from inspector.recording.axes import Panel
 from inspector.recording.blueprint import limbs
+from inspector.recording.camera import Camera
 from inspector.recording.joints import Plot
+from inspector.recording.noise import HIGH_DB, LOW_DB
 from inspector.recording.series import TIMELINE
-from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
+
+WHOLE = 832.0
+"""Height of all parts, in points, in a window of 1440 x 900."""
+ABOVE = 240.0
+"""Least height of the report and the robots."""
+SPAN = "/span"
+"""What makes every plot reach from the start of the runs to their end."""
+ALL = ("$origin/**", SPAN)
+CHANGE_PATHS = ("/change/noise", "/change/none", "/change/finding/**", SPAN)
+TITLES = 28.0
+"""Height of a row of tabs."""
 
 
 @dataclass(frozen=True)
@@ -20,22 +34,26 @@ class Contents:
 
     Attributes:
         joints: Plots of joint signals.
+        classes: Panel of the classes.
+        spectra: Panels of the spectrograms, by what they show.
+        changes: Panel of the links' changes; None without links.
         links: Links whose power before and after is shown.
-        root: Frame that the view follows; None without a robot.
-        lanes: How many lanes of classes there are.
+        cameras: From where each robot is seen; empty without one.
         events: Whether any change is listed.
+        noise: Lower and upper end of the noise's axis.
         sounds: Names of the sounds.
-        rate: Samples per second, in [Hz].
         loop: Stretch of time that playing repeats, in [s].
     """
 
     joints: Sequence[Plot]
+    classes: Panel
+    spectra: Mapping[str, Panel]
+    changes: Panel | None
     links: Sequence[str]
-    root: str | None
-    lanes: int
+    cameras: Mapping[str, Camera]
     events: bool
+    noise: tuple[float, float]
     sounds: Sequence[str]
-    rate: float
     loop: tuple[float, float] | None
 
 
@@ -48,54 +66,69 @@ def layout(contents: Contents) -> Blueprint:
     Returns:
         The blueprint; all time axes are linked.
     """
-    over_time: list[tuple[Part, float]] = []
-    if contents.lanes:
-        over_time.append((unstable.lanes("Classes", "/class"), 1.1 + 0.8 * contents.lanes))
-    over_time += [(_noise(contents), 2.6), (_spectrogram(contents), 3.2)]
-    if contents.links:
-        over_time.append((_links(contents), 2.8))
-    over_time.append((unstable.tabs(*limbs(contents.joints)), 2.8))
-    left = unstable.text("Report", "/report")
-    if contents.events:
-        left = unstable.tabs(left, unstable.events("Events", "/events"))
-    if contents.root is not None:
-        title = "Robot after: orange is louder than before, blue quieter"
-        robot = unstable.robot(title, "/robot", contents.root)
-        left = unstable.above((robot, 2.4), (left, 2.6))
-    whole = unstable.beside((left, 2.0), (unstable.above(*over_time), 3.0))
+    report = unstable.text("Before \u2192 after", "/report")
+    events = unstable.events("Changes", "/events")
+    text = unstable.tabs(report, events) if contents.events else report
+    head: list[tuple[Part, float]] = [(text, 34.0)]
+    for side, camera in contents.cameras.items():
+        head.append((unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0))
+    if contents.cameras:
+        head.append((unstable.drawing(f"/axis/{links.KEY.name}/right"), 8.0))
+    over_time = [
+        (
+            contents.classes,
+            _rows("/class"),
+        ),
+        (
+            LEVEL,
+            unstable.plot(
+                "Level", "/level", ALL, between=(LOW_DB, HIGH_DB), fixed=True, titled=False
+            ),
+        ),
+        (
+            CHANGED,
+            unstable.plot(
+                "Change",
+                "/change",
+                CHANGE_PATHS,
+                between=(-SPAN_DB, SPAN_DB),
+                fixed=True,
+                titled=False,
+            ),
+        ),
+    ]
+    parts = [(axes.part(panel, plot), panel.height) for panel, plot in over_time]
+    whole = unstable.above(
+        (unstable.beside(*head), ABOVE), *parts, (_details(contents), DETAILS + TITLES)
+    )
     return unstable.blueprint(whole, TIMELINE, contents.loop)
 
 
-def _noise(contents: Contents) -> Part:
-    parts = [
-        unstable.plot("Noise, simplified estimate [rad/s]", "/noise", legend=True),
-        unstable.plot("Level above 10 Hz [dB re 1 rad/s]", "/level", legend=True),
-        unstable.plot("Change of it [dB]", "/change/noise"),
-    ]
-    if contents.root is not None:
-        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", legend=True))
+def _details(contents: Contents) -> Part:
+    parts: list[Part] = []
+    if contents.changes is not None:
+        plot = unstable.plot(
+            "Links", "/change/links", between=(0.0, axes.TOP), fixed=True, titled=False
+        )
+        parts.append(axes.part(contents.changes, plot, name="Links, change"))
+    for what, panel in contents.spectra.items():
+        plot = _rows(f"/spectrogram/{what}")
+        comma = ", " if what == "change" else " "
+        parts.append(axes.part(panel, plot, name=f"Spectrum{comma}{what}"))
+    plot = unstable.plot("Noise", "/noise", ALL, between=contents.noise, fixed=True, titled=False)
+    parts.append(axes.part(NOISE, plot, name="Noise"))
+    if contents.cameras:
+        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", ALL, legend=True))
+    if contents.links:
+        both = [
+            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", ALL, legend=True)
+            for name in contents.links
+        ]
+        parts.append(unstable.tabs(*both, name="Links, before and after"))
     parts += [unstable.audio(f"Listen {name}", f"/sound/{name}") for name in contents.sounds]
-    return unstable.tabs(*parts)
+    return unstable.tabs(*parts, *limbs(contents.joints))
 
 
-def _spectrogram(contents: Contents) -> Part:
-    top = min(TOP_HZ, contents.rate / 2)
-    titles = {
-        "change": f"Spectrogram, change, 0-{top:.0f} Hz, {-RANGE_DB:.0f} to {RANGE_DB:+.0f} dB",
-        "before": "before",
-        "after": "after",
-    }
-    parts = (
-        unstable.plot(title, f"/spectrogram/{name}", between=(0.0, top), fixed=True)
-        for name, title in titles.items()
-    )
-    return unstable.tabs(*parts)
-
-
-def _links(contents: Contents) -> Part:
-    change = unstable.plot("Change of links above 10 Hz [dB]", "/change/links", legend=True)
-    both = (
-        unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", legend=True)
-        for name in contents.links
-    )
-    return unstable.tabs(change, *both)
+def _rows(path: str) -> Part:
+    """A plot of rows."""
+    return unstable.plot("", path, ALL, between=(0.0, axes.TOP), fixed=True, titled=False)

@@ -1,15 +1,22 @@
-"""The failures that are new, resolved and unchanged, matched in time."""
+"""The failures that are new, resolved, louder, quieter and unchanged, matched in time."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from inspector.analysis.analyse import Analysis
-from inspector.pair.levels import Level, within
+from inspector.pair.levels import STEP, Level, steps, within
 from inspector.pair.pair import Pair
+from inspector.report.markdown import spoken
 from models import Event
 from noisemodel import Block
 
-NEW, RESOLVED, UNCHANGED = "new", "resolved", "unchanged"
+NEW, LOUDER, UNCHANGED, QUIETER, RESOLVED = "new", "louder", "unchanged", "quieter", "resolved"
+KINDS = (NEW, LOUDER, RESOLVED, QUIETER, UNCHANGED)
+"""In the order in which they matter."""
+LOUDER_DB = 3.0
+"""A failure in both runs whose level changed by as much is louder or quieter."""
 
 
 @dataclass(frozen=True)
@@ -17,7 +24,7 @@ class Change:
     """A failure in either run, or in both at the same time.
 
     Attributes:
-        kind: "new", "resolved" or "unchanged".
+        kind: One of ``KINDS``.
         label: Its class.
         start: In [s], of whichever run has it first.
         stop: In [s], of whichever has it last.
@@ -32,7 +39,7 @@ class Change:
 
     def __str__(self) -> str:
         return (
-            f"{self.kind}: {self.label}, {self.start:.2f} s to {self.stop:.2f} s,"
+            f"{self.kind}: {spoken(self.label)}, {self.start:.2f} s to {self.stop:.2f} s,"
             f" {self.level.change:+.1f} dB"
         )
 
@@ -40,8 +47,9 @@ class Change:
 def changes(pair: Pair) -> tuple[Change, ...]:
     """Match the failures of two runs.
 
-    Findings of one class that overlap in time, whichever run they are of, are one failure. It is
-    unchanged if both runs have a part in it; otherwise it is new or resolved.
+    Findings of one class that overlap in time, whichever run they are of, are one failure. If both
+    runs have a part in it, it is louder or quieter by 3 dB or more, or else unchanged; otherwise it
+    is new or resolved.
 
     Args:
         pair: The two runs.
@@ -50,10 +58,31 @@ def changes(pair: Pair) -> tuple[Change, ...]:
         Changes in order of time; of annotated blocks, unless both runs could be labelled.
     """
     found = [
-        Change(kind, label, start, stop, within(pair, start, stop))
+        Change(_kind(kind, level := within(pair, start, stop)), label, start, stop, level)
         for kind, label, start, stop in _matched(*(failures(pair, s) for _, s in pair.sides))
     ]
     return tuple(sorted(found, key=lambda change: (change.start, change.stop, change.label)))
+
+
+def largest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
+    """Start and stop of what is to be shown first, in [s].
+
+    The failure in which the level changed most, new before louder before resolved before quieter
+    ones; of runs without such, the largest change of level.
+    """
+    time, level = steps(pair)
+    change = np.abs(level[:, 1] - level[:, 0])
+
+    def most(each: Change) -> float:
+        inside = (time > each.start - STEP) & (time < each.stop + STEP)
+        return float(change[inside].max(initial=0.0))
+
+    changed = [each for each in found if each.kind != UNCHANGED]
+    if changed:
+        worst = min(changed, key=lambda each: (KINDS.index(each.kind), -most(each)))
+        return max(worst.start, float(pair.time[0])), min(worst.stop, float(pair.time[-1]))
+    place = float(time[change.argmax()])
+    return place - STEP, place + STEP
 
 
 def failures(pair: Pair, side: Analysis) -> Sequence[Event | Block]:
@@ -66,6 +95,12 @@ def failures(pair: Pair, side: Analysis) -> Sequence[Event | Block]:
 def labelled(pair: Pair) -> bool:
     """Whether both runs could be labelled, so that findings are what is matched."""
     return pair.before.labels is not None and pair.after.labels is not None
+
+
+def _kind(kind: str, level: Level) -> str:
+    if kind != UNCHANGED or abs(level.change) < LOUDER_DB:
+        return kind
+    return LOUDER if level.change > 0.0 else QUIETER
 
 
 def _matched(

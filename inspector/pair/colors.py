@@ -6,32 +6,31 @@ Blue and orange differ to any eyes; what did not change is as grey as a quiet li
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector import colors
 from inspector.colors import Color
+from inspector.levels import Scale
 from noisemodel.types import Array
 
-BEFORE: Color = colors.SERIES[0]
-AFTER: Color = colors.SERIES[1]
+BEFORE: Color = (86, 180, 233)
+AFTER: Color = (240, 160, 30)
 SAME: Color = (62, 68, 80)
-RANGE_DB = 12.0
-"""Change that is as blue or as orange as can be, in [dB]."""
+SIDES = {"before": BEFORE, "after": AFTER}
 SHADES = 25
 """An odd number, so that no change has a shade of its own."""
 
-KINDS: dict[str, Color] = {"new": AFTER, "resolved": BEFORE, "unchanged": (190, 190, 190)}
 
-
-def diverging(change: Array) -> NDArray[np.uint8]:
-    """Colour changes of level, in few shades: few changes of colour are logged.
+def diverging(place: Array) -> NDArray[np.uint8]:
+    """Colour changes: blue at 0, grey at 0.5, orange at 1.
 
     Args:
-        change: Any shape, in [dB]; positive is louder.
+        place: Any shape.
 
     Returns:
         Red, green, blue and opacity, shape (…, 4).
     """
-    half = SHADES // 2
-    place = np.round(np.clip(change / RANGE_DB, -1.0, 1.0) * half) / half
     scale = np.array([BEFORE, SAME, AFTER], dtype=np.float64)
-    channels = [np.interp(place, (-1.0, 0.0, 1.0), scale[:, channel]) for channel in range(3)]
-    return np.stack([*channels, np.full(place.shape, 255.0)], axis=-1).astype(np.uint8)
+    channels = [np.interp(place, (0.0, 0.5, 1.0), scale[:, channel]) for channel in range(3)]
+    return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
+
+
+CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
+"""Of levels; what is beyond is as blue or as orange as can be."""

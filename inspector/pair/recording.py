@@ -1,7 +1,7 @@
 """Two runs as one rerun recording: what goes into it, in order."""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -12,18 +12,22 @@ from rerun.urdf import UrdfTree
 from inspector.errors import InspectorError
 from inspector.pair import classes, joints, links, noise
 from inspector.pair.blueprint import Contents, layout
-from inspector.pair.changes import NEW, Change, changes
-from inspector.pair.levels import STEP, steps, whole
+from inspector.pair.changes import changes, largest_change
+from inspector.pair.levels import whole
 from inspector.pair.pair import Pair
 from inspector.pair.report import report
-from inspector.recording import robot, unstable
+from inspector.recording import framing, robot, unstable
+from inspector.recording.camera import Camera
 from inspector.recording.limbs import limbs
+from inspector.recording.noise import log_span
 from inspector.recording.series import TIMELINE
 from inspector.recording.stream import log_report, writing
 from inspector.sound.sonification import Settings, common_gain, sound_of
 from inspector.sound.sound import SMALL_RATE
 from noisemodel.run import part
 
+ASPECT = 1.35
+"""Least width of a robot's view by its height."""
 MAX_VALUES = 8_000_000
 """Velocities of a run that are mixed into a sound: a second of work."""
 
@@ -46,21 +50,33 @@ def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
     parts = (pair.before.sha256, pair.after.sha256, str(pair.alignment.lag))
     identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
-        tree = None if pair.links is None else robot.of_run(pair.after.run, Path(folder))
-        contents = _log(recording, pair, tree)
+        trees = {} if pair.links is None else _robots(pair, Path(folder))
+        contents = _log(recording, pair, trees, Path(folder))
         recording.send_blueprint(layout(contents))  # takes the place of an older layout
 
 
-def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Contents:
-    run, found, shown = pair.after.run, changes(pair), list[str]()
-    if tree is not None:
-        robot.log(recording, tree, run, coloured=True)
-        shown = links.log(recording, tree, pair)
-    lanes = classes.log(recording, pair, found)
-    noise.log(recording, pair)
+def _robots(pair: Pair, folder: Path) -> dict[str, UrdfTree]:
+    """The robot before and after, as two robots."""
+    return {side: robot.of_run(each.run, folder, side=side) for side, each in pair.sides}
+
+
+def _log(
+    recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree], folder: Path
+) -> Contents:
+    run, found = pair.after.run, changes(pair)
+    panel, shown, cameras = None, list[str](), dict[str, Camera]()
+    log_span(recording, run)
+    if trees:
+        assert run.robot is not None
+        pairs = [(trees[side], each.run) for side, each in pair.sides]
+        for tree, own in pairs:
+            robot.log(recording, tree, own, coloured=True)
+        urdf = robot.drawn_file(run.robot, folder)
+        cameras = dict(zip(trees, framing.log(recording, pairs, urdf, aspect=ASPECT), strict=True))
+        panel, shown = links.log(recording, trees, pair)
     names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
-    limb_plots = joints.log(recording, pair, limbs(tuple(names), tree))
-    loop = _loudest_change(pair, found)
+    limb_plots = joints.log(recording, pair, limbs(tuple(names), trees.get("after")))
+    loop = largest_change(pair, found)
     audible = _sounds(pair, loop[0])
     start = float(pair.time[0])
     for name, sound in audible.items():
@@ -68,26 +84,16 @@ def _log(recording: rr.RecordingStream, pair: Pair, tree: UrdfTree | None) -> Co
     _log_text(recording, pair)
     return Contents(
         joints=limb_plots,
+        classes=classes.log(recording, pair, found),
+        noise=noise.log(recording, pair, found),
+        spectra=noise.log_spectra(recording, pair),
+        changes=panel,
         links=shown,
-        root=None if tree is None else robot.root(tree, floating=run.base_pose is not None),
-        lanes=lanes,
+        cameras=cameras,
         events=bool(found),
         sounds=tuple(audible),
-        rate=pair.rate,
         loop=loop,
     )
-
-
-def _loudest_change(pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
-    """Time to show first: of the loudest new failure, or else of the largest change of level."""
-    new = [change for change in found if change.kind == NEW]
-    if new:
-        worst = max(new, key=lambda change: change.level.after)
-        begin, end = float(pair.time[0]), float(pair.time[-1])
-        return max(worst.start, begin), min(worst.stop, end)
-    time, level = steps(pair)
-    place = float(time[np.abs(level[:, 1] - level[:, 0]).argmax()])
-    return place - STEP, place + STEP
 
 
 def _sounds(pair: Pair, around: float) -> dict[str, bytes]:

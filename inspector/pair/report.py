@@ -4,9 +4,19 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from inspector.pair.changes import NEW, RESOLVED, UNCHANGED, changes, labelled
-from inspector.pair.levels import Level, by_band, by_class, by_link, whole
+from inspector.pair.changes import KINDS, changes, labelled
+from inspector.pair.levels import (
+    Level,
+    by_band,
+    by_class,
+    by_link,
+    link_steps,
+    shared_links,
+    steps,
+    whole,
+)
 from inspector.pair.pair import Pair
+from inspector.report.markdown import spoken
 
 LINKS = 10
 
@@ -26,50 +36,77 @@ def report(pair: Pair) -> str:
 def summary(pair: Pair) -> str:
     """The status of both runs and what changed, in a line."""
     found = changes(pair)
-    count = {kind: sum(each.kind == kind for each in found) for kind in (NEW, RESOLVED, UNCHANGED)}
+    count = {kind: sum(each.kind == kind for each in found) for kind in KINDS}
     events = "nothing found in either"
     if found:
-        events = ", ".join(f"{number} {kind}" for kind, number in count.items())
+        events = ", ".join(f"{number} {kind}" for kind, number in count.items() if number)
         events = f"{'findings' if labelled(pair) else 'annotated failures'}: {events}"
     statuses = f"{pair.before.status} → {pair.after.status}"
     return f"{statuses}; {events}; vibration {whole(pair).change:+.1f} dB"
 
 
 def _parts(pair: Pair) -> Iterator[str]:
-    yield f"# {pair.before.name} → {pair.after.name}"
+    yield f"### {pair.before.name} → {pair.after.name}"
     yield f"**{summary(pair)}**"
-    yield f"Aligned {pair.alignment}. Changes in dB; positive is louder after."
-    found = changes(pair)
+    found = sorted(changes(pair), key=lambda change: (KINDS.index(change.kind), change.start))
     if found:
-        yield "## Events" if labelled(pair) else "## Annotated events"
         events = [
-            (c.kind, c.label, f"{c.start:.2f}", f"{c.stop:.2f}", *_numbers(c.level)) for c in found
+            (
+                f"**{c.kind}**",
+                spoken(c.label),
+                f"{c.start:.2f} to {c.stop:.2f}",
+                *_numbers(c.level),
+            )
+            for c in found
         ]
-        yield _table(("", "class", "from [s]", "to [s]", "before", "after", "change"), events)
+        title = "finding" if labelled(pair) else "annotated"
+        yield _table(("", title, "time [s]", "before [dB]", "after [dB]", "change"), events)
+    yield _largest(pair)
+    yield f"Aligned {pair.alignment}. Changes in dB; positive is louder after."
     if classes := by_class(pair):
-        yield "## Classes"
+        yield "#### Classes"
         rows = [
             (
-                each.level.name,
+                spoken(each.level.name),
                 *(f"{seconds:.1f}" for seconds in each.seconds),
                 *_numbers(each.level),
             )
             for each in classes
+            if any(each.seconds)
         ]
         head = ("class", "before [s]", "after [s]", "before", "after", "change")
         yield _table(head, rows)
-    yield "## Bands"
+    yield "#### Bands"
     yield _levels("octave", by_band(pair))
     yield "Levels of the noise in dB re 1 rad/s; of events and classes, above 10 Hz."
     if links := by_link(pair):
-        yield "## Links"
+        yield "#### Links"
         yield _levels("link", links[:LINKS])
         yield "Sound power of the vibration above 10 Hz, in dB re 1 pW; the largest changes first."
-    yield "## Runs"
+    yield "#### Runs"
     yield _table(("", "before", "after"), list(_facts(pair)))
     if pair.remarks:
-        yield "## Remarks"
+        yield "#### Remarks"
         yield "\n".join(f"- {remark}" for remark in pair.remarks)
+
+
+def _largest(pair: Pair) -> str:
+    """Where the level changed most, in a sentence."""
+    time, level = steps(pair)
+    change = level[:, 1] - level[:, 0]
+    place = int(np.abs(change).argmax())
+    if change[place] == 0.0:
+        return "The level is the same at all times."
+    links = ""
+    if pair.links is not None:
+        names = shared_links(pair)
+        starts, changed = link_steps(pair, names)
+        column = max(int(np.searchsorted(starts, time[place], side="right")) - 1, 0)
+        by_name = dict(zip(names, changed[column].tolist(), strict=True))
+        most = max(by_name, key=lambda name: abs(by_name[name]), default="")
+        if most and by_name[most] != 0.0:
+            links = f"; {most} {by_name[most]:+.0f} dB"
+    return f"Largest change of level: **{change[place]:+.0f} dB at {time[place]:.2f} s**{links}."
 
 
 def _facts(pair: Pair) -> Iterator[tuple[str, str, str]]:
