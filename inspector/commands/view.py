@@ -1,11 +1,13 @@
-"""`inspector view`: one run in the viewer, or two side by side."""
+"""`inspector view`: one run in the viewer, or several side by side."""
 
+import hashlib
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from inspector.analysis.status import EXIT, Status
 from inspector.commands.options import (
     Floor,
     Kind,
@@ -31,11 +33,12 @@ class Aligned(StrEnum):
 
 @reads_logs
 def view(
-    run: Annotated[
-        Path | None, typer.Argument(help="A run file, or any log; by default the shipped demo.")
-    ] = None,
-    after: Annotated[
-        Path | None, typer.Argument(help="A second run, after a change: new, resolved, louder.")
+    runs: Annotated[
+        list[Path] | None,
+        typer.Argument(
+            help="A run file, or any log; by default the shipped demo. Two are before and after a"
+            " change; more lie side by side."
+        ),
     ] = None,
     save: Annotated[
         Path | None,
@@ -59,16 +62,18 @@ def view(
     align: Annotated[
         Aligned | None,
         typer.Option(
-            "--align", help="Align two runs by motion (auto), start, or not at all (none)."
+            "--align",
+            help="Align two runs by motion (auto), several by start, or not at all (none).",
         ),
     ] = None,
     overwrite: Overwrite = False,
     *,
     reading: "Reading",
 ) -> None:
-    """Show a run, or two side by side, in the rerun viewer.
+    """Show a run, or several side by side, in the rerun viewer.
 
-    The views: joints, noise, spectrogram, classes and the moving robot.
+    The views: joints, noise, spectrogram, classes and the moving robot; of two runs, what is new,
+    resolved and louder. Runs that cannot be read are named, and the others shown (exit status 3).
     """
     from inspector import assets
     from inspector.library import load_library
@@ -77,46 +82,99 @@ def view(
 
     if web and save:
         raise typer.BadParameter("name one of --web and --save")
-    one_at_a_time(reading, 1 if after is None else 2)
-    if align and not after:
-        raise typer.BadParameter("--align takes two runs")
-    if terms and after:
+    paths = runs or [assets.demo_run()]
+    one_at_a_time(reading, len(paths))
+    if align and len(paths) < 2:
+        raise typer.BadParameter("--align takes two runs or more")
+    if align is Aligned.AUTO and len(paths) > 2:
+        raise typer.BadParameter("--align auto takes two runs; more lie side by side from start")
+    if terms and len(paths) > 1:
         raise typer.BadParameter("--terms takes one run")
-    if floor is not None and after:
+    if floor is not None and len(paths) > 1:
         raise typer.BadParameter("--floor takes one run")
     if port:
         from inspector.recording import web as browser
 
         browser.free_port(port)
-    path = run or assets.demo_run()
-    both = path if after is None else path.joinpath(*after.resolve().parts[1:])
-    target = save or viewer.scratch_path(both)
+    target = save or viewer.scratch_path(_together(paths))
     overwrite = overwrite or save is None
     refuse_existing(target, overwrite=overwrite)
     library = load_library(assets.model_files(model))
-    robot = not no_robot
-    run_of = opened(path, reading, said=False)  # the remarks say it
-    seconds = None
-    if after is None:
-        links = kind if robot else ""
-        seconds = _one(
-            run_of, target, library, links, terms=terms, floor=floor, overwrite=overwrite
-        )
+    robot, unread, seconds = not no_robot, False, None
+    if len(paths) > 2:
+        found, unread = _read(paths, reading)
+        _several(found, target, library, from_start=align is not Aligned.NONE, overwrite=overwrite)
     else:
-        both_runs, how = (run_of, opened(after, reading, said=False)), align or Aligned.AUTO
-        _two(both_runs, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
+        first, *second = (opened(path, reading, said=False) for path in paths)  # remarks say it
+        if second:
+            both, how = (first, second[0]), align or Aligned.AUTO
+            _two(both, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
+        else:
+            links = kind if robot else ""
+            seconds = _one(
+                first, target, library, links, terms=terms, floor=floor, overwrite=overwrite
+            )
+    _show(target, seconds, web=web, port=port, saved=save is not None)
+    if unread:
+        raise typer.Exit(EXIT[Status.BAD_INPUT])
+
+
+def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: bool) -> None:
+    """Open a recording, or say how it is opened."""
+    from inspector.recording import viewer
+
     if web:
         from inspector.recording import web as browser
 
         browser.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
         return
-    if save is None and viewer.has_display():
+    problem = ""
+    if not saved and viewer.has_display():
         problem = viewer.open_window(target, seconds)
         if not problem:
             return
-        typer.echo(problem, err=True)
     typer.echo(f"recording: {target} ({target.stat().st_size / 1e6:.1f} MB)")
     typer.echo(viewer.how_to_open(target))
+    if problem:
+        raise viewer.DisplayError(f"{problem}; --web shows it in a browser, --save FILE writes it")
+
+
+def _together(paths: list[Path]) -> Path:
+    """A name of several runs, the same for the same ones."""
+    if len(paths) == 1:
+        return paths[0]
+    others = "\n".join(str(path.resolve()) for path in paths[1:])
+    key = hashlib.sha256(others.encode()).hexdigest()[:8]
+    return paths[0].with_name(f"{paths[0].stem}-and-{len(paths) - 1}-{key}")
+
+
+def _read(paths: list[Path], reading: "Reading") -> tuple[list["Opened"], bool]:
+    """Open the runs that can be read, and name the others; whether there are such."""
+    from inspector.analysis.verdict import EXPECTED
+    from inspector.errors import InspectorError
+
+    found = []
+    for path in paths:
+        try:
+            found.append(opened(path, reading, said=False))
+        except EXPECTED as error:
+            typer.echo(f"inspector: {error}", err=True)
+    if not found:
+        raise InspectorError(f"none of {len(paths)} runs can be read")
+    return found, len(found) < len(paths)
+
+
+def _several(
+    runs: list["Opened"], target: Path, library: "Library", *, from_start: bool, overwrite: bool
+) -> None:
+    from inspector.many.many import lay
+    from inspector.many.recording import write
+
+    several = lay(runs, library, from_start=from_start)
+    write(several, target, overwrite=overwrite)
+    for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
+        mark = " (worst)" if index == several.worst else ""
+        typer.echo(f"{name}: {side.headline}{mark}")
 
 
 def _one(

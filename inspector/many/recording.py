@@ -1,0 +1,287 @@
+"""Several runs as one rerun recording: a row for each, of classes and of level; curves; a table."""
+
+import hashlib
+from collections import Counter
+from collections.abc import Sequence
+from itertools import takewhile
+from pathlib import Path
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+from rerun.blueprint import Blueprint
+
+from inspector import colors, levels
+from inspector.many.many import Several
+from inspector.recording import axes, classes, rows, series, unstable
+from inspector.recording.axes import Label, Panel
+from inspector.recording.noise import HIGH_DB, LOW_DB
+from inspector.recording.series import TIMELINE
+from inspector.recording.stream import log_report, writing
+from inspector.recording.unstable import Part
+from inspector.report.markdown import spoken
+from noisemodel.types import Array
+
+CURVES = 8
+"""Runs whose level is drawn as a curve, the worst; more lines cannot be told apart."""
+COLUMNS = 1500
+"""Columns of the levels; of long runs, the highest level in each is shown."""
+WHOLE, CURVE, TITLES = 832.0, 190.0, 28.0
+"""Height of all parts, of the curves, and of a row of tabs, in points, at 1440 x 900."""
+LOWEST = 20.0
+"""Height of a run's row below which classes and levels lie behind each other in tabs."""
+NAMED = 16.0
+"""Least distance of two names."""
+LINE = 8.0
+"""Most height of a line, in points: thick ones have round ends, so a row is several of them."""
+LETTERS = 16
+"""Of a name beside a row."""
+SPAN = "/span"
+"""What makes every plot reach from the first start to the last end."""
+SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"
+"""The markers of `classes.MARKERS` as text."""
+ROWS = ("class", "levels")
+ALL = ("$origin/**", SPAN)
+
+
+def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
+    """Write the recording of several runs, whole or not at all.
+
+    Args:
+        several: The runs.
+        path: The file to write, by convention ``*.rrd``.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    identity = " ".join(f"{side.name} {side.sha256}" for side in several.sides)
+    key = hashlib.sha256(identity.encode()).hexdigest()
+    with writing(path, key, overwrite=overwrite) as recording:
+        begin = min(float(side.run.time[0]) for side in several.sides)
+        end = max(float(side.run.time[-1]) for side in several.sides)
+        ends, nothing = np.array([begin, end]), np.full((2, 1), np.nan)
+        series.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
+        height = _height(len(several.names))
+        panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
+        panels["curves"] = Panel("curves", CURVE)
+        _log_classes(recording, several, panels["class"])
+        _log_levels(recording, several, panels["levels"], (begin, end))
+        _log_curves(recording, several, panels["curves"])
+        properties = {"runs": len(several.names), "model": several.sides[0].model}
+        title = f"{several.names[0]} and {len(several.names) - 1} more"
+        log_report(recording, title, report(several), properties)
+        recording.send_blueprint(layout(several, panels))
+
+
+def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
+    """Lay several runs out: a table at the left, everything over time at the right.
+
+    Args:
+        several: The runs.
+        panels: Of classes and levels.
+
+    Returns:
+        The blueprint; all time axes are linked.
+    """
+    plots = {
+        name: axes.part(
+            panels[name],
+            unstable.plot("", f"/{name}", ALL, between=(0.0, axes.TOP), fixed=True, titled=False),
+            name={"class": "Classes", "levels": "Level above 10 Hz"}[name],
+        )
+        for name in ROWS
+    }
+    panel = panels["curves"]
+    curves = unstable.plot(
+        "", "/curves", between=(LOW_DB, HIGH_DB), legend=True, fixed=True, titled=False
+    )
+    over_time: list[tuple[Part, float]] = [(plots[name], panels[name].height) for name in ROWS]
+    if sum(height for _, height in over_time) > WHOLE - CURVE:
+        over_time = [(unstable.tabs(*plots.values()), panels["class"].height + TITLES)]
+    over_time.append((axes.part(panel, curves), panel.height))
+    text = unstable.text("Runs", "/report", titled=False)
+    whole = unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
+    return unstable.blueprint(whole, TIMELINE, _loop(several))
+
+
+def report(several: Several) -> str:
+    """Write the table of several runs in Markdown, in the order given, the worst marked."""
+    failing = sum(bool(side.findings) for side in several.sides)
+    lines = [f"### {len(several.names)} runs, {failing} with findings"]
+    if several.worst is not None:
+        lines += [
+            "",
+            f"Worst: **{several.names[several.worst]}**, {_first(several, several.worst)}",
+        ]
+    lines += ["", "| run | findings | peak [dB] |", "|---|---|---|"]
+    for index, (name, side) in enumerate(zip(several.names, several.sides, strict=True)):
+        shown = f"**{name}** (worst)" if index == several.worst else name
+        count = Counter(spoken(event.label) for event in side.findings)
+        found = ", ".join(f"{number} {label}" for label, number in count.items())
+        lines.append(f"| {shown} | {found or side.status} | {several.peaks[index]:.0f} |")
+    lines += ["", "Peak of the level above 10 Hz, in dB re 1 rad/s."]
+    remarks = Counter(remark for side in several.sides for remark in dict.fromkeys(side.remarks))
+    told = [
+        f"- {remark} ({f'{number} runs' if number > 1 else _of(several, remark)})"
+        for remark, number in remarks.items()
+    ]
+    return "\n".join([*lines, *(["", "**Remarks**", "", *told] if told else [])]) + "\n"
+
+
+def _of(several: Several, remark: str) -> str:
+    sides = zip(several.names, several.sides, strict=True)
+    return next(name for name, side in sides if remark in side.remarks)
+
+
+def _first(several: Several, index: int) -> str:
+    event = max(several.sides[index].findings, key=lambda event: event.stop - event.start)
+    return f"{spoken(event.label)} from {event.start:.2f} s to {event.stop:.2f} s"
+
+
+def _loop(several: Several) -> tuple[float, float] | None:
+    if several.worst is None:
+        return None
+    found = several.sides[several.worst].findings
+    event = max(found, key=lambda event: event.stop - event.start)
+    return event.start, event.stop
+
+
+def _height(count: int) -> float:
+    """Height of a run's row."""
+    both = (WHOLE - CURVE - 2 * axes.AXIS) / 2 / count
+    if both >= LOWEST:
+        return both
+    return (WHOLE - CURVE - TITLES - axes.AXIS) / count
+
+
+def shortened(names: Sequence[str]) -> list[str]:
+    """Names of runs, without what all begin with if they are too long to stand beside a row."""
+    longest = max(map(len, names))
+    if longest <= LETTERS:
+        return list(names)
+    pairs = zip(min(names), max(names), strict=False)  # all begin with what these two share
+    same = "".join(one for one, _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
+    cut = max(same.rfind(mark) for mark in "-_./ ") + 1
+    return [_ending(name[cut:] if len(names) > 1 else name) for name in names]
+
+
+def _ending(name: str) -> str:
+    return name if len(name) <= LETTERS else f"\u2026{name[1 - LETTERS :]}"
+
+
+def _log_rows(
+    recording: rr.RecordingStream,
+    several: Several,
+    panel: Panel,
+    edges: Array,
+    rgba: NDArray[np.uint8],
+    names: Sequence[str],
+) -> None:
+    """Log a row of colours for each run."""
+    height = (panel.height - axes.AXIS) / len(several.names)
+    lines = max(1, int(height / LINE))
+    width = 0.8 * height if lines == 1 else height / (lines + 1) + 1.0
+    path = "/class/found" if panel.name == "class" else f"/{panel.name}"
+    rows.log(recording, path, edges, rgba, names=names, width=width, lines=lines)
+
+
+def _names(several: Several, panel: Panel) -> list[Label]:
+    """Names of the rows, as many as there is room for; the worst is marked."""
+    step = int(np.ceil(NAMED * len(several.names) / (panel.height - axes.AXIS)))
+    labels = []
+    for index, label in enumerate(axes.rows(shortened(several.names))):
+        worst = index == several.worst
+        if index % step == 0 or worst:
+            text = f"{label.text}\nworst" if worst and step == 1 else label.text
+            color = classes.readable(colors.CLASSES["impact"]) if worst else axes.INK
+            labels.append(Label(label.place, text, color=color))
+    return labels
+
+
+def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> None:
+    colours = classes.colours_of(*several.sides)
+    lanes = [[each for each in side.lane if each[2]] for side in several.sides]
+    edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
+    if len(edges) < 2:
+        edges = np.array([0.0, 1.0])
+    rgba = np.tile(np.array(rows.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
+    for row, lane in enumerate(lanes):
+        for start, stop, name in lane:
+            first, last = np.searchsorted(edges, (start, stop))
+            rgba[row, first:last] = (*colours[name], 255)
+    _log_rows(recording, several, panel, edges, rgba, several.names)
+    failing = list(dict.fromkeys(e.label for side in several.sides for e in side.findings))
+    places = axes.middles(len(lanes))
+    for number, name in enumerate(failing):
+        marks = [
+            (event.start, places[row])
+            for row, side in enumerate(several.sides)
+            for event in side.findings
+            if event.label == name
+        ]
+        shape = classes.MARKERS[number % len(classes.MARKERS)]
+        style = rr.SeriesPoints(
+            names=[spoken(name)], colors=[axes.INK], markers=[shape], marker_sizes=[4.0]
+        )
+        time, place = np.array(sorted(marks)).T
+        recording.log(f"/class/mark/{name}", style, static=True)
+        recording.send_columns(
+            f"/class/mark/{name}", indexes=[series.at(time)], columns=series.scalars(place)
+        )
+    axes.log_left(recording, panel, _names(several, panel))
+    shown = [*failing, "ok"]
+    key = [
+        Label(
+            1.0 - (row + 0.5) / max(len(shown), 3),
+            spoken(name)
+            if name == "ok"
+            else f"{SIGNS[row % len(SIGNS)]} {spoken(name)}".replace("high ", "high\n"),
+            color=classes.readable(colours.get(name, colors.CLASSES["ok"])),
+        )
+        for row, name in enumerate(shown)
+    ]
+    axes.log_right(recording, panel, key)
+
+
+def _log_levels(
+    recording: rr.RecordingStream, several: Several, panel: Panel, span: tuple[float, float]
+) -> None:
+    step = max(levels.STEP, (span[1] - span[0]) / COLUMNS)
+    columns = int(np.ceil((span[1] - span[0]) / step))
+    edges: Array = span[0] + step * np.arange(columns + 1, dtype=np.float64)
+    if len(edges) < 2:
+        edges = np.array([span[0], span[0] + step])
+    found = np.stack([_columns(time, level, edges) for time, level in several.levels])
+    rgba = levels.JOINTS.colours(np.nan_to_num(found, nan=-np.inf), shades=rows.SHADES)
+    rgba[np.isnan(found)] = rows.EMPTY
+    called = [f"{name} [{levels.JOINTS.unit}]" for name in several.names]
+    _log_rows(recording, several, panel, edges, rgba, called)
+    axes.log_left(recording, panel, _names(several, panel))
+    axes.log_scale(recording, panel, levels.JOINTS)
+
+
+def _columns(time: Array, level: Array, edges: Array) -> Array:
+    """Highest level in each column, NaN where there is none."""
+    column = np.clip(np.searchsorted(edges, time + 1e-9, side="right") - 1, 0, len(edges) - 2)
+    found: Array = np.full(len(edges) - 1, -np.inf)
+    np.maximum.at(found, column, np.nan_to_num(level, nan=-np.inf))
+    return np.where(np.isfinite(found), found, np.nan)
+
+
+def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -> None:
+    chosen: Sequence[int] = sorted(several.order[:CURVES])
+    for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
+        time, level = several.levels[index]
+        path, name = f"/curves/{index:03d}", several.names[index]
+        series.log_lines(recording, path, time, level[:, None], names=[name], colours=[color])
+    span = HIGH_DB - LOW_DB
+    marks = [
+        Label((mark - LOW_DB) / span, axes.written(mark), 44.0)
+        for mark in (-60.0, -40.0, -20.0, 0.0)
+    ]
+    axes.log_left(recording, panel, [Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0), *marks])
+    more = len(several.names) > len(chosen)
+    axes.log_right(
+        recording, panel, [Label(0.5, f"the worst\n{CURVES} runs" if more else "all runs")]
+    )
