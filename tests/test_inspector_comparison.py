@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 import rerun as rr
 from chains import chain
+from recordings import read
 from rerun.chunk import RrdReader
 
 from inspector.cli import main
 from inspector.comparison import picture
 from inspector.comparison.output import write_csv
-from inspector.comparison.recording import levels, write
+from inspector.comparison.recording import cells, levels, shades, write
 from noisemodel import ROBOTS, Comparisons, compare
 from noisemodel.excitation import excitation
 
@@ -73,9 +74,39 @@ def test_a_recording_holds_every_model_of_every_robot(found, urdf, tmp_path):
     for kind in KINDS:
         assert f"{root}/level/{kind}" in held
         assert f"{root}/vibration/{kind}" in held
-        assert f"{root}/spectrogram/{kind}/00" in held
-    assert {f"{root}/events", "/report"} <= held
+        assert f"{root}/spectrogram/{kind}/bands/00" in held
+    assert {f"{root}/events/jerk", "/report"} <= held
     assert len(RrdReader(tmp_path / "out.rrd").blueprints()) == 1
+
+
+def test_the_heat_maps_have_the_numbers_of_the_table_and_the_reference_is_dark(found, tmp_path):
+    rr.set_strict_mode(True)
+    write(found, tmp_path / "out.rrd")
+    for name, own, form in (("correlation", 1.0, "{:.2f}"), ("distance", 0.0, "{:.1f}")):
+        numbers = cells(found, name)
+        assert numbers.shape == (3, len(KINDS))
+        np.testing.assert_allclose(numbers[:, KINDS.index("normal")], own)
+        _, (labels,) = read(tmp_path / "out.rrd", f"/overview/{name}/numbers", "Points2D:labels")
+        written = [form.format(number) for row in numbers for number in row]
+        assert [label for label in labels if label in written] == written
+        assert labels[-len(KINDS) :] == list(KINDS)
+    near, far = shades(np.array([[1.0, 0.2]]), "correlation")[0].astype(int).sum(axis=-1)
+    assert near < far
+    near, far = shades(np.array([[0.0, 8.0]]), "distance")[0].astype(int).sum(axis=-1)
+    assert near < far
+
+
+def test_curves_of_all_kinds_lie_over_each_other_in_one_plot(found, tmp_path):
+    write(Comparisons(found.robots[:1]), tmp_path / "out.rrd")
+    reader = RrdReader(tmp_path / "out.rrd")
+    (blueprint,) = reader.blueprints()
+    origins = [
+        batch.column("ViewBlueprint:space_origin").to_pylist()[0][0]
+        for batch in (c.to_record_batch() for c in reader.store(store=blueprint).stream())
+        if "ViewBlueprint:space_origin" in batch.schema.names
+    ]
+    assert sum(origin.endswith("/vibration") for origin in origins) == 1
+    assert sum(origin.endswith("/level") for origin in origins) == 1
 
 
 def test_levels_are_relative_to_the_root_mean_square(found):

@@ -1,15 +1,18 @@
-"""Comparisons of noise models as a rerun recording: one above the other, on one time axis."""
+"""Comparisons of noise models as a rerun recording: heat maps, a table, each robot's curves."""
 
 import hashlib
 from pathlib import Path
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
 from inspector import colors
-from inspector.recording import series, unstable
-from inspector.recording.spectrogram import TOP_HZ, log_bands
+from inspector.levels import Scale
+from inspector.recording import axes, series, unstable
+from inspector.recording.axes import Label, Panel
+from inspector.recording.spectrogram import HEIGHT, log_panel
 from inspector.recording.stream import writing
 from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
@@ -24,6 +27,24 @@ FLOOR_DB = -60.0
 """Levels below this are drawn at it, in [dB]."""
 RANGE_DB = (-25.0, 20.0)
 """What is drawn: the same for all, so that heights compare, in [dB]."""
+SPECTRUM = Scale(-60.0, 10.0, "dB re its own rms")
+PARTS = {"vibration": "above 10 Hz", "level": "whole motion"}
+CELL = (96, 44)
+"""Width and height of a cell of the heat maps, in points."""
+NAMED = (150, 40)
+"""Width of the names of robots, and height of those of kinds."""
+MAPS = {
+    "correlation": "Correlation of the envelope with that of {}: 1 is dark",
+    "distance": "Distance of the spectrum to that of {} [dB]: 0 is dark",
+}
+WORST_DB = 10.0
+"""Distance that is as light as can be, in [dB]: near that of independent noises."""
+LIGHTEST = 0.75
+"""Place on the palette of what is farthest: numbers have to be read on it."""
+WHOLE, TITLES = 832.0, 28.0
+"""Height of all parts and of a row of tabs, in points, at 1440 x 900."""
+SPAN = "/span"
+"""What makes every plot reach from the first start to the last end."""
 
 
 def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
@@ -42,6 +63,11 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
     identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
     with writing(path, identity.hexdigest(), overwrite=overwrite) as recording:
         recording.send_blueprint(layout(found))
+        for name in MAPS:
+            _log_map(recording, found, name)
+        ends = np.array([min(one.time[0] for one in found), max(one.time[-1] for one in found)])
+        nothing = np.full((2, 1), np.nan)
+        series.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
         for one in found:
             _log(recording, one)
         document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
@@ -69,7 +95,7 @@ def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
 
 
 def layout(found: Comparisons) -> Blueprint:
-    """Lay out a recording: one tab per robot, in it events, levels and spectrograms.
+    """Lay out a recording: heat maps and table first, then one tab per robot.
 
     Args:
         found: The comparisons.
@@ -77,56 +103,165 @@ def layout(found: Comparisons) -> Blueprint:
     Returns:
         The blueprint; all time axes are linked.
     """
-    report = unstable.text("Table", "/report")
-    return unstable.blueprint(unstable.tabs(*map(_robot, found), report), series.TIMELINE)
+    reference = found[0].kinds[found[0].comparison.reference]
+    columns, rows = len(found[0].kinds), len(found)
+    across, down = (-NAMED[0], CELL[0] * columns), (-NAMED[1], CELL[1] * rows)
+    maps: list[tuple[Part, float]] = [
+        (
+            unstable.picture(
+                title.format(f"\u2018{reference}\u2019"), f"/overview/{name}", across, down
+            ),
+            1.0,
+        )
+        for name, title in MAPS.items()
+    ]
+    table = unstable.text("Table", "/report")
+    share = min(max(len(found), 3) * CELL[1] + NAMED[1] + 28, 500)
+    overview = unstable.above(
+        (unstable.beside(*maps), share), (table, WHOLE - share), name="Robots"
+    )
+    return unstable.blueprint(unstable.tabs(overview, *map(_robot, found)), series.TIMELINE)
+
+
+def cells(found: Comparisons, name: str) -> Array:
+    """The numbers of a heat map.
+
+    Args:
+        found: The comparisons.
+        name: "correlation" of the envelopes or "distance" of the spectra in [dB], to the reference.
+
+    Returns:
+        Shape (robots, kinds); NaN where there is none.
+    """
+    return np.stack([getattr(one.comparison, name)[:, one.comparison.reference] for one in found])
+
+
+def shades(numbers: Array, name: str) -> NDArray[np.uint8]:
+    """Colour the numbers of a heat map: the farther from the reference, the lighter.
+
+    Args:
+        numbers: See `cells`.
+        name: Of the heat map.
+
+    Returns:
+        Red, green and blue, shape (robots, kinds, 3); of NaN that of the background.
+    """
+    far = 1.0 - numbers if name == "correlation" else numbers / WORST_DB
+    rgb = colors.heat(LIGHTEST * np.clip(np.nan_to_num(far), 0.0, 1.0))[..., :3]
+    return np.where(
+        np.isnan(numbers)[..., None], np.array(colors.BACKGROUNDS[0], dtype=np.uint8), rgb
+    )
+
+
+def _log_map(recording: rr.RecordingStream, found: Comparisons, name: str) -> None:
+    """Log a heat map, robots by kinds, with its numbers."""
+    numbers = cells(found, name)
+    image = shades(numbers, name).repeat(CELL[1] - 2, axis=0).repeat(CELL[0] - 2, axis=1)
+    framed = np.zeros((len(found), CELL[1], len(found[0].kinds), CELL[0], 3), dtype=np.uint8)
+    framed[:] = colors.BACKGROUNDS[0]
+    shape = (len(found), CELL[1] - 2, len(found[0].kinds), CELL[0] - 2, 3)
+    framed[:, 1:-1, :, 1:-1] = image.reshape(shape)
+    size = (len(found) * CELL[1], len(found[0].kinds) * CELL[0], 3)
+    path = f"/overview/{name}"
+    recording.log(f"{path}/cells", rr.Image(framed.reshape(size)), static=True)
+    texts, places = [], []
+    for row, one in enumerate(found):
+        y = CELL[1] * (row + 0.5)
+        texts.append(_short(one.name))
+        places.append((-NAMED[0] / 2, y))
+        for column, number in enumerate(numbers[row].tolist()):
+            if not np.isnan(number):
+                texts.append(f"{number:.2f}" if name == "correlation" else f"{number:.1f}")
+                places.append((CELL[0] * (column + 0.5), y))
+    for column, kind in enumerate(found[0].kinds):
+        texts.append(kind)
+        places.append((CELL[0] * (column + 0.5), -NAMED[1] / 2))
+    labels = rr.Points2D(
+        [(x, y - axes.TEXT) for x, y in places],
+        labels=texts,
+        colors=[axes.INK] * len(texts),
+        radii=rr.Radius.ui_points(0.0),
+        show_labels=True,
+    )
+    recording.log(f"{path}/numbers", labels, static=True)
+
+
+def _short(name: str) -> str:
+    """The name of a robot, or of the file of a run, that fits beside its row."""
+    stem = Path(name).stem if "/" in name else name
+    return stem if len(stem) <= 18 else f"\u2026{stem[-17:]}"
 
 
 def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
     whole = np.ones(len(one.time), dtype=bool)
-    parts = {
-        "vibration": vibrating(one.pressure.T, whole, one.rate).T,
-        "level": one.pressure,
-    }
-    for part, pressure in parts.items():
+    pressures = {"vibration": vibrating(one.pressure.T, whole, one.rate).T, "level": one.pressure}
+    shown = dict(zip(one.kinds, colors.of_series(len(one.kinds)), strict=True))
+    for part, pressure in pressures.items():
         time, level = levels(one, pressure)
-        for index, color in enumerate(colors.of_series(len(one.kinds))):
-            kind = one.kinds[index]
+        for index, (kind, color) in enumerate(shown.items()):
             path = f"{_root(one)}/{part}/{kind}"
             series.log_lines(
                 recording, path, time, level[:, [index]], names=[kind], colours=[color]
             )
+        panel = _panel(one, part)
+        axes.log_left(recording, panel, [Label(0.5, f"{PARTS[part]}\n[dB re its rms]")])
+        named = [
+            Label(1.0 - (row + 0.5) / max(len(shown), 6), kind, color=color)
+            for row, (kind, color) in enumerate(shown.items())
+        ]
+        axes.log_right(recording, panel, named)
     for kind, pressure in zip(one.kinds, one.pressure, strict=True):
         spectrum = spectrogram(pressure, one.rate, start=float(one.time[0]), valid=whole)
-        log_bands(recording, f"{_root(one)}/spectrogram/{kind}", spectrum)
+        log_panel(recording, _panel(one, f"spectrogram/{kind}"), spectrum, SPECTRUM, kind)
     labels = tuple(dict.fromkeys(event.label for event in one.events))
     states = dict(zip(labels, colors.of_series(len(labels)), strict=True))
-    stretches = [(event.start, event.stop, event.label) for event in one.events]
-    series.log_lane(recording, f"{_root(one)}/events", stretches, states)
+    panel = _panel(one, "events")
+    for row, label in enumerate(labels):
+        own = [(event.start, event.stop) for event in one.events if event.label == label]
+        upper, lower = (axes.TOP * (1.0 - (row + share) / len(labels)) for share in (0.15, 0.85))
+        unstable.log_stretches(
+            recording,
+            f"{_root(one)}/events/{label}",
+            series.TIMELINE,
+            own,
+            between=(lower, upper),
+            name=label,
+            color=states[label],
+            opaque=True,
+        )
+    axes.log_left(recording, panel, axes.rows(labels) or [Label(0.5, "no events")])
+    axes.log_right(recording, panel, [Label(0.5, "events")])
+
+
+def _panel(one: RobotComparison, part: str) -> Panel:
+    """A panel of a robot, by what lies below the robot's entity."""
+    labels = len(dict.fromkeys(event.label for event in one.events))
+    events = 20.0 * max(labels, 2) + axes.AXIS
+    curves = (WHOLE - events - HEIGHT - 2 * TITLES) / 2
+    height = {"events": events, "vibration": curves, "level": curves}
+    return Panel(f"{_root(one)[1:]}/{part}", height.get(part, HEIGHT))
 
 
 def _robot(one: RobotComparison) -> Part:
-    parts = {"vibration": "above 10 Hz", "level": "whole motion"}
-    levels = unstable.tabs(*(_lines(one, part, name) for part, name in parts.items()))
-    spectrograms = unstable.tabs(*(_spectrogram(one, kind) for kind in one.kinds))
-    lane = unstable.lanes("Events", f"{_root(one)}/events")
-    height = 1.2 * len(one.kinds)
-    return unstable.above((lane, 1.0), (levels, height), (spectrograms, 3.0), name=one.name)
-
-
-def _lines(one: RobotComparison, part: str, name: str) -> Part:
-    plots = [
-        unstable.plot(
-            f"{kind} [dB re its own rms]", f"{_root(one)}/{part}/{kind}", between=RANGE_DB
-        )
-        for kind in one.kinds
-    ]
-    return unstable.above(*((plot, 1.0) for plot in plots), name=name)
+    parts = []
+    for part, between in (
+        ("events", (0.0, axes.TOP)),
+        ("vibration", RANGE_DB),
+        ("level", RANGE_DB),
+    ):
+        path, every = f"{_root(one)}/{part}", ("$origin/**", SPAN)
+        plot = unstable.plot("", path, every, between=between, fixed=True, titled=False)
+        panel = _panel(one, part)
+        parts.append((axes.part(panel, plot), panel.height))
+    spectrograms = [_spectrogram(one, kind) for kind in one.kinds]
+    height = HEIGHT + TITLES
+    return unstable.above(*parts, (unstable.tabs(*spectrograms), height), name=_short(one.name))
 
 
 def _spectrogram(one: RobotComparison, kind: str) -> Part:
-    top = min(TOP_HZ, one.rate / 2)
-    origin = f"{_root(one)}/spectrogram/{kind}"
-    return unstable.plot(f"{kind}, 0-{top:.0f} Hz", origin, between=(0.0, top), fixed=True)
+    panel = _panel(one, f"spectrogram/{kind}")
+    plot = unstable.plot("", f"/{panel.name}", between=(0.0, axes.TOP), fixed=True, titled=False)
+    return axes.part(panel, plot, name=kind)
 
 
 def _root(one: RobotComparison) -> str:

@@ -42,12 +42,26 @@ def log(
         Its panel.
     """
     panel = Panel("spectrogram", HEIGHT)
-    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
-    title = Label(0.5, "noise\nspectrum", -22.0)
-    _log_axis(recording, panel, low, high, title, axes.hertz)
-    _log_rows(recording, panel, spectrum, (low, high), scale, "Hz")
+    log_panel(recording, panel, spectrum, scale, "noise\nspectrum")
     log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
     return panel
+
+
+def log_panel(
+    recording: rr.RecordingStream, panel: Panel, spectrum: Spectrogram, scale: Scale, title: str
+) -> None:
+    """Log a spectrogram with its axis in Hz and its scale.
+
+    Args:
+        recording: Where to; the rows lie below ``/<panel>/bands``.
+        panel: Its panel.
+        spectrum: What to show.
+        scale: Of its levels.
+        title: What it is of.
+    """
+    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
+    _log_axis(recording, panel, low, high, Label(0.5, title, -22.0), axes.hertz)
+    _log_rows(recording, panel, spectrum, (low, high), scale, "Hz")
 
 
 def log_orders(

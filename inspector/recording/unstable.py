@@ -96,6 +96,16 @@ def drawing(origin: str) -> Part:
     )
 
 
+def picture(name: str, origin: str, across: tuple[float, float], down: tuple[float, float]) -> Part:
+    """Draw images, points and lines in a part of a plane, y downwards."""
+    return rrb.Spatial2DView(
+        origin=origin,
+        name=name,
+        visual_bounds=rrb.VisualBounds2D(x_range=across, y_range=down),
+        background=rrb.Background(color=PLOTS),
+    )
+
+
 def lanes(name: str, origin: str, *, last: float | None = None) -> Part:
     """Draw states over time, a lane for each entity under ``origin``; see `plot`."""
     return rrb.StateTimelineView(origin=origin, name=name, time_view=_over(last))
