@@ -11,10 +11,13 @@ from inspector.live.clock import Clock
 from inspector.live.decimator import Decimator
 from inspector.live.labeller import NOISY, Labeller, NoiseSignals
 from inspector.live.lane import Lane
+from inspector.live.links import LinkLevels
 from inspector.live.robot import LiveRobot
 from inspector.live.spectrogram import FLOOR_DB, SpectrogramStream
 from inspector.live.warnings import Warnings
 from inspector.recording import robot as scene
+from inspector.recording.camera import FIELD_OF_VIEW, sight
+from noisemodel.links import link_noise
 
 CLASSES = ("ok", "impact")
 
@@ -239,6 +242,41 @@ def test_silence_and_gaps_are_dark():
     assert 8.5 < columns.time[0] < columns.time[1] < 8.56
 
 
+# The links.
+
+
+@pytest.mark.parametrize("size", [37, 400, 3000])
+def test_levels_of_links_are_those_of_the_whole_run_however_samples_come(size):
+    time = np.arange(3000) / 1000
+    names = nm.Robot.load("panda").joint_names[:7]
+    hum = 0.1 * np.sin(2 * np.pi * 90 * time) * ((time >= 1.0) & (time < 2.0))
+    position = np.full((3000, 7), 0.3)
+    velocity = 0.02 * np.cos(time)[:, None] + hum[:, None] * np.linspace(0.2, 1.0, 7)
+    run = nm.Run(time=time, velocity=velocity, position=position, joint_names=names, robot="panda")
+    noise = link_noise(run)
+    levels = LinkLevels("panda", names, 1000.0, floating=False)
+    assert levels.links == noise.links
+    steps = []
+    for first in range(0, 3000, size):
+        piece = slice(first, first + size)
+        signals = {"velocity": velocity[piece], "position": position[piece]}
+        steps += levels.push(time[piece], signals)
+    assert [step.time for step in steps] == pytest.approx(0.2 * np.arange(14))
+    for step in steps:
+        inside = (noise.time >= step.time) & (noise.time < step.time + 0.2)
+        power = noise.vibration[inside].mean(axis=0)
+        np.testing.assert_allclose(10 ** (step.level / 10) * 1e-12, power, rtol=1e-6, atol=1e-15)
+
+
+def test_levels_of_links_begin_anew_after_a_sample_that_is_not_known():
+    names = nm.Robot.load("panda").joint_names[:7]
+    levels = LinkLevels("panda", names, 1000.0, floating=False)
+    time, velocity = np.arange(2000) / 1000, np.ones((2000, 7))
+    velocity[700] = np.nan
+    steps = levels.push(time, {"velocity": velocity, "position": np.zeros((2000, 7))})
+    assert [step.time for step in steps] == pytest.approx(0.701 + 0.2 * np.arange(6))
+
+
 # The robot.
 
 
@@ -265,6 +303,23 @@ def test_joints_stand_where_rerun_would_put_them(robot, tmp_path):
         assert abs(expected @ turn) == pytest.approx(1.0, abs=1e-6)
         checked += 1
     assert checked >= len(names)
+
+
+@pytest.mark.parametrize("robot", ["panda", "talos"])
+def test_an_arm_is_in_the_picture_wherever_its_joints_take_it(robot):
+    names = nm.Robot.load(robot).joint_names[:7]
+    drawn = LiveRobot(rr.RecordingStream("test"), robot, names, floating=False)
+    position = np.zeros(7)
+    camera = drawn.camera(position, None)
+    right, up, ahead = sight()
+    random = np.random.default_rng(7)
+    for _ in range(50):
+        pose = random.uniform(drawn._low, drawn._high)[None]
+        for points in drawn._reached(pose, None):
+            offset = points - camera.eye
+            edge = np.tan(FIELD_OF_VIEW / 2) * (offset @ ahead)
+            assert (np.abs(offset @ right) < edge).all()
+            assert (np.abs(offset @ up) < edge).all()
 
 
 @pytest.mark.parametrize("missing", [(), ("base_velocity",), ("velocity_desired",)])

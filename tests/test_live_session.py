@@ -18,6 +18,7 @@ from inspector.library import label_run, load_library
 from inspector.live import LiveError
 from inspector.live.session import BATCH
 from inspector.live.sink import Sink
+from inspector.report.markdown import spoken
 from models.signals import JOINTS, MOTION, NOISE
 from noisemodel import OutputError, UnknownJointError
 
@@ -92,6 +93,64 @@ def test_a_session_shows_everything(tmp_path, library):
     assert summary.warnings == {}
     assert "delay from a sample to its label: median" in str(summary)
     assert all(0.0 < delay < 10.0 for delay in summary.delays)
+
+
+def test_findings_are_listed_as_they_come_and_are_those_of_the_summary(tmp_path, library):
+    path, _, summary = shown(tmp_path, motion(4.0), library=library)
+    assert summary.findings
+    time, texts = read(path, "/report", "TextDocument:text")
+    assert texts[0] == ["### ok so far\n\n"]
+    assert any(" since " in text[0] for text in texts[1:-1])  # while it lasts
+    for event in summary.findings:
+        line = f"- **{spoken(event.label)}**, {event.start:.2f} s to {event.stop:.2f} s"
+        assert line in texts[-1][0]
+        later = [at for at, text in zip(time, texts, strict=True) if spoken(event.label) in text[0]]
+        assert event.start < later[0] < event.stop + 1.0
+    listed, lines = read(path, "/events", "TextLog:text")
+    found = [line[0] for line in lines if line[0].startswith("found: ")]
+    assert found == [f"found: {spoken(e.label)} from {e.start:.2f} s" for e in summary.findings]
+    np.testing.assert_allclose(listed[-len(found) :], [e.start for e in summary.findings])
+
+
+def test_the_robot_glows_while_it_hums_and_is_quiet_before(tmp_path, library):
+    signals = motion(3.0, 7, hum=(1.0, 2.0))
+    path, _, _ = shown(tmp_path, signals, robot="panda", joint_names=PANDA, library=library)
+    mesh = "/robot/panda/visual_geometries/panda_link7/visual_0"
+    time, shades = read(path, mesh, "Asset3D:albedo_factor")
+    level = [sum(shade[0].to_bytes(4, "big")[:3]) for shade in shades]
+    assert time[0] == 0.0
+    during = max(each for at, each in zip(time, level, strict=True) if 1.0 <= at < 2.0)
+    assert during > level[0]
+    assert level[-1] < during
+    _, base = read(path, mesh.replace("link7", "link0"), "Asset3D:albedo_factor")
+    assert len(base) == 1
+
+
+def window(path):
+    """What plots over time show, in each layout that was sent: start and end, with their kinds."""
+    reader, found = RrdReader(path), []
+    for blueprint in reader.blueprints():
+        for chunk in reader.store(store=blueprint).stream():
+            batch = chunk.to_record_batch()
+            if "TimeAxis:view_range" in batch.schema.names:
+                found += [row[0] for row in batch.column("TimeAxis:view_range").to_pylist() if row]
+    return found
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+def test_plots_begin_with_the_first_sample_and_no_time_is_negative(tmp_path, library, start):
+    signals = motion(0.5)
+    signals["time"] = signals["time"] + start
+    path, _, _ = shown(tmp_path, signals, library=library)
+    ranges = window(path)
+    assert ranges
+    for each in ranges:
+        assert each["start"] == int(start * 1e9)
+        assert each["end"] == int((start + 10.0) * 1e9)
+    for entity in entities(path):
+        for component in ("Scalars:scalars", "StateChange:state", "TextDocument:text"):
+            time, _ = read(path, entity, component)
+            assert time is None or time.min() >= 0.0
 
 
 @pytest.mark.parametrize("size", [1, 7, 50, 1301])

@@ -112,11 +112,12 @@ def test_every_link_is_in_the_picture_at_every_time(filmed):
     samples = range(0, len(run.time), 20)
     moved = np.zeros((len(samples), 3))
     if robot.floating_base:
-        time, centre = read(recording, eye["tracking_entity"], "Points3D:positions")
+        time, below = read(recording, "/robot/motion/view", "Transform3D:translation")
         np.testing.assert_allclose(time, run.time[::20], atol=1e-9)
-        moved = np.array(centre)[:, 0] - centre[0][0]
-        np.testing.assert_allclose(centre[0][0], target, atol=1e-6)
+        moved = np.array(below)[:, 0]
         assert np.ptp(moved, axis=0)[:2].min() > 1.0  # it walks far out of the first picture
+        _, frames = read(recording, "/robot/motion/view", "Transform3D:child_frame")
+        assert frames[0] == [eye["target_frame"]]
     most = 0.0
     for points, shift in zip(placed(robot, run, samples), moved, strict=True):
         seen = in_picture(points, position + shift, target + shift, 1.0)
@@ -128,8 +129,16 @@ def test_the_floor_is_below_the_robot_at_all_times(filmed):
     robot, run, recording = filmed
     plane = eye_of(recording)["plane"]
     assert plane[:3] == [0.0, 0.0, 1.0]
-    lowest = min(points[:, 2].min() for points in placed(robot, run, range(0, len(run.time), 20)))
-    assert lowest == pytest.approx(plane[3], abs=0.02)
+    places = list(placed(robot, run, range(0, len(run.time), 20)))
+    assert min(points[:, 2].min() for points in places) == pytest.approx(plane[3], abs=0.02)
+    if robot.floating_base:  # it lies still, wherever the robot walks
+        _, (lines,) = read(recording, "/robot/floor", "LineStrips3D:strips")
+        lines = np.array(lines)
+        np.testing.assert_allclose(lines[..., 2], plane[3], atol=1e-6)
+        for points in places:
+            assert (lines.min(axis=(0, 1))[:2] < points.min(axis=0)[:2]).all()
+            assert (lines.max(axis=(0, 1))[:2] > points.max(axis=0)[:2]).all()
+        assert read(recording, "/robot/floor", "CoordinateFrame:frame")[1] == [["world"]]
 
 
 def test_a_nearer_camera_would_not_see_all():

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
+from inspector.live.robot import KEY
 from inspector.live.spectrogram import FLOOR_DB
 from inspector.recording import unstable
 from inspector.recording.camera import Camera
@@ -24,38 +25,62 @@ class Contents:
         joints: Title and entity paths of each plot of joint signals.
         camera: From where the robot is seen; None without one.
         classes: Whether there are classes.
+        links: Whether the links are coloured.
         rate: Samples per second, in [Hz].
+        start: Time of the first sample, in [s].
+        full: Whether the last ten seconds are all after that.
     """
 
     joints: Sequence[tuple[str, Sequence[str]]]
     camera: Camera | None
     classes: bool
+    links: bool
     rate: float
+    start: float
+    full: bool
 
 
 def layout(contents: Contents) -> Blueprint:
-    """Lay a live recording out; every plot shows the last ten seconds.
+    """Lay a live recording out; every plot shows ten seconds: the first, and then the last.
 
     Args:
         contents: What there is to show.
     """
     top = min(TOP_HZ, contents.rate / 2)
-    title = f"Spectrogram of the noise, 0-{top:.0f} Hz, {FLOOR_DB:.0f}-0 dB re 1 rad/s"
-    right = [
-        (_plot("/noise", "Noise, simplified estimate [rad/s]"), 2.2),
-        (_plot("/spectrogram", title, between=(0.0, top)), 2.8),
+    title = f"Spectrogram of the noise, 0-{top:.0f} Hz, {FLOOR_DB:.0f} to 0 dB re 1 rad/s"
+    over_time = [
+        (_plot(contents, "/noise", "Noise p\u0302 [rad/s]"), 2.2),
+        (_plot(contents, "/spectrogram", title, between=(0.0, top)), 2.8),
         (_signals(contents), 4.2),
     ]
     if contents.classes:
-        right.insert(0, (unstable.lanes("Classes", "/class", last=SHOWN), 1.6))
-    left = unstable.events("Events", "/events")
+        during, last = _shown(contents)
+        over_time.insert(0, (unstable.lanes("Classes", "/class", during=during, last=last), 1.6))
+    findings = unstable.text("Findings", "/report", titled=False)
+    left = [(findings, 2.0), (unstable.events("Events", "/events"), 1.4)]
     if contents.camera is not None:
-        left = unstable.above((unstable.robot("Robot", "/robot", contents.camera), 3), (left, 2))
-    content = unstable.beside((left, 2), (unstable.above(*right), 3))
-    return unstable.blueprint(content, TIMELINE, following=True)
+        title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
+        robot = unstable.robot(title, "/robot", contents.camera)
+        if contents.links:
+            key = unstable.drawing(f"/axis/{KEY.name}/right")
+            robot = unstable.beside((robot, 88.0), (key, 12.0))
+        left.insert(1, (robot, 3.4))
+    whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*over_time), 64.0))
+    return unstable.blueprint(whole, TIMELINE, following=True)
+
+
+def _shown(contents: Contents) -> tuple[tuple[float, float] | None, float | None]:
+    """What plots show: a stretch of time at first, so that it begins with the samples, or a last.
+
+    Before ten seconds are over, the last ten begin before the first sample.
+    """
+    if contents.full:
+        return None, SHOWN
+    return (contents.start, contents.start + SHOWN), None
 
 
 def _plot(
+    contents: Contents,
     origin: str,
     name: str,
     paths: Sequence[str] = ("$origin/**",),
@@ -63,13 +88,16 @@ def _plot(
     legend: bool = False,
     between: tuple[float, float] | None = None,
 ) -> Part:
+    during, last = _shown(contents)
     return unstable.plot(
-        name, origin, paths, legend=legend, between=between, fixed=True, last=SHOWN
+        name, origin, paths, legend=legend, between=between, fixed=True, during=during, last=last
     )
 
 
 def _signals(contents: Contents) -> Part:
-    plots = [_plot("/joints", title, paths, legend=True) for title, paths in contents.joints]
+    plots = [
+        _plot(contents, "/joints", title, paths, legend=True) for title, paths in contents.joints
+    ]
     if contents.classes:
-        plots.append(_plot("/score", "Scores", legend=True))
+        plots.append(_plot(contents, "/score", "Scores", legend=True))
     return unstable.tabs(*plots)

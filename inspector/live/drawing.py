@@ -1,5 +1,6 @@
 """What a live session draws: lines, spectrogram, lanes, events; in columns, thinned."""
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -8,12 +9,15 @@ import rerun as rr
 from inspector import colors
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
+from inspector.recording import classes
 from inspector.recording.joints import UNITS
 from inspector.recording.limbs import JOINTS_PER_PLOT
 from inspector.recording.series import at, log_events, scalars, style_lane, style_lines
 from inspector.recording.spectrogram import style_bands
+from inspector.report.markdown import spoken
 from inspector.thinning import extremes
-from models import UNKNOWN, Labels
+from models import UNKNOWN, Event, Labels
+from models.labels import interval
 from noisemodel.types import Array
 
 JOINT_POINTS = 400.0
@@ -25,6 +29,8 @@ FILE_INTERVAL = 2.0
 """The same for a file without a viewer: for each message, rerun keeps some hundred bytes until the
 file is closed."""
 NOISE = "noise"
+NEWEST = 8
+"""Findings that are shown in words; the others are counted."""
 
 
 class Drawing:
@@ -63,6 +69,7 @@ class Drawing:
             kind: [(_joints(kind, plot), columns) for plot, columns in enumerate(self._slices)]
             for kind in self._signals
         }
+        self._told, self._listed = "", set[tuple[str, float]]()
         self._waiting: dict[str, list[tuple[Array, Array]]] = {}
         self._held = 0.0  # time that waits, in [s]
         for kind in self._signals:
@@ -161,7 +168,7 @@ class Drawing:
             self._scores = []
 
     def changes(self, changes: Sequence[Change]) -> None:
-        """Draw where the class changes, and list findings."""
+        """Draw where the class changes."""
         if not changes:
             return
         self._recording.send_columns(
@@ -169,10 +176,31 @@ class Drawing:
             indexes=[at(np.array([change.time for change in changes]))],
             columns=rr.StateChange.columns(state=[change.state for change in changes]),
         )
-        for change in changes:
-            if change.state not in ("", "ok"):
-                text = f"{change.state} from {change.time:.2f} s (score {change.score:.2f})"
-                self.event(change.time, text, self._colours[change.state])
+
+    def findings(self, time: float, found: Sequence[Event], lasting: Sequence[Event]) -> None:
+        """Show the findings so far in a document, and list those that are new.
+
+        Args:
+            time: Of the latest sample, in [s].
+            found: All findings so far, in order of time.
+            lasting: Those that have not ended.
+        """
+        lines = [_line(event, lasts=event in lasting) for event in reversed(found)]
+        count = Counter(spoken(event.label) for event in found)
+        title = ", ".join(f"{number} {label}" for label, number in count.items())
+        head = f"### findings: {title}" if title else "### ok so far"
+        rest = [f"- {len(lines) - NEWEST} more before"] if len(lines) > NEWEST else []
+        text = "\n".join([head, "", *lines[:NEWEST], *rest]) + "\n"
+        if text != self._told:
+            self._told = text
+            document = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
+            index = [at(np.array([time]))]
+            self._recording.send_columns("/report", indexes=index, columns=document)
+        for event in found:
+            if (event.label, event.start) not in self._listed:
+                self._listed.add((event.label, event.start))
+                line = f"found: {spoken(event.label)} from {event.start:.2f} s"
+                self.event(event.start, line, classes.readable(self._colours[event.label]))
 
     def event(self, time: float, text: str, colour: colors.Color = (200, 200, 200)) -> None:
         """Add a line to the list of events."""
@@ -191,6 +219,12 @@ class Drawing:
         labels = [f"{name} desired" if desired else name for name in names]
         shades = colors.of_series(len(names), dim=desired)
         style_lines(self._recording, _joints(kind, plot), names=labels, colours=shades)
+
+
+def _line(event: Event, *, lasts: bool) -> str:
+    """A finding in a line of Markdown."""
+    when = f"since {event.start:.2f} s" if lasts else interval(event.start, event.stop)
+    return f"- **{spoken(event.label)}**, {when}, score {event.score:.2f}{event.novelty}"
 
 
 def _joints(kind: str, plot: int) -> str:

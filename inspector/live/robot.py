@@ -1,6 +1,7 @@
 """The robot in a live recording: one message for all of its joints."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -8,14 +9,24 @@ import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfJoint
 
-from inspector.recording import framing, series
+from inspector.levels import LINKS
+from inspector.recording import axes, framing, series
 from inspector.recording import robot as scene
 from inspector.recording.camera import Camera, fitted
+from noisemodel.limits import Limits, joint_limits
 from noisemodel.types import Array
 
 SLIDING = "prismatic"
+SHADES = 16
+KEY = axes.Panel("key", 360.0)
+"""The scale beside the robot."""
 ROOM = 1.3
-"""What the camera sees, by the size of the robot as it stands at first."""
+"""What the camera sees of a robot that moves its base, by its size as it stands at first."""
+POSES = 200
+"""Random poses within the limits of the joints, of which the camera sees all."""
+AROUND = np.array([[-20.0, -20.0], [20.0, 20.0]])
+"""How far the floor reaches from the first pose, in [m]."""
+UPRIGHT = np.array([0.0, 0.0, 0.0, 1.0])
 
 
 class LiveRobot:
@@ -29,7 +40,8 @@ class LiveRobot:
         at_once: Poses that a message has.
 
     Attributes:
-        children: Links that move, in the order of `transforms`; the base, if it moves, is last.
+        children: Links that move, in the order of `transforms`; the base, if it moves, and the
+            frame of the camera are last.
 
     Raises:
         RobotError: If there is no such robot, or it cannot be read.
@@ -49,8 +61,14 @@ class LiveRobot:
         with TemporaryDirectory() as folder:
             tree = scene.load(robot, Path(folder), joint_names)
             self._outermost = framing.outermost(scene.drawn_file(robot, Path(folder)))
-            scene.log_shapes(recording, tree, coloured=False)
+            scene.log_shapes(recording, tree, coloured=True)
+            self._kinds = scene.shapes(tree)
         self._tree = tree
+        self._shades: dict[str, bytes] = {}
+        self._paths = {
+            link: [path for each in members for path in tree.get_visual_geometry_paths(each)]
+            for link, members in scene.moving_links(tree).items()
+        }
         movable = {joint.name: joint for joint in tree.joints() if joint.joint_type != "fixed"}
         leaders = {
             name: joint.mimic.joint if joint.mimic else name for name, joint in movable.items()
@@ -68,7 +86,8 @@ class LiveRobot:
         self._slide = np.where(slides, _rotated(self._turn, axis), 0.0)
         self._spin = np.where(slides, 0.0, _times(self._turn, np.pad(axis, ((0, 0), (0, 1)))))
         self._half = np.where(slides, 0.0, 0.5)
-        base = [(scene.WORLD, str(tree.root_link().name))] if floating else []
+        moved = (str(tree.root_link().name), framing.VIEW) if floating else ()
+        base = [(scene.WORLD, child) for child in moved]
         links = [*((joint.parent_link, joint.child_link) for joint in joints), *base]
         self.children = [child for _, child in links]
         self._carriers = [parent for parent, _ in links]
@@ -76,24 +95,58 @@ class LiveRobot:
         self._waiting: list[tuple[float, Array, Array]] = []
         self._names = [joint.name for joint in joints]
         self._recording = recording
-        self._followed: tuple[Camera, Array] | None = None
+        axes.log_scale(recording, KEY, LINKS, "dB re\n1 pW")
+        limits = joint_limits(robot)
+        ranges = [_range(limits.get(name, Limits())) for name in joint_names]
+        self._low, self._high = np.array(ranges).T
 
     def camera(self, position: Array, base_pose: Array | None) -> Camera:
-        """Place the camera by the first pose, with room to move: what will come is not known.
+        """Place the camera, before it is known what will come.
+
+        A robot on a base is seen wherever its joints can take it; one that moves its base as it
+        stands at first, with room to move.
 
         Args:
             position: Of the named joints, shape (joints,), in [rad] or [m].
             base_pose: x, y, z and quaternion x, y, z, w of a floating base, shape (7,).
         """
-        angle = self._factor * np.nan_to_num(position)[self._columns] + self._offset
-        angles = dict(zip(self._names, angle[:, None], strict=True))
+        first = np.nan_to_num(position)[None]
         pose = None if base_pose is None else _known(base_pose)[None]
-        reached = framing.reached(self._tree, self._outermost, angles, pose)
-        seen = framing.standing(fitted(reached, room=ROOM), self._tree, pose)
-        if base_pose is not None:
-            self._followed = seen, _known(base_pose)
-            framing.begin_to_follow(self._recording, seen)
-        return seen
+        seen = fitted(self._reached(first, pose), room=ROOM if pose is not None else 1.0)
+        if pose is not None:
+            seen = framing.standing(seen, self._tree, moves=True)
+            framing.log_floor(self._recording, self._tree, seen, pose[:, :2] + AROUND)
+            return seen
+        random = np.random.default_rng(0)
+        everywhere = random.uniform(self._low, self._high, (POSES, len(position)))
+        floor = seen.floor
+        seen = fitted(self._reached(np.concatenate((first, everywhere)), None))
+        return framing.standing(replace(seen, floor=floor), self._tree, moves=False)
+
+    def _reached(self, position: Array, pose: Array | None) -> Iterator[Array]:
+        angle = self._factor * position[:, self._columns] + self._offset
+        angles = dict(zip(self._names, angle.T, strict=True))
+        return framing.reached(self._tree, self._outermost, angles, pose)
+
+    def colour(self, time: float, links: Sequence[str], level: Array) -> None:
+        """Colour the links, those whose colour changes.
+
+        Args:
+            time: From when on, in [s].
+            links: Their names; all others are as quiet as can be.
+            level: Shape (links,), in [dB re 1 pW].
+        """
+        levels = dict(zip(links, level.tolist(), strict=True))
+        each = np.array([levels.get(link, -np.inf) for link in self._paths])
+        for link, own in zip(self._paths, LINKS.colours(each, shades=SHADES), strict=True):
+            if self._shades.get(link) != own.tobytes():
+                self._shades[link] = own.tobytes()
+                for path in self._paths[link]:
+                    kind = self._kinds[path]
+                    colour = {scene.COLOURED[kind]: own[None]}
+                    columns = getattr(rr, kind).columns(**colour)
+                    index = [series.at(np.array([time]))]
+                    self._recording.send_columns(path, indexes=index, columns=columns)
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
         """Move the robot, once there are as many poses as a message has.
@@ -105,7 +158,9 @@ class LiveRobot:
         """
         places, turns = self.transforms(position)
         if base_pose is not None:
-            places, turns = np.vstack((places, base_pose[:3])), np.vstack((turns, base_pose[3:]))
+            below = base_pose[:3] * framing.ON_FLOOR
+            places = np.vstack((places, base_pose[:3], below))
+            turns = np.vstack((turns, base_pose[3:], UPRIGHT))
         if not len(places):
             return
         self._waiting.append((time, places, turns))
@@ -119,10 +174,6 @@ class LiveRobot:
         times, places, turns = (list(each) for each in zip(*self._waiting, strict=True))
         self._waiting = []
         count = len(times)
-        if self._followed is not None:  # the base is the last of the links
-            seen, first = self._followed
-            base = np.array([[*at[-1], *turn[-1]] for at, turn in zip(places, turns, strict=True)])
-            framing.follow(self._recording, seen, np.array(times), base, first)
         self._recording.send_columns(
             "/robot/motion",
             indexes=[series.at(np.repeat(times, len(self.children)))],
@@ -151,9 +202,16 @@ class LiveRobot:
         return self._place + angle * self._slide, turned
 
 
+def _range(limits: Limits) -> tuple[float, float]:
+    """Where a joint may be, in [rad] or [m]: a turn at most; one that slides without end rests."""
+    if limits.turns:
+        return max(limits.lower, -np.pi), min(limits.upper, np.pi)
+    return (limits.lower, limits.upper) if limits.upper - limits.lower < np.inf else (0.0, 0.0)
+
+
 def _known(pose: Array) -> Array:
     """A pose, or that of a base in the origin where it is not known."""
-    return pose if np.isfinite(pose).all() else np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    return pose if np.isfinite(pose).all() else np.concatenate((np.zeros(3), UPRIGHT))
 
 
 def _quaternion(joint: UrdfJoint) -> Array:

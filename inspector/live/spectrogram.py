@@ -4,12 +4,13 @@ from typing import NamedTuple
 
 import numpy as np
 
+from inspector.levels import SPECTRUM
 from inspector.recording.spectrogram import BANDS, TOP_HZ
 from inspector.spectrogram import amplitudes, window_length
 from noisemodel.types import Array, Mask
 
-FLOOR_DB = -90.0
-"""What is darkest: 3e-5 rad/s, the best encoders' noise. Brightest is 1 rad/s, 0 dB."""
+FLOOR_DB = SPECTRUM.low
+"""What is darkest, as in the recordings of whole runs. Brightest is 1 rad/s, 0 dB."""
 COLUMNS_AT_ONCE = 4
 """Columns that are handed out at once, every tenth of a second."""
 

@@ -10,13 +10,14 @@ import numpy as np
 
 import noisemodel as nm
 from inspector.library import Library
-from inspector.live.blueprint import Contents, layout
+from inspector.live.blueprint import SHOWN, Contents, layout
 from inspector.live.buffer import SampleBuffer
 from inspector.live.clock import Clock
 from inspector.live.drawing import Drawing
 from inspector.live.findings import Findings, News
 from inspector.live.labeller import NOISY, Labeller
 from inspector.live.lane import Lane
+from inspector.live.links import LinkLevels
 from inspector.live.robot import LiveRobot
 from inspector.live.sink import Sink
 from inspector.live.spectrogram import SpectrogramStream
@@ -76,6 +77,7 @@ class Worker:
         self._news = None if on_finding is None else News(on_finding)
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._robot = None
+        self._links: LinkLevels | None = None
         self._watch = watch
         if robot is not None:
             floating = "base_pose" in widths
@@ -86,6 +88,7 @@ class Worker:
                 floating=floating,
                 at_once=1 if sink.watched else POSES,
             )
+            self._links = self._levels_of(robot, joint_names, floating=floating)
         self._drawing = Drawing(
             sink.recording,
             joint_names,
@@ -94,7 +97,7 @@ class Worker:
             self._spectrogram.centres,
             watched=sink.watched,
         )
-        self._laid_out = False
+        self._contents: Contents | None = None  # until the first sample
         if self._labeller.remark:
             warnings.emit(self._labeller.remark)
 
@@ -136,8 +139,7 @@ class Worker:
         time, received = buffer.time[chosen], buffer.received[chosen]
         signals = {name: values[chosen] for name, values in buffer.signals.items()}
         self._now = float(time[-1])
-        if not self._laid_out:
-            self._lay_out(signals)
+        self._lay_out(float(time[0]), signals)
         motion = np.hstack([signals[name] for name in self._noisy])
         valid = np.asarray(np.isfinite(motion).all(axis=1))
         self._note_unknown(time, valid)
@@ -148,6 +150,7 @@ class Worker:
             piece = slice(first, stop)
             self._skip(int(lost[first]))
             self._label(time[piece], received[piece], motion[piece], noise[piece], valid[piece])
+            self._colour(time[piece], {name: rows[piece] for name, rows in signals.items()})
         if self._sink.alive:
             self._drawing.changes(self._lane.expire(self._now))
             self._drawing.lines(time[valid], noise[valid], _rows(signals, valid), self._rate)
@@ -177,31 +180,56 @@ class Worker:
             self._news.update(self.findings.events, float("inf"))
         if self._sink.alive:
             self._drawing.changes(self._lane.end())
+            if self._labeller.classes and self._contents is not None:
+                self._drawing.findings(self._now, self.findings.events, ())
             if (columns := self._spectrogram.flush()) is not None:
                 self._drawing.spectrogram(columns)
             self._drawing.flush()
             if self._robot is not None:
                 self._robot.flush()
 
-    def _lay_out(self, signals: Mapping[str, Array]) -> None:
-        """Send the layout, with the camera placed for the first pose."""
-        self._laid_out, camera = True, None
-        if self._robot is not None:
-            pose = signals.get("base_pose")
-            first = None if pose is None else pose[0]
-            camera = self._robot.camera(signals["position"][0], first)
-        contents = Contents(
-            joints=self._drawing.plots,
-            camera=camera,
-            classes=bool(self._labeller.classes),
-            rate=self._rate,
-        )
-        self._sink.recording.send_blueprint(layout(contents))
+    def _levels_of(
+        self, robot: str, joint_names: Sequence[str], *, floating: bool
+    ) -> LinkLevels | None:
+        """What colours the robot; nothing where its surface cannot be had."""
+        try:
+            return LinkLevels(robot, joint_names, self._rate, floating=floating)
+        except nm.NoiseModelError as error:
+            self._warnings.emit(f"The links are not coloured: {error}.")
+            return None
+
+    def _lay_out(self, time: float, signals: Mapping[str, Array]) -> None:
+        """Send the layout with the first sample, whose pose places the camera, and at 10 s."""
+        known = self._contents
+        if known is None:
+            camera = None
+            if self._robot is not None:
+                pose = signals.get("base_pose")
+                first = None if pose is None else pose[0]
+                camera = self._robot.camera(signals["position"][0], first)
+                self._robot.colour(time, (), np.empty(0))
+            self._contents = Contents(
+                joints=self._drawing.plots,
+                camera=camera,
+                classes=bool(self._labeller.classes),
+                links=self._links is not None,
+                rate=self._rate,
+                start=time,
+                full=False,
+            )
+            if self._labeller.classes:
+                self._drawing.findings(time, (), ())
+        elif not known.full and time >= known.start + SHOWN:
+            self._contents = replace(known, full=True)
+        if self._contents is not known and self._contents is not None:
+            self._sink.recording.send_blueprint(layout(self._contents))
 
     def _skip(self, samples: int) -> None:
         if samples:
             self._labeller.skip(samples)
             self._spectrogram.skip()
+            if self._links is not None:
+                self._links.skip()
 
     def _label(
         self, time: Array, received: Array, motion: Array, noise: Array, valid: Mask
@@ -228,8 +256,15 @@ class Worker:
                 before = np.minimum(last, 0) / self._rate
                 delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
                 self._delays.extend(delay.tolist())
+                self._show_findings(end)
         if columns is not None and self._sink.alive:
             self._drawing.spectrogram(columns)
+
+    def _show_findings(self, end: float) -> None:
+        """Show the findings so far; one that reaches the latest frame lasts."""
+        found = self.findings.events
+        latest = end - 2 * self._labeller.hop
+        self._drawing.findings(end, found, [event for event in found if event.stop >= latest])
 
     def _check_limits(self, signals: Mapping[str, Array]) -> None:
         """Warn where the motion has been far beyond the limits of the robot for a second."""
@@ -247,6 +282,11 @@ class Worker:
         last = None if pose is None else pose[-1]
         if np.isfinite(position).all() and (last is None or np.isfinite(last).all()):
             self._robot.show(time, position, last)
+
+    def _colour(self, time: Array, signals: Mapping[str, Array]) -> None:
+        if self._links is not None and self._robot is not None and self._sink.alive:
+            for step in self._links.push(time, signals):
+                self._robot.colour(step.time, self._links.links, step.level)
 
     def _note_unknown(self, time: Array, valid: Mask) -> None:
         if not valid.all():

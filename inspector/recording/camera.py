@@ -22,12 +22,12 @@ class Camera:
     """Where a view of a robot is seen from.
 
     Attributes:
-        eye: Where the camera stands at first, shape (3,), in [m].
-        target: What it looks at then, shape (3,), in [m].
+        eye: Where the camera stands, shape (3,), in [m].
+        target: What it looks at, shape (3,), in [m].
         floor: Height of the floor, in [m].
         spacing: Distance of the lines on the floor, in [m].
         frame: Frame of transforms that the view is drawn in, and all this.
-        follows: Entity that it moves with; empty if it stands still.
+        moves: Whether that frame moves with a base, over a floor that is drawn by itself.
     """
 
     eye: Array
@@ -35,7 +35,7 @@ class Camera:
     floor: float
     spacing: float
     frame: str = ""
-    follows: str = ""
+    moves: bool = False
 
 
 def fitted(parts: Iterable[Array], *, aspect: float = 1.0, room: float = 1.0) -> Camera:

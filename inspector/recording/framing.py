@@ -22,6 +22,12 @@ from noisemodel.types import Array
 
 ON_FLOOR = np.array([1.0, 1.0, 0.0])
 """The camera follows a base along the floor, not up and down."""
+VIEW = "_view"
+"""Frame of transforms that the camera moves with."""
+FLOOR, THICKNESS = (58, 62, 70), 0.006
+"""Colour of the lines of a floor, and half of their width by their distance."""
+MOST_LINES = 200
+"""Lines of a floor in one direction."""
 DIRECTIONS = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=3) if any(each)])
 """Along each of these, a mesh is taken by its outermost point; it reaches beyond by a tenth."""
 
@@ -33,7 +39,7 @@ def log(
     *,
     aspect: float = 1.0,
 ) -> list[Camera]:
-    """Place the cameras for runs of a robot, and log the paths that they follow if a base moves.
+    """Place the cameras for runs of a robot, and log how they move with a base, over its floor.
 
     Args:
         recording: Where to.
@@ -53,10 +59,11 @@ def log(
     cameras = []
     for tree, run in robots:
         pose = _base(run)
-        cameras.append(standing(seen, tree, pose))
-        if pose is not None and len(pose):
-            begin_to_follow(recording, cameras[-1])
-            follow(recording, cameras[-1], run.time[robot.shown(run)], pose, pose[0])
+        moves = pose is not None and len(pose) > 0
+        cameras.append(standing(seen, tree, moves=moves))
+        if pose is not None and moves:
+            follow(recording, tree, run.time[robot.shown(run)], pose)
+            log_floor(recording, tree, cameras[-1], pose)
     return cameras
 
 
@@ -85,44 +92,60 @@ def reached(
     return points(tree, drawn, angles, _turns(pose[:, 3:]), height)
 
 
-def standing(camera: Camera, tree: UrdfTree, pose: Array | None) -> Camera:
-    """A camera that was placed for a base above the origin, where a motion starts.
+def standing(camera: Camera, tree: UrdfTree, *, moves: bool) -> Camera:
+    """A camera in the frame of transforms that it stands in.
 
     Args:
-        camera: The camera.
+        camera: As it was placed.
         tree: The robot.
-        pose: Of a base that moves, shape (frames, 7).
+        moves: Whether its base does; the camera moves with it then.
     """
-    seen = replace(camera, frame=robot.root(tree, floating=pose is not None))
-    if pose is None or not len(pose):
-        return seen
-    first = pose[0, :3] * ON_FLOOR
-    path = f"{robot.origin(tree)}/centre"
-    return replace(seen, eye=seen.eye + first, target=seen.target + first, follows=path)
+    frame = robot.frame(tree, VIEW) if moves else robot.root(tree, floating=False)
+    return replace(camera, frame=frame, moves=moves)
 
 
-def begin_to_follow(recording: rr.RecordingStream, camera: Camera) -> None:
-    """Log in which frame lies what a camera follows, and that it is not to be seen."""
-    recording.log(camera.follows, rr.CoordinateFrame(camera.frame), static=True)
-    unseen = rr.Points3D.from_fields(radii=1e-4, colors=(0, 0, 0, 0))
-    recording.log(camera.follows, unseen, static=True)
-
-
-def follow(
-    recording: rr.RecordingStream, camera: Camera, time: Array, pose: Array, first: Array
-) -> None:
-    """Log the point that a camera follows, which nobody sees.
+def follow(recording: rr.RecordingStream, tree: UrdfTree, time: Array, pose: Array) -> None:
+    """Log the frame that a camera moves with: on the floor below the base, without its turns.
 
     Args:
         recording: Where to.
-        camera: As it stands at first.
+        tree: The robot.
         time: Shape (steps,), in [s].
         pose: Of the base, shape (steps, 3 or more), in [m].
-        first: That for which the camera was placed, shape (3 or more,), in [m].
     """
-    place = camera.target + (pose[:, :3] - first[:3]) * ON_FLOOR
-    columns = rr.Points3D.columns(positions=place)
-    recording.send_columns(camera.follows, indexes=[series.at(time)], columns=columns)
+    columns = rr.Transform3D.columns(
+        translation=pose[:, :3] * ON_FLOOR,
+        parent_frame=[robot.frame(tree, robot.WORLD)] * len(pose),
+        child_frame=[robot.frame(tree, VIEW)] * len(pose),
+    )
+    path = f"{robot.origin(tree)}/motion/view"
+    recording.send_columns(path, indexes=[series.at(time)], columns=columns)
+
+
+def log_floor(recording: rr.RecordingStream, tree: UrdfTree, camera: Camera, pose: Array) -> None:
+    """Log the lines of a floor that stays where it is while the camera moves over it.
+
+    Args:
+        recording: Where to.
+        tree: The robot.
+        camera: Above it.
+        pose: Where the base will be, shape (steps, 2 or more), in [m].
+    """
+    reach = 4.0 * float(np.linalg.norm(camera.eye - camera.target))
+    low, high = pose[:, :2].min(axis=0) - reach, pose[:, :2].max(axis=0) + reach
+    spacing = camera.spacing
+    while (high - low).max() > MOST_LINES * spacing:
+        spacing *= 2.0
+    low, high = np.floor(low / spacing) * spacing, np.ceil(high / spacing) * spacing
+    across, along = (
+        np.arange(low[i], high[i] + spacing / 2, spacing, dtype=np.float64) for i in (0, 1)
+    )
+    lines = [[(x, low[1], camera.floor), (x, high[1], camera.floor)] for x in across.tolist()]
+    lines += [[(low[0], y, camera.floor), (high[0], y, camera.floor)] for y in along.tolist()]
+    path = f"{robot.origin(tree)}/floor"
+    recording.log(path, rr.CoordinateFrame(robot.frame(tree, robot.WORLD)), static=True)
+    drawn = rr.LineStrips3D(lines, colors=[FLOOR] * len(lines), radii=spacing * THICKNESS)
+    recording.log(path, drawn, static=True)
 
 
 def outermost(urdf: Path) -> dict[str, Array]:

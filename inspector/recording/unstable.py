@@ -106,9 +106,16 @@ def picture(name: str, origin: str, across: tuple[float, float], down: tuple[flo
     )
 
 
-def lanes(name: str, origin: str, *, last: float | None = None) -> Part:
+def lanes(
+    name: str,
+    origin: str,
+    *,
+    during: tuple[float, float] | None = None,
+    last: float | None = None,
+) -> Part:
     """Draw states over time, a lane for each entity under ``origin``; see `plot`."""
-    return rrb.StateTimelineView(origin=origin, name=name, time_view=_over(last))
+    shown = _over(last) if during is None else _alone(*during)
+    return rrb.StateTimelineView(origin=origin, name=name, time_view=shown)
 
 
 def bars(name: str, origin: str) -> Part:
@@ -141,7 +148,7 @@ def robot(name: str, origin: str, camera: Camera) -> Part:
         spatial_information=rrb.SpatialInformation(target_frame=camera.frame),
         background=rrb.Background(color=BACKGROUND),
         line_grid=rrb.LineGrid3D(
-            visible=True,
+            visible=not camera.moves,
             spacing=camera.spacing,
             plane=rr.components.Plane3D.XY.with_distance(camera.floor),
             color=GRID,
@@ -150,7 +157,6 @@ def robot(name: str, origin: str, camera: Camera) -> Part:
             position=camera.eye,
             look_target=camera.target,
             eye_up=(0.0, 0.0, 1.0),
-            tracking_entity=camera.follows or None,
         ),
     )
 
