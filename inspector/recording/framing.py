@@ -201,7 +201,9 @@ def points(
     drawn = drawn or dict.fromkeys(poses, np.zeros((1, 3)))
     for link, own in drawn.items():
         turned, shifted = poses[link]
-        yield (own @ np.swapaxes(turned, -1, -2) + shifted[..., None, :]).reshape(-1, 3)
+        # One product for all frames: many of three by three would take much longer.
+        placed = (turned.reshape(-1, 3) @ own.T).reshape(-1, 3, len(own))
+        yield (placed + shifted.reshape(-1, 3, 1)).swapaxes(1, 2).reshape(-1, 3)
 
 
 def _pose(joint: UrdfJoint, angle: Array) -> tuple[Array, Array]:
