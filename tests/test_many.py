@@ -94,12 +94,14 @@ def test_each_run_has_its_row_of_classes_and_of_levels_in_the_order_given(tmp_pa
     write(several, tmp_path / "out.rrd")
     out = tmp_path / "out.rrd"
     slots = np.linspace(TOP, 0.0, count + 1)
-    loud = [place for _, place, shades in rows(out, "/levels/") if len(set(shades)) > 3]
+    levels = rows(out, "/levels/")
+    quiet = set(levels[0][2])
+    loud = [place for _, place, shades in levels if set(shades) - quiet]
     assert loud
     assert all(
         slots[2] < line < slots[1] for place in loud for line in place
     )  # in the second row, no other
-    assert {time[0] for time, _, _ in rows(out, "/levels/")} == {0.0}
+    assert {time[0] for time, _, _ in levels} == {0.0}
     time, place = read(out, "/class/mark/impact", "Scalars:scalars")
     assert time.tolist() == [1.0]
     assert slots[2] < place[0][0] < slots[1]

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
+from inspector.live.drawing import CLASS_PANEL, NOISE_PANEL, SPECTROGRAM_PANEL
 from inspector.live.robot import KEY
-from inspector.live.spectrogram import FLOOR_DB
-from inspector.recording import unstable
+from inspector.recording import axes, unstable
 from inspector.recording.camera import Camera
 from inspector.recording.series import TIMELINE
-from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
 
 SHOWN = 10.0
@@ -46,16 +45,17 @@ def layout(contents: Contents) -> Blueprint:
     Args:
         contents: What there is to show.
     """
-    top = min(TOP_HZ, contents.rate / 2)
-    title = f"Spectrogram of the noise, 0-{top:.0f} Hz, {FLOOR_DB:.0f} to 0 dB re 1 rad/s"
+    noise = _plot(contents, "/noise", "Noise", titled=False)
+    bands = _plot(contents, "/spectrogram", "Spectrum", between=(0.0, axes.TOP), titled=False)
     over_time = [
-        (_plot(contents, "/noise", "Noise p\u0302 [rad/s]"), 2.2),
-        (_plot(contents, "/spectrogram", title, between=(0.0, top)), 2.8),
-        (_signals(contents), 4.2),
+        (axes.part(NOISE_PANEL, noise), NOISE_PANEL.height),
+        (axes.part(SPECTROGRAM_PANEL, bands), SPECTROGRAM_PANEL.height),
+        (_signals(contents), 290.0),
     ]
     if contents.classes:
         during, last = _shown(contents)
-        over_time.insert(0, (unstable.lanes("Classes", "/class", during=during, last=last), 1.6))
+        lanes = unstable.lanes("Classes", "/class", during=during, last=last)
+        over_time.insert(0, (axes.part(CLASS_PANEL, lanes), CLASS_PANEL.height))
     findings = unstable.text("Findings", "/report", titled=False)
     left = [(findings, 2.0), (unstable.events("Events", "/events"), 1.4)]
     if contents.camera is not None:
@@ -87,10 +87,19 @@ def _plot(
     *,
     legend: bool = False,
     between: tuple[float, float] | None = None,
+    titled: bool = True,
 ) -> Part:
     during, last = _shown(contents)
     return unstable.plot(
-        name, origin, paths, legend=legend, between=between, fixed=True, during=during, last=last
+        name,
+        origin,
+        paths,
+        legend=legend,
+        between=between,
+        fixed=True,
+        during=during,
+        last=last,
+        titled=titled,
     )
 
 

@@ -7,13 +7,15 @@ import numpy as np
 import rerun as rr
 
 from inspector import colors
+from inspector.levels import SPECTRUM
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
-from inspector.recording import classes
+from inspector.recording import axes, classes
+from inspector.recording.axes import Label, Panel
 from inspector.recording.joints import UNITS
 from inspector.recording.limbs import JOINTS_PER_PLOT
 from inspector.recording.series import at, log_events, scalars, style_lane, style_lines
-from inspector.recording.spectrogram import style_bands
+from inspector.recording.spectrogram import log_axis, style_bands
 from inspector.report.markdown import spoken
 from inspector.thinning import extremes
 from models import UNKNOWN, Event, Labels
@@ -29,6 +31,8 @@ FILE_INTERVAL = 2.0
 """The same for a file without a viewer: for each message, rerun keeps some hundred bytes until the
 file is closed."""
 NOISE = "noise"
+CLASS_PANEL, NOISE_PANEL = Panel("class", 110.0), Panel("noise", 150.0)
+SPECTROGRAM_PANEL = Panel("spectrogram", 220.0)
 NEWEST = 8
 """Findings that are shown in words; the others are counted."""
 
@@ -41,7 +45,7 @@ class Drawing:
         joint_names: Names of the joints.
         signals: Which of velocity, velocity_desired and position there are.
         classes: What can be predicted; empty without a model.
-        centres: Of the spectrogram's bands, shape (bands,), in [Hz].
+        edges: Of the spectrogram's bands, shape (bands + 1,), in [Hz].
         watched: Whether a viewer shows the recording meanwhile; in a file, messages can be larger.
     """
 
@@ -51,11 +55,11 @@ class Drawing:
         joint_names: Sequence[str],
         signals: Sequence[str],
         classes: tuple[str, ...],
-        centres: Array,
+        edges: Array,
         *,
         watched: bool = True,
     ) -> None:
-        self._recording, self._centres, self._watched = recording, centres, watched
+        self._recording, self._watched = recording, watched
         self._interval = SEND_INTERVAL if watched else FILE_INTERVAL
         self._columns: list[Columns] = []
         self._scores: list[tuple[Array, Array]] = []
@@ -80,11 +84,17 @@ class Drawing:
             recording, "/noise/simplified", names=["simplified [rad/s]"], colours=[colors.NOISE]
         )
         # A line of one entity each: an entity each would cost a message each.
-        style_bands(recording, "/spectrogram/bands", centres.tolist())
+        style_bands(recording, "/spectrogram/bands", np.sqrt(edges[:-1] * edges[1:]).tolist())
+        title = Label(0.5, "noise\nspectrum", -22.0)
+        ends = float(edges[0]), float(edges[-1])
+        log_axis(recording, SPECTROGRAM_PANEL, *ends, title, axes.hertz)
+        axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
+        axes.log_left(recording, NOISE_PANEL, [Label(0.5, "noise p\u0302\n[rad/s]")])
         if classes:
             shown = [self._colours[name] for name in classes]
             style_lines(recording, "/score", names=classes, colours=shown)
             style_lane(recording, "/class/found", self._colours)
+            axes.log_left(recording, CLASS_PANEL, [Label(0.5, "classes")])
 
     @property
     def plots(self) -> list[tuple[str, list[str]]]:
@@ -150,7 +160,7 @@ class Drawing:
             "/spectrogram/bands",
             indexes=[at(time)],
             columns=[
-                *scalars(np.tile(self._centres, (count, 1))),
+                *scalars(np.tile(axes.middles(bands)[::-1], (count, 1))),
                 *rr.SeriesLines.columns(colors=rgba).partition([bands] * count),
             ],
         )

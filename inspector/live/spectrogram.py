@@ -5,12 +5,11 @@ from typing import NamedTuple
 import numpy as np
 
 from inspector.levels import SPECTRUM
-from inspector.recording.spectrogram import BANDS, TOP_HZ
-from inspector.spectrogram import amplitudes, window_length
+from inspector.recording.spectrogram import BANDS
+from inspector.spectrogram import amplitudes, in_bands, window_length
+from noisemodel.noise import decibel
 from noisemodel.types import Array, Mask
 
-FLOOR_DB = SPECTRUM.low
-"""What is darkest, as in the recordings of whole runs. Brightest is 1 rad/s, 0 dB."""
 COLUMNS_AT_ONCE = 4
 """Columns that are handed out at once, every tenth of a second."""
 
@@ -25,12 +24,13 @@ class Columns(NamedTuple):
 
 
 class SpectrogramStream:
-    """Levels of frequency bands, on one scale at all times.
+    """Levels of frequency bands on a logarithmic axis, on the scale of whole runs.
 
     Args:
         rate: Samples per second, in [Hz].
 
     Attributes:
+        edges: Of the bands, shape (bands + 1,), in [Hz].
         centres: Of the bands, shape (bands,), in [Hz].
     """
 
@@ -38,11 +38,9 @@ class SpectrogramStream:
         self._rate = rate
         self._length = window_length(rate)
         self._hop = max(1, self._length // 4)
-        frequency = rate / self._length * np.arange(1, self._length // 2 + 1)
-        shown = int((frequency <= TOP_HZ).sum())
-        edges = np.linspace(0, shown, min(BANDS, shown) + 1).astype(int)
-        self._firsts, self._shown = edges[:-1], shown
-        self.centres = np.add.reduceat(frequency[:shown], self._firsts) / np.diff(edges)
+        self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
+        self.edges = np.geomspace(self._frequency[0], self._frequency[-1], BANDS + 1)
+        self.centres = np.sqrt(self.edges[:-1] * self.edges[1:])
         self._samples = np.empty(0)
         self._valid = np.empty(0, dtype=bool)
         self._gap = False
@@ -95,7 +93,6 @@ class SpectrogramStream:
         view = np.lib.stride_tricks.sliding_window_view
         windows = view(samples, self._length)[:: self._hop][:count]
         whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
-        amplitude = amplitudes(windows)[:, : self._shown] * whole[:, None]
-        loudest = np.maximum.reduceat(amplitude, self._firsts, axis=1).T
-        decibel = 20.0 * np.log10(np.maximum(loudest, 10.0 ** (FLOOR_DB / 20.0)))
-        return np.asarray(1.0 - decibel / FLOOR_DB)
+        amplitude = amplitudes(windows).T * whole
+        level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
+        return np.clip(SPECTRUM.place(level), 0.0, 1.0)

@@ -94,7 +94,7 @@ class Worker:
             joint_names,
             list(widths),
             self._labeller.classes,
-            self._spectrogram.centres,
+            self._spectrogram.edges,
             watched=sink.watched,
         )
         self._contents: Contents | None = None  # until the first sample

@@ -30,6 +30,8 @@ WHOLE, CURVE, TITLES = 832.0, 190.0, 28.0
 """Height of all parts, of the curves, and of a row of tabs, in points, at 1440 x 900."""
 LOWEST = 20.0
 """Height of a run's row below which classes and levels lie behind each other in tabs."""
+HIGHEST = 36.0
+"""Height of a row at most; the rest is for the curves."""
 NAMED = 16.0
 """Least distance of two names."""
 LINE = 8.0
@@ -64,7 +66,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         series.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
         height = _height(len(several.names))
         panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
-        panels["curves"] = Panel("curves", CURVE)
+        panels["curves"] = Panel("curves", max(CURVE, WHOLE - 2 * panels["class"].height))
         _log_classes(recording, several, panels["class"])
         _log_levels(recording, several, panels["levels"], (begin, end))
         _log_curves(recording, several, panels["curves"])
@@ -121,7 +123,9 @@ def report(several: Several) -> str:
         found = ", ".join(f"{number} {label}" for label, number in count.items())
         lines.append(f"| {shown} | {found or side.status} | {several.peaks[index]:.0f} |")
     lines += ["", "Peak of the level above 10 Hz, in dB re 1 rad/s."]
-    remarks = Counter(remark for side in several.sides for remark in dict.fromkeys(side.remarks))
+    remarks = Counter(
+        remark for side in several.sides for remark in dict.fromkeys(map(spoken, side.remarks))
+    )
     told = [
         f"- {remark} ({f'{number} runs' if number > 1 else _of(several, remark)})"
         for remark, number in remarks.items()
@@ -131,7 +135,7 @@ def report(several: Several) -> str:
 
 def _of(several: Several, remark: str) -> str:
     sides = zip(several.names, several.sides, strict=True)
-    return next(name for name, side in sides if remark in side.remarks)
+    return next(name for name, side in sides if remark in map(spoken, side.remarks))
 
 
 def _first(several: Several, index: int) -> str:
@@ -151,7 +155,7 @@ def _height(count: int) -> float:
     """Height of a run's row."""
     both = (WHOLE - CURVE - 2 * axes.AXIS) / 2 / count
     if both >= LOWEST:
-        return both
+        return min(both, HIGHEST)
     return (WHOLE - CURVE - TITLES - axes.AXIS) / count
 
 

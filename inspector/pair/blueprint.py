@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from rerun.blueprint import Blueprint
 
 from inspector.pair import links
-from inspector.pair.noise import CHANGED, DETAILS, LEVEL, NOISE, SPAN_DB
+from inspector.pair.noise import CHANGED, DETAILS, LEVEL, NOISE, Ends
 from inspector.recording import axes, unstable
 from inspector.recording.axes import Panel
 from inspector.recording.blueprint import limbs
@@ -40,7 +40,7 @@ class Contents:
         links: Links whose power before and after is shown.
         cameras: From where each robot is seen; empty without one.
         events: Whether any change is listed.
-        noise: Lower and upper end of the noise's axis.
+        ends: Lower and upper ends of the axes of the noise and of the change.
         sounds: Names of the sounds.
         loop: Stretch of time that playing repeats, in [s].
     """
@@ -52,7 +52,7 @@ class Contents:
     links: Sequence[str]
     cameras: Mapping[str, Camera]
     events: bool
-    noise: tuple[float, float]
+    ends: Ends
     sounds: Sequence[str]
     loop: tuple[float, float] | None
 
@@ -91,7 +91,7 @@ def layout(contents: Contents) -> Blueprint:
                 "Change",
                 "/change",
                 CHANGE_PATHS,
-                between=(-SPAN_DB, SPAN_DB),
+                between=contents.ends.change,
                 fixed=True,
                 titled=False,
             ),
@@ -115,7 +115,9 @@ def _details(contents: Contents) -> Part:
         plot = _rows(f"/spectrogram/{what}")
         comma = ", " if what == "change" else " "
         parts.append(axes.part(panel, plot, name=f"Spectrum{comma}{what}"))
-    plot = unstable.plot("Noise", "/noise", ALL, between=contents.noise, fixed=True, titled=False)
+    plot = unstable.plot(
+        "Noise", "/noise", ALL, between=contents.ends.noise, fixed=True, titled=False
+    )
     parts.append(axes.part(NOISE, plot, name="Noise"))
     if contents.cameras:
         parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", ALL, legend=True))

@@ -1,6 +1,7 @@
 """Both runs' noise in a recording, its levels and spectra, and by how much they differ."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import rerun as rr
@@ -30,10 +31,23 @@ LEVEL, CHANGED, NOISE = Panel("level", 118.0), Panel("change", 84.0), Panel("noi
 BANDS, WIDTH = 48, 5.0
 """Of a spectrogram, and the height of one in points."""
 SPAN_DB = 24.0
-"""Change of level at the upper end of its axis, in [dB]; what is beyond is drawn there."""
+"""Change of level at the upper end of its axis, in [dB], or a multiple where it is larger."""
 
 
-def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> tuple[float, float]:
+@dataclass(frozen=True)
+class Ends:
+    """Lower and upper ends of axes.
+
+    Attributes:
+        noise: Of the noise.
+        change: Of the change of level, in [dB].
+    """
+
+    noise: tuple[float, float]
+    change: tuple[float, float]
+
+
+def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Ends:
     """Log noises and their levels every 50 ms, with what changed shaded.
 
     Args:
@@ -42,7 +56,7 @@ def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> t
         found: What changed between them.
 
     Returns:
-        Lower and upper end of the noise's axis.
+        Lower and upper ends of the axes.
     """
     between = _log_noise(recording, pair)
     time, level = steps(pair)
@@ -55,15 +69,15 @@ def log(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> t
     axes.log_left(recording, LEVEL, [title, *_written(marks, 44.0)])
     axes.log_right(recording, LEVEL, _sides())
     change = level[:, 1] - level[:, 0]
-    shown = np.clip(change, -SPAN_DB, SPAN_DB)
-    _log(recording, "/change/noise", time, shown, axes.INK)
-    _log(recording, "/change/none", time[[0, -1]], np.zeros(2), colors.CLASSES["unknown"])
-    log_shades(recording, "/change/finding", found, (-SPAN_DB, SPAN_DB))
-    marks = [(mark, 0.5 + mark / SPAN_DB / 2) for mark in (-12.0, 0.0, 12.0)]
-    axes.log_left(recording, CHANGED, [Label(0.6, "change\n[dB]", -22.0), *_written(marks, 44.0)])
     peak = float(change[np.abs(change).argmax()])
+    reach = SPAN_DB * max(float(np.ceil(abs(peak) / SPAN_DB)), 1.0)
+    _log(recording, "/change/noise", time, change, axes.INK)
+    _log(recording, "/change/none", time[[0, -1]], np.zeros(2), colors.CLASSES["unknown"])
+    log_shades(recording, "/change/finding", found, (-reach, reach))
+    marks = [(mark, 0.5 + mark / reach / 2) for mark in (-reach / 2, 0.0, reach / 2)]
+    axes.log_left(recording, CHANGED, [Label(0.6, "change\n[dB]", -22.0), *_written(marks, 44.0)])
     axes.log_right(recording, CHANGED, [Label(0.5, f"largest\n{_signed(peak)}")])
-    return between
+    return Ends(between, (-reach, reach))
 
 
 def log_spectra(recording: rr.RecordingStream, pair: Pair) -> dict[str, Panel]:

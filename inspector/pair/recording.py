@@ -85,7 +85,7 @@ def _log(
     return Contents(
         joints=limb_plots,
         classes=classes.log(recording, pair, found),
-        noise=noise.log(recording, pair, found),
+        ends=noise.log(recording, pair, found),
         spectra=noise.log_spectra(recording, pair),
         changes=panel,
         links=shown,

@@ -27,10 +27,15 @@ TEXT = 13.0
 """Rerun writes a label below its point: from there to the label's middle, in points."""
 HALF = 10.0
 """Half of the height of a label, in points: none is cut by the upper edge."""
+LINE = 16.0
+"""Height of a further line of a label, in points."""
 LEFT, MIDDLE, RIGHT = 14.0, 78.0, 8.0
 """Shares of the width: names and ticks, the panel, its scale."""
 STEPS = 24
 """Colours of a scale."""
+GROWN = 1.15
+"""Times that a panel is as high as in a window of 1440 x 900, between those of that window and of
+one of 1920 x 1080: labels stand as well in either."""
 APART = 17.0
 """Least distance of two ticks, in points."""
 
@@ -49,8 +54,9 @@ class Panel:
 
     def y(self, place: float) -> float:
         """Where a label is put in the view beside the panel, so that it stands at a place in it."""
-        middle = max((1.0 - place) * (self.height - AXIS), HALF)
-        return (middle - TEXT) / self.height
+        height = GROWN * self.height
+        middle = max((1.0 - place) * (height - AXIS), HALF)
+        return (middle - TEXT) / height
 
 
 @dataclass(frozen=True)
@@ -89,18 +95,22 @@ def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: 
         scale: The scale.
         title: Above it; "dB" without one.
     """
+    title = title or "dB"
     path, shift = f"/axis/{panel.name}/right", -22.0 / panel.height
-    lowest, highest = (panel.y(place) + TEXT / panel.height for place in (0.04, 0.86))
+    below = 2.0 * HALF + LINE * title.count("\n") + HALF  # the title ends, the highest tick begins
+    top = 1.0 - below / (GROWN * panel.height - AXIS)
+    low = 0.04
+    highest, lowest = (panel.y(place) + TEXT / (GROWN * panel.height) for place in (top, low))
     edges = np.linspace(lowest, highest, STEPS + 1)
     shades = scale.colours(np.linspace(scale.low, scale.high, STEPS))
     strips = [[[shift, low], [shift, high]] for low, high in pairwise(edges.tolist())]
     bar = rr.LineStrips2D(strips, colors=shades, radii=rr.Radius.ui_points(6.0))
     recording.log(f"{path}/scale", bar, static=True)
     ticks = [
-        Label(0.04 + 0.82 * float(scale.place(np.array(tick))), written(tick), 8.0)
+        Label(low + (top - low) * float(scale.place(np.array(tick))), written(tick), 8.0)
         for tick in scale.ticks
     ]
-    log_right(recording, panel, [*ticks, Label(0.99, title or "dB")])
+    log_right(recording, panel, [*ticks, Label(1.0, title)])
 
 
 def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:

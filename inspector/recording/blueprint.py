@@ -82,12 +82,12 @@ def layout(contents: Contents) -> Blueprint:
 
 def _left(contents: Contents) -> Part:
     """Findings above, the robot with its scale, and samples of the worst moments below."""
-    parts: list[tuple[Part, float]] = [(unstable.text("Findings", "/report", titled=False), 196.0)]
+    parts: list[tuple[Part, float]] = [(unstable.text("Findings", "/report", titled=False), 214.0)]
     if contents.events:
         parts.append(
             (
                 unstable.events("Click a time to go there", "/events"),
-                72.0 + 21.0 * min(contents.events, 4),
+                76.0 + 23.0 * min(contents.events, 4),
             )
         )
     if contents.camera is not None:

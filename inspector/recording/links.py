@@ -16,9 +16,9 @@ from noisemodel.links import LinkNoise
 from noisemodel.noise import REFERENCE_POWER
 from noisemodel.types import Array
 
-ROW = 20.0
+ROW = 18.0
 """Height of a row, in points; what is drawn is lower, so that rows are told apart."""
-WIDTH, STROKES = 6.0, 3
+WIDTH, STROKES = 5.0, 4
 """Of the lines of a row, in points, and how many there are."""
 SHADES = 16
 """Colours of the robot."""

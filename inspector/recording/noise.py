@@ -17,7 +17,7 @@ from noisemodel.types import Array
 POINTS = 100_000
 NOISE, LEVEL = Panel("noise", 128.0), Panel("level", 120.0)
 PROBABILITY = Panel("probability", 92.0)
-LOW_DB, HIGH_DB = -80.0, 20.0
+LOW_DB, HIGH_DB = -80.0, 30.0
 """Ends of the level's axis, in [dB re 1 rad/s]."""
 
 

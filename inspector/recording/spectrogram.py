@@ -60,7 +60,7 @@ def log_panel(
         title: What it is of.
     """
     low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
-    _log_axis(recording, panel, low, high, Label(0.5, title, -22.0), axes.hertz)
+    log_axis(recording, panel, low, high, Label(0.5, title, -22.0), axes.hertz)
     _log_rows(recording, panel, spectrum, (low, high), scale, "Hz")
 
 
@@ -84,13 +84,13 @@ def log_orders(
     panel = Panel("orders", HEIGHT)
     low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
     title = Label(0.5, "periods\nper turn", -22.0)
-    _log_axis(recording, panel, low, high, title, "{:g}".format)
+    log_axis(recording, panel, low, high, title, "{:g}".format)
     _log_rows(recording, panel, spectrum, (low, high), scale, "periods per turn")
     log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
     return joint, panel
 
 
-def _log_axis(
+def log_axis(
     recording: rr.RecordingStream,
     panel: Panel,
     low: float,
@@ -98,6 +98,16 @@ def _log_axis(
     title: Label,
     written: Callable[[float], str],
 ) -> None:
+    """Log a title and ticks at the left of a panel whose axis is logarithmic.
+
+    Args:
+        recording: Where to.
+        panel: The panel.
+        low: Lower end of its axis.
+        high: Upper end.
+        title: Beside the ticks.
+        written: How a value is written.
+    """
     span = np.log(max(high / low, 1.01))
     marks = [
         Label(float(np.log(tick / low) / span), written(tick), 40.0)
