@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector.live.drawing import CLASS_PANEL, NOISE_PANEL, SPECTROGRAM_PANEL
+from inspector.live.drawing import CLASS_PANEL, NOISE_PANEL, SIGNALS_PANEL, SPECTROGRAM_PANEL
 from inspector.live.robot import KEY
 from inspector.recording import axes, unstable
 from inspector.recording.camera import Camera
@@ -50,7 +50,7 @@ def layout(contents: Contents) -> Blueprint:
     over_time = [
         (axes.part(NOISE_PANEL, noise), NOISE_PANEL.height),
         (axes.part(SPECTROGRAM_PANEL, bands), SPECTROGRAM_PANEL.height),
-        (_signals(contents), 290.0),
+        (_signals(contents), SIGNALS_PANEL.height),
     ]
     if contents.classes:
         during, last = _shown(contents)
@@ -104,9 +104,12 @@ def _plot(
 
 
 def _signals(contents: Contents) -> Part:
-    plots = [
-        _plot(contents, "/joints", title, paths, legend=True) for title, paths in contents.joints
-    ]
+    plots = {
+        title: _plot(contents, "/joints", title, paths, legend=True, titled=False)
+        for title, paths in contents.joints
+    }
     if contents.classes:
-        plots.append(_plot(contents, "/score", "Scores", legend=True))
-    return unstable.tabs(*plots)
+        plots["Scores"] = _plot(contents, "/score", "Scores", legend=True, titled=False)
+    return unstable.tabs(
+        *(axes.part(SIGNALS_PANEL, plot, name=name) for name, plot in plots.items())
+    )

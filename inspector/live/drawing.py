@@ -31,8 +31,8 @@ FILE_INTERVAL = 2.0
 """The same for a file without a viewer: for each message, rerun keeps some hundred bytes until the
 file is closed."""
 NOISE = "noise"
-CLASS_PANEL, NOISE_PANEL = Panel("class", 110.0), Panel("noise", 150.0)
-SPECTROGRAM_PANEL = Panel("spectrogram", 220.0)
+CLASS_PANEL, NOISE_PANEL = Panel("class", 100.0), Panel("noise", 130.0)
+SPECTROGRAM_PANEL, SIGNALS_PANEL = Panel("spectrogram", 150.0), Panel("signals", 390.0)
 NEWEST = 8
 """Findings that are shown in words; the others are counted."""
 
@@ -90,6 +90,10 @@ class Drawing:
         log_axis(recording, SPECTROGRAM_PANEL, *ends, title, axes.hertz)
         axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
         axes.log_left(recording, NOISE_PANEL, [Label(0.5, "noise p\u0302\n[rad/s]")])
+        nothing = [Label(0.5, "")]  # else the viewer says that there is no data
+        for panel in (CLASS_PANEL, NOISE_PANEL, SIGNALS_PANEL):
+            axes.log_right(recording, panel, nothing)
+        axes.log_left(recording, SIGNALS_PANEL, nothing)
         if classes:
             shown = [self._colours[name] for name in classes]
             style_lines(recording, "/score", names=classes, colours=shown)

@@ -31,7 +31,9 @@ WHOLE, CURVE, TITLES = 832.0, 190.0, 28.0
 LOWEST = 20.0
 """Height of a run's row below which classes and levels lie behind each other in tabs."""
 HIGHEST = 36.0
-"""Height of a row at most; the rest is for the curves."""
+"""Height of a row at most; the rest is for the table, above all panels."""
+TABLE = 240.0
+"""Least height of the table above the panels; with less, it stands at their left."""
 NAMED = 16.0
 """Least distance of two names."""
 LINE = 8.0
@@ -66,7 +68,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         series.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
         height = _height(len(several.names))
         panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
-        panels["curves"] = Panel("curves", max(CURVE, WHOLE - 2 * panels["class"].height))
+        panels["curves"] = Panel("curves", CURVE)
         _log_classes(recording, several, panels["class"])
         _log_levels(recording, several, panels["levels"], (begin, end))
         _log_curves(recording, several, panels["curves"])
@@ -77,7 +79,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
 
 
 def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
-    """Lay several runs out: a table at the left, everything over time at the right.
+    """Lay several runs out: a table above or at the left, everything over time below or beside.
 
     Args:
         several: The runs.
@@ -103,7 +105,11 @@ def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
         over_time = [(unstable.tabs(*plots.values()), panels["class"].height + TITLES)]
     over_time.append((axes.part(panel, curves), panel.height))
     text = unstable.text("Runs", "/report", titled=False)
-    whole = unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
+    rest = WHOLE - sum(height for _, height in over_time)
+    if rest >= TABLE:
+        whole = unstable.above((text, rest), *over_time)
+    else:
+        whole = unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
     return unstable.blueprint(whole, TIMELINE, _loop(several))
 
 
