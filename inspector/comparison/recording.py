@@ -41,8 +41,8 @@ WORST_DB = 10.0
 """Distance that is as light as can be, in [dB]: near that of independent noises."""
 LIGHTEST = 0.75
 """Place on the palette of what is farthest: numbers have to be read on it."""
-WHOLE, TITLES = 832.0, 28.0
-"""Height of all parts and of a row of tabs, in points, at 1440 x 900."""
+WHOLE, WIDE, TITLES = 832.0, 720.0, 28.0
+"""Height of all parts, width of half of them, height of tabs, in points, at 1440 x 900."""
 SPAN = "/span"
 """What makes every plot reach from the first start to the last end."""
 
@@ -116,7 +116,9 @@ def layout(found: Comparisons) -> Blueprint:
         for name, title in MAPS.items()
     ]
     table = unstable.text("Table", "/report")
-    share = min(max(len(found), 3) * CELL[1] + NAMED[1] + 28, 500)
+    # A map is as wide as half of the window: its cells are larger or smaller than drawn.
+    grown = WIDE / (NAMED[0] + CELL[0] * columns)
+    share = min(grown * (max(rows, 3) * CELL[1] + NAMED[1]) + 2 * TITLES, 520.0)
     overview = unstable.above(
         (unstable.beside(*maps), share), (table, WHOLE - share), name="Robots"
     )

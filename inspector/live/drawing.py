@@ -10,7 +10,7 @@ from inspector import colors
 from inspector.levels import SPECTRUM
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
-from inspector.recording import axes, classes
+from inspector.recording import axes
 from inspector.recording.axes import Label, Panel
 from inspector.recording.joints import UNITS
 from inspector.recording.limbs import JOINTS_PER_PLOT
@@ -214,9 +214,9 @@ class Drawing:
             if (event.label, event.start) not in self._listed:
                 self._listed.add((event.label, event.start))
                 line = f"found: {spoken(event.label)} from {event.start:.2f} s"
-                self.event(event.start, line, classes.readable(self._colours[event.label]))
+                self.event(event.start, line, self._colours[event.label])
 
-    def event(self, time: float, text: str, colour: colors.Color = (200, 200, 200)) -> None:
+    def event(self, time: float, text: str, colour: colors.Color = colors.CLASSES[UNKNOWN]) -> None:
         """Add a line to the list of events."""
         log_events(self._recording, [time], [text], [colour])
 

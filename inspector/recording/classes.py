@@ -208,6 +208,6 @@ def _log_events(
             recording,
             [event.start for _, event in rows],
             [f"{how}: {brief(analysis, event)}" for how, event in rows],
-            [readable(colours[event.label]) for _, event in rows],
+            [colours[event.label] for _, event in rows],  # legible in light themes, too
             warnings=[how == "found" for how, _ in rows],
         )

@@ -25,7 +25,7 @@ SHADES = 16
 LINES = 8
 FLOOR_DB = -20.0
 """Sound power below this is drawn at it, in [dB re 1 pW]."""
-KEY = Panel("key", 340.0)
+KEY = Panel("key", 285.0)
 """The scale beside the robot."""
 
 

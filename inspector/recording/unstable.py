@@ -81,6 +81,7 @@ def plot(
         name=name,
         plot_legend=rrb.PlotLegend(corner, visible=legend),
         axis_x=_over(last) if during is None else _alone(*during),
+        background=rrb.archetypes.PlotBackground(color=PLOTS),  # in light themes, too
         axis_y=None if between is None else rrb.ScalarAxis(range=between, zoom_lock=fixed),
         titlebar=None if titled else False,
     )
