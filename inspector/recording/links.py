@@ -18,7 +18,7 @@ from noisemodel.types import Array
 
 ROW = 18.0
 """Height of a row, in points; what is drawn is lower, so that rows are told apart."""
-WIDTH, STROKES = 5.0, 4
+WIDTH, STROKES = 7.0, 3
 """Of the lines of a row, in points, and how many there are."""
 SHADES = 16
 """Colours of the robot."""
