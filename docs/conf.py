@@ -35,7 +35,12 @@ class _Shown:
 numpy.typing.NDArray = _Shown  # type: ignore[misc, assignment]
 
 NAVIGATION = {
-    "Start": ["Overview <overview>", "tutorial", "The first log, in pictures <first-log>"],
+    "Start": [
+        "Overview <overview>",
+        "tutorial",
+        "Read the picture <reading>",
+        "The first log, in pictures <first-log>",
+    ],
     "How to": [
         "Logs of robots <logs>",
         "menagerie",
@@ -54,7 +59,13 @@ NAVIGATION = {
     "Theory": ["theory", "classifier", "noise-models"],
     "API": ["api/inspector", "api/noisemodel", "api/models", "api/scenarios"],
     "Reference": ["formats", "limits", "security", "upgrading", "changelog", "contributing"],
-    "Measured": ["measured", "measured-robots", "elsewhere", "benchmarks"],
+    "Measured": [
+        "measured",
+        "measured-robots",
+        "elsewhere",
+        "benchmarks",
+        "First view <first-view>",
+    ],
     "Earlier versions": [
         "The models of 0.3 <measured-0.3>",
         "The models before 0.3 <classifier-measured>",
