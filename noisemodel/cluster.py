@@ -52,8 +52,15 @@ class _Client:
     software: Mapping[str, str]
 
 
-class _Died(Exception):  # noqa: N818
-    """An item killed as many workers as Dask allows."""
+@dataclass(frozen=True)
+class _Died:
+    """A task has lost as many workers as Dask allows.
+
+    Attributes:
+        task: Its key: that of an item, or of the function that items wait for.
+    """
+
+    task: str
 
 
 def on_cluster(
@@ -83,11 +90,13 @@ def on_cluster(
     with _connected(address) as client:
         _check_software(client, address)
         here = _Client(str(Path.cwd()), _variables(), _software())
-        with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", "Sending large graph")  # once, and it has to
-            shared = client.submit(_itself, function, pure=False)
 
-        def gathered(indices: Iterable[int]) -> Iterator[tuple[int, Any] | None]:
+        def sent() -> Any:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", "Sending large graph")  # once, and it has to
+                return client.submit(_itself, function, pure=False)
+
+        def gathered(indices: Iterable[int], shared: Any) -> Iterator[tuple[int, Any] | None]:
             ready: SimpleQueue[Any] = SimpleQueue()
             running = {}
             for index in indices:
@@ -104,14 +113,23 @@ def on_cluster(
                 else:
                     yield running.pop(future.key), _outcome(future, client, address)
 
-        suspects = []
-        for found in gathered(range(len(items))):
-            if found is not None and isinstance(found[1], _Died):
-                suspects.append(found[0])
-            else:
-                yield found
+        suspects: list[int] = []
+        waiting = list(range(len(items)))
+        while waiting:
+            shared, unsent = sent(), []
+            for found in gathered(waiting, shared):
+                if found is None or not isinstance(found[1], _Died):
+                    yield found
+                elif found[1].task == shared.key:  # the function was lost, before the item began
+                    unsent.append(found[0])
+                else:
+                    suspects.append(found[0])
+            if len(unsent) == len(waiting):
+                suspects += unsent
+                unsent = []
+            waiting = unsent
         for suspect in suspects:
-            for found in gathered([suspect]):
+            for found in gathered([suspect], sent()):
                 if found is not None and isinstance(found[1], _Died):
                     yield suspect, died(items[suspect])
                 else:
@@ -185,8 +203,8 @@ def _outcome(future: Any, client: Any, address: str) -> Any:
 
     try:
         return future.result()
-    except KilledWorker:
-        return _Died()
+    except KilledWorker as error:
+        return _Died(str(error.task))
     except CancelledError as error:
         raise _lost(address) from error
     except Exception:

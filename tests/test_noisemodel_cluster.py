@@ -1,6 +1,7 @@
 """Runs on the workers of a Dask scheduler: a real one, on this machine."""
 
 import json
+import multiprocessing
 import os
 import shutil
 import signal
@@ -21,7 +22,7 @@ from noisemodel.parallel import DIED, in_order
 ROOT = Path(__file__).parents[1]
 PATH = os.pathsep.join([str(ROOT), str(ROOT / "tests"), os.environ.get("PYTHONPATH", "")])
 COUNT = 24
-SLOW = 120.0
+SLOW = 600.0
 """Most time that a process of the cluster may take to start, or an answer to arrive, in [s]."""
 
 
@@ -145,6 +146,31 @@ def square_or_die(number):
 def test_an_item_that_kills_every_worker_is_named_and_the_others_are_not(two):
     found = list(in_order(square_or_die, range(8), jobs=two.address, died=lambda item: DIED))
     assert found == [DIED if number in (3, 7) else number**2 for number in range(8)]
+    until(lambda: len(two.workers()) == 2)
+
+
+class Fragile:
+    """A function that kills the first worker that gets it."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        if multiprocessing.parent_process() and not self.mark.exists():  # no scheduler
+            self.mark.touch()
+            os._exit(1)
+
+    def __call__(self, number):
+        return number**2
+
+
+@pytest.mark.slow
+def test_items_whose_function_is_lost_with_a_worker_get_it_again(two, tmp_path):
+    mark = tmp_path / "mark"
+    found = in_order(Fragile(mark), range(4), jobs=two.address, died=lambda item: DIED)
+    assert list(found) == [0, 1, 4, 9]
+    assert mark.exists()
     until(lambda: len(two.workers()) == 2)
 
 
