@@ -1,8 +1,6 @@
 """Humanoids of the wide domains: robots, motions and faults."""
 
-import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -221,9 +219,3 @@ def test_a_soft_and_late_robot_walks_on():
     )  # fmt: skip
     error = np.abs(run.position - run.position_desired).max()
     assert 0.01 < error < 0.3
-
-
-def test_the_table_of_licences_has_every_robot():
-    text = (Path(__file__).parents[1] / "docs" / "robots.md").read_text()
-    rows = set(re.findall(r"`(\w+)`", " ".join(re.findall(r"^\| (`[^|]*) \|", text, re.M))))
-    assert set(noisemodel.ROBOTS) <= rows
