@@ -1,6 +1,7 @@
 """The folder of a data set: its settings, its runs, and those that are missing.
 
-``dataset.json`` has the settings. Samples lie at ``<robot>/<scenario>-<seed>.npz``; in the format
+``dataset.json`` has the settings, and the versions of the software that began it; those of each run
+are in its own ``meta``. Samples lie at ``<robot>/<scenario>-<seed>.npz``; in the format
 of NoisyTest, runs lie at ``training/<robot>-<scenario>-<seed>.log`` or in ``validation``. A run in
 which the robot fell leaves ``….fallen.json`` instead. ``times.csv`` has a line per run: its name
 and its processor time, in [s].
@@ -18,7 +19,7 @@ from noisemodel.archive import ArchiveError, read_text
 from noisemodel.atomic import replacing
 from scenarios.errors import DatasetError, SampleError, SimulationError
 from scenarios.formats import FORMATS, Format
-from scenarios.simulation import SHORTEST
+from scenarios.simulation import SHORTEST, software
 from scenarios.tasks import Task
 
 FORMAT = "noise-dataset/1"
@@ -66,6 +67,7 @@ class Folder:
         Raises:
             DatasetError: If its settings differ, it holds other files or cannot be created, or the
                 duration is too short.
+            MissingSimulatorError: If it is new, and MuJoCo is not installed.
         """
         path = Path(path)
         if format_name not in FORMATS:
@@ -86,8 +88,9 @@ class Folder:
                     f"{path}: holds other files (it has no {MANIFEST}); name an empty folder"
                 )
             else:
+                begun = {**settings, "versions": software()}
                 path.mkdir(parents=True, exist_ok=True)
-                _write_json(path / MANIFEST, settings)
+                _write_json(path / MANIFEST, begun)
         except OSError as error:
             raise DatasetError(f"{path}: cannot be made ({error.strerror or error})") from error
         return cls(path, format_name, duration)

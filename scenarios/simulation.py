@@ -80,12 +80,7 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
         raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
     if not SHORTEST <= duration < np.inf:
         raise ScenarioError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingSimulatorError from error
-    import pinocchio
-
+    versions = software()
     try:
         twin = _twin(robot, Case(case.motion), seed, duration)
         trial = twin if entry.healthy else _trial(simulated, case, seed, duration)
@@ -119,11 +114,7 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
             "seed": int(seed),
             "duration": float(duration),
             "recipe": RECIPE,
-            "versions": {
-                "mujoco": mujoco.__version__,
-                "pinocchio": pinocchio.__version__,
-                "numpy": np.__version__,
-            },
+            "versions": versions,
             "motion": asdict(case.motion),
             "imperfections": asdict(trial.imperfections),
             "defect": dict(trial.faults.facts),
@@ -131,6 +122,22 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
             "labelling": asdict(RULE),
         },
     )
+
+
+def software() -> dict[str, str]:
+    """Versions of the software on which a simulated run depends, by name.
+
+    Raises:
+        MissingSimulatorError: If MuJoCo is not installed.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise MissingSimulatorError from error
+    import pinocchio
+
+    modules = {"mujoco": mujoco, "pinocchio": pinocchio, "numpy": np}
+    return {name: str(module.__version__) for name, module in modules.items()}
 
 
 def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:

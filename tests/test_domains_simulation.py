@@ -1,9 +1,12 @@
 """Runs of wide domains: equal seeds give equal runs, faults act in time, errors are named."""
 
+import json
 import re
 from dataclasses import replace
 
+import mujoco
 import numpy as np
+import pinocchio
 import pytest
 
 import scenarios
@@ -64,6 +67,19 @@ def test_a_good_run_has_no_event_and_nothing_but_ok(good):
     assert {block.label for block in good.blocks} == {"ok"}
     assert good.duration == pytest.approx(SECONDS, abs=0.01)
     assert good.meta["domain"]["name"].startswith("mujoco-")
+
+
+def test_a_run_and_a_data_set_name_the_software_that_they_depend_on(good, tmp_path):
+    versions = {each.__name__: each.__version__ for each in (mujoco, pinocchio, np)}
+    assert good.meta["versions"] == versions
+    path = Folder.opened(tmp_path / "set", format_name="domains").path
+    assert json.loads((path / "dataset.json").read_text())["versions"] == versions
+
+
+def test_a_data_set_is_continued_with_other_versions_of_the_software(tmp_path):
+    path = Folder.opened(tmp_path / "set").path / "dataset.json"
+    path.write_text(json.dumps({**json.loads(path.read_text()), "versions": {"mujoco": "1"}}))
+    assert Folder.opened(tmp_path / "set").path == tmp_path / "set"
 
 
 def test_a_run_equals_its_twin_until_its_fault_begins(tone):

@@ -48,11 +48,13 @@ def folder(tmp_path_factory):
         recordings.append(replace(of_run(folder / "run.npz", run, RATE), name=f"run{seed}"))
     recipe = replace(models.ANY, rounds=20)
     frames = models.Frames.joined(models.frames_of(recordings, recipe))
-    models.General.train(frames, recipe).save(folder / "small.npz")
+    small = models.General.train(frames, recipe)
+    replace(small, versions={**small.versions, "mujoco": "4.0.0"}).save(folder / "small.npz")
     (folder / "good").mkdir()
     for seed in range(20, 26):
         blocks = (Block(0.0, 12.0, "ok"),) if seed == 25 else ()
-        replace(run_of(seed), blocks=blocks).save(folder / "good" / f"good{seed}.npz")
+        run = replace(run_of(seed), blocks=blocks, meta={"versions": {"mujoco": "4.1.0"}})
+        run.save(folder / "good" / f"good{seed}.npz")
     status, out, err = call(
         "adapt", folder / "good", "-o", folder / "robot.npz", "--alarms", 5,
         "--model", folder / "small.npz",
@@ -70,6 +72,10 @@ def test_it_says_what_it_learnt_from_what_that_can_show_and_what_it_finds(folder
     assert re.search(r"found of 36 faults put into this motion +no fault +0.1 rad/s", out)
     assert re.search(r"\n  small( +\d+){4}\n  adapted( +\d+){4}\n", out)
     assert "robot.npz: written, for 250 Hz and desired, measured, error, desired_joints" in out
+
+
+def test_an_adapted_model_names_the_simulators_of_the_general_one_and_its_own(folder):
+    assert models.load(folder / "robot.npz").versions["mujoco"] == "4.0.0, 4.1.0"
 
 
 def test_classify_finds_failures_of_the_robot_by_the_adapted_model_and_names_them(folder, tmp_path):

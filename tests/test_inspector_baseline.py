@@ -35,7 +35,8 @@ def folder(tmp_path_factory):
     """Three good runs, a baseline of them, and a run that rattles."""
     folder = tmp_path_factory.mktemp("baseline")
     for seed in range(3):
-        run_of(seed).save(folder / f"good{seed}.npz")
+        made_by = {"versions": {"mujoco": f"4.0.{seed}"}}
+        replace(run_of(seed), meta=made_by).save(folder / f"good{seed}.npz")
     blocks = (Block(0.0, 2.5, "ok"), Block(3.0, 4.0, "oscillations"), Block(4.5, 6.0, "ok"))
     (folder / "test").mkdir()
     replace(run_of(7, rattle=0.5), blocks=blocks).save(folder / "test" / "bad.npz")
@@ -59,6 +60,10 @@ def test_an_anomaly_against_good_runs_is_a_finding(folder):
     assert event["start"] == pytest.approx(2.8, abs=0.25)
     assert event["stop"] == pytest.approx(4.2, abs=0.25)
     assert (fine["status"], fine["model"]) == ("ok", "robot")
+
+
+def test_a_baseline_names_the_simulators_of_its_runs(folder):
+    assert models.load(folder / "robot.npz").versions["mujoco"] == "4.0.0, 4.0.1, 4.0.2"
 
 
 def test_findings_go_into_label_files(folder, tmp_path):

@@ -1,7 +1,7 @@
 """General models adapted to a robot by good runs of it, from files."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from inspector.library import load_library
 from inspector.logs.opening import Reading
 from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
+from inspector.training.recordings import Simulators
 from models.logbands import HIGHEST
 from models.novelty.faults import Recall, recall
 from noisemodel.atomic import refuse_existing
@@ -94,14 +95,15 @@ def adapt(
         )
 
     found = read("read", remark)
-    first = next(found)
+    first, simulators = next(found), Simulators()
     bound = general.at(first.rate, models.signals.named(first.signal))
     try:
-        good = models.GoodMotion.read(chain([first], found), bound.profile)
+        good = models.GoodMotion.read(simulators.noting(chain([first], found)), bound.profile)
     except models.RecordingError as error:
         hint = f"; {first.name} has it: give runs of the same signals"
         raise InspectorError(f"{error}{hint if 'no signal' in str(error) else ''}") from error
     learnt = models.adapt(bound, good, alarms=alarms)
+    learnt = replace(learnt, classifier=simulators.signed(learnt.classifier))
     measured = recall({name: bound, "adapted": learnt.classifier}, read("put faults into"), good)
     learnt.classifier.save(output, overwrite=overwrite)
     return Adapted(learnt, measured)

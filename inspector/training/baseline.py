@@ -1,6 +1,7 @@
 """Baselines trained on good runs only, from files."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from inspector.errors import InspectorError
 from inspector.logs.opening import Reading
 from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
+from inspector.training.recordings import Simulators
 from models.estimators.baseline import MOTION, NOISE_ALONE
 from noisemodel.atomic import refuse_existing
 
@@ -55,15 +57,16 @@ def train(
         raise InspectorError(f"a baseline has no profile {profile!r}; expected general or scalar")
     refuse_existing(output, overwrite=overwrite)
     found = good_runs(inputs, "a baseline", rate=rate, part=part, reading=reading, remark=remark)
-    first = next(found)
+    first, simulators = next(found), Simulators()
     there = models.signals.named(first.signal)
     richest = profile or ("general" if {*MOTION.signals} <= {*there} else "scalar")
     chosen = PROFILES[richest].at(first.rate)
     try:
-        good = models.GoodMotion.read(chain([first], found), chosen)
+        good = models.GoodMotion.read(simulators.noting(chain([first], found)), chosen)
     except models.RecordingError as error:
         hint = "; --profile scalar takes the noise alone" if "no signal" in str(error) else ""
         raise InspectorError(f"{error}{hint}") from error
-    baseline = models.learn_baseline(good, chosen, alarms=alarms)
+    learnt = models.learn_baseline(good, chosen, alarms=alarms)
+    baseline = replace(learnt, classifier=simulators.signed(learnt.classifier))
     baseline.classifier.save(output, overwrite=overwrite)
     return baseline

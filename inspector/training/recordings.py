@@ -1,10 +1,10 @@
 """Recordings of run files, samples and NoisyTest folders, at the rate of a model."""
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import models
 import noisemodel as nm
@@ -18,8 +18,13 @@ from models.profile import NOMINAL
 from scenarios.sample import DECIMATED, Sample, is_sample
 from scenarios.signals import WHOLE
 
+SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}
+"""Software whose versions in the ``meta`` of a run go into the manifest of a model."""
 SLOWER = 1e-3
 """Relative difference below which the rate of a sample is not lower."""
+
+
+Model = TypeVar("Model", models.Classifier, models.General)
 
 
 class SlowRunError(InspectorError):
@@ -252,7 +257,7 @@ def _name(path: Path, robot: str | None) -> str:
 
 
 def facts(robot: str | None, meta: Mapping[str, Any]) -> dict[str, str]:
-    """Robot, scenario and domain of a run, as far as they are known.
+    """Robot, scenario, domain and simulators of a run, as far as they are known.
 
     Args:
         robot: Name of its robot, if it has one.
@@ -261,12 +266,38 @@ def facts(robot: str | None, meta: Mapping[str, Any]) -> dict[str, str]:
     """
     domain = meta.get("domain")
     named = domain.get("name") if isinstance(domain, Mapping) else domain
+    software = meta.get("versions")
     found = {
         "robot": robot,
         "scenario": meta.get("scenario"),
         "domain": named or meta.get("simulator") or meta.get("source"),
+        **{name: software.get(name) for name in SIMULATORS if isinstance(software, Mapping)},
     }
     return {name: str(value) for name, value in found.items() if value}
+
+
+class Simulators:
+    """The software that simulated what a model learns from, noted while it is read.
+
+    Attributes:
+        versions: Versions of each, by name.
+    """
+
+    def __init__(self) -> None:
+        self.versions: dict[str, set[str]] = {}
+
+    def noting(self, found: Iterable[models.Recording]) -> Iterator[models.Recording]:
+        """Recordings as they are, once their software is noted."""
+        for each in found:
+            for name in SIMULATORS & each.facts.keys():
+                self.versions.setdefault(name, set()).add(each.facts[name])
+            yield each
+
+    def signed(self, model: Model) -> Model:
+        """A model that has the versions in its manifest, beside those that it had already."""
+        had = {name: set(model.versions.get(name, "").split(", ")) - {""} for name in self.versions}
+        said = {name: ", ".join(sorted(had[name] | own)) for name, own in self.versions.items()}
+        return replace(model, versions={**model.versions, **said})
 
 
 def faults(

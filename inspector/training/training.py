@@ -8,7 +8,7 @@ import models
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.recordings import classified, count, samples
+from inspector.training.recordings import Simulators, classified, count, samples
 from models.logbands import HIGHEST, LOWEST
 from noisemodel.atomic import refuse_existing
 
@@ -127,18 +127,18 @@ def train(
     rate = RATE if rate is None else rate
     chosen = profile_at(profile, rate)
     refuse_existing(output, overwrite=overwrite)
-    left_out = LeftOut()
+    left_out, simulators = LeftOut(), Simulators()
     read = progress(classified(inputs, rate, part, bare_too=True), "read", total=count(inputs))
     try:
         usable = left_out.without((recording for recording, _ in read), chosen)
-        examples = models.Examples.read(usable, chosen)
+        examples = models.Examples.read(simulators.noting(usable), chosen)
     except models.NoFrameError as error:
         if error.count or not left_out.runs:
             raise
         scalar = set(LACKING.values()) & left_out.runs.keys()
         hint = "; --profile scalar takes the noise alone" if scalar else ""
         raise InspectorError(f"no run to train {profile} on; {left_out}{hint}") from error
-    classifier = models.Classifier.train(examples, chosen)
+    classifier = simulators.signed(models.Classifier.train(examples, chosen))
     classifier.save(output, overwrite=overwrite)
     predicted = classifier.predict_features(examples.features)
     evaluation = models.Evaluation.of(examples.labels, predicted, classifier.classes)
@@ -148,18 +148,18 @@ def train(
 def _train_general(inputs: Sequence[Path], output: Path, *, part: Part, overwrite: bool) -> Trained:
     """Train a general model and write it, see `train`."""
     refuse_existing(output, overwrite=overwrite)
-    left_out = LeftOut()
+    left_out, simulators = LeftOut(), Simulators()
     slowest = models.ANY.bound(LOWEST, (models.NOISE,))
     fast = list(samples(inputs))  # have noise of two rates
     parts: list[models.Frames] = []
     for paths, rate in ((inputs, None), (fast, HIGHEST)):
         read = progress(classified(paths, rate, part, bare_too=True), "read", total=count(paths))
         usable = left_out.without((recording for recording, _ in read), slowest)
-        parts += models.frames_of(usable, models.ANY, thin=THIN)
+        parts += models.frames_of(simulators.noting(usable), models.ANY, thin=THIN)
     if not parts:
         raise InspectorError(f"no run to train {ANY_RATE} on; {left_out}")
     frames = models.Frames.joined(parts)
-    model = models.General.train(frames, models.ANY, thin=THIN)
+    model = simulators.signed(models.General.train(frames, models.ANY, thin=THIN))
     model.save(output, overwrite=overwrite)
     return Trained(model.evaluate(frames), left_out)
 

@@ -13,7 +13,7 @@ import models
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.recordings import recordings
+from inspector.training.recordings import Simulators, recordings
 from inspector.training.training import profile_at
 from inspector.training.tuningfile import opened
 from models.modelfile import versions
@@ -105,9 +105,11 @@ class Tuned:
         """
         best = self.profiles[self.ranked(criterion)[0]]
         learn, check = self._recordings()
-        examples = models.Examples.read(learn, best)
+        simulators = Simulators()
+        examples = models.Examples.read(simulators.noting(learn), best)
         validation = models.Dataset.of(check, best, training=False) if check else None
-        classifier = models.Classifier.train(examples, best, validation=validation)
+        trained = models.Classifier.train(examples, best, validation=validation)
+        classifier = simulators.signed(trained)
         classifier.save(output, overwrite=overwrite)
 
     def table(self, criterion: Criterion, *, rows: int = 10) -> str:

@@ -30,7 +30,7 @@ from scenarios.imperfections import Imperfections
 from scenarios.labels import RULE, annotate
 from scenarios.limits import Limits
 from scenarios.robots import WIDE, Simulated
-from scenarios.simulation import recorded
+from scenarios.simulation import recorded, software
 
 if TYPE_CHECKING:
     from scenarios.loop import Motion
@@ -149,6 +149,7 @@ def simulate(
             "seed": int(seed),
             "duration": seconds,
             "recipe": f"domains {RECIPE}",
+            "versions": software(),
             "domain": trial.domain.as_dict(),
             "motion": trial.description,
             "effort_limit": [trial.domain.torque_limit * one for one in entry.drives.torque],
