@@ -112,6 +112,43 @@ def test_a_finding_starts_at_its_onset_and_ends_when_the_event_does():
     assert [*found.findings] == sorted(found.findings, key=lambda each: (each.start, each.stop))
 
 
+def test_an_unknown_frame_that_is_no_finding_takes_the_hop_around_its_middle_in_the_lane():
+    lane = analysed("...u...").lane
+    assert [name for *_, name in lane] == ["ok", "unknown", "ok"]
+    assert lane[1][:2] == pytest.approx((0.45, 0.55))  # its frame is from 0.3 s to 0.7 s
+
+
+def test_the_lane_has_no_class_in_a_gap():
+    labels = analysed("...oOO....").labels
+    late = np.where(np.arange(10) >= 6, 2.0, 0.0)
+    apart = replace(labels, start=labels.start + late, stop=labels.stop + late)
+    lane = analysed("...", labels=apart, spans=(), findings=()).lane
+    assert [name for *_, name in lane] == ["ok", "ok"]
+    assert np.array([stretch[:2] for stretch in lane]) == pytest.approx(
+        np.array([(0.0, 0.9), (2.6, 3.3)])
+    )
+
+
+def test_runs_are_worse_by_status_then_by_their_findings_then_by_the_best_score(tmp_path):
+    def event(score, start=0.0):
+        return Event("impact", start, start + 0.5, score)
+
+    def verdict(*findings, status=Status.FINDINGS):
+        found = analysed("...", findings=findings, spans=findings, status=status)
+        return Verdict.of(tmp_path / "run.npz", found)
+
+    worst_first = [
+        verdict(event(0.8), event(0.8, 1.0), event(0.8, 2.0)),
+        verdict(event(0.8), event(0.8, 1.0)),
+        verdict(event(0.9)),
+        verdict(event(0.7)),
+        verdict(status=Status.OK),
+    ]
+    severities = [each.severity for each in worst_first]
+    assert severities == sorted(severities)
+    assert len(set(severities)) == len(severities)
+
+
 def test_the_lane_shows_findings_from_onset_to_end():
     found = analyse(moving(tone=1.0), LIBRARY)
     shown = [stretch for stretch in found.lane if stretch[2] != "ok"]

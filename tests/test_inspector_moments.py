@@ -42,6 +42,7 @@ def test_without_any_failure_it_is_the_loudest_moment(tmp_path):
     (only,) = worst(inspected(tmp_path))
     assert not only.failure
     assert 2.0 <= only.peak <= 3.0
+    assert (only.start, only.stop) == (0.0, 3.999)
 
 
 def test_at_most_three_are_picked(tmp_path):

@@ -93,6 +93,20 @@ def test_the_limit_of_an_exponential_tail_is_where_it_has_to_be():
     assert found.peaks <= PEAKS
 
 
+def test_what_other_robots_show_counts_as_much_as_that_many_alarms():
+    apart = np.random.default_rng(2).exponential(0.2, 2000)
+    good = motion(apart)
+    alone = limit(apart, good, 0.5)
+    peaks = alarm_peaks(apart, good, alone.level)
+    own = float((peaks - alone.level).mean())
+    ratio = np.log(len(peaks) / (0.5 * good.seconds / HOUR))
+    assert alone.distance == pytest.approx(alone.level + own * ratio)
+    for expected in (own, 0.0, 3.0):
+        both = (len(peaks) * own + PEAKS * expected) / (len(peaks) + PEAKS)
+        found = limit(apart, good, 0.5, expected=expected)
+        assert found.distance == pytest.approx(max(alone.level + both * ratio, 0.0))
+
+
 def test_where_there_is_motion_enough_alarms_are_counted():
     generator = np.random.default_rng(3)
     apart = generator.normal(size=30_000) ** 2
@@ -116,6 +130,8 @@ def test_frames_that_overlap_or_touch_are_one_alarm_and_runs_are_never_joined():
     np.testing.assert_array_equal(alarm_peaks(apart, overlapping, 0.5), [5.0])
     apart_by_time = motion(apart, hop=0.3)
     np.testing.assert_array_equal(alarm_peaks(apart, apart_by_time, 0.5), [3.0, 5.0, 2.0])
+    touching = motion(apart, hop=0.4)
+    np.testing.assert_array_equal(alarm_peaks(apart, touching, 0.5), [3.0, 5.0, 2.0])
     two = motion(apart, ["a"] * 4 + ["b"] * 5, hop=0.1)
     np.testing.assert_array_equal(alarm_peaks(apart, two, 0.5), [5.0, 4.0])
 

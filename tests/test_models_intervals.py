@@ -100,6 +100,13 @@ def test_only_runs_in_the_sample_of_a_measure_count():
     assert nothing.as_dict() == {"value": None, "low": None, "high": None, "runs": 0, "groups": 0}
 
 
+def test_the_rate_of_one_robot_has_the_bounds_of_its_count():
+    events, time = np.array([2.0, 0.0, 1.0]), np.array([0.5, 0.25, 3.25])
+    found = each_its_own(3).mean_rate(events, time, [np.ones(3, dtype=bool)])
+    assert found.value == pytest.approx(3 / 4.0)
+    assert (found.low, found.high) == pytest.approx(np.divide(garwood(3), 4.0))
+
+
 def test_sets_are_the_same_each_time_and_in_any_order_of_the_runs():
     names = [f"g{number // 3}" for number in range(60)]
     part, whole = np.arange(60.0) % 7, np.full(60, 7.0)

@@ -130,6 +130,7 @@ def test_probabilities_differ_from_margins():
     assert not are_probabilities(votes)
     assert failure_score(votes, CLASSES).tolist() == pytest.approx([-1.1])
     assert not are_probabilities(np.array([[1.5, -0.5]]))
+    assert not are_probabilities(np.array([[0.5, 0.5], [0.5, 0.4]]))
 
 
 def confident(name, confidence, right, random):

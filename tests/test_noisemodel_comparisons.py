@@ -112,6 +112,15 @@ def test_distances_by_band_add_up_to_the_distance(tmp_path):
     assert whole == pytest.approx(found.comparison.distance[0, 3], rel=1e-9)
 
 
+def test_the_distance_in_a_band_is_that_of_its_own_frequencies(tmp_path):
+    found = alone(arm(tmp_path, "revolute", "revolute")).comparison
+    for place, (low, high) in enumerate(BANDS):
+        own = (found.frequency >= low) & (found.frequency < high)
+        other = np.where(own, found.distance_by_frequency, 0.0)
+        alike = dataclasses.replace(found, distance_by_frequency=other)
+        assert alike.by_band(0, 3)[place] == found.by_band(0, 3)[place] > 0.0
+
+
 @pytest.mark.parametrize(
     ("kinds", "reference"),
     [("paper,normal,mean", "normal"), ("mean,paper", "mean"), ("paper,A,simplified", "simplified")],

@@ -36,6 +36,10 @@ def test_bins_hold_the_mean_power_of_the_extended_noise():
     assert found.links == noise.names
 
 
+def test_a_robot_that_is_fixed_is_not_said_to_lack_the_motion_of_its_base():
+    assert not any("base" in remark for remark in link_noise(arm_run()).remarks)
+
+
 def test_the_desired_motion_adds_its_own_power():
     run = arm_run()
     both = arm_run(velocity_desired=run.velocity, position_desired=run.position)

@@ -249,6 +249,7 @@ BAD_NODE = '<node id="n"><instance_node url="#n"/></node>'
         ("a.dae", dae(geometry(BRICK * np.nan), NODE), "not finite"),
         ("a.dae", dae(geometry(BRICK), NODE).replace(b"0.5", b"half"), "cannot be read"),
         ("a.dae", dae(geometry(BRICK), NODE).replace(b"34 35<", b"34 36<"), "names a point"),
+        ("a.dae", dae(geometry(BRICK), NODE).replace(b"34 35<", b"34 -1<"), "names a point"),
         ("a.dae", dae(geometry(BRICK), NODE).replace(b" 35<", b"<"), "cannot be read"),
         (
             "a.dae",

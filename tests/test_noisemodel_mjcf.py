@@ -169,6 +169,12 @@ def test_joints_that_an_equality_ties_together_are_coupled_if_asked(tmp_path):
     assert coupled.mimics["knee"] == Mimic("hip", -2.0, 0.1)
 
 
+def test_a_joint_that_is_held_at_an_angle_follows_no_other(tmp_path):
+    held = '<equality><joint joint1="knee" polycoef="0.1 0 0 0 0"/></equality></mujoco>'
+    robot = Robot.load(written(tmp_path, LEGS.replace("</mujoco>", held)), mimic=True)
+    assert (robot.joint_names, dict(robot.mimics)) == (("hip", "knee"), {})
+
+
 @pytest.mark.parametrize(
     ("geom", "area"),
     [
@@ -221,6 +227,26 @@ def test_a_mesh_is_scaled_and_placed_as_mujoco_does(tmp_path):
     found = triangles(Robot.load(path)).triangles[0].reshape(-1, 3)
     distance = np.linalg.norm(found[:, None] - expected, axis=2).min(axis=1)
     assert distance.max() < 1e-5  # MuJoCo has single precision
+
+
+def test_meshes_are_read_wherever_they_stand_among_other_geoms(tmp_path):
+    write_stl(tmp_path / "part.stl")
+    head = '<asset><mesh name="m" file="part.stl"/></asset>'
+    mesh = '<geom type="mesh" mesh="m"/>'
+    for other in ('type="box" size="1 1 1"', 'type="box" mesh="m"'):
+        box, areas = f'<geom {other} pos="9 0 0"/>', []
+        for geoms in (box, mesh, mesh + box, box + mesh):
+            robot = Robot.load(written(tmp_path, one_body(geoms, head=head)))
+            areas.append(nm.Surface.of(robot).area.sum())
+        assert areas[2:] == pytest.approx([areas[0] + areas[1]] * 2)
+
+
+def test_a_geom_keeps_its_own_colour_where_a_material_has_another(tmp_path):
+    head = '<asset><material name="m" rgba="0 0 1 1"/></asset>'
+    for own, shown in (('rgba="1 1 0 1"', (1.0, 1.0, 0.0, 1.0)), ("", (0.0, 0.0, 1.0, 1.0))):
+        geom = f'<geom type="box" size="1 1 1" material="m" {own}/>'
+        robot = Robot.load(written(tmp_path, one_body(geom, head=head)))
+        assert robot.mjcf.visual[0].colour == shown
 
 
 def test_a_mesh_that_the_file_itself_holds_is_read(tmp_path):

@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import zipfile
 from contextlib import suppress
 
@@ -281,6 +282,17 @@ def test_an_array_that_states_more_than_there_is_is_refused(tmp_path):
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("time.npy", b"\x93NUMPY\x01\x00\x76\x00" + header.encode() + b"\n")
     with pytest.raises(RunFileError, match=r"damaged: time states shape \(1000000000000,\)"):
+        Run.load(path)
+
+
+@pytest.mark.parametrize("shape", ["(-1,)", "(-1, -1)", "(0, -1)"])
+def test_an_array_of_a_negative_size_is_refused(tmp_path, shape):
+    path = tmp_path / "run.npz"
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117)
+    with zipfile.ZipFile(path, "w") as archive:
+        content = b"\x93NUMPY\x01\x00\x76\x00" + header.encode() + b"\n"
+        archive.writestr("time.npy", content + bytes(0 if "0" in shape else 8))
+    with pytest.raises(RunFileError, match=re.escape(f"damaged: time states shape {shape}")):
         Run.load(path)
 
 
