@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from noisemodel import ROBOTS, GeometryError, MeshError, MissingMeshError, Robot, shapes
-from noisemodel.geometry import triangles
+from noisemodel.geometry import pieces, triangles
 
 GOLDEN = Path(__file__).parents[2] / "shared" / "golden" / "surface"
 BOX = '<geometry><box size="1 2 3"/></geometry>'
@@ -107,6 +107,20 @@ def test_a_link_without_geometry_is_listed_and_has_no_triangles(tmp_path):
     assert links.kind == ("visual", "none")
     assert links.triangles[1].shape == (0, 3, 3)
     assert str(links) == "12 triangles on 2 links\nwithout geometry: slide"
+    both = robot(tmp_path, arm=visual(BOX) + collision(BOX))
+    assert triangles(both, "collision").without_geometry == ("slide",)
+    assert triangles(both, "hull").without_geometry == ("slide",)
+
+
+def test_a_mesh_is_drawn_as_it_is_and_not_as_its_hull(tmp_path):
+    outer = np.array([[[0, 0, 0], [9, 0, 0], [0, 9, 0]], [[0, 0, 0], [9, 0, 0], [0, 0, 9]]])
+    inner = np.array([[[1, 1, 1], [2, 1, 1], [1, 2, 1]]])
+    mesh = mesh_of(np.concatenate((outer, inner)), tmp_path)
+    built = robot(tmp_path, arm=visual(MESH.format(mesh, "")))
+    ((_, _, drawn),) = pieces(built)
+    assert {(1.0, 1.0, 1.0), (2.0, 1.0, 1.0), (1.0, 2.0, 1.0)} <= corners(drawn)
+    hull = triangles(built, "hull").triangles[0]
+    assert corners(hull) == corners(outer)
 
 
 @pytest.mark.parametrize(
