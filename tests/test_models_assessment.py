@@ -233,3 +233,7 @@ def test_a_table_of_arrow_has_all_measures_in_long_form():
     assert rows["protocol", "recall_felt", None, "talos", None, None, None]["value"] == 1.0
     assert rows["chance", "class_f1", None, None, None, None, None]["value"] < f1.value
     assert {row["class"] for row in rows.values()} == {None, *CLASSES}
+    for domain, ranked in found.protocol.ranked.items():
+        auc = rows["protocol", "auc", None, None, domain, None, None]
+        assert auc["value"] == pytest.approx(ranked.auc, nan_ok=True)
+    assert found.protocol.ranked

@@ -1,4 +1,5 @@
 import dataclasses
+import os
 
 import numpy as np
 import pinocchio as pin
@@ -163,6 +164,12 @@ def test_a_run_without_positions_cannot_move_a_robot(tmp_path):
 def test_a_name_that_is_not_listed_gets_a_suggestion():
     with pytest.raises(UnknownRobotError, match=r"no robot 'tallos'.*did you mean 'talos'\?"):
         Robot.load("tallos")
+
+
+def test_reading_a_robot_leaves_standard_error_as_it_was(capfd):
+    Robot.load("panda")
+    os.write(2, b"still here")
+    assert capfd.readouterr().err == "still here"
 
 
 def test_a_urdf_that_is_not_there_is_named(tmp_path):
