@@ -2,7 +2,8 @@
 
 import re
 
-CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Control characters, ends of lines, and what turns the direction of writing."""
 FORMULA = ("=", "+", "-", "@")
 """What a cell begins with that a spreadsheet computes."""
 

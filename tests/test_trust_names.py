@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from commandline import call
@@ -59,6 +60,22 @@ def test_joints_cannot_be_named_by_control_characters(tmp_path):
     assert "\x1b" not in err
     with pytest.raises(ValueError, match="it is empty or cannot be printed"):
         Run(time=np.arange(9) / 9, velocity=np.zeros((9, 1)), joint_names=("a\nb",))
+
+
+@pytest.mark.parametrize("name", ["demo_\n::error::b", "demo_\x1b[31m", "demo_\u202eb"])
+@pytest.mark.parametrize("command", ["import", "smoothness", "classify"])
+def test_episodes_cannot_be_named_by_control_characters(tmp_path, command, name):
+    time = np.arange(1000) / 100
+    with h5py.File(tmp_path / "log.hdf5", "w") as file:
+        for each in ("demo_0", name):
+            file[f"data/{each}/obs/joint_vel"] = np.sin(time)[:, None]
+            file[f"data/{each}/obs/joint_pos"] = -np.cos(time)[:, None]
+    output = ("-o", tmp_path / "out") if command == "import" else ()
+    status, out, err = call(command, tmp_path / "log.hdf5", "--rate", 100, *output)
+    assert (status, not (tmp_path / "out").exists()) == (3, True)
+    assert "an episode is called demo_\\" in out + err
+    assert not set(out + err) & set("\x1b\u202e")
+    assert not any(line.startswith("::error::") for line in (out + err).splitlines())
 
 
 @pytest.mark.parametrize("start", ["=", "+", "-", "@"])

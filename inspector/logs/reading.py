@@ -14,6 +14,7 @@ from inspector.logs.log import LogReader, Progress, without_progress
 from inspector.logs.options import ReadOptions, parse_mapping
 from inspector.logs.preparation import prepared
 from inspector.logs.signals import listed
+from inspector.text import printable
 from noisemodel import Robot, RobotError
 
 
@@ -134,6 +135,10 @@ def jobs_of(
     opened_desired = open_log(desired, options) if desired else None
     jobs = []
     for episode in opened.episodes:
+        if printable(episode) != episode:
+            raise LogError(
+                path, f"an episode is called {printable(episode)}, which has control characters"
+            )
         name = f"{path.stem}-{episode}" if episode else path.stem
         read = partial(
             _run_of_episode, path, name, opened, opened_desired, episode, options, robot, progress
