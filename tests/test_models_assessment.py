@@ -55,6 +55,18 @@ def test_frames_are_those_that_were_always_counted(classifier):
     assert found.frames.evaluation.confusion.tolist() == whole.confusion.tolist()
 
 
+def test_the_events_of_a_robot_are_those_of_its_runs_alone():
+    good = [predicted(f"go2/good-{seed:03d}", GOOD) for seed in range(2)]
+    missed = [predicted("go2/blow-000", IMPACT, ["ok"] * len(good[0].labels))]
+    found = measure([*many(2), *good, *missed])
+    for robot, runs in (("talos", many(2)), ("go2", [*good, *missed])):
+        own, alone = found.by_robot[robot], measure(runs).events
+        assert own.all_found.value == alone.all_found.value
+        assert own.false_alarms == alone.false_alarms
+        assert own.ok_hours == pytest.approx(alone.ok_hours)
+    assert found.by_robot["go2"].all_found.value < found.by_robot["talos"].all_found.value
+
+
 def test_measures_with_intervals_are_the_measures_without():
     cut = ["ok", "impact", "ok"], ["ok", "ok", "highaccelerations"], ["ok", "impact", "impact"]
     runs = [

@@ -102,6 +102,7 @@ def test_a_rate_that_leaves_no_bands_is_refused():
         ({"classes": "ok"}, "classes is 'ok', expected a tuple of str"),
         ({"bands": "log"}, r"edges are \(\), expected two or more, ascending"),
         ({"bands": "log", "edges": (10.0, 6000.0)}, "to 6000 Hz, expected 0 to half the rate"),
+        ({"bands": "log", "edges": (-1.0, 100.0)}, "from -1 to 100 Hz, expected 0 to half the"),
     ],
 )
 def test_settings_that_cannot_be_are_refused(change, text):

@@ -84,12 +84,22 @@ def test_shifted_findings_score_less_than_those_that_are_right():
     assert flagged.by_chance["recall_injected"] == 1.0  # what flags everything needs no knowledge
 
 
-def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault():
-    # It meets the fault if it begins within 0.2 + 0.1 s before and 0.1 + 0.2 s after its start.
+@pytest.mark.parametrize(("start", "stop"), [(2.5, 2.6), (0.5, 2.5), (3.9, 4.9)])
+def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault(start, stop):
+    # It meets the fault if it ends 0.2 s before its start or later, and begins 0.2 s after its stop
+    # or earlier.
     annotated = blocks((0.0, 2.0, "ok"), (2.5, 2.6, "impact"), (3.0, 5.0, "ok"))
-    runs = [exact(f"a{number}", annotated) for number in range(120)]
-    expected = (0.1 + 0.1 + 2 * 0.2) / 5.0
+    found = [("impact", start, stop)]
+    runs = [reporting(f"a{number}", annotated, found) for number in range(120)]
+    expected = (stop - start + 0.1 + 2 * 0.2) / 5.0
     assert measured(runs).by_chance["recall_injected"] == pytest.approx(expected, rel=0.15)
+
+
+def test_a_fault_that_is_found_twice_by_chance_counts_once():
+    once = [reporting(run.name, run.blocks, [("impact", 2.03, 2.2)]) for run in perfect()]
+    twice = [reporting(run.name, run.blocks, [("impact", 2.03, 2.2)] * 2) for run in perfect()]
+    for name in ("recall_injected", "onset_within"):
+        assert measured(twice).by_chance[name] == measured(once).by_chance[name] > 0.0, name
 
 
 def test_a_robot_with_ten_times_as_many_runs_weighs_the_same():

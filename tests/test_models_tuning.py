@@ -127,6 +127,12 @@ def test_recordings_without_annotations_are_passed_over():
     (found,) = measure([PROFILES["paper"]], given.trial)
     more = Trial.against([*given.learn, silent], [silent, *given.check])
     assert measure([PROFILES["paper"]], more) == [found]
+    one, *others = np.split(np.arange(1 + len(more.recordings)), [1])
+    first = Trial(
+        [silent, *more.recordings],
+        [(others[0], one), *((1 + learn, 1 + check) for learn, check in more.splits)],
+    )
+    assert measure([PROFILES["paper"]], first) == [found]
 
 
 def test_measures_are_those_of_an_evaluation():

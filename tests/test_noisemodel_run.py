@@ -118,6 +118,13 @@ def test_blocks_that_do_not_fit_are_refused(blocks, message):
         run(blocks=tuple(Block(*block) for block in blocks))
 
 
+def test_only_signals_whose_axes_are_exchanged_are_said_to_be_transposed():
+    for shape, hint in (((2, 100), True), ((2, 99), False), ((100, 3), False), ((100,), False)):
+        with pytest.raises(RunError) as caught:
+            run(velocity=np.ones(shape))
+        assert str(caught.value).endswith("; samples come first, is it transposed?") == hint
+
+
 def test_blocks_may_touch_and_reach_the_end_of_the_last_sample():
     assert len(run(blocks=(Block(0.0, 0.05, "ok"), Block(0.05, 0.1, "impact"))).blocks) == 2
 
