@@ -84,11 +84,16 @@ def test_shifted_findings_score_less_than_those_that_are_right():
     assert flagged.by_chance["recall_injected"] == 1.0  # what flags everything needs no knowledge
 
 
-@pytest.mark.parametrize(("start", "stop"), [(2.5, 2.6), (0.5, 2.5), (3.9, 4.9)])
-def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault(start, stop):
+@pytest.mark.parametrize(
+    ("fault", "start", "stop"), [(2.5, 2.5, 2.6), (2.5, 0.5, 2.5), (0.5, 3.9, 4.9)]
+)
+def test_chance_is_the_share_of_the_time_in_which_a_shifted_finding_meets_the_fault(
+    fault, start, stop
+):
     # It meets the fault if it ends 0.2 s before its start or later, and begins 0.2 s after its stop
-    # or earlier.
-    annotated = blocks((0.0, 2.0, "ok"), (2.5, 2.6, "impact"), (3.0, 5.0, "ok"))
+    # or earlier; what is shifted beyond the end of the run comes at its beginning.
+    around = (0.0, fault - 0.1, "ok"), (fault + 0.2, 5.0, "ok")
+    annotated = blocks(around[0], (fault, fault + 0.1, "impact"), around[1])
     found = [("impact", start, stop)]
     runs = [reporting(f"a{number}", annotated, found) for number in range(120)]
     expected = (stop - start + 0.1 + 2 * 0.2) / 5.0

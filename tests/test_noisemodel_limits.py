@@ -51,3 +51,8 @@ def test_a_speed_is_as_it_is_written_and_none_if_no_joint_moves_so(tmp_path, wri
 def test_a_joint_that_turns_for_ever_has_a_speed_and_no_range(tmp_path):
     found = limits(tmp_path, "lower='-1' upper='1' velocity='3'", kind="continuous")
     assert found == Limits(-inf, inf, 3.0, turns=True)
+
+
+def test_limits_of_which_nothing_is_stated_are_none():
+    nothing = Limits()
+    assert (nothing.lower, nothing.upper, nothing.velocity) == (-inf, inf, inf)
