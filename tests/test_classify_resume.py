@@ -13,15 +13,18 @@ from commandline import call
 
 from inspector import assets
 from inspector.analysis import state, verdict
+from inspector.analysis.resuming import classify_resumed
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import Verdict
-from inspector.assets import demo_run
-from inspector.logs.opening import open_source
+from inspector.assets import demo_run, model_files
+from inspector.library import load_library
+from inspector.logs.opening import Reading, Source, open_source
 from inspector.version import program_version
 from noisemodel import parallel
 
 ROOT = Path(__file__).parents[1]
 COUNT = 24
+LIBRARY = load_library(model_files())
 
 
 @pytest.fixture
@@ -61,6 +64,28 @@ def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, jobs)
     assert after[: len(before)] == before
     assert sorted(row["run"] for row in after) == sorted(map(str, runs.glob("*.npz")))
     assert call("classify", runs)[1] == out
+
+
+def test_a_run_whose_picture_is_gone_is_done_again(tmp_path):
+    pictures = []
+
+    def draw(_, shown):
+        pictures.append(tmp_path / f"{shown.stem}{len(pictures)}.png")
+        pictures[-1].touch()
+        return pictures[-1]
+
+    def resumed():
+        run, state = Source(demo_run()), tmp_path / "state.jsonl"
+        (verdict,) = classify_resumed([run], LIBRARY, state, reading=Reading(), draw=draw)
+        return verdict.picture
+
+    first = resumed()
+    assert resumed() == first
+    assert len(pictures) == 1
+    first.unlink()
+    assert resumed() == pictures[1] != first
+    assert resumed() == pictures[1]
+    assert len(pictures) == 2
 
 
 def test_only_what_changed_is_done_again(runs, tmp_path):
