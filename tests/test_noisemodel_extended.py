@@ -69,6 +69,12 @@ def test_a_watt_has_120_decibels_and_a_pascal_has_94():
     assert watt.pressure_level(distance)[0] == pytest.approx(93.979, abs=1e-3)
 
 
+@pytest.mark.parametrize(("watts", "decibels"), [(1.0, "120.0"), (1e-3, "90.0"), (2.0, "123.0")])
+def test_a_noise_prints_the_level_of_its_mean_power(watts, decibels):
+    noise = Noise(watts * np.array([[0.5, 0.5], [0.25, 0.75], [0.0, 1.0]]), ("left", "right"))
+    assert str(noise).startswith(f"3 samples, mean sound power {decibels} dB re 1 pW\n")
+
+
 def test_air_and_efficiency_scale_the_power(solo):
     robot, surface = solo
     q, v = motion(robot)
