@@ -1,5 +1,6 @@
 """A batch that is killed and resumes."""
 
+import fcntl
 import json
 import os
 import shutil
@@ -17,6 +18,7 @@ from inspector.analysis.resuming import classify_resumed
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import Verdict
 from inspector.assets import demo_run, model_files
+from inspector.errors import InspectorError
 from inspector.library import load_library
 from inspector.logs.opening import Reading, Source, open_source
 from inspector.version import program_version
@@ -86,6 +88,30 @@ def test_a_run_whose_picture_is_gone_is_done_again(tmp_path):
     assert resumed() == pictures[1] != first
     assert resumed() == pictures[1]
     assert len(pictures) == 2
+
+
+def test_a_state_that_another_process_releases_in_time_is_opened(tmp_path, monkeypatch):
+    holder, waits = (tmp_path / "state.jsonl").open("ab"), []
+    fcntl.flock(holder, fcntl.LOCK_EX)
+
+    def sleep(seconds):
+        waits.append(seconds)
+        if len(waits) == 3:
+            holder.close()
+
+    monkeypatch.setattr(state, "sleep", sleep)
+    with state.opened(tmp_path / "state.jsonl", {}) as opened:
+        assert opened.verdicts == {}
+    assert len(waits) == 3
+
+
+def test_a_state_that_another_process_keeps_is_not_opened(tmp_path, monkeypatch):
+    monkeypatch.setattr(state, "PATIENCE", 0.05)
+    with (tmp_path / "state.jsonl").open("ab") as holder:
+        fcntl.flock(holder, fcntl.LOCK_EX)
+        refused = pytest.raises(InspectorError, match="is being written by another process; wait")
+        with refused, state.opened(tmp_path / "state.jsonl", {}):
+            pass
 
 
 def test_only_what_changed_is_done_again(runs, tmp_path):

@@ -146,6 +146,7 @@ def test_no_frame_at_all_is_refused():
         ([(1.0, 3.5, "ok")], "outside of the recording, which lasts from 0 s to 3 s"),
         ([(-1.0, 0.5, "ok")], "outside of the recording"),
         ([(4.0, inf, "ok")], "outside of the recording"),
+        ([(3.001, inf, "ok")], "outside of the recording"),  # a sample beyond its end
         (
             [(0.0, 2.0, "ok"), (0.1, 0.2, "ok"), (1.9, 2.5, "impact")],
             "block 'ok' from 0 s to 2 s and block 'impact' from 1.9 s to 2.5 s overlap",
