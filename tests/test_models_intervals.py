@@ -3,6 +3,7 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
+from models.evaluation.eventmeasures import quantile_of
 from models.evaluation.intervals import Resampling, garwood
 
 
@@ -105,6 +106,38 @@ def test_the_rate_of_one_robot_has_the_bounds_of_its_count():
     found = each_its_own(3).mean_rate(events, time, [np.ones(3, dtype=bool)])
     assert found.value == pytest.approx(3 / 4.0)
     assert (found.low, found.high) == pytest.approx(np.divide(garwood(3), 4.0))
+
+
+def test_the_mean_of_one_set_or_of_two_that_are_the_same_is_the_share_of_the_set():
+    random = np.random.default_rng(3)
+    whole = random.uniform(1.0, 9.0, 40)
+    whole[[1, 2]] = 0.0  # these count nowhere
+    part = whole * random.uniform(0.0, 1.0, 40)
+    own = np.arange(40) % 3 > 0
+    alone = each_its_own(40).share(part * own, whole * own)
+    for sets in ([own], [own, own]):
+        mean = each_its_own(40).mean_share(part, whole, sets)
+        assert (mean.runs, mean.groups) == (alone.runs, alone.groups) == (24, 24)
+        assert (mean.value, mean.low, mean.high) == pytest.approx(
+            (alone.value, alone.low, alone.high)
+        )
+        rate = each_its_own(40).mean_rate(part, whole, sets)
+        assert rate.value == pytest.approx(alone.value)
+
+
+def test_a_quantile_has_the_runs_that_hold_its_values():
+    owner = np.repeat(np.arange(2, 10), 3)
+    alike = quantile_of(np.full(24, 7.0), owner, 0.5, each_its_own(12))
+    assert (alike.value, alike.low, alike.high, alike.runs, alike.groups) == (7, 7, 7, 8, 8)
+    values = np.random.default_rng(0).permutation(24).astype(np.float64)
+    for share in (0.1, 0.5, 0.9):
+        found = quantile_of(values, owner, share, each_its_own(12))
+        assert found.value == np.quantile(values, share, method="inverted_cdf")
+        assert 0.0 <= found.low <= found.value <= found.high <= 23.0
+        assert found.low < found.high
+    few = quantile_of(values[:6], owner[:6], 0.5, each_its_own(12))
+    assert (few.runs, few.groups) == (2, 2)
+    assert isnan(few.low)
 
 
 def test_sets_are_the_same_each_time_and_in_any_order_of_the_runs():
