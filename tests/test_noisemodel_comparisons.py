@@ -28,6 +28,7 @@ from noisemodel import (
 from noisemodel.comparison import BANDS
 from noisemodel.comparisons import medians
 from noisemodel.excitation import excitation
+from noisemodel.similarity import log_spectra
 
 FEW = ("simplified", "C", "paper", "normal")
 THREE = ("simplified", "paper", "normal")
@@ -110,6 +111,14 @@ def test_distances_by_band_add_up_to_the_distance(tmp_path):
     counts = [np.sum((frequency >= low) & (frequency < high)) for low, high in BANDS]
     whole = np.sqrt(np.average(found.comparison.by_band(0, 3) ** 2, weights=counts))
     assert whole == pytest.approx(found.comparison.distance[0, 3], rel=1e-9)
+
+
+def test_a_sine_of_a_tenth_of_the_amplitude_is_20_decibels_lower():
+    phase = 2 * np.pi * np.arange(4000) / 1000
+    spectra = log_spectra(np.sin(50 * phase) + 0.1 * np.sin(200 * phase), 1000)
+    assert spectra.max() == 0.0
+    np.testing.assert_allclose(spectra[:, 50] - spectra[:, 200], 20.0, atol=0.01)
+    assert np.all(log_spectra(np.zeros(4000), 1000) == -100.0)
 
 
 def test_the_distance_in_a_band_is_that_of_its_own_frequencies(tmp_path):
