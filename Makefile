@@ -2,7 +2,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: view test test-slow check docs bench models clean
+.PHONY: view test test-slow check docs bench models mutation clean
 
 view: $(VENV)/.installed
 	$(BIN)/inspector view
@@ -28,6 +28,10 @@ bench: $(VENV)/.installed-dev
 
 models: $(VENV)/.installed-dev
 	$(BIN)/python assets/build.py
+
+mutation: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --editable ".[dev,mutation]"
+	$(BIN)/python -m benchmarks.mutation build/mutation
 
 clean:
 	rm -rf $(VENV)

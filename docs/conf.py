@@ -64,6 +64,7 @@ NAVIGATION = {
         "measured-robots",
         "elsewhere",
         "benchmarks",
+        "mutation",
         "First view <first-view>",
     ],
     "Earlier versions": [

@@ -12,7 +12,7 @@ from generalmodel import fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspector.analysis.analyse import Analysis, analyse, analyse_noise
+from inspector.analysis.analyse import Analysis, analyse, analyse_noise, with_links
 from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict, exit_status
 from inspector.assets import demo_run, model_files
@@ -147,6 +147,22 @@ def test_runs_are_worse_by_status_then_by_their_findings_then_by_the_best_score(
     severities = [each.severity for each in worst_first]
     assert severities == sorted(severities)
     assert len(set(severities)) == len(severities)
+
+
+def test_what_a_run_lacks_is_missing_and_what_it_has_is_not():
+    none, motion = (
+        "No 3D robot: the run names none.",
+        "The run has no desired velocities: the noise",
+    )
+    assert with_links(analysed("..."), "").missing == (none,)
+    bare = with_links(analysed("...", run=moving(desired=False)), "").missing
+    assert bare == (none, f"{motion} counts the measured motion alone.")
+    valid = np.arange(5000) >= 3
+    gap = with_links(analysed("...", run=moving(valid=valid, robot="panda")), "").missing
+    assert gap == (
+        "No 3D robot: the run has no positions.",
+        "3 samples lie in gaps; frames that touch one are not labelled.",
+    )
 
 
 def test_the_lane_shows_findings_from_onset_to_end():

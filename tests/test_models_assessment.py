@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 import pytest
@@ -7,7 +8,8 @@ from predicted_runs import CLASSES, GOOD, IMPACT, many, predicted
 
 import models
 from models.confusion import Evaluation
-from models.evaluation.assessment import WORDS, measure
+from models.evaluation.assessment import WORDS, measure, number
+from models.evaluation.intervals import Estimate
 
 RATE = 1000.0
 PROFILE = models.LogBands(classes=("ok", "oscillations")).at(RATE)
@@ -180,6 +182,11 @@ def test_everything_goes_through_json(classifier):
 
 def text_of(assessment):
     return {" ".join(line.split()) for line in str(assessment).splitlines()}
+
+
+def test_numbers_have_three_digits_and_large_ones_no_exponent():
+    words = [number(Estimate(value, nan, nan, 1, 1), "s").split()[0] for value in (0.12345, 1800.0)]
+    assert words == ["0.123", "1800"]
 
 
 def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
