@@ -1,6 +1,7 @@
 import csv
 import json
 import sys
+from dataclasses import replace
 from itertools import islice
 from xml.etree import ElementTree
 
@@ -162,6 +163,7 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
         "/joint_states": len(demo.time),
         "/joint_states/desired": len(demo.time),
         "/noise": len(demo.time),
+        "/level": round(demo.duration / 0.05),
         "/labels": len(content.analysis.labels),
         "/class": len(content.analysis.lane) + 1,
         "/findings": len(content.analysis.findings),
@@ -227,10 +229,23 @@ def test_mcap_holds_the_noise_to_the_bit(exported, demo):
     np.testing.assert_allclose(np.array(stamps) * 1e-9, demo.time, atol=1e-9)
 
 
+def test_mcap_holds_the_level_above_10_hz_where_it_is_known(exported, tmp_path):
+    folder, content = exported
+    stamps, found = zip(*messages(folder / "demo.mcap", "/level"), strict=True)
+    start, level = content.analysis.noise_level
+    assert [each["level"] for each in found] == level[:, 0].tolist()
+    np.testing.assert_allclose(np.array(stamps) * 1e-9, start, atol=1e-9)
+    run = plain_run()
+    valid = run.time > 0.5
+    export(replace(run, valid=valid), tmp_path / "run.mcap", LIBRARY)
+    assert min(stamp for stamp, _ in messages(tmp_path / "run.mcap", "/level")) >= 0.5e9
+
+
 def test_mcap_holds_labels_scores_findings_and_annotations(exported, demo):
     folder, content = exported
     frames = [message for _, message in messages(folder / "demo.mcap", "/labels")]
     assert [frame["label"] for frame in frames] == content.analysis.labels.label.tolist()
+    assert {frame["alarm"] for frame in frames} == {content.analysis.alarm}
     scores = [list(frame["scores"].values()) for frame in frames]
     assert scores == content.analysis.labels.scores.tolist()
     found = [message for _, message in messages(folder / "demo.mcap", "/findings")]
@@ -294,7 +309,12 @@ def test_every_line_of_the_layouts_is_in_the_file(exported, demo):
     joints = {f"{topic}/{name}/velocity" for topic in topics for name in demo.joint_names}
     curves = ElementTree.parse(folder / "demo.plotjuggler.xml").iter("curve")
     names = {curve.get("name") for curve in curves}
-    assert names == joints | {"/noise/simplified", "/labels/failure"}
+    assert names == joints | {
+        "/noise/simplified",
+        "/level/level",
+        "/labels/failure",
+        "/labels/alarm",
+    }
 
 
 def panels_of(layout):
@@ -307,7 +327,7 @@ def panels_of(layout):
 def test_a_layout_has_no_panel_for_what_is_not_there(tmp_path):
     export(plain_run(rate=50.0), tmp_path / "run.mcap", LIBRARY, layouts=True)
     foxglove = json.loads((tmp_path / "run.foxglove.json").read_text())
-    assert panels_of(foxglove["layout"]) == ["Plot!noise", "Plot!measured"]
+    assert panels_of(foxglove["layout"]) == ["Plot!noise", "Plot!level", "Plot!measured"]
 
 
 def test_layouts_are_for_mcap_and_replace_nothing_unasked(tmp_path):

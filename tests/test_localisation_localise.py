@@ -110,11 +110,11 @@ def test_the_report_states_stage_and_band_of_each_failure(tmp_path):
     analysis = inspected(shaken_run(), tmp_path)
     low, high = analysis.localisations[SHAKE].band
     assert (
-        "- **oscillations**, 2.00 s to 3.50 s: first in `measured` by knee 100%;"
-        f" {low:.0f}-{high:.0f} Hz\n" in report(analysis)
+        "- **oscillations**, 2.00 s to 3.50 s: joints knee 100%;"
+        f" {low:.0f}-{high:.0f} Hz; first in `measured`\n" in report(analysis)
     )
     assert sentence(analysis, SHAKE).startswith(
-        f"oscillations, 2.00 s to 3.50 s: first in `measured` by knee 100%; {low:.0f}-{high:.0f} Hz"
+        f"oscillations, 2.00 s to 3.50 s: joints knee 100%; {low:.0f}-{high:.0f} Hz; first in `meas"
     )
     assert "No stages" not in report(analysis)
 

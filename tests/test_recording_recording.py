@@ -516,10 +516,10 @@ def test_the_report_states_what_was_found(whole):
     path, _ = whole
     _, (text,) = read(path, "/report", "TextDocument:text")
     assert "### findings: 1 impact" in text[0]
-    assert "- **impact**, 0.50 s to 1.00 s, score 0.90: first in `desired` by panda" in text[0]
+    assert "- **impact**, 0.50 s to 1.00 s, score 0.90: joints panda" in text[0]
     assert "](recording://robot/panda/visual_geometries/panda_link" in text[0]
     assert "scenario made up" in text[0]
-    assert "- **oscillations**, 1.00 s to 1.50 s, not found: first in" in text[0]
+    assert "- **oscillations**, 1.00 s to 1.50 s, not found: joints" in text[0]
 
 
 def test_time_and_velocity_alone_still_show_noise_and_spectrogram(tmp_path):

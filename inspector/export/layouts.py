@@ -1,8 +1,8 @@
 """Layouts for Foxglove and PlotJuggler that open an exported MCAP as the recording looks.
 
-From top to bottom: the class (in Foxglove), the noise, the probability of a failure, and the
-velocities of the joints, measured and desired; in Foxglove the findings are listed at the left.
-Neither has a spectrogram of its own.
+From top to bottom: the class (in Foxglove), the noise, its level above 10 Hz, the probability of a
+failure with the alarm threshold, and the velocities of the joints, measured and desired; in
+Foxglove the findings are listed at the left. Neither has a spectrogram of its own.
 """
 
 import json
@@ -13,6 +13,7 @@ from inspector import colors
 from inspector.export.content import Content
 from inspector.export.mcap import DESIRED, MEASURED, joint_signals
 
+LEVEL = "level above 10 Hz [dB re 1 rad/s]"
 LISTED = 12
 """A legend with more lines would cover the plot."""
 
@@ -29,8 +30,12 @@ def foxglove(content: Content) -> str:
         over_time["StateTransitions!class"] = ({"paths": [state], "isSynced": True}, 1.0)
     noise = {"/noise.simplified": ("noise, simplified [rad/s]", colors.NOISE)}
     over_time["Plot!noise"] = (_foxglove_plot("Noise", noise), 2.0)
+    level = {"/level.level": (LEVEL, colors.NOISE)}
+    over_time["Plot!level"] = (_foxglove_plot(LEVEL, level), 1.5)
     if content.analysis.labels is not None:
         failure = {"/labels.failure": ("probability of a failure", colors.CLASSES["impact"])}
+        if content.analysis.alarm is not None:
+            failure["/labels.alarm"] = ("alarm threshold", colors.THRESHOLD)
         plot = _foxglove_plot("Probability of a failure", failure)
         over_time["Plot!failure"] = (plot | {"minYValue": 0, "maxYValue": 1}, 1.5)
     for topic, title, names in _velocities(content):
@@ -67,9 +72,14 @@ def plotjuggler(content: Content) -> str:
     Args:
         content: What was exported.
     """
-    plots = {"noise": {"/noise/simplified": colors.NOISE}}
+    plots = {
+        "noise": {"/noise/simplified": colors.NOISE},
+        "level": {"/level/level": colors.NOISE},
+    }
     if content.analysis.labels is not None:
         plots["failure"] = {"/labels/failure": colors.CLASSES["impact"]}
+        if content.analysis.alarm is not None:
+            plots["failure"]["/labels/alarm"] = colors.THRESHOLD
     for topic, title, names in _velocities(content):
         hues = colors.of_series(len(names))
         curves = (f"{topic}/{name}/velocity" for name in names)

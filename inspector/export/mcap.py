@@ -1,14 +1,16 @@
 """Export as MCAP, for Foxglove and PlotJuggler.
 
 /joint_states and /joint_states/desired are ROS 2 JointStates, a message for each sample, which
-`inspector import` reads as well. The other topics are JSON: /noise for each sample, /labels at the
-middle of each frame, /class where the class changes, /findings and /annotations at their start, and
-/log with a line for each finding. Times are those of the run, added to the first stamp in its
-``meta``. MCAP has no negative times: a run that starts before 0 is shifted.
+`inspector import` reads as well. The other topics are JSON: /noise for each sample, /level each
+50 ms, /labels at the middle of each frame, /class where the class changes, /findings and
+/annotations at their start, and /log with a line for each finding. Times are those of the run,
+added to the first stamp in its ``meta``. MCAP has no negative times: a run that starts before 0 is
+shifted.
 """
 
 import heapq
 import json
+import math
 from collections.abc import Iterator
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
@@ -131,11 +133,14 @@ def _topics(content: Content) -> dict[str, dict[str, Any]]:
     """JSON properties of the messages of each topic."""
     noise = {"time": NUMBER, "simplified": NUMBER}
     topics: dict[str, dict[str, Any]] = {
-        "/noise": noise if content.extended is None else noise | {"extended": NUMBER}
+        "/noise": noise if content.extended is None else noise | {"extended": NUMBER},
+        "/level": {"level": NUMBER},
     }
     if content.analysis.labels is not None:
         scores = dict.fromkeys(content.analysis.labels.classes, NUMBER)
         parts = {"failure": NUMBER, "scores": {"type": "object", "properties": scores}}
+        if content.analysis.alarm is not None:
+            parts["alarm"] = NUMBER
         topics |= {"/labels": SPAN | parts, "/class": {"label": TEXT}}
     if content.analysis.findings:
         numbers = {"level": {"type": "integer"}, "line": {"type": "integer"}}
@@ -152,6 +157,7 @@ def _messages(content: Content) -> list[Iterator[Message]]:
     found = content.analysis.findings
     parts = {
         "/noise": _noise(content),
+        "/level": _levels(content),
         "/labels": _frames(content),
         "/class": _classes(content),
         "/findings": _spans(found, "score"),
@@ -184,13 +190,22 @@ def _noise(content: Content) -> Iterator[Row]:
         yield row[0], dict(zip(names, row, strict=True))
 
 
+def _levels(content: Content) -> Iterator[Row]:
+    """The level of the noise above 10 Hz, where it is known."""
+    start, level = content.analysis.noise_level
+    for time, each in zip(start.tolist(), level[:, 0].tolist(), strict=True):
+        if not math.isnan(each):
+            yield time, {"level": each}
+
+
 def _frames(content: Content) -> Iterator[Row]:
-    labels = content.analysis.labels
+    labels, alarm = content.analysis.labels, content.analysis.alarm
     if labels is None:
         return
     rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.debounced.tolist(), strict=True)
     for (start, stop, label), scores in zip(rows, labels.scores.tolist(), strict=True):
         message = {"label": label, "start": start, "stop": stop}
+        message |= {} if alarm is None else {"alarm": alarm}
         each = dict(zip(labels.classes, scores, strict=True))
         failure = 1.0 - each["ok"]
         yield (start + stop) / 2, message | {"failure": failure, "scores": each}

@@ -59,8 +59,8 @@ def report(analysis: Analysis) -> str:
 def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "") -> str:
     """Class, time, score, novelty and localisation of an event, in a line of Markdown."""
     stage, joints, band, links = localised(analysis, event, quote="`")
-    by = f"first in {stage}{joints and f' by {joints}'}" if stage else ""
-    where = "; ".join(part for part in (by, band, links and f"links {links}") if part)
+    named = {"joints": joints, "links": links, "": band, "first in": stage}
+    where = "; ".join(f"{name} {part}".strip() for name, part in named.items() if part)
     sure = _sure(analysis, event) if isinstance(event, Event) else ""
     when = f"{interval(event.start, event.stop)}{sure}"
     return f"{bold}{spoken(event.label)}{bold}, {when}{where and f': {where}'}"
