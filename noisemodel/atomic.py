@@ -1,7 +1,9 @@
 """Files that are written whole or not at all."""
 
 import fcntl
+import hashlib
 import os
+import platform
 import re
 import time
 from collections.abc import Iterator
@@ -12,10 +14,11 @@ from uuid import uuid4
 
 from noisemodel.errors import OutputError
 
-TEMPORARY = re.compile(r"\.noise-inspector-[0-9a-f]{8}")
-"""Names of temporary files; those of `models.modelfile` too."""
-ABANDONED = 86_400.0
-"""Age from which a temporary file is one of a process that was killed, in [s]."""
+TEMPORARY = re.compile(r"\.noise-inspector-([0-9a-f]{8})?[0-9a-f]{8}")
+"""Names of temporary files, with the machine; those of `models.modelfile`, without, too."""
+ABANDONED, ABANDONED_HERE = 86_400.0, 60.0
+"""Ages from which a temporary file is one of a process that was killed, in [s]: on any machine that
+shares the folder, and on this one, whose locks are known."""
 
 
 @contextmanager
@@ -23,7 +26,8 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Offer a temporary path beside ``path`` that takes its place only if the block succeeds.
 
     Of several that write one file at once and may not replace it, one succeeds. Temporary files
-    that have not changed for a day, and that no process holds, are deleted from the folder.
+    that no process holds are deleted from the folder: after a minute without a change, or after a
+    day if another machine may hold them.
 
     Args:
         path: The file to write.
@@ -38,7 +42,7 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     path = Path(path)
     refuse_existing(path, overwrite=overwrite)
     _sweep(path.parent.absolute())
-    temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")
+    temporary = path.with_name(f".noise-inspector-{_machine()}{uuid4().hex[:8]}")
     try:  # with the permissions that the umask leaves to any file
         held = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
     except OSError as error:
@@ -92,10 +96,21 @@ def _sweep(folder: Path) -> None:
     """Delete what processes that were killed have left in a folder, once per process."""
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            if TEMPORARY.fullmatch(entry.name):
+            if found := TEMPORARY.fullmatch(entry.name):
+                age = ABANDONED_HERE if found[1] == _machine() else ABANDONED
                 with suppress(OSError):
-                    if time.time() - entry.stat().st_mtime > ABANDONED and _is_left(entry.path):
+                    if time.time() - entry.stat().st_mtime > age and _is_left(entry.path):
                         Path(entry.path).unlink()
+
+
+@cache
+def _machine() -> str:
+    """This machine since it was started, as 8 hexadecimal digits."""
+    try:
+        name = Path("/proc/sys/kernel/random/boot_id").read_text()
+    except OSError:
+        name = platform.node()
+    return hashlib.sha256(name.encode()).hexdigest()[:8]
 
 
 def _is_left(path: str) -> bool:

@@ -1,10 +1,15 @@
 import os
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import pytest
 
 from noisemodel import OutputError
 from noisemodel.atomic import _sweep, replacing
+
+ROOT = Path(__file__).parents[1]
 
 
 def write(path, text, **options):
@@ -124,6 +129,28 @@ def test_temporary_files_of_killed_processes_are_deleted_after_a_day(tmp_path):
     os.utime(tmp_path / names[1])  # one that is being written
     write(tmp_path / "out.txt", "")
     assert sorted(os.listdir(tmp_path)) == sorted([*names[1:], "out.txt"])
+
+
+KILLED = """
+import os, signal, sys
+from noisemodel.atomic import replacing
+with replacing(sys.argv[1]):
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_what_a_killed_process_has_left_is_deleted_by_the_next(tmp_path):
+    for _ in range(2):
+        subprocess.run([sys.executable, "-c", KILLED, tmp_path / "out.txt"], cwd=ROOT, check=False)
+    first, second = tmp_path.iterdir()
+    machine = first.name[-16:-8]
+    other = second.rename(tmp_path / second.name.replace(machine, "0123abcd"))
+    fresh = first.with_name(first.name[:-8] + "01234567")
+    fresh.touch()
+    for each in (first, other):
+        os.utime(each, (time.time() - 70,) * 2)
+    write(tmp_path / "out.txt", "")
+    assert sorted(tmp_path.iterdir()) == sorted([other, fresh, tmp_path / "out.txt"])
 
 
 def test_the_temporary_file_of_a_process_that_waits_for_days_is_kept(tmp_path):
