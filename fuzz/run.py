@@ -9,6 +9,7 @@ expected is kept by its place, and fuzzing goes on; the exit status is 1 if ther
 
 import argparse
 import os
+import shutil
 import sys
 import tempfile
 import time
@@ -92,7 +93,7 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
             data = damaged(whole, READERS[name].kind, Random(f"{name} {number}"))
             if len(data) < LONGEST:
                 (corpus / f"{place}-{number}").write_bytes(bytes((place,)) + data)
-    one = target(names, paths, time.monotonic() + seconds, found)
+    one = target(names, paths, time.monotonic() + seconds, found, folder)
     atheris.Setup(
         [
             *("fuzz", str(corpus), f"-seed={seed}", "-verbosity=0", "-rss_limit_mb=2048"),
@@ -105,7 +106,7 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
 
 
 def target(
-    names: tuple[str, ...], paths: list[Path], until: float, found: Path | None
+    names: tuple[str, ...], paths: list[Path], until: float, found: Path | None, folder: Path
 ) -> Callable[[bytes], None]:
     """A function that gives an input to one of the readers, and notes what it raises.
 
@@ -114,6 +115,7 @@ def target(
         paths: Where each has its file.
         until: When to print what was found and to end the process, by the monotonic clock.
         found: Folder for inputs that raise what is not expected.
+        folder: Deleted at the end.
     """
     counts, places = Counter[str](), dict[str, str]()
 
@@ -124,6 +126,7 @@ def target(
             for where, text in places.items():
                 print(f"FOUND {where}: {text}")
             sys.stdout.flush()
+            shutil.rmtree(folder, ignore_errors=True)
             os._exit(bool(places))  # libFuzzer ends the process without unwinding it
         place = data[0] % len(names) if data else 0
         name, path = names[place], paths[place]

@@ -202,6 +202,8 @@ def test_no_row_ends_a_live_session(tmp_path):
         '{"time": [], "velocity": [0.1, 0.2]}',
         '{"time": 0.2995, "velocity": [1e308, -1e308]}',
         '{"time": 1e308, "velocity": [0.1, 0.2]}',
+        '{"time": 5e-324, "velocity": [5e-324, 0.2]}',
+        '{"time": 1e-320, "velocity": [0.1, 0.2]}',
         '{"time": 0.2996, "velocity": [1' + "0" * 400 + ", 0]}",
         '{"time": 1' + "0" * 5000 + ', "velocity": [0, 0]}',
         '{"velocity": ' + "[" * 100_000,
@@ -217,7 +219,8 @@ def test_no_row_ends_a_live_session(tmp_path):
         check=False,
     )
     assert done.returncode == 4, done.stderr  # no stretch is long enough for a label
-    assert done.stdout.startswith("604 samples")
+    assert done.stdout.startswith("606 samples")
+    assert "2 samples out of order" in done.stdout
     assert path.exists()
 
 
