@@ -1,6 +1,7 @@
 """Bags that unpack to more than is read, or whose rows are no messages."""
 
 import os
+import re
 import sqlite3
 import tracemalloc
 from contextlib import closing, suppress
@@ -120,6 +121,16 @@ def test_stamps_of_64_bits_are_left_out_and_said(tmp_path, stamp):
     imported = read_log(path)
     assert len(imported.run.time) == len(TIMES)
     assert any("1 messages without data, or with stamps after 2116" in r for r in imported.remarks)
+
+
+@pytest.mark.parametrize("value", ["[]", "null", "1.5", "1" * 400, "-" + "9" * 30])
+@pytest.mark.parametrize("key", ["message_count", "nanoseconds", "type"])
+def test_metadata_of_other_kinds_are_not_believed(tmp_path, key, value):
+    folder = write_bag(tmp_path / "bag", TALK, {"/joint_states": states(TALK)}, storage="sqlite3")
+    text = (folder / "metadata.yaml").read_text()
+    changed = re.sub(rf"(?m)\b{key}: .*", f"{key}: {value}", text)
+    (folder / "metadata.yaml").write_text(changed)
+    assert len(read_log(folder).run.time) == len(TIMES)
 
 
 def test_a_bag_whose_metadata_is_gigabytes_is_read_without_it(tmp_path):

@@ -42,9 +42,9 @@ def open_bag(path: Path) -> Bag:
         raise
     except Exception as error:  # rosbags lets struct's, SQLite's and its own errors through
         raise DamagedError(_one_line(error)) from error
-    if not all(isinstance(each.topic, str) for each in reader.connections):
+    if problem := _problem(reader):
         reader.close()
-        raise DamagedError("a topic has no name")
+        raise DamagedError(problem)
     topics: dict[str, Topic] = {}
     for connection in reader.connections:
         before = topics.get(connection.topic)
@@ -57,6 +57,17 @@ def open_bag(path: Path) -> Bag:
     bag = Bag(kind, ros1, topics, lambda names: iter(()), reader.close, seconds)
     bag.messages = lambda names: _messages(path, reader, bag, names)
     return bag
+
+
+def _problem(reader: Any) -> str:
+    """What is wrong with what rosbags has taken unchecked from a bag; empty if nothing is."""
+    texts = (text for each in reader.connections for text in (each.topic, each.msgtype))
+    if not all(isinstance(text, str) for text in texts):
+        return "a topic has no name or no type"
+    counts = (reader.duration, *(each.msgcount for each in reader.connections))
+    if not all(isinstance(count, int) and abs(count) < 2**64 for count in counts):
+        return "the duration or the messages of a topic are no whole number of 64 bits"
+    return ""
 
 
 def _messages(path: Path, reader: Any, bag: Bag, names: Collection[str]) -> Iterator[Message]:
