@@ -5,6 +5,8 @@ from xml.parsers import expat
 
 MAX_DEPTH = 500
 """Most elements within each other, as MuJoCo has it too; parsers that recurse crash on more."""
+MAX_ATTRIBUTES = 200
+"""Most attributes of an element; Pinocchio compares each with all others."""
 
 
 def parsed(text: bytes) -> ET.Element:
@@ -18,7 +20,7 @@ def parsed(text: bytes) -> ET.Element:
 
     Raises:
         ValueError: If the text has a document type (which may define entities, bombs among them),
-            is nested too deeply, or is not XML.
+            is nested too deeply, has an element of too many attributes, or is not XML.
     """
     parser = expat.ParserCreate()
     depth = 0
@@ -26,9 +28,11 @@ def parsed(text: bytes) -> ET.Element:
     def refuse(*_: object) -> None:
         raise ValueError("no document type or entities are read")
 
-    def enter(*_: object) -> None:
+    def enter(_: str, attributes: dict[str, str]) -> None:
         nonlocal depth
         depth += 1
+        if len(attributes) > MAX_ATTRIBUTES:
+            raise ValueError(f"an element has more than {MAX_ATTRIBUTES} attributes")
         if depth > MAX_DEPTH:
             raise ValueError(f"elements are nested more than {MAX_DEPTH} deep")
 

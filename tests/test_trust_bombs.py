@@ -93,6 +93,15 @@ def test_elements_that_are_nested_without_end_are_refused(tmp_path, name, root):
         Robot.load(path)
 
 
+@pytest.mark.parametrize("name", ["r.urdf", "r.xml"])
+def test_an_element_of_attributes_without_end_is_refused(tmp_path, name):
+    attributes = "".join(f'a{n}="" ' for n in range(100_000))
+    root = "robot" if name == "r.urdf" else "mujoco"
+    (tmp_path / name).write_text(f"<{root}><a {attributes}/></{root}>")
+    with pytest.raises(RobotError, match="an element has more than 200 attributes"):
+        Robot.load(tmp_path / name)
+
+
 def test_a_file_of_unclosed_comments_is_looked_at_once(tmp_path):
     path = tmp_path / "r.xml"
     path.write_text("<!--" * 1_000_000)
