@@ -167,6 +167,7 @@ def _run(reader: Reader, folder: Path, path: Path) -> tuple[int, float, int, str
     def command() -> None:
         from inspector.cli import main as inspector
 
+        reader.before()
         places = {"folder": folder, "parent": path.parent}
         sys.argv = ["inspector"]
         sys.argv += [str(path) if a == "{}" else a.format(**places) for a in reader.command]

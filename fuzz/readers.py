@@ -8,12 +8,13 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from io import BytesIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
@@ -31,7 +32,7 @@ from inspector.logs.options import ReadOptions, parse_mapping
 from inspector.logs.reading import listing, read_logs
 from inspector.training import tuningfile
 from models import noisytest
-from noisemodel import meshfile
+from noisemodel import meshfile, runfile
 from noisemodel.geometry import triangles
 from scenarios import ScenarioError
 from scenarios import noisytest as simulated_noisytest
@@ -111,7 +112,7 @@ class Reader:
         command: Arguments of the command line that reads it: ``{}`` is the file, ``{folder}`` the
             folder that it was made in, ``{parent}`` the one that the file lies in.
         stdin: Whether the command reads the file from standard input.
-        words: Text that only few mutations would find.
+        before: Runs first in the process of the command.
     """
 
     kind: str
@@ -119,7 +120,7 @@ class Reader:
     read: Callable[[Path], object]
     command: tuple[str, ...] = ("import", "{}", "-o", "{folder}/out.npz")
     stdin: bool = False
-    words: tuple[bytes, ...] = field(default=())
+    before: Callable[[], object] = lambda: None
 
 
 @cache
@@ -427,6 +428,16 @@ def _read_run(path: Path) -> None:
     analyse(nm.Run.load(path), library())
 
 
+def _in_pieces() -> Any:
+    """Leave each array of a run in its file, as large ones are left."""
+    return patch.object(runfile, "LARGE", 0).start()
+
+
+def _read_pieces(path: Path) -> None:
+    with patch.object(runfile, "LARGE", 0):
+        analyse(nm.Run.load(path, on_demand=True), library())
+
+
 def _read_model(path: Path) -> None:
     analyse(run(), load_library([path]))
 
@@ -445,6 +456,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
     {
         "run": Reader("arrays", _run_file, _read_run, CLASSIFY),
         "run, stored noise": Reader("arrays", _run_file, _read_run, ("noise", "{}")),
+        "run, in pieces": Reader("arrays", _run_file, _read_pieces, CLASSIFY, before=_in_pieces),
         "model": Reader("bytes", _model, _read_model, WITH_MODEL),
         "model, small": Reader("arrays", _small_model, _read_model, WITH_MODEL),
         "baseline": Reader(

@@ -32,7 +32,7 @@ GROUPS = {
     "settings": ("mapping", "expect.toml", "resume state", "tune state", "dataset.json"),
     "rows": ("live rows, CSV", "live rows, JSON"),
     "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
-    "arrays": ("run", "npz of arrays", "MuJoCo's npz", "npy", "sample"),
+    "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy", "sample"),
     "models": ("model, small", "baseline"),
     "bags": tuple(name for name in READERS if name.startswith(("MCAP", "ROS"))),
     "robots": ("URDF", "MJCF", "STL", "STL, text", "OBJ", "DAE"),

@@ -353,6 +353,8 @@ def _check(members: Iterable[zipfile.ZipInfo], packed: int) -> None:
         name = member.filename.removesuffix(".npy")
         if name in seen:
             raise ArchiveError(f"has two arrays named {name!r}")
+        if not name.isprintable():
+            raise ArchiveError(f"has an array named {name!r}")
         seen.add(name)
         if member.compress_type not in METHODS:
             raise ArchiveError(f"{name} is compressed by another method than NumPy's")

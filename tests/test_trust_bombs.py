@@ -209,6 +209,16 @@ def test_a_second_member_of_one_name_is_refused(tmp_path):
             read(path)
 
 
+@pytest.mark.parametrize("method", [zipfile.ZIP_STORED, zipfile.ZIP_LZMA])
+def test_an_array_whose_name_has_control_characters_is_refused(tmp_path, method):
+    path = tmp_path / "run.npz"
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr("a\n\x1b[31m.npy", b"")
+    for read, error in ((Run.load, RunFileError), (read_log, LogError)):
+        with pytest.raises(error, match=r"has an array named 'a\\n\\x1b\[31m'"):
+            read(path)
+
+
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
 def test_methods_that_unpack_gigabytes_at_once_are_not_read(tmp_path, method):
     with zipfile.ZipFile(tmp_path / "run.npz", "w", method) as archive:
