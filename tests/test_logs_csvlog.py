@@ -99,6 +99,7 @@ HEAD = "time,a.velocity,b.velocity\n"
         ),
         ("clock,a.velocity\n0,1\n", "no time column is named; expected one of time, timestamp, t"),
         ("0.0,1.0\n0.1,1.0\n", "row 1: there is no header; .* such as --columns time,q1 "),
+        ("0,00;1,0\n0,04;1,0\n", "row 1: there is no header; the first row has 2 numbers"),
         ("0.0,1.0,2.0\n\n0.1,1.0\n", "row 1: there is no header; the first row has 3 numbers"),
         ("time,speed\n0,1\n0.1,1\n", "no position or velocity of a joint; name columns"),
         ("time,a.effort\n0,1\n0.1,1\n", "no position or velocity of a joint"),

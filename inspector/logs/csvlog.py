@@ -363,7 +363,7 @@ def _no_header(
     path: Path, rows: Sequence[list[str]], before: Sequence[tuple[int, list[str]]]
 ) -> LogError:
     width = len(rows[0]) - (not rows[0][-1].strip())
-    first = [float(row[0]) for row in rows if row and _is_number(row[0])]
+    first = [float(row[0].replace(",", ".")) for row in rows if row and _is_number(row[0])]
     stamped = len(first) < 2 or first[1] > first[0]
     how = " (without stamps: no time, and --rate 1000)" if stamped else " --rate 1000"
     return LogError(
