@@ -58,7 +58,15 @@ NAVIGATION = {
     ],
     "Theory": ["theory", "classifier", "noise-models"],
     "API": ["api/inspector", "api/noisemodel", "api/models", "api/scenarios"],
-    "Reference": ["formats", "limits", "security", "upgrading", "changelog", "contributing"],
+    "Reference": [
+        "formats",
+        "limits",
+        "security",
+        "malformed",
+        "upgrading",
+        "changelog",
+        "contributing",
+    ],
     "Measured": [
         "measured",
         "measured-robots",
