@@ -90,7 +90,7 @@ def velocity_levels(
     size = max(1, round(STEP * rate))
     firsts = np.arange(0, len(valid), size)
     whole = len(valid) // size * size
-    steps = fast[:, :whole].reshape(len(fast), -1, size)
+    steps = fast[:, :whole].reshape(len(fast), whole // size, size)
     energy = np.einsum("jsk,jsk->sj", steps, steps)
     if whole < len(valid):
         energy = np.vstack((energy, np.square(fast[:, whole:]).sum(axis=1)))

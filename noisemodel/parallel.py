@@ -27,8 +27,9 @@ Result = TypeVar("Result")
 Jobs: TypeAlias = int | str
 """How many items to work on at once in this machine, or the address of a Dask scheduler."""
 
-FRESH = 3.0
-"""Work in [s] below which two fresh interpreters are not faster than this one alone."""
+FRESH, FORKED = 3.0, 0.1
+"""Work in [s] below which two fresh interpreters, or two forks, are not faster than this one
+alone."""
 POLL = 0.5
 """Time without a result after which `polled` yields None, in [s]."""
 DIED = "the worker died, of lack of memory or a crash"
@@ -99,8 +100,7 @@ def polled(
 
         yield from on_cluster(function, items, address=jobs, died=died, poll=POLL)
         return
-    little = len(items) < 2 or work < FRESH
-    if jobs < 2 or (little and not _forks()):
+    if min(jobs, len(items)) < 2 or work < (FORKED if _forks() else FRESH):
         yield from enumerate(map(function, items))
         return
     jobs = max(1, min(jobs, len(items)))

@@ -43,9 +43,10 @@ def test_results_come_as_they_are_ready_and_in_order_if_requested(start):
     assert list(in_order(slow_first, range(4), jobs=2, died=dead)) == [0, 1, 2, 3]
 
 
-def test_little_work_starts_no_fresh_interpreters(monkeypatch):
-    monkeypatch.setattr(parallel, "_forks", lambda: False)
-    found = list(in_order(square_or_die, [1, 2], jobs=2, died=dead, work=0.5))
+@pytest.mark.parametrize(("forks", "work"), [(False, 0.5), (True, 0.05)])
+def test_little_work_starts_no_processes(monkeypatch, forks, work):
+    monkeypatch.setattr(parallel, "_forks", lambda: forks)
+    found = list(in_order(square_or_die, [1, 2], jobs=2, died=dead, work=work))
     assert {process for *_, process in found} == {os.getpid()}
 
 

@@ -118,7 +118,7 @@ def classify(
       0  ok: no run has a finding that counts
       1  findings: at least one run has one, or lacks one that is required
       2  wrong usage
-      3  bad input: a file cannot be read; the cluster of --dask cannot be reached, or is lost
+      3  bad input: a file cannot be read, or the cluster of --dask is lost
       4  cannot tell: say, the rate is too low for every model
       5  output lost: an output could not be written
      70  internal error: a bug, with its traceback on standard error
