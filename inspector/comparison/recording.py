@@ -62,6 +62,7 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
     # The same comparison has the same id: opened again, it replaces itself in the viewer.
     identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
     with writing(path, identity.hexdigest(), overwrite=overwrite) as recording:
+        recording.send_blueprint(layout(found))  # takes the place of an older layout
         for name in MAPS:
             _log_map(recording, found, name)
         ends = np.array([min(one.time[0] for one in found), max(one.time[-1] for one in found)])
@@ -72,7 +73,6 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
         document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
         recording.log("/report", document, static=True)
         recording.send_recording_name(f"noise models: {', '.join(one.name for one in found)}")
-        recording.send_blueprint(layout(found))  # takes the place of an older layout
 
 
 def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:

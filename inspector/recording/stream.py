@@ -11,6 +11,8 @@ from inspector.recording import unstable
 from noisemodel.atomic import replacing
 
 APPLICATION = "inspector"
+PATIENCE = 3.0
+"""How long a file may stay as it is while it is written, in [s]."""
 
 
 @contextmanager
@@ -33,10 +35,22 @@ def writing(path: Path, identity: str, *, overwrite: bool = False) -> Iterator[r
         recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
         recording.save(temporary)
         yield recording
-        with suppress(RuntimeError):  # its file cannot be written, which is noticed below
-            recording.flush()
-        recording.disconnect()
+        if _flushed(recording, temporary):
+            recording.disconnect()
+        else:
+            unstable.abandon(recording)
         require_whole(temporary)
+
+
+def _flushed(recording: rr.RecordingStream, path: Path) -> bool:
+    """Write what waits, as long as the file grows: of a full disk rerun waits without end."""
+    size = -1
+    while path.stat().st_size != size:
+        size = path.stat().st_size
+        with suppress(RuntimeError):  # not done within `PATIENCE`, or it cannot be written
+            recording.flush(timeout_sec=PATIENCE)
+            return True
+    return False
 
 
 def require_whole(recording: Path) -> None:

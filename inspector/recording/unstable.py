@@ -9,7 +9,7 @@ What changes between versions, as of 0.41:
 - ``ViewCoordinates``;
 - ``Measurements``, whose band shades findings;
 - ``rerun.experimental``, by which a viewer returns pictures and what its views report;
-- the end of a recording's file;
+- the end of a recording's file, and what rerun waits for if it cannot be written;
 - columns of tensors, which ``BarChart.columns`` takes for one unless they are Arrow's.
 
 Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLines``,
@@ -17,6 +17,7 @@ Stable, and used where it is needed: streams, columns, ``Scalars``, ``SeriesLine
 When rerun moves on, this module follows and no other.
 """
 
+import ctypes
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -419,3 +420,14 @@ def _lists(kind: Any, flat: Any, count: int) -> Any:
 
     offsets = np.arange(count + 1, dtype=np.int32) * np.int32(len(flat) // count)
     return pa.Array.from_buffers(kind, count, [None, pa.py_buffer(offsets)], children=[flat])
+
+
+def abandon(recording: rr.RecordingStream) -> None:
+    """Leave a recording whose file cannot be written as it is until the process ends.
+
+    Rerun 0.41 may wait for the file without end: to disconnect, to delete the recording, and when
+    the process ends.
+    """
+    for each in (recording, recording.inner):
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(each))
+    rr.unregister_shutdown()
