@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector import colors
-from noisemodel.links import LinkNoise, vibrating
+from noisemodel.links import LinkNoise, vibrating_pieces
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array, Mask, Real
 
@@ -86,14 +86,13 @@ def velocity_levels(
         what is valid in each, shape (steps, joints), in [dB re 1 rad/s], at least -100; NaN in
         steps that lie in a gap.
     """
-    fast = vibrating(velocity, valid, rate).T  # joint by joint in memory
     size = max(1, round(STEP * rate))
     firsts = np.arange(0, len(valid), size)
-    whole = len(valid) // size * size
-    steps = fast[:, :whole].reshape(len(fast), whole // size, size)
-    energy = np.einsum("jsk,jsk->sj", steps, steps)
-    if whole < len(valid):
-        energy = np.vstack((energy, np.square(fast[:, whole:]).sum(axis=1)))
+    energy = np.zeros((len(firsts), velocity.shape[1]))
+    for rows, fast in vibrating_pieces(velocity, valid, rate, size):
+        here = np.arange(0, rows.stop - rows.start, size)
+        first = rows.start // size
+        energy[first : first + len(here)] = np.add.reduceat(np.square(fast), here, axis=0)
     count = np.add.reduceat(valid.astype(np.float64), firsts)[:, None]
     level = np.maximum(decibel(energy / np.maximum(count, 1.0)), FLOOR_DB)
     return start + firsts / rate, np.asarray(np.where(count > 0.0, level, np.nan))

@@ -10,6 +10,7 @@ from inspector.analysis.analyse import Analysis
 from inspector.localisation.order import SLOWEST
 from inspector.spectrogram import Spectrogram, amplitudes, in_bands
 from noisemodel.links import vibrating
+from noisemodel.ondemand import pieces
 from noisemodel.types import Array
 
 WINDOW = 0.8
@@ -41,7 +42,9 @@ def orders(analysis: Analysis) -> tuple[str, Spectrogram] | None:
     if analysis.audit is None or len(run.time) < size or size < 16:
         return None
     joint = _joint(analysis)
-    speed = run.velocity[:, joint].astype(np.float64)
+    speed = np.concatenate(
+        [run.velocity[rows][:, joint].astype(np.float64) for rows in pieces(run.velocity)]
+    )
     speed = speed - vibrating(speed[:, None], run.mask, run.rate)[:, 0]
     hop = max(1, size // 8, -(-(len(speed) - size) // (COLUMNS - 1)))
     firsts = np.arange(0, len(speed) - size + 1, hop)
@@ -66,7 +69,8 @@ def _joint(analysis: Analysis) -> int:
     for known in analysis.orders.values():
         return run.joint_names.index(known.joint)
     _, level = analysis.joint_levels
-    moving = np.abs(run.velocity).max(axis=0) > SLOWEST
+    fastest = [np.abs(run.velocity[rows]).max(axis=0) for rows in pieces(run.velocity)]
+    moving = np.max(fastest, axis=0) > SLOWEST
     power = np.nansum(10.0 ** (level / 10.0), axis=0)
     return int(np.argmax(np.where(moving, power, -1.0)))
 

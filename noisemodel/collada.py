@@ -64,7 +64,8 @@ def _instances(
     """Walk down from a node, one of those that are left; what a node contains moves with it."""
     if next(left, None) is None:
         raise ValueError(f"it has more than {MAX_NODES} nodes with their instances")
-    placement = placement @ _transform(node)
+    with np.errstate(over="ignore", invalid="ignore"):
+        placement = placement @ _transform(node)
     for child in node:
         match _word(child):
             case "node":
@@ -73,7 +74,9 @@ def _instances(
                 yield from _instances(named, _target(named, child), placement, left)
             case "instance_geometry":
                 for points, faces in _geometry(named, _target(named, child)):
-                    yield points @ placement[:3, :3].T + placement[:3, 3], faces
+                    with np.errstate(over="ignore", invalid="ignore"):  # refused when it is read
+                        placed = points @ placement[:3, :3].T + placement[:3, 3]
+                    yield placed, faces
             case "instance_controller":
                 raise ValueError("it has a skin (<instance_controller>), which is not supported")
 
@@ -95,7 +98,8 @@ def _transform(node: ET.Element) -> Array:
                 part[:3, :3] = _rotation(np.array(axis), np.deg2rad(degrees))
             case "lookat" | "skew" as word:
                 raise ValueError(f"it has a <{word}>, which is not supported")
-        whole = whole @ part
+        with np.errstate(over="ignore", invalid="ignore"):
+            whole = whole @ part
     return whole
 
 

@@ -154,18 +154,21 @@ def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
     return fast.T
 
 
-def vibrating_pieces(velocity: Real, valid: Mask, rate: float) -> Iterator[tuple[slice, Array]]:
+def vibrating_pieces(
+    velocity: Real, valid: Mask, rate: float, multiple: int = 1
+) -> Iterator[tuple[slice, Array]]:
     """The fast part of a motion, see `vibrating`, piece by piece.
 
     Args:
         velocity: Shape (samples, nv); may stay in its file.
         valid: False in gaps, shape (samples,).
         rate: Samples per second, in [Hz].
+        multiple: All pieces but the last have a multiple of so many samples.
 
     Yields:
         Samples of a piece, and what vibrates in it, shape (samples, nv).
     """
-    for rows in pieces(velocity):
+    for rows in pieces(velocity, multiple):
         yield rows, _vibrating_part(velocity, valid, rate, rows.start, rows.stop)
 
 

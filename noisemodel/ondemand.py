@@ -116,8 +116,8 @@ def rows_at_once(array: Any) -> int:
     return max(1, AT_ONCE // max(1, row))
 
 
-def pieces(array: Any) -> Iterator[slice]:
-    """Rows of an array, piece by piece."""
-    size = rows_at_once(array)
+def pieces(array: Any, multiple: int = 1) -> Iterator[slice]:
+    """Rows of an array, piece by piece; all but the last have a multiple of so many rows."""
+    size = max(1, rows_at_once(array) // multiple) * multiple
     for first in range(0, len(array), size):
         yield slice(first, min(first + size, len(array)))

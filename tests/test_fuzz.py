@@ -45,6 +45,7 @@ def whole(tmp_path_factory, request):
 
 def laws(name, whole, examples):
     data = whole.read_bytes()
+    READERS[name].read(whole)
 
     @settings(LAWFUL, max_examples=examples)
     @given(st.one_of(st.binary(max_size=200), st.randoms(use_true_random=False)))

@@ -142,6 +142,7 @@ def test_a_run_that_kills_its_worker_is_named_and_the_others_are_compared(sides,
 
     monkeypatch.setattr(measuring, "open_run", die_of_one)
     monkeypatch.setattr(parallel, "_forks", lambda: True)
+    monkeypatch.setattr(parallel, "FORKED", 0.0)
     given = sides / "reference", sides / "same", "-j", 2
     status, out, err = diff(*given, "--on-bad-input", "ignore")
     assert status == 70

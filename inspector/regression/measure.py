@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from models import Event
 from noisemodel import Run
 from noisemodel.links import LinkNoise, vibrating
 from noisemodel.noise import decibel
+from noisemodel.ondemand import OnDemand
 from noisemodel.parallel import DIED, Jobs, in_order
-from noisemodel.types import Array
+from noisemodel.types import Array, Real
 
 ENVELOPE = 200.0
 """Rate of the envelope by which runs are aligned, in [Hz]."""
@@ -205,8 +207,15 @@ def measure(
 
 
 def _errors(run: Run) -> Levels | None:
-    desired = run.velocity_desired
-    return None if desired is None else levels(replace(run, velocity=run.velocity - desired))
+    measured, desired = run.velocity, run.velocity_desired
+    if desired is None:
+        return None
+
+    def error(first: int, stop: int) -> Array:
+        return measured[first:stop] - desired[first:stop]
+
+    difference = cast(Real, OnDemand(measured.shape, np.float64, error))
+    return levels(replace(run, velocity=difference))
 
 
 def _findings(analysis: Analysis) -> tuple[Finding, ...]:
