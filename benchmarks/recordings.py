@@ -1,6 +1,6 @@
 """Recordings of `inspector view`: CPU time, size, and points of lines that are open at first.
 
-    python benchmarks/recordings.py [--repeats 3]
+    python -m benchmarks.recordings [--repeats 3]
 
 The runs: 10 s at 10 kHz of TALOS, 32 joints; 150 s at 1 kHz of 60 joints without a robot; both
 float32, with positions, velocities measured and desired, and a vibration in the middle. Times are
@@ -17,10 +17,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-import numpy as np
 from rerun.chunk import RrdReader
 
-from noisemodel import Robot, Run
+from benchmarks.commands import moving
+from noisemodel import Robot
 
 OPEN = ("/class/", "/noise/", "/level/", "/probability/", "/spectrogram/", "/strips/joints/")
 OPEN += ("/detail/0/velocity",)
@@ -29,24 +29,6 @@ VALUES = ("Scalars:scalars", "Measurements:values")
 CASES = {"10 s, 10 kHz, 32 joints": (3.0, 20.0), "150 s, 1 kHz, 60 joints": (5.0, 20.0)}
 """Most CPU time, in [s], and most MB."""
 MOST_POINTS = 300_000
-
-
-def moving(rate: float, seconds: float, names: tuple[str, ...], robot: str | None) -> Run:
-    """Run with a smooth motion of every joint, and a vibration in the middle."""
-    generator = np.random.default_rng(0)
-    instants = np.arange(round(rate * seconds)) / rate
-    phase = 2 * np.pi * generator.uniform(0.1, 0.6, len(names)) * instants[:, None]
-    desired = 0.5 * np.cos(phase)
-    rattle = np.sin(2 * np.pi * 140 * instants) * np.exp(-((instants - seconds / 2) ** 2) / 0.1)
-    measured = desired + 0.01 * generator.normal(size=desired.shape) + 0.1 * rattle[:, None]
-    return Run(
-        time=instants,
-        velocity=measured.astype(np.float32),
-        velocity_desired=desired.astype(np.float32),
-        position=(0.3 * np.sin(phase)).astype(np.float32),
-        joint_names=names,
-        robot=robot,
-    )
 
 
 def used(command: list[str], repeats: int) -> float:

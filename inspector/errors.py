@@ -7,6 +7,21 @@ class InspectorError(ValueError):
     """The base of every error that `inspector` expects."""
 
 
+class FileError(InspectorError):
+    """A file of the inspector's own that is wrong; subclasses say what to do about it.
+
+    Args:
+        path: The file.
+        problem: What is wrong with it, in one line.
+    """
+
+    advice = ""
+
+    def __init__(self, path: Path, problem: str) -> None:
+        self.path, self.problem = path, problem
+        super().__init__(f"{path}: {problem}{self.advice}")
+
+
 class LogError(InspectorError):
     """A log that cannot be read as the motion of a robot.
 

@@ -19,7 +19,7 @@ from typing import IO, Any
 
 from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict
-from inspector.errors import InspectorError
+from inspector.errors import FileError, InspectorError
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from models import Event
@@ -36,17 +36,10 @@ MAX_BYTES = 256 * 2**20
 """Most bytes of a state file that is read: those of some hundred thousand runs."""
 
 
-class StateError(InspectorError):
-    """A state file that a batch cannot resume.
+class StateError(FileError):
+    """A state file that a batch cannot resume."""
 
-    Args:
-        path: The file.
-        problem: What is wrong with it, in one line.
-    """
-
-    def __init__(self, path: Path, problem: str) -> None:
-        self.path, self.problem = path, problem
-        super().__init__(f"{path}: {problem}; name another file, or delete it")
+    advice = "; name another file, or delete it"
 
 
 @dataclass(eq=False)

@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from inspector.errors import InspectorError
+from inspector.errors import FileError
 from inspector.library import Library
 from models.jsontext import from_toml, text_of
 from models.labels import UNKNOWN
@@ -33,17 +33,8 @@ KEYS = {
 NEEDED = {"waive": ("reason", "until"), "require": ("class",)}
 
 
-class ExpectationError(InspectorError):
-    """A file of expectations that is wrong.
-
-    Args:
-        path: The file.
-        problem: What is wrong with it, in one line.
-    """
-
-    def __init__(self, path: Path, problem: str) -> None:
-        self.path, self.problem = path, problem
-        super().__init__(f"{path}: {problem}")
+class ExpectationError(FileError):
+    """A file of expectations that is wrong."""
 
 
 @dataclass(frozen=True)

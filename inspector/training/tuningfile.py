@@ -16,7 +16,7 @@ from math import nan
 from pathlib import Path
 from typing import IO, Any
 
-from inspector.errors import InspectorError
+from inspector.errors import FileError, InspectorError
 from models.jsontext import from_json
 from models.tuning.grid import Point
 from models.tuning.search import Measures
@@ -27,17 +27,10 @@ MAX_BYTES = 256 * 2**20
 """Most bytes of a results file that is read: those of some hundred thousand points."""
 
 
-class ResultsError(InspectorError):
-    """A results file that the search cannot resume.
+class ResultsError(FileError):
+    """A results file that the search cannot resume."""
 
-    Args:
-        path: The file.
-        problem: What is wrong with it, in one line.
-    """
-
-    def __init__(self, path: Path, problem: str) -> None:
-        self.path, self.problem = path, problem
-        super().__init__(f"{path}: {problem}; name another file, or overwrite it (--overwrite)")
+    advice = "; name another file, or overwrite it (--overwrite)"
 
 
 @dataclass(eq=False)
