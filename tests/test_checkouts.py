@@ -239,6 +239,7 @@ def test_each_new_name_exists_and_each_old_name_is_listed_once(checkouts, probe)
     assert len({old for old, _ in rows}) == len(rows)
 
 
+@pytest.mark.slow
 def test_each_old_name_existed_in_the_first_version(checkouts, first):
     called(RESOLVE, first, given=[old for old, _ in checkouts.names()])
 

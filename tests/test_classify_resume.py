@@ -47,7 +47,8 @@ def start(*arguments):
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
 
 
-@pytest.mark.parametrize("jobs", [pytest.param(1, marks=pytest.mark.slow), 2])
+@pytest.mark.slow
+@pytest.mark.parametrize("jobs", [1, 2])
 def test_a_killed_batch_resumes_without_loss_or_repetition(runs, tmp_path, jobs):
     state = tmp_path / "state.jsonl"
     process = start("classify", runs, "--resume", state, "-j", jobs)
@@ -114,6 +115,7 @@ def test_a_state_that_another_process_keeps_is_not_opened(tmp_path, monkeypatch)
             pass
 
 
+@pytest.mark.slow
 def test_only_what_changed_is_done_again(runs, tmp_path):
     state = tmp_path / "state.jsonl"
     first = call("classify", runs, "--format", "json", "--localise", "--resume", state)[1]

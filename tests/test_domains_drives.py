@@ -132,6 +132,7 @@ def test_faults_begin_and_end_within_the_run(name):
         assert fault.event.label in ("impact", "highaccelerations", "oscillations")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", FAULTS)
 def test_drives_are_nominal_until_the_fault_begins(name):
     fault = FAULTS[name](np.random.default_rng(3), TWO, 3.0)

@@ -106,6 +106,7 @@ def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
     np.testing.assert_allclose(twin.effort[steady], trial.motion.torque[::step][steady], atol=0.5)
 
 
+@pytest.mark.slow
 def test_a_blow_from_outside_is_not_among_the_torques_of_the_drives():
     blow = simulate("panda", "blow", STANDS, duration=3.0)
     twin = simulate("panda", GOOD, STANDS, duration=3.0)

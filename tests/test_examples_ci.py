@@ -77,6 +77,7 @@ def test_the_action_annotates_summarises_and_keeps_a_page(job):
     assert (job.folder / "noise-report" / "index.html").exists()
 
 
+@pytest.mark.slow
 def test_the_action_passes_when_all_is_expected_and_takes_options(job):
     allow(job)
     done = classify(job)
@@ -116,6 +117,7 @@ def test_the_workflow_uses_inputs_that_the_action_has():
     assert len((ROOT / "examples/ci/github.yml").read_text().splitlines()) <= 15
 
 
+@pytest.mark.slow
 def test_the_job_for_gitlab_writes_what_it_keeps(job):
     noise = read("examples/ci/gitlab.yml")["noise"]
     install, command = noise["script"]
@@ -131,6 +133,7 @@ def test_the_job_for_gitlab_writes_what_it_keeps(job):
     assert job(*bash(f"{command} --overwrite")).returncode == 0
 
 
+@pytest.mark.slow
 def test_the_pre_merge_script_says_what_to_do(job):
     script = ROOT / "examples" / "ci" / "pre-merge.sh"
     done = job(script, "logs")

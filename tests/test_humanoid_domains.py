@@ -89,6 +89,7 @@ def test_its_data_are_those_of_its_description(robot):
             assert angle + reach <= high + 0.05, joint
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [G1_MOVING, ROMEO], ids=lambda robot: robot.name)
 def test_it_stands_sways_squats_and_waves(robot):
     way, run = simulated(robot, SQUAT, duration=3.0)
@@ -101,6 +102,7 @@ def test_it_stands_sways_squats_and_waves(robot):
     np.testing.assert_allclose(upper[50:], way.upper[50:], atol=0.1)
 
 
+@pytest.mark.slow
 def test_it_walks_while_its_arms_move():
     walks_well(G1_MOVING, "walk")
 

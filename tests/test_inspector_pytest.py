@@ -63,6 +63,7 @@ def test_allowed_elsewhere(noise):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", PROCESSES)
 def test_a_finding_fails_with_its_name_a_recording_and_a_picture(project, tmp_path, processes):
     status, out = project(QUIET, *processes, "--junitxml", tmp_path / "junit.xml")
@@ -95,6 +96,7 @@ def test_repetitions(noise):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("processes", PROCESSES)
 def test_runs_are_compared_with_stored_ones(project, tmp_path, processes):
     status, out = project(WORSE.format(tone=0.0, first=0), *processes)

@@ -65,6 +65,7 @@ def simulated(path, seed, versions):
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("profile", ["joints", "general"])
 def test_a_model_names_all_versions_of_what_simulated_its_runs(tmp_path, profile):
     others = {**MADE_BY, "mujoco": "4.1.0"}
@@ -116,6 +117,7 @@ def test_nothing_left_to_train_on_is_one_line(tmp_path, changes, text):
     assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_a_model_for_any_rate_is_trained_and_evaluated_on_logs_of_several_rates(tmp_path):
     logs, model = tmp_path / "logs", tmp_path / "m.npz"
     logs.mkdir()

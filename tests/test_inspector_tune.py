@@ -159,6 +159,7 @@ def test_an_interrupted_search_resumes_to_the_same_bytes(data, whole, tmp_path, 
     assert output.read_bytes() == content
 
 
+@pytest.mark.slow
 def test_two_jobs_give_the_same_results(data, whole, tmp_path):
     output = tmp_path / "tuned.jsonl"
     assert tune(data, output, "-j", 2)[0] == 0

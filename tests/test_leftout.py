@@ -393,6 +393,7 @@ def test_a_run_below_the_lowest_rate_is_left_out(tmp_path):
     assert str(left_out) == "left out: 2 runs below 80 Hz, e.g. ur5/fault-1"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("options", [[], ["--profile", "norms", "--rate", "250"]])
 def test_the_benchmark_prints_its_tables(logs, monkeypatch, capsys, options):
     paths = [str(path) for path in logs[: 1 if options else 2]]

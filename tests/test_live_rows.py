@@ -248,6 +248,7 @@ def test_invalid_input_begins_no_session(content, reason):
         follow(io.BytesIO(content), (), lambda names: pytest.fail("a session began"))
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_with_the_summary_and_a_whole_file(tmp_path):
     path = tmp_path / "live.rrd"
     command = [sys.executable, "-m", "inspector", "live", "--rate", "1000", "--save", str(path)]

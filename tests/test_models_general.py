@@ -313,6 +313,7 @@ def test_a_model_saved_twice_has_the_same_bytes(path, tmp_path):
         trained().save(path)
 
 
+@pytest.mark.slow
 def test_training_twice_gives_the_same_bytes(path, tmp_path):
     models.General.train(frames(), RECIPE).save(tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()

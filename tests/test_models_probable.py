@@ -234,6 +234,7 @@ def test_a_stream_of_other_joints_is_refused():
         models.Stream(classifier, joints=4).push(RECORDINGS[0].signal)
 
 
+@pytest.mark.slow
 def test_training_twice_gives_the_same_bytes_and_they_are_read_back(classifier, tmp_path):
     profile = classifier.profile
     again = models.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)

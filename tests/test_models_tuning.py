@@ -210,6 +210,7 @@ def stand_in(lola):
     return Sets(*each)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kernel", "count"), [("rbf", 8), ("linear", 3)])
 def test_points_of_the_papers_grid_predict_what_a_classifier_predicts(stand_in, kernel, count):
     points = Grid.paper(kernel).profiles(models.Profile.noisytest(kernel))
