@@ -39,7 +39,7 @@ def orders(analysis: Analysis) -> tuple[str, Spectrogram] | None:
     """
     run = analysis.run
     size = round(WINDOW * run.rate)
-    if analysis.audit is None or len(run.time) < size or size < 16:
+    if analysis.audit is None or not run.joint_names or len(run.time) < size or size < 16:
         return None
     joint = _joint(analysis)
     speed = np.concatenate(

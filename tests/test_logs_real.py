@@ -33,7 +33,7 @@ def test_a_real_robots_log_is_imported_viewed_and_classified(tmp_path):
     assert viewed.returncode == 0, viewed.stderr
     found = set(RrdReader(tmp_path / "run.rrd").store().schema().entity_paths())
     assert {"/class/found/ok", "/noise/simplified", "/robot/motion/panda_joint7"} <= found
-    assert {"/joints/velocity_desired/0", "/joints/effort/0", "/spectrogram/levels"} <= found
+    assert {"/joints/velocity_desired/0", "/joints/effort/0", "/spectrogram/bands/00"} <= found
 
     classified = inspector(tmp_path, "classify", "run.npz", "--format", "json")
     assert classified.returncode == 0, classified.stdout
