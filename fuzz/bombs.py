@@ -460,6 +460,9 @@ def _hdf5(data: bytes) -> Iterator[Bomb]:
             file.create_virtual_dataset(joint, layout)
 
     yield Bomb("virtual", virtual, refuse=True)
+    first = data.index(b"GCOL") + 16
+    free = first + 16 + -(-int.from_bytes(data[first + 8 : first + 16], "little") // 8) * 8
+    yield Bomb("a heap without end", data[: free + 8] + bytes(8) + data[free + 16 :], refuse=True)
 
 
 def _dense_attributes(path: Path) -> None:

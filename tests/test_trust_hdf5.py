@@ -1,5 +1,6 @@
 """HDF5 files that hold what is not theirs, or claim to hold more than they do."""
 
+import json
 import re
 import time
 import tracemalloc
@@ -119,3 +120,40 @@ def test_attributes_of_any_number_and_size_cost_nothing(tmp_path):
     assert tracemalloc.get_traced_memory()[1] < 20e6
     assert time.process_time() - begin < 10
     tracemalloc.stop()
+
+
+ARGUMENTS = json.dumps({"env_kwargs": {"control_freq": 50}})
+
+
+@pytest.mark.parametrize("written", [ARGUMENTS, np.bytes_(ARGUMENTS)], ids=["free", "fixed"])
+def test_the_arguments_of_an_environment_are_read_whatever_their_length(tmp_path, written):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["data/demo_0/joint_pos"] = MOTION
+        file["data"].attrs["env_args"] = written
+    assert read_log(path).run.rate == 50.0
+
+
+def test_a_heap_that_libhdf5_searches_for_ever_is_given_up(tmp_path, monkeypatch):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["data/demo_0/joint_pos"] = MOTION
+        file["data"].attrs["env_args"] = ARGUMENTS
+    data = bytearray(path.read_bytes())
+    first = data.index(b"GCOL") + 16
+    free = first + 16 + -(-len(ARGUMENTS) // 8) * 8
+    data[free + 8 : free + 16] = bytes(8)  # the size of what is free: none
+    path.write_bytes(data)
+    monkeypatch.setattr("inspector.logs.hdf5.PATIENCE", 1.0)
+    with pytest.raises(LogError, match="damaged: env_args is not found in 1 s$"):
+        read_log(path)
+
+
+def test_an_environment_whose_text_is_gone_is_damaged(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["data/demo_0/joint_pos"] = MOTION
+        file["data"].attrs["env_args"] = ARGUMENTS
+    path.write_bytes(path.read_bytes().replace(b"GCOL", b"GONE"))
+    with pytest.raises(LogError, match="damaged: env_args cannot be read$"):
+        read_log(path)

@@ -1,6 +1,8 @@
 """HDF5 logs, with a group for each episode (robomimic, Isaac Lab, Minari) or a row per sample."""
 
 import re
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
 from math import inf, prod
 from pathlib import Path
@@ -32,6 +34,9 @@ from noisemodel.archive import ArchiveError, check_unpacked
 EPISODES = "data"
 """The group that holds the episodes of robomimic and Isaac Lab."""
 
+ARGUMENTS = "env_args"
+"""The attribute of that group which tells how robomimic and Isaac Lab set up their simulator."""
+
 NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 """Names of episodes in a file without that group: Minari's, ManiSkill's and others."""
 
@@ -42,6 +47,16 @@ SMALL = 8 * 2**20
 """Bytes up to which a dataset is read whatever its name is."""
 
 NAMES = {*TIMES, *EPISODE_ENDS}
+
+SEARCHED = """
+import sys, h5py
+file = h5py.File(sys.argv[1])
+text = file.get(sys.argv[2], file).attrs[sys.argv[3]]
+text = text.encode("utf-8", "surrogateescape") if isinstance(text, str) else text
+sys.stdout.buffer.write(text)
+"""
+PATIENCE = 10.0
+"""Time in [s] for a text of any length: in a damaged heap libhdf5 searches it for ever."""
 
 CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
 """Type of the controller of an arm in robosuite's arguments."""
@@ -60,6 +75,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     try:
         with h5py.File(path) as file:
             home, episodes = _episodes(path, file)
+            about = _arguments(path, file.get(EPISODES, file).attrs)
     except LogError:
         raise
     except DAMAGE as error:
@@ -67,7 +83,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     return LogReader(
         "HDF5",
         episodes,
-        lambda episode, progress: _read(path, options, home, episode),
+        lambda episode, progress: _read(path, options, home, episode, about),
         lambda: _listing(path, home, episodes),
     )
 
@@ -89,13 +105,12 @@ def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
     return "", tuple(episodes_of(flags))
 
 
-def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
+def _read(path: Path, options: ReadOptions, home: str, episode: str, about: str) -> Log:
     try:
         with h5py.File(path) as file:
             group = _own(path, file[f"{home}/{episode}"], file) if home else file
             datasets, left_out = _wanted(group, options)
             arrays = dict(_values(path, [(n, _own(path, each, file)) for n, each in datasets]))
-            about = _arguments(file.get(EPISODES, file).attrs)
             attributes = {**_single(file.attrs), **_single(group.attrs)}
     except LogError:
         raise
@@ -104,7 +119,7 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str) -> Log:
     if not home:
         part, samples = episodes_of(arrays)[episode], max(map(len, arrays.values()), default=0)
         arrays = {n: each[part] if len(each) == samples else each for n, each in arrays.items()}
-    controller = CONTROLLER.search(str(about))
+    controller = CONTROLLER.search(about)
     return log_of(
         Episode(
             path,
@@ -130,11 +145,22 @@ def _single(attributes: Any) -> dict[str, Any]:
     }
 
 
-def _arguments(attributes: Any) -> Any:
+def _arguments(path: Path, attributes: Any) -> str:
     """The environment's arguments of robomimic and Isaac Lab, unless they are larger than any."""
-    name = "env_args"
-    small = name in attributes and attributes.get_id(name).get_storage_size() <= SMALL
-    return attributes[name] if small else None
+    if ARGUMENTS not in attributes:
+        return ""
+    about = attributes.get_id(ARGUMENTS)
+    text = h5py.check_string_dtype(about.dtype) is not None and about.shape == ()
+    if not text or about.get_storage_size() > SMALL:
+        return ""
+    command = [sys.executable, "-P", "-c", SEARCHED, str(path), EPISODES, ARGUMENTS]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=PATIENCE)
+    except subprocess.TimeoutExpired as error:
+        raise LogError(path, f"damaged: {ARGUMENTS} is not found in {PATIENCE:g} s") from error
+    if done.returncode:
+        raise LogError(path, f"damaged: {ARGUMENTS} cannot be read")
+    return done.stdout.decode("utf-8", "surrogateescape")
 
 
 def _own(path: Path, each: Any, file: Any) -> Any:
@@ -180,7 +206,7 @@ def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tu
     return found, tuple(left_out)
 
 
-def _rate(env_args: Any) -> float | None:
+def _rate(env_args: str) -> float | None:
     """Control rate in [Hz] from the environment's arguments of robomimic or Isaac Lab."""
     try:
         args = from_json(env_args)
