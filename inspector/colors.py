@@ -16,8 +16,8 @@ from models import ANOMALY, UNKNOWN
 
 Color: TypeAlias = tuple[int, int, int]
 
-BACKGROUNDS: tuple[Color, ...] = ((13, 13, 13), (24, 26, 30), (255, 255, 255))
-"""Of the viewer's plots, of its robot, and of reports."""
+BACKGROUNDS: tuple[Color, ...] = ((13, 13, 13), (255, 255, 255))
+"""Of the viewer's plots, and of reports."""
 
 CLASSES: dict[str, Color] = {
     "ok": (48, 114, 96),

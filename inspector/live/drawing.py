@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 import rerun as rr
@@ -10,11 +11,12 @@ from inspector import colors
 from inspector.levels import SPECTRUM
 from inspector.live.lane import Change
 from inspector.live.spectrogram import Columns
-from inspector.recording import axes
+from inspector.recording import axes, unstable
 from inspector.recording.axes import Label, Panel
+from inspector.recording.classes import FOUND, ROW, readable
 from inspector.recording.joints import UNITS
 from inspector.recording.limbs import JOINTS_PER_PLOT
-from inspector.recording.series import at, log_events, scalars, style_lane, style_lines
+from inspector.recording.series import TIMELINE, at, log_events, scalars, style_lines
 from inspector.recording.spectrogram import log_axis, style_bands
 from inspector.report.markdown import spoken
 from inspector.thinning import extremes
@@ -30,8 +32,8 @@ SEND_INTERVAL = 0.1
 FILE_INTERVAL = 2.0
 """The same for a file without a viewer: for each message, rerun keeps some hundred bytes until the
 file is closed."""
-NOISE = "noise"
-CLASS_PANEL, NOISE_PANEL = Panel("class", 100.0), Panel("noise", 130.0)
+NOISE, FOUND_PATH = "noise", "/class/found"
+NOISE_PANEL = Panel("noise", 130.0)
 SPECTROGRAM_PANEL, SIGNALS_PANEL = Panel("spectrogram", 150.0), Panel("signals", 390.0)
 NEWEST = 8
 """Findings that are shown in words; the others are counted."""
@@ -44,7 +46,7 @@ class Drawing:
         recording: Where to.
         joint_names: Names of the joints.
         signals: Which of velocity, velocity_desired and position there are.
-        classes: What can be predicted; empty without a model.
+        classes: What can be predicted; empty without a model. `Drawing.classes` is their panel.
         edges: Of the spectrogram's bands, shape (bands + 1,), in [Hz].
         watched: Whether a viewer shows the recording meanwhile; in a file, messages can be larger.
     """
@@ -64,6 +66,8 @@ class Drawing:
         self._columns: list[Columns] = []
         self._scores: list[tuple[Array, Array]] = []
         self._colours = colors.of_classes((*classes, UNKNOWN))
+        self._rows = (*(name for name in classes if name != "ok"), UNKNOWN, "ok")
+        self._state, self._changes = "", list[Change]()
         self._signals = [name for name in signals if name.removesuffix("_desired") in UNITS]
         self._slices = [
             slice(first, min(first + JOINTS_PER_PLOT, len(joint_names)))
@@ -91,14 +95,14 @@ class Drawing:
         axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
         axes.log_left(recording, NOISE_PANEL, [Label(0.5, "noise p\u0302\n[rad/s]")])
         nothing = [Label(0.5, "")]  # else the viewer says that there is no data
-        for panel in (CLASS_PANEL, NOISE_PANEL, SIGNALS_PANEL):
+        self.classes = Panel("class", ROW * len(self._rows) + axes.AXIS) if classes else None
+        for panel in filter(None, (self.classes, NOISE_PANEL, SIGNALS_PANEL)):
             axes.log_right(recording, panel, nothing)
         axes.log_left(recording, SIGNALS_PANEL, nothing)
-        if classes:
+        if self.classes is not None:
             shown = [self._colours[name] for name in classes]
             style_lines(recording, "/score", names=classes, colours=shown)
-            style_lane(recording, "/class/found", self._colours)
-            axes.log_left(recording, CLASS_PANEL, [Label(0.5, "classes")])
+            self._style_classes(self.classes)
 
     @property
     def plots(self) -> list[tuple[str, list[str]]]:
@@ -145,6 +149,7 @@ class Drawing:
         self._waiting, self._held = {}, 0.0
         self._send_spectrogram()
         self._send_scores()
+        self._send_changes()
 
     def spectrogram(self, columns: Columns) -> None:
         """Draw columns of the spectrogram, at once if they are watched."""
@@ -182,14 +187,32 @@ class Drawing:
             self._scores = []
 
     def changes(self, changes: Sequence[Change]) -> None:
-        """Draw where the class changes."""
-        if not changes:
-            return
-        self._recording.send_columns(
-            "/class/found",
-            indexes=[at(np.array([change.time for change in changes]))],
-            columns=rr.StateChange.columns(state=[change.state for change in changes]),
-        )
+        """Draw the class where it changes and until when it lasts, at once if it is watched."""
+        self._changes += changes
+        if self._watched:
+            self._send_changes()
+
+    def _send_changes(self) -> None:
+        points: list[tuple[int, str]] = []
+        for change in self._changes:
+            begin = round(1e9 * change.time)
+            if self._state not in ("", change.state):
+                points.append((begin - 1, self._state))
+            points.append((begin, change.state))
+            self._state = change.state
+        self._changes = []
+        if points:
+            middle, half = self._places()
+            shown = np.array([[state == name for name in self._rows] for _, state in points])
+            values = np.where(shown, middle, np.nan).repeat(unstable.COPIES, axis=1)
+            times = np.array([time for time, _ in points])
+            unstable.send_bands(self._recording, FOUND_PATH, TIMELINE, times, values, half)
+
+    def _places(self) -> tuple[Array, float]:
+        """Middles of the classes' bands on their axis, from above, and half of their width."""
+        count, (upper, lower) = len(self._rows), FOUND
+        middles = 1.0 - (np.arange(count) + (upper + lower) / 2) / count
+        return axes.TOP * middles, axes.TOP * (lower - upper) / 2 / count
 
     def findings(self, time: float, found: Sequence[Event], lasting: Sequence[Event]) -> None:
         """Show the findings so far in a document, and list those that are new.
@@ -227,6 +250,15 @@ class Drawing:
 
     def _send(self, path: str, index: list[rr.TimeColumn], values: Array) -> None:
         self._recording.send_columns(path, indexes=index, columns=scalars(values))
+
+    def _style_classes(self, panel: Panel) -> None:
+        shades = [self._colours[name] for name in self._rows]
+        copies = [name for name in map(spoken, self._rows) for _ in range(unstable.COPIES)]
+        every = [shade for shade in shades for _ in range(unstable.COPIES)]
+        unstable.style_bands(self._recording, FOUND_PATH, copies, every)
+        rows = axes.rows([spoken(name) for name in self._rows])
+        named = [replace(at, color=readable(c)) for at, c in zip(rows, shades, strict=True)]
+        axes.log_left(self._recording, panel, named)
 
     def _style_joints(self, kind: str, plot: int, names: Sequence[str]) -> None:
         desired = kind.endswith("_desired")

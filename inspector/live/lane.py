@@ -1,4 +1,4 @@
-"""The lane of classes while labels come in: where it changes."""
+"""The class over time while labels come in: where it changes, and until when it lasts."""
 
 from typing import NamedTuple
 
@@ -6,14 +6,12 @@ from models import Labels
 
 
 class Change(NamedTuple):
-    """A class that begins."""
+    """A class that begins, or lasts."""
 
     time: float
     """When, in [s]."""
     state: str
     """The class; empty where nothing is known."""
-    score: float
-    """How certain the class is in the frame that begins it."""
 
 
 class Lane:
@@ -29,7 +27,7 @@ class Lane:
         self._state, self._end = "", 0.0
 
     def take(self, labels: Labels) -> list[Change]:
-        """Where the class changes.
+        """Where the class changes, and the end of the last frame.
 
         Args:
             labels: The next ones, in order of time.
@@ -40,9 +38,9 @@ class Lane:
             if begin > self._end + self._hop / 2:
                 changes += self.end()
             if label != self._state:
-                changes.append(Change(begin, label, labels.score(index)))
+                changes.append(Change(begin, label))
             self._state, self._end = label, begin + self._hop
-        return changes
+        return [*changes, Change(self._end, self._state)] if len(labels) else changes
 
     def expire(self, now: float) -> list[Change]:
         """End the lane if its next frame is overdue.
@@ -54,6 +52,6 @@ class Lane:
 
     def end(self) -> list[Change]:
         """End what the lane shows."""
-        changes = [Change(self._end, "", 0.0)] if self._state else []
+        changes = [Change(self._end, "")] if self._state else []
         self._state = ""
         return changes

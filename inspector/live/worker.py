@@ -211,7 +211,7 @@ class Worker:
             self._contents = Contents(
                 joints=self._drawing.plots,
                 camera=camera,
-                classes=bool(self._labeller.classes),
+                classes=self._drawing.classes,
                 links=self._links is not None,
                 rate=self._rate,
                 start=time,

@@ -1,6 +1,6 @@
-"""Columns of a rerun recording: lines, lanes, events. Never row by row."""
+"""Columns of a rerun recording: lines, events. Never row by row."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
@@ -63,55 +63,6 @@ def style_lines(
         aggregation_policy="MinMax",
     )
     recording.log(path, style, static=True)
-
-
-def log_lane(
-    recording: rr.RecordingStream,
-    path: str,
-    stretches: Sequence[tuple[float, float, str]],
-    colours: Mapping[str, Color],
-) -> None:
-    """Log a lane of states.
-
-    Args:
-        recording: Where to.
-        path: Entity path; it is the lane's caption.
-        stretches: Start and stop in [s] and state, in order, not overlapping.
-        colours: One per state.
-    """
-    style_lane(recording, path, colours)
-    changes: list[tuple[float, str]] = []
-    for start, stop, state in stretches:
-        if changes and changes[-1][0] == start:
-            changes.pop()  # the stretch before ends where this one starts
-        if not changes or changes[-1][1] != state:
-            changes.append((start, state))
-        changes.append((stop, ""))
-    merged = _without_repeats(changes)
-    if merged:
-        recording.send_columns(
-            path,
-            indexes=[at(np.array([time for time, _ in merged]))],
-            columns=rr.StateChange.columns(state=[state for _, state in merged]),
-        )
-
-
-def style_lane(recording: rr.RecordingStream, path: str, colours: Mapping[str, Color]) -> None:
-    """Log the states that a lane may have, and their colours."""
-    states = rr.StateConfiguration(
-        values=list(colours), labels=list(colours), colors=list(colours.values())
-    )
-    recording.log(path, states, static=True)
-
-
-def _without_repeats(changes: list[tuple[float, str]]) -> list[tuple[float, str]]:
-    previous: str | None = None
-    kept = []
-    for time, state in changes:
-        if state != previous:
-            kept.append((time, state))
-        previous = state
-    return kept
 
 
 def log_events(

@@ -37,8 +37,9 @@ if TYPE_CHECKING:
 Part: TypeAlias = rrb.View | rrb.Container
 """A view, or views that are arranged."""
 
-PLOTS, BACKGROUND = colors.BACKGROUNDS[:2]
-GRID = (70, 74, 82, 130)
+PLOTS = colors.BACKGROUNDS[0]
+ROBOT, GRID = (80, 84, 94), (112, 116, 126, 130)
+"""Behind a robot, lighter than a quiet one, and the lines of its floor."""
 
 
 def has_end(recording: Path) -> bool:
@@ -108,18 +109,6 @@ def picture(name: str, origin: str, across: tuple[float, float], down: tuple[flo
     )
 
 
-def lanes(
-    name: str,
-    origin: str,
-    *,
-    during: tuple[float, float] | None = None,
-    last: float | None = None,
-) -> Part:
-    """Draw states over time, a lane for each entity under ``origin``; see `plot`."""
-    shown = _over(last) if during is None else _alone(*during)
-    return rrb.StateTimelineView(origin=origin, name=name, time_view=shown)
-
-
 def bars(name: str, origin: str) -> Part:
     """Draw the bar chart that holds at the time cursor."""
     return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
@@ -148,7 +137,7 @@ def robot(name: str, origin: str, camera: Camera) -> Part:
         contents=[f"{origin}/**"],
         name=name,
         spatial_information=rrb.SpatialInformation(target_frame=camera.frame),
-        background=rrb.Background(color=BACKGROUND),
+        background=rrb.Background(color=ROBOT),
         line_grid=rrb.LineGrid3D(
             visible=not camera.moves,
             spacing=camera.spacing,
@@ -322,10 +311,39 @@ def log_stretches(
     # A value that is none ends a band.
     times = np.array([(start, stop, stop + 1) for start, stop in apart], dtype=np.int64).ravel()
     values = np.tile([middle, middle, np.nan], len(apart))[:, None].repeat(copies, axis=1)
-    style = rr.Measurements.from_fields(
-        names=[name] * copies, colors=[color] * copies, widths=[0.0] * copies
-    )
+    style_bands(recording, path, [name] * copies, [color] * copies)
+    send_bands(recording, path, timeline, times, values, half)
+
+
+def style_bands(
+    recording: rr.RecordingStream,
+    path: str,
+    names: Sequence[str],
+    shades: Sequence[tuple[int, int, int]],
+) -> None:
+    """Log names and colours of bands that `send_bands` draws."""
+    style = rr.Measurements.from_fields(names=names, colors=shades, widths=[0.0] * len(names))
     recording.log(path, style, static=True)
+
+
+def send_bands(
+    recording: rr.RecordingStream,
+    path: str,
+    timeline: str,
+    times: NDArray[np.int64],
+    values: Array,
+    half: float,
+) -> None:
+    """Draw bands along a plot, which end where there is no value.
+
+    Args:
+        recording: Where to.
+        path: Entity path.
+        timeline: Along which time runs.
+        times: Shape (points,), in [ns].
+        values: Middle of each band, shape (points, bands); NaN draws nothing.
+        half: Half of their widths.
+    """
     recording.send_columns(
         path,
         indexes=[rr.TimeColumn(timeline, duration=times.astype("timedelta64[ns]"))],
