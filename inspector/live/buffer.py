@@ -62,6 +62,19 @@ class SampleBuffer:
         self.held += count
         return count
 
+    def take(self) -> tuple[Array, Array, dict[str, Array]]:
+        """Take all samples out.
+
+        Returns:
+            Their times, when they were received, and the signals; values whose square would
+            overflow are unknown. They are overwritten by the samples that are put in next.
+        """
+        held, self.held = self.held, 0
+        signals = {name: values[:held] for name, values in self.signals.items()}
+        for values in signals.values():
+            values[~(np.abs(values) < LARGEST)] = np.nan
+        return self.time[:held], self.received[:held], signals
+
     def _note(self, name: str, given: Array | None, width: int, time: float, count: int) -> None:
         if given is None:
             line = f"no {name} from {time:.3f} s on: it was there at first"
@@ -93,7 +106,6 @@ def rows_of(given: Mapping[str, ArrayLike]) -> dict[str, Array]:
             array = np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError) as error:
             raise LiveError(f"{name}: holds no numbers ({error})") from error
-        array = np.where((array > -LARGEST) & (array < LARGEST), array, np.nan)  # squares overflow
         rows[name] = array if array.ndim == 2 else array.reshape(1, -1)
         if array.ndim not in (1, 2):
             raise LiveError(

@@ -128,16 +128,15 @@ class Worker:
 
     def work(self, buffer: SampleBuffer) -> None:
         """Show the samples that a buffer holds, and empty it."""
-        held, buffer.held = buffer.held, 0
-        if not held:
+        time, received, signals = buffer.take()
+        if not len(time):
             return
-        self.samples += held
-        kept, lost = self._clock.take(buffer.time[:held])
+        self.samples += len(time)
+        kept, lost = self._clock.take(time)
         if not kept.any():
             return
-        chosen = slice(held) if kept.all() else np.flatnonzero(kept)
-        time, received = buffer.time[chosen], buffer.received[chosen]
-        signals = {name: values[chosen] for name, values in buffer.signals.items()}
+        if not kept.all():
+            time, received, signals = time[kept], received[kept], _rows(signals, kept)
         self._now = float(time[-1])
         self._lay_out(float(time[0]), signals)
         motion = np.hstack([signals[name] for name in self._noisy])
