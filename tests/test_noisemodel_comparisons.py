@@ -463,6 +463,9 @@ def test_a_table_has_a_row_per_robot_and_medians(thrice):
     assert sum("chain.urdf" in line for line in lines) == 3
     assert sum(line.startswith("median of 3 fixed") for line in lines) == 1
     assert not any("of 3 floating" in line for line in lines)
+    more = str(Comparisons((*thrice, thrice[0])))
+    assert "median of 4 fixed" in more
+    assert "median of" not in str(Comparisons(tuple(thrice)[:2]))
     (row,) = (line for line in lines if line.startswith("normal"))
     assert row.split()[1:5] == ["0.0"] * 4
     assert len({line.index("A") for line in lines if line.split()[:3] == ["A", "B", "C"]}) == 1

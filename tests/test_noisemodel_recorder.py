@@ -131,6 +131,17 @@ def test_stamps_that_jitter_are_resampled_and_holes_are_gaps():
     assert 0.001 < run.meta["jitter"]["rms"] < 0.003
 
 
+def test_angles_that_jump_by_a_turn_are_resampled_without_the_jump():
+    recorder, random = nm.Recorder(None, 100), np.random.default_rng(0)
+    for step in range(500):
+        time = step / 100 + random.uniform(-0.002, 0.002)
+        angle = np.angle(np.exp(3j * time))  # between -pi and pi
+        recorder.push(position=[angle, 0.1 * time], velocity=[3.0, 0.1], time=time)
+    run = recorder.run()
+    since = run.time + float(run.meta["start"])
+    assert np.allclose(run.position[run.mask], np.outer(since, [3.0, 0.1])[run.mask], atol=1e-6)
+
+
 def test_uniform_stamps_count_for_more_than_the_rate():
     recorder = nm.Recorder(None, 1000)
     for step in range(100):

@@ -108,6 +108,17 @@ def test_an_array_on_demand_computes_as_one_in_memory(tmp_path):
     np.testing.assert_array_equal(np.asarray(ours.astype(np.float32)), theirs.astype(np.float32))
 
 
+def test_the_motion_of_a_floating_base_and_its_joints_is_side_by_side(tmp_path):
+    run = shaken()
+    base = np.random.default_rng(2).standard_normal((len(run.time), 6)) * run.mask[:, None]
+    run = replace(run, base_velocity=base)
+    run.save(tmp_path / "run.npz")
+    found = Run.load(tmp_path / "run.npz", on_demand=True).motion
+    assert found.shape == (len(run.time), 6 + len(run.joint_names))
+    np.testing.assert_array_equal(found[1000:1010], run.motion[1000:1010])
+    np.testing.assert_array_equal(np.asarray(found), np.hstack((base, run.velocity)))
+
+
 def findings(analysis):
     """All that an analysis says."""
     verdict = Verdict.of(Path("run"), analysis, localise=True)
