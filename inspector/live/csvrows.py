@@ -104,9 +104,8 @@ class CsvReader:
             return None  # a row is too short or too long
         edges = np.zeros(len(places) + 1, dtype=np.int32)  # of cells, once the marks are gone
         edges[1:] = places - np.arange(len(places))
-        cells = pa.StringArray.from_buffers(
-            len(places), pa.py_buffer(edges), pa.py_buffer(text[~marks])
-        )
+        written = lines.translate(None, b"\n" + self._delimiter.encode())
+        cells = pa.StringArray.from_buffers(len(places), pa.py_buffer(edges), pa.py_buffer(written))
         try:
             numbers = cells.cast(pa.float64())
         except pa.ArrowInvalid:  # such as cells that are empty, quoted or padded
