@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inspector.live.findings import Findings, News
+from inspector.live.findings import Findings, News, lasting
 from models import Labels
 
 NAMES = {".": "ok", "i": "impact", "o": "oscillations", "u": "unknown"}
@@ -71,6 +71,51 @@ def test_the_news_of_a_stream_end_with_its_events_each_once(text, sizes, gaps):
     for place, event in enumerate(ended):
         begun = [each for each, over in told[: told.index((event, True))] if not over]
         assert any(each.label == event.label and each.start >= event.start for each in begun), place
+
+
+@given(
+    st.text(alphabet=".IO", min_size=1, max_size=40),
+    st.lists(st.integers(1, 5), max_size=40),
+)
+def test_no_event_is_told_of_twice(text, sizes):
+    whole, found, first, told = labels(text), Findings(), 0, []
+    news = News(lambda event, over: told.append((event.label, event.start, over)))
+    for size in [*sizes, len(text)]:
+        found.add(whole.part(slice(first, first + size)))
+        news.update(found.confirmed, found.decided)
+        first += size
+    assert len(told) == len(set(told))
+
+
+def test_frames_that_touch_a_failure_are_no_finding_of_their_own():
+    edged = labels("....IOOOOOOI....").events()
+    assert [event.label for event in edged] == ["impact", "oscillations", "impact"]
+    assert [event.label for event in lasting(edged, 0.4, 0.1)] == ["oscillations"]
+    apart = labels("..III.......OOOO..").events()
+    assert lasting(apart, 0.4, 0.1) == apart
+    both = labels("..IIIIIIOOOOOO..").events()
+    assert lasting(both, 0.4, 0.1) == both
+
+
+@given(st.text(alphabet="..IIOO", min_size=1, max_size=40))
+def test_of_events_that_follow_each_other_one_is_a_finding(text):
+    events = labels(text).events()
+    kept = lasting(events, 0.4, 0.1)
+    assert set(kept) <= set(events)
+    for event in events:
+        near = [each for each in kept if each.start <= event.stop and event.start <= each.stop]
+        assert near or len(events) > 2
+    assert bool(kept) == bool(events)
+
+
+def test_an_event_is_told_of_when_its_class_is_settled():
+    whole, found, told = labels("...IOOOOOO....."), Findings(), []
+    news = News(lambda event, over: told.append((place, event.label, over)), 0.7)
+    for place in range(len(whole.start)):
+        part = whole.part(slice(place, place + 1))
+        found.add(part)
+        news.update(lasting(found.confirmed, 0.4, 0.1), found.decided, float(part.stop[-1]))
+    assert told == [(7, "oscillations", False), (14, "oscillations", True)]
 
 
 def test_a_single_frame_above_the_threshold_is_no_news():

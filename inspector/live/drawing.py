@@ -77,7 +77,7 @@ class Drawing:
             kind: [(_joints(kind, plot), columns) for plot, columns in enumerate(self._slices)]
             for kind in self._signals
         }
-        self._told, self._listed = "", set[tuple[str, float]]()
+        self._told = ""
         self._waiting: dict[str, list[tuple[Array, Array]]] = {}
         self._held = 0.0  # time that waits, in [s]
         for kind in self._signals:
@@ -215,7 +215,7 @@ class Drawing:
         return axes.TOP * middles, axes.TOP * (lower - upper) / 2 / count
 
     def findings(self, time: float, found: Sequence[Event], lasting: Sequence[Event]) -> None:
-        """Show the findings so far in a document, and list those that are new.
+        """Show the findings so far in a document.
 
         Args:
             time: Of the latest sample, in [s].
@@ -233,11 +233,11 @@ class Drawing:
             document = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
             index = [at(np.array([time]))]
             self._recording.send_columns("/report", indexes=index, columns=document)
-        for event in found:
-            if (event.label, event.start) not in self._listed:
-                self._listed.add((event.label, event.start))
-                line = f"found: {spoken(event.label)} from {event.start:.2f} s"
-                self.event(event.start, line, self._colours[event.label])
+
+    def found(self, event: Event) -> None:
+        """Add a finding to the list of events."""
+        line = f"found: {spoken(event.label)} from {event.start:.2f} s"
+        self.event(event.start, line, self._colours[event.label])
 
     def event(self, time: float, text: str, colour: colors.Color = colors.CLASSES[UNKNOWN]) -> None:
         """Add a line to the list of events."""

@@ -5,7 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from inspector.localisation.extent import END, ONSET
 from models import Event, Labels
+
+SETTLED = 3
+"""Hops after the start of an event by which its class is told from that of its edge."""
 
 
 class Findings:
@@ -65,25 +69,29 @@ class Findings:
 
 
 class News:
-    """Tells of each event twice: as soon as it is there, and when it is over.
+    """Tells of each event twice: when it is there, and when it is over.
 
-    What an event is called may still change while it lasts: `unknown` frames take the class of a
-    failure that follows. Such an event is told of again under its new name, and only that ends.
+    The frames at the edges of a failure often look like another one: an event is told of when there
+    are frames that begin `SETTLED` hops after it. What it is called may still change: `unknown`
+    frames take the class of a failure that follows. Such an event is told of again under its new
+    name, and only that ends.
 
     Args:
         tell: Called with an event, and whether it is over.
+        wait: Time from the start of an event to the stop of the frames that it waits for, in [s].
     """
 
-    def __init__(self, tell: Callable[[Event, bool], None]) -> None:
-        self._tell = tell
+    def __init__(self, tell: Callable[[Event, bool], None], wait: float = 0.0) -> None:
+        self._tell, self._wait = tell, wait
         self._begun: dict[str, float] = {}
         self._ended: dict[str, float] = {}
 
-    def update(self, events: Sequence[Event], decided: float) -> None:
+    def update(self, events: Sequence[Event], decided: float, now: float = float("inf")) -> None:
         """Tell of what is new.
 
         Args:
             events: All events so far, in order of time.
+            now: Stop of the latest frame, in [s].
             decided: Time up to which nothing changes any more, in [s]: an event that stops earlier
                 is over, since what continues it would begin before its end.
         """
@@ -91,9 +99,11 @@ class News:
         for event in events:
             if event.stop <= self._ended.get(event.label, never):
                 continue
+            if event.start + self._wait > now and event.stop >= decided:
+                continue
             if event.stop > self._begun.get(event.label, never) and not self._lasts(event):
                 self._tell(event, False)
-            self._begun[event.label] = event.stop
+            self._begun[event.label] = max(event.stop, self._begun.get(event.label, never))
             if event.stop < decided:
                 self._ended[event.label] = event.stop
                 self._tell(event, True)
@@ -101,6 +111,39 @@ class News:
     def _lasts(self, event: Event) -> bool:
         """Whether an event has been told of before: it continues one of its class."""
         return self._begun.get(event.label, -float("inf")) >= event.start
+
+
+def lasting(events: Sequence[Event], frame: float, hop: float) -> tuple[Event, ...]:
+    """Leave out events whose frames only touch what another event covers.
+
+    Each frame counts for the hop around its middle. Where events of several classes follow each
+    other, those that keep less than three quarters of a hop of what lies between onset and end of all, where
+    `inspector.localisation.extent` expects them, are the edge of another one.
+
+    Args:
+        events: Events, from the start of the first frame of each to the stop of its last.
+        frame: Duration of a frame, in [s].
+        hop: Time from one frame to the next, in [s].
+
+    Returns:
+        The others, in order of time; of events that follow each other the longest at least.
+    """
+    groups: list[list[Event]] = []
+    for event in sorted(events, key=lambda event: event.start):
+        if groups and event.start <= max(each.stop for each in groups[-1]):
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+    kept: list[Event] = []
+    for group in groups:
+        onset = group[0].start + frame - ONSET * hop
+        end = max(each.stop for each in group) - END * hop
+        margin = (frame - hop) / 2
+        time = [min(end, each.stop - margin) - max(onset, each.start + margin) for each in group]
+        kept += [each for each, own in zip(group, time, strict=True) if own >= 0.75 * hop] or [
+            max(group, key=lambda each: each.stop - each.start)
+        ]
+    return tuple(sorted(kept, key=lambda event: (event.start, event.stop)))
 
 
 def _merged(events: Sequence[Event], others: Sequence[Event]) -> list[Event]:

@@ -197,8 +197,8 @@ class LiveSession:
     def summary(self) -> Summary:
         """What became of the samples so far."""
         worker, buffer = self._worker, self._buffer
-        findings = worker.findings.events if worker else ()
-        frames = worker.findings.frames if worker else 0
+        findings = worker.findings if worker else ()
+        frames = worker.frames if worker else 0
         return Summary(
             samples=worker.samples + buffer.held if worker and buffer else 0,
             rate=self._rate,

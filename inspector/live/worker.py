@@ -14,7 +14,7 @@ from inspector.live.blueprint import SHOWN, Contents, layout
 from inspector.live.buffer import SampleBuffer
 from inspector.live.clock import Clock
 from inspector.live.drawing import Drawing
-from inspector.live.findings import Findings, News
+from inspector.live.findings import SETTLED, Findings, News, lasting
 from inspector.live.labeller import NOISY, Labeller
 from inspector.live.lane import Lane
 from inspector.live.links import LinkLevels
@@ -73,8 +73,9 @@ class Worker:
         self._labeller = Labeller(library, rate, widths)
         self._lane = Lane(self._labeller.hop, self._labeller.length)
         self._counts: Counter[str] = Counter()
-        self.findings = Findings()
-        self._news = None if on_finding is None else News(on_finding)
+        self._findings = Findings()
+        wait = self._labeller.length + SETTLED * self._labeller.hop
+        self._news, self._on_finding = News(self._tell, wait), on_finding
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
         self._robot = None
         self._links: LinkLevels | None = None
@@ -126,6 +127,19 @@ class Worker:
         """From a frame's last sample to its label in the recording, in [s]."""
         return tuple(self._delays)
 
+    @property
+    def findings(self) -> tuple[Event, ...]:
+        """The findings so far, as if the signal ended here."""
+        return self._lasting(self._findings.events)
+
+    @property
+    def frames(self) -> int:
+        """How many frames were labelled."""
+        return self._findings.frames
+
+    def _lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
+        return lasting(events, self._labeller.length, self._labeller.hop)
+
     def work(self, buffer: SampleBuffer) -> None:
         """Show the samples that a buffer holds, and empty it."""
         time, received, signals = buffer.take()
@@ -175,12 +189,11 @@ class Worker:
 
     def finish(self) -> None:
         """Show what waits, and tell of findings that last to the end."""
-        if self._news is not None:
-            self._news.update(self.findings.events, float("inf"))
+        self._news.update(self.findings, float("inf"))
         if self._sink.alive:
             self._drawing.changes(self._lane.end())
             if self._labeller.classes and self._contents is not None:
-                self._drawing.findings(self._now, self.findings.events, ())
+                self._drawing.findings(self._now, self.findings, ())
             if (columns := self._spectrogram.flush()) is not None:
                 self._drawing.spectrogram(columns)
             self._drawing.flush()
@@ -242,9 +255,9 @@ class Worker:
             back = np.rint((self._labeller.elapsed - labels.stop) * self._rate).astype(int)
             shift = end - self._labeller.elapsed
             labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
-            self.findings.add(labels)
-            if self._news is not None:
-                self._news.update(self.findings.confirmed, self.findings.decided)
+            self._findings.add(labels)
+            told = self._lasting(self._findings.confirmed)
+            self._news.update(told, self._findings.decided, float(labels.stop[-1]))
             labels = replace(labels, label=labels.raw)
             self._counts.update(labels.label.tolist())
             changes = self._lane.take(labels)
@@ -259,9 +272,15 @@ class Worker:
         if columns is not None and self._sink.alive:
             self._drawing.spectrogram(columns)
 
+    def _tell(self, event: Event, over: bool) -> None:
+        if self._sink.alive and not over:
+            self._drawing.found(event)
+        if self._on_finding is not None:
+            self._on_finding(event, over)
+
     def _show_findings(self, end: float) -> None:
         """Show the findings so far; one that reaches the latest frame lasts."""
-        found = self.findings.events
+        found = self.findings
         latest = end - 2 * self._labeller.hop
         self._drawing.findings(end, found, [event for event in found if event.stop >= latest])
 
