@@ -139,10 +139,14 @@ class _StandardOutput(io.FileIO):
 
 
 def _standard_output() -> _StandardOutput | None:
-    """Watch standard output for errors, if it is a file or a pipe."""
+    """Watch standard output for errors, if it is a file or a pipe, or closed."""
     plain = sys.__stdout__
-    if plain is None or sys.stdout is not plain or plain.isatty():
+    if sys.stdout is not plain or (plain is not None and plain.isatty()):
         return None
+    if plain is None:  # was closed: whatever is written is lost
+        watched = _StandardOutput(os.open(os.devnull, os.O_RDONLY), "w")
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(watched), encoding="utf-8")
+        return watched
     watched = _StandardOutput(plain.fileno(), "w", closefd=False)
     sys.stdout = io.TextIOWrapper(
         io.BufferedWriter(watched), encoding=plain.encoding, errors=plain.errors

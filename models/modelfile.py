@@ -97,8 +97,12 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
     """
     if path.is_dir():
         raise OutputError(path, "is a folder; name a file")
+    if path.exists() and not path.is_file():
+        raise OutputError(path, "is no regular file; name one")
     if path.exists() and not overwrite:
         raise OutputError(path, EXISTS)
+    if path.is_symlink():  # the link stays
+        path = path.resolve()
     temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")  # swept by `noisemodel`
     try:
         file = temporary.open("xb")

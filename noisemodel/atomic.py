@@ -6,7 +6,7 @@ import os
 import platform
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
@@ -25,9 +25,9 @@ shares the folder, and on this one, whose locks are known."""
 def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Offer a temporary path beside ``path`` that takes its place only if the block succeeds.
 
-    Of several that write one file at once and may not replace it, one succeeds. Temporary files
-    that no process holds are deleted from the folder: after a minute without a change, or after a
-    day if another machine may hold them.
+    A link stays, and what it leads to is written. Of several that write one file at once and may
+    not replace it, one succeeds. Temporary files that no process holds are deleted from the folder:
+    after a minute without a change, or after a day if another machine may hold them.
 
     Args:
         path: The file to write.
@@ -41,6 +41,8 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """
     path = Path(path)
     refuse_existing(path, overwrite=overwrite)
+    if path.is_symlink():
+        path = path.resolve()
     _sweep(path.parent.absolute())
     temporary = path.with_name(f".noise-inspector-{_machine()}{uuid4().hex[:8]}")
     try:  # with the permissions that the umask leaves to any file
@@ -122,19 +124,27 @@ def _is_left(path: str) -> bool:
         os.close(file)
 
 
-def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
+def refuse_existing(
+    path: str | Path, *, overwrite: bool = False, read: Iterable[Path] = ()
+) -> None:
     """Refuse an output before long work is done for it.
 
     Args:
         path: The file that will be written.
         overwrite: Whether a file that exists may be replaced.
+        read: Files that are read for it, which it never replaces.
 
     Raises:
-        OutputError: If ``path`` exists and may not be replaced, is a folder, or has no folder.
+        OutputError: If ``path`` exists and may not be replaced, is a folder, a device or a pipe, or
+            has no folder.
     """
     path = Path(path)
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file")
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path}: is no regular file; name one")
+    if path.exists() and any(each.exists() and path.samefile(each) for each in read):
+        raise OutputError(f"{path}: is read, too; choose another name for the output")
     if path.exists() and not overwrite:
         raise _exists(path)
     if not path.parent.is_dir():

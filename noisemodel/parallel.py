@@ -14,10 +14,10 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -150,19 +150,23 @@ def _pool(function: Callable[..., Any], jobs: int) -> Executor:
     threads = max(1, (os.cpu_count() or 1) // jobs)
     if _forks():
         return ProcessPoolExecutor(
-            jobs, multiprocessing.get_context("fork"), _begin, (function, threads)
+            jobs, multiprocessing.get_context("fork"), _begin, (function, threads, os.getpid())
         )
     from joblib.externals.loky import ProcessPoolExecutor as Fresh
 
-    pool: Executor = Fresh(jobs, timeout=60, initializer=_begin, initargs=(function, threads))
+    given = (function, threads, os.getpid())
+    pool: Executor = Fresh(jobs, timeout=60, initializer=_begin, initargs=given)
     return pool
 
 
 _function: Callable[[Any], Any]
 
 
-def _begin(function: Callable[[Any], Any], threads: int) -> None:
-    """Prepare a worker: it has the function, and as many threads as there are cores for it."""
+def _begin(function: Callable[[Any], Any], threads: int, parent: int) -> None:
+    """Prepare a worker: it has the function, and as many threads as there are cores for it.
+
+    It ends with its parent, which may be killed at any moment.
+    """
     from threadpoolctl import threadpool_limits
 
     global _function
@@ -170,15 +174,13 @@ def _begin(function: Callable[[Any], Any], threads: int) -> None:
     gc.freeze()  # a collection that visits what was forked would copy its pages
     threadpool_limits(threads)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops its workers
-    parent = multiprocessing.parent_process()
-    if parent is not None and parent.sentinel is not None:  # of a fresh one loky takes care
-        threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
-def _end_with(parent: Any) -> None:
-    """End this process with its parent, which may be killed at any moment."""
-    with suppress(OSError):
-        parent.join()
+def _end_with(parent: int) -> None:
+    """End this process when its parent is another one."""
+    while os.getppid() == parent:
+        time.sleep(POLL)
     os._exit(1)
 
 

@@ -147,10 +147,48 @@ def test_entries_that_name_joints_are_applied(runs):
         (["--expect", "x.toml", "--no-expect"], 2),
         (["--write", "excel=x"], 2),
         (["--write", "junit"], 2),
+        (["--write", "junit=a.out", "--write", "json=a.out"], 2),
+        (["--min-score", "nan"], 2),
+        (["--min-duration", "inf"], 2),
     ],
 )
 def test_options_name_the_findings_that_fail_a_run(runs, options, status):
     assert call("classify", runs / "demo.npz", *options)[0] == status
+
+
+def test_a_run_that_is_named_twice_is_classified_once(runs):
+    (runs / "link.npz").symlink_to("demo.npz")
+    demo = runs / "demo.npz"
+    status, out, _ = call("classify", demo, runs / "link.npz", demo, "--format", "json")
+    assert status == 1
+    assert [each["run"] for each in json.loads(out)["runs"]] == [str(demo)]
+
+
+@pytest.mark.parametrize(
+    ("output", "name"),
+    [
+        (["--labels-to", "runs", "--labels-format", "csv"], "demo.csv"),
+        (["--write", "json=runs/demo.csv"], "demo.csv"),
+    ],
+)
+def test_an_output_never_replaces_a_run_that_is_read(runs, monkeypatch, output, name):
+    monkeypatch.chdir(runs.parent)
+    log = Path("runs") / name
+    log.write_text("time,elbow.velocity\n" + "".join(f"{k / 100},0\n" for k in range(300)))
+    before = log.read_text()
+    status, _, err = call("classify", log, *output, "--overwrite")
+    assert (status, log.read_text()) == (3, before)
+    assert f"inspector: {log}: is read, too; choose another name for the output\n" in err
+
+
+@pytest.mark.parametrize("command", [("report", "-o"), ("view", "--save")])
+def test_a_picture_never_replaces_its_run(runs, command):
+    name, option = command
+    demo = runs / "demo.npz"
+    before = demo.read_bytes()
+    status, _, err = call(name, demo, option, demo, "--overwrite")
+    assert (status, demo.read_bytes()) == (3, before)
+    assert "is read, too" in err
 
 
 def test_bad_input_is_ignored_on_request_unless_there_is_nothing_else(runs):

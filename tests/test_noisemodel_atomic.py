@@ -6,10 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from models import modelfile
 from noisemodel import OutputError
-from noisemodel.atomic import _sweep, replacing
+from noisemodel.atomic import _sweep, refuse_existing, replacing
 
 ROOT = Path(__file__).parents[1]
+
+
+def save_model(path, text, **options):
+    modelfile.write(path, {"text": text}, {}, **options)
 
 
 def write(path, text, **options):
@@ -78,6 +83,32 @@ def test_a_file_that_exists_is_not_replaced_unasked(tmp_path):
 def test_a_folder_is_not_replaced(tmp_path):
     with pytest.raises(OutputError, match="is a folder; name a file"):
         write(tmp_path, "", overwrite=True)
+
+
+def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
+    (tmp_path / "link").symlink_to(tmp_path / "target")
+    write(tmp_path / "link", "first")
+    with pytest.raises(OutputError, match="link: exists already"):
+        write(tmp_path / "link", "second")
+    write(tmp_path / "link", "second", overwrite=True)
+    assert (tmp_path / "link").is_symlink()
+    assert (tmp_path / "target").read_text() == "second"
+
+
+@pytest.mark.parametrize("save", [write, save_model], ids=["file", "model"])
+def test_a_pipe_is_not_replaced(tmp_path, save):
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(ValueError, match="pipe: is no regular file; name one"):
+        save(tmp_path / "pipe", "", overwrite=True)
+    assert (tmp_path / "pipe").is_fifo()
+
+
+def test_what_is_read_is_not_replaced(tmp_path):
+    (tmp_path / "log.csv").write_text("log")
+    (tmp_path / "link").symlink_to("log.csv")
+    with pytest.raises(OutputError, match="log.csv: is read, too; choose another name"):
+        refuse_existing(tmp_path / "log.csv", overwrite=True, read=[tmp_path / "link"])
+    refuse_existing(tmp_path / "log.csv", overwrite=True, read=[tmp_path / "gone.csv"])
 
 
 def test_a_missing_folder_is_named(tmp_path):

@@ -57,6 +57,16 @@ def test_every_command_ends_with_5_if_standard_output_is_on_a_full_disk(argument
 
 
 @pytest.mark.parametrize("arguments", COMMANDS, ids=lambda each: each[0])
+def test_every_command_ends_with_5_if_standard_output_is_closed(arguments):
+    shell = ["sh", "-c", 'exec "$@" >&-', "sh", *command(*arguments)]
+    done = subprocess.run(shell, cwd=ROOT, check=False, text=True, stderr=subprocess.PIPE)
+    assert done.returncode == 5
+    reason = "cannot be written (Bad file descriptor)"
+    assert done.stderr.splitlines()[-1] == f"inspector: output lost: standard output: {reason}"
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("arguments", COMMANDS, ids=lambda each: each[0])
 def test_every_command_ends_with_5_if_the_reader_of_standard_output_is_gone(arguments):
     reader, writer = os.pipe()
     os.close(reader)
@@ -131,19 +141,21 @@ def alive(pid):
 
 SLOW = """
 import sys, time
-from noisemodel.parallel import in_order
+from noisemodel import parallel
+parallel._forks = lambda: FORKS
 def wait(seconds):
     open(f"{sys.argv[1]}/{seconds}", "w").close()
     time.sleep(seconds)
-list(in_order(wait, [50, 51, 52], jobs=2, died=None))
+list(parallel.in_order(wait, [50, 51, 52], jobs=2, died=None))
 """
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="needs /proc")
 @pytest.mark.parametrize("stop", [signal.SIGKILL, signal.SIGTERM])
-def test_workers_end_with_the_process_that_waits_for_them(tmp_path, stop):
+@pytest.mark.parametrize("forks", [True, False])
+def test_workers_end_with_the_process_that_waits_for_them(tmp_path, stop, forks):
     script = tmp_path / "slow.py"
-    script.write_text(SLOW.replace("sys.argv[1]", repr(str(tmp_path))))
+    script.write_text(SLOW.replace("sys.argv[1]", repr(str(tmp_path))).replace("FORKS", str(forks)))
     with subprocess.Popen(
         [sys.executable, script], env=os.environ | {"PYTHONPATH": str(ROOT)}
     ) as p:

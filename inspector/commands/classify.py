@@ -15,6 +15,7 @@ from inspector.commands.options import (
     Dask,
     ModelFiles,
     Overwrite,
+    finite,
     jobs_or_dask,
     reads_logs,
     say_assumed,
@@ -100,10 +101,17 @@ def classify(
         _of_gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
     ] = None,
     min_score: Annotated[
-        float | None, _of_gate("--min-score", help="Only findings of this score or more.")
+        float | None,
+        _of_gate("--min-score", callback=finite, help="Only findings of this score or more."),
     ] = None,
     min_duration: Annotated[
-        float, _of_gate("--min-duration", min=0.0, help="Only findings of so many seconds or more.")
+        float,
+        _of_gate(
+            "--min-duration",
+            min=0.0,
+            callback=finite,
+            help="Only findings of so many seconds or more.",
+        ),
     ] = 0.0,
     on_bad_input: Annotated[
         BadInput, _of_gate("--on-bad-input", help="A file that cannot be read: fails, or ignored.")
@@ -134,6 +142,7 @@ def classify(
     from inspector.progress import progress
     from inspector.report.cases import published
     from inspector.report.formats import FORMATS
+    from noisemodel.atomic import refuse_existing
 
     if localise and format is not Format.JSON:
         raise typer.BadParameter("--localise takes --format json")
@@ -144,6 +153,8 @@ def classify(
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
     found, others = sources(runs, reading)
     shown = [each.shown for each in found]
+    for path in files:
+        refuse_existing(path, overwrite=overwrite, read=shown)
     expected = {} if no_expect else _expected(shown, expect, library)
     today = date.today()
     targets = {}

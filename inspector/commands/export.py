@@ -38,7 +38,9 @@ def export(
     from inspector.export import LAYOUTS
     from inspector.export import export as write
     from inspector.library import load_library
+    from noisemodel.atomic import refuse_existing
 
+    refuse_existing(output, overwrite=overwrite, read=[run])
     library = load_library(assets.model_files(model))
     found = write(
         opened(run, reading).run,

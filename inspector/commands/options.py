@@ -4,6 +4,7 @@ import inspect
 import os
 from collections.abc import Callable, Collection
 from functools import wraps
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -49,6 +50,13 @@ def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
     if dask and jobs > 1:
         raise typer.BadParameter("--jobs and --dask exclude each other")
     return dask or jobs
+
+
+def finite(value: float | None) -> float | None:
+    """Refuse what no number can be compared with."""
+    if value is not None and not isfinite(value):
+        raise typer.BadParameter(f"{value} is no finite number")
+    return value
 
 
 def _known(kind: str) -> str:

@@ -42,6 +42,8 @@ def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -
                 param_hint="'--write'",
             )
         refuse_existing(path, overwrite=overwrite)
+        if Path(path) in files:
+            raise typer.BadParameter(f"{path}: is named twice", param_hint="'--write'")
         files[Path(path)] = name
     return files
 

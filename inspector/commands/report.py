@@ -42,7 +42,7 @@ def report(
     from noisemodel.atomic import refuse_existing
 
     html.require()
-    refuse_existing(output, overwrite=overwrite)
+    refuse_existing(output, overwrite=overwrite, read=[run])
     library = load_library(assets.model_files(model))
     found = analyse_file(opened(run, reading), library, links=not no_robot, kind=kind)
     assert found.audit is not None

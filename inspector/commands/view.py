@@ -98,7 +98,7 @@ def view(
         browser.free_port(port)
     target = save or viewer.scratch_path(_together(paths))
     overwrite = overwrite or save is None
-    refuse_existing(target, overwrite=overwrite)
+    refuse_existing(target, overwrite=overwrite, read=paths)
     library = load_library(assets.model_files(model))
     robot, unread, seconds = not no_robot, False, None
     if len(paths) > 2:

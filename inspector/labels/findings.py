@@ -41,7 +41,7 @@ def label_paths(
     except OSError as error:
         raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
     for target in targets.values():
-        refuse_existing(target, overwrite=overwrite)
+        refuse_existing(target, overwrite=overwrite, read=targets)
     return targets
 
 

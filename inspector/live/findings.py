@@ -117,8 +117,8 @@ def lasting(events: Sequence[Event], frame: float, hop: float) -> tuple[Event, .
     """Leave out events whose frames only touch what another event covers.
 
     Each frame counts for the hop around its middle. Where events of several classes follow each
-    other, those that keep less than three quarters of a hop of what lies between onset and end of all, where
-    `inspector.localisation.extent` expects them, are the edge of another one.
+    other, onset and end of all are expected where `inspector.localisation.extent` does without the
+    signal. Those that keep less than three quarters of a hop in between are the edge of another.
 
     Args:
         events: Events, from the start of the first frame of each to the stop of its last.

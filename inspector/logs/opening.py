@@ -159,8 +159,8 @@ def sources(
         reading: How to read them.
 
     Returns:
-        The runs, in the order of the paths, those of a folder by name; and the files of folders
-        that are not taken for logs.
+        The runs, each once, in the order of the paths, those of a folder by name; and the files of
+        folders that are not taken for logs.
 
     Raises:
         InspectorError: If a folder holds no log, or a desired log is named for several.
@@ -168,10 +168,13 @@ def sources(
     reading = reading or Reading()
     found: list[Source] = []
     others: list[Path] = []
+    seen: set[Path] = set()
     for path in paths:
         logs, rest = logs_in(path)
         others += rest
-        found += (each for log in logs for each in _episodes(log, reading))
+        new = [log for log in logs if log.resolve() not in seen]
+        seen.update(log.resolve() for log in new)
+        found += (each for log in new for each in _episodes(log, reading))
     if reading.desired and len(found) > 1:
         raise InspectorError(
             f"{reading.desired}: belongs to one log, {len(found)} are given (--desired)"
