@@ -370,3 +370,42 @@ def test_the_audit_names_a_placeholder_of_the_desired_velocity():
     clause = "zero throughout while joints move at more than 0.1 rad/s for seconds: it is left out"
     assert any(clause in warning for warning in audit(zeros(moving()), LIBRARY).warnings)
     assert not any("left out" in warning for warning in audit(moving(), LIBRARY).warnings)
+
+
+@pytest.mark.parametrize(
+    ("content", "names"),
+    [
+        ("0.0 1.5\n", False),
+        ("# time noise\n\n 0.0, 1.5\n", False),
+        ("-1;2\n", False),
+        ("time,noise\n", True),
+        ("0.0 1.5 2.5\n", True),
+        ("0.0 1.5 2.5 3.5\n", True),
+        ("# nothing but a remark\n", False),
+        ("", False),
+    ],
+)
+def test_a_log_of_two_numbers_a_line_is_told_from_one_with_names(tmp_path, content, names):
+    from inspector.analysis.verdict import _has_header
+
+    path = tmp_path / "noise.log"
+    path.write_text(content)
+    assert _has_header(path) == names
+
+
+def test_noises_are_not_written_over_a_file_unasked(tmp_path):
+    from inspector.analysis.level import write_csv
+    from noisemodel import OutputError
+
+    write_csv(moving(), (), tmp_path / "noise.csv")
+    with pytest.raises(OutputError, match="exists already"):
+        write_csv(moving(), (), tmp_path / "noise.csv")
+
+
+def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
+    from inspector.analysis.verdict import work_of
+
+    (tmp_path / "a.npz").write_bytes(bytes(1_000_000))
+    (tmp_path / "b.npz").write_bytes(bytes(500_000))
+    found = [tmp_path / "a.npz", tmp_path / "b.npz", tmp_path / "gone.npz", tmp_path]
+    assert work_of(found) == pytest.approx(0.03, rel=1e-12)

@@ -175,11 +175,12 @@ def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
     status, _, err = call("classify", demo_run(), "--resume", state, "--model", other)
     assert status == 3
     assert err == f"inspector: {state}: is of other models; name another file, or delete it\n"
-    state.write_text("some notes")
-    status, _, err = call("classify", demo_run(), "--resume", state)
-    assert status == 3
-    assert "holds no state of classify" in err
-    assert state.read_text() == "some notes"
+    for content in ("some notes\n", '{"format": "notes/1"}\n', '["noise-state/1"]\n', "7\n"):
+        state.write_text(content)
+        status, _, err = call("classify", demo_run(), "--resume", state)
+        assert status == 3
+        assert "holds no state of classify" in err
+        assert state.read_text() == content
 
 
 def test_a_run_that_kills_its_worker_is_named_and_the_others_are_classified(runs, monkeypatch):

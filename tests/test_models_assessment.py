@@ -200,6 +200,8 @@ def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
     assert "impact in talos/good-009, 0.00 s to 5.00 s" in lines
     assert "Calibration error - (the scores are no probabilities)" in lines
     assert "highaccelerations - - 0 0 0" in lines
+    for budget, share in ((5, "0.0%"), (20, "0.0%"), (100, "100.0%")):
+        assert f"{budget} false alarms per h {share} [0.0, 100.0] {share} [0.0, 100.0]" in lines
 
 
 def test_it_prints_the_papers_measures_under_the_papers_names():

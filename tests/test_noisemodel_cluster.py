@@ -305,3 +305,57 @@ def test_processes_here_and_a_cluster_exclude_each_other():
     status, _, err = call("classify", demo_run(), "-j", 2, "--dask", "tcp://127.0.0.1:1")
     assert status == 2
     assert "--jobs and --dask exclude each other" in err
+
+
+class Fake:
+    """A client of a scheduler with such workers."""
+
+    def __init__(self, *, status="running", workers=("one",), versions=None):
+        self.status, self._workers, self._versions = status, workers, versions or {}
+
+    def nthreads(self):
+        return dict.fromkeys(self._workers, 1)
+
+    def run(self, function, name, on_error):
+        assert on_error == "return"
+        here = cluster._software()[name]
+        return {worker: self._versions.get((worker, name), here) for worker in self._workers}
+
+
+def test_workers_with_other_software_are_named():
+    cluster._check_software(Fake(workers=("one", "two")), "tcp://here:1")
+    for there, said in (("0.0.1", "numpy 0.0.1, here is"), (ImportError(), "numpy none, here is")):
+        client = Fake(workers=("one", "two"), versions={("two", "numpy"): there})
+        with pytest.raises(ClusterError, match=rf"^tcp://here:1: worker two has {said}"):
+            cluster._check_software(client, "tcp://here:1")
+
+
+def test_a_scheduler_may_be_without_workers_for_a_minute(monkeypatch):
+    monkeypatch.setattr(cluster, "monotonic", lambda: 100.0)
+    assert cluster._check_alive(Fake(), "a", 30.0) == 100.0
+    assert cluster._check_alive(Fake(workers=()), "a", 40.0) == 40.0
+    with pytest.raises(ClusterError, match="a: the Dask scheduler has lost all its workers"):
+        cluster._check_alive(Fake(workers=()), "a", 39.9)
+    with pytest.raises(ClusterError, match="a: the connection to the Dask scheduler is lost"):
+        cluster._check_alive(Fake(status="closed"), "a", 100.0)
+
+
+def test_a_worker_calls_a_function_where_and_as_its_client_would(tmp_path, monkeypatch):
+    monkeypatch.setenv("OTHER", "here")
+    own = cluster._Client(str(tmp_path), {"NOISE_X": "1"}, cluster._software())
+    before, folder = dict(os.environ), Path.cwd()
+
+    def seen(item):
+        return item, Path.cwd(), os.environ["NOISE_X"], os.environ["OTHER"]
+
+    assert cluster._called(seen, 7, own) == (7, tmp_path, "1", "here")
+    with pytest.raises(ZeroDivisionError):
+        cluster._called(lambda item: item / 0, 7, own)
+    assert (dict(os.environ), Path.cwd()) == (before, folder)
+    late = cluster._Client(str(tmp_path), {}, {**cluster._software(), "numpy": "0.0.1"})
+    with pytest.raises(ClusterError, match="this worker came later, and has other software"):
+        cluster._called(seen, 7, late)
+    gone = cluster._Client(str(tmp_path / "gone"), {}, cluster._software())
+    with pytest.raises(ClusterError, match=rf"a worker has no folder {tmp_path}/gone; it must see"):
+        cluster._called(seen, 7, gone)
+    assert (dict(os.environ), Path.cwd()) == (before, folder)

@@ -460,6 +460,8 @@ def thrice(urdfs):
 def test_a_table_has_a_row_per_robot_and_medians(thrice):
     lines = str(thrice).splitlines()
     assert "Reference 'normal'" in lines[0]
+    assert "Of all 3, medians" in lines
+    assert "By kind" in str(Comparisons((thrice[0],))).splitlines()
     assert sum("chain.urdf" in line for line in lines) == 3
     assert sum(line.startswith("median of 3 fixed") for line in lines) == 1
     assert not any("of 3 floating" in line for line in lines)

@@ -8,7 +8,7 @@ import pinocchio
 import pytest
 
 import noisemodel as nm
-from noisemodel import MissingMeshError, Robot, RobotError, Run, UnknownRobotError
+from noisemodel import MissingMeshError, Robot, RobotError, Run, UnknownRobotError, mjcf
 from noisemodel.excitation import excitation, limits
 from noisemodel.geometry import triangles
 from noisemodel.links import link_noise
@@ -169,6 +169,30 @@ def test_joints_that_an_equality_ties_together_are_coupled_if_asked(tmp_path):
     assert coupled.mimics["knee"] == Mimic("hip", -2.0, 0.1)
 
 
+def test_an_equality_that_couples_no_joints_hides_none_that_follows(tmp_path):
+    pairs = (
+        '<connect body1="left" body2="shin" anchor="0 0 0"/>',
+        '<joint joint1="knee" joint2="hip" polycoef="0 1 2 0 0"/>',  # not linear
+        '<joint joint1="knee" joint2="hip" polycoef="0 1 0 0 0" active="false"/>',
+        '<joint joint1="knee" joint2="hip" polycoef="0.1 -2 0 0 0"/>',
+    )
+    text = LEGS.replace("</mujoco>", f"<equality>{''.join(pairs)}</equality></mujoco>")
+    assert Robot.load(written(tmp_path, text), mimic=True).mimics == {"knee": Mimic("hip", -2, 0.1)}
+
+
+def test_a_file_that_only_an_included_one_is_beside_is_included(tmp_path):
+    written(tmp_path, ARM, "parts/arm.xml")
+    written(tmp_path, '<mujoco><include file="arm.xml"/></mujoco>', "parts/both.xml")
+    scene = written(tmp_path, '<mujoco><include file="parts/both.xml"/></mujoco>', "scene.xml")
+    assert "wrist" in Robot.load(scene).joint_names
+
+
+def test_a_urdf_is_known_by_its_root_after_a_long_beginning(tmp_path):
+    text = f'<?xml version="1.0"?>\n<!-- {"a licence " * 20} -->\n<robot name="r"/>'
+    assert not mjcf.is_mjcf(written(tmp_path, text, "r.xml"))
+    assert mjcf.is_mjcf(written(tmp_path, text.replace("robot", "mujoco"), "m.xml"))
+
+
 def test_a_joint_that_is_held_at_an_angle_follows_no_other(tmp_path):
     held = '<equality><joint joint1="knee" polycoef="0.1 0 0 0 0"/></equality></mujoco>'
     robot = Robot.load(written(tmp_path, LEGS.replace("</mujoco>", held)), mimic=True)
@@ -182,6 +206,8 @@ def test_a_joint_that_is_held_at_an_angle_follows_no_other(tmp_path):
         ('type="box" size="0.5 1 1.5"', 22.0),
         ('type="cylinder" size="0.5 1"', 2.5 * np.pi),
         ('type="capsule" size="0.5 1"', 3 * np.pi),
+        ('type="capsule" size="0.5 0.75"', 2.5 * np.pi),
+        ('type="cylinder" size="0.5 0.75"', 2.0 * np.pi),
         ('type="capsule" fromto="0 0 0 0 2 0" size="0.5"', 3 * np.pi),
         ('type="ellipsoid" size="0.5 0.5 0.5"', np.pi),
     ],
@@ -235,10 +261,11 @@ def test_meshes_are_read_wherever_they_stand_among_other_geoms(tmp_path):
     mesh = '<geom type="mesh" mesh="m"/>'
     for other in ('type="box" size="1 1 1"', 'type="box" mesh="m"'):
         box, areas = f'<geom {other} pos="9 0 0"/>', []
-        for geoms in (box, mesh, mesh + box, box + mesh):
+        for geoms in (box, mesh, mesh + box, box + mesh, box + mesh + box + mesh):
             robot = Robot.load(written(tmp_path, one_body(geoms, head=head)))
             areas.append(nm.Surface.of(robot).area.sum())
-        assert areas[2:] == pytest.approx([areas[0] + areas[1]] * 2)
+        both = areas[0] + areas[1]
+        assert areas[2:] == pytest.approx([both, both, 2 * both])
 
 
 def test_a_geom_keeps_its_own_colour_where_a_material_has_another(tmp_path):

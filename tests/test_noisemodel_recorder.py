@@ -125,6 +125,7 @@ def test_stamps_that_jitter_are_resampled_and_holes_are_gaps():
             recorder.push(velocity=[np.sin(3 * time)], time=time)
     run = recorder.run()
     assert run.rate == 100.0
+    assert run.mask[0]
     since = run.time + float(run.meta["start"])
     assert np.allclose(run.velocity[run.mask, 0], np.sin(3 * since[run.mask]), atol=1e-3)
     assert 48 <= (~run.mask).sum() <= 52

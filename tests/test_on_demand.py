@@ -18,7 +18,7 @@ from inspector.analysis.verdict import Verdict
 from inspector.hold import hold_length, without_hold
 from inspector.library import load_library, signal_names, signals_of
 from inspector.logs.opening import open_run
-from noisemodel import Run, RunFileError, archive, decimated, ondemand, runfile
+from noisemodel import Run, RunError, RunFileError, archive, decimated, ondemand, runfile
 from noisemodel.ondemand import OnDemand, pieces
 from noisemodel.run import pieces_of
 
@@ -277,3 +277,12 @@ def test_names_of_signals_are_those_of_the_signals():
         assert set(signal_names(run)) == set(signals_of(run))
     assert "error" not in signal_names(replace(shaken(), velocity_desired=shaken().velocity))
     assert set(models.signals.JOINTS) < set(signal_names(shaken()))
+
+
+@pytest.mark.parametrize("row", range(1, 40))
+def test_a_step_that_is_uneven_is_named_wherever_pieces_of_the_time_begin(monkeypatch, row):
+    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 8)
+    time = np.arange(40) / 10.0
+    time[row:] += 0.05
+    with pytest.raises(RunError, match=rf"not uniform, the step to row {row} is 0.15 s"):
+        Run(time=time, velocity=np.zeros((40, 1)), joint_names=("a",))
