@@ -23,7 +23,8 @@ from inspector import colors
 from inspector.analysis.analyse import Analysis, Status, analyse_file
 from inspector.errors import InspectorError
 from inspector.levels import velocity_levels
-from inspector.recording import axes
+from inspector.recording import axes, blueprint
+from inspector.recording.blueprint import height
 from inspector.recording.noise import POINTS as NOISE_POINTS
 from inspector.recording.noise import scaled
 from inspector.recording.recording import linked, write
@@ -722,3 +723,13 @@ def test_links_before_their_share_point_to_the_robot():
 def test_names_elsewhere_are_left_alone():
     text = "- Links without geometry make no noise: arm_2_link.\n- 60% of arm_2_link"
     assert linked(text, ENTITIES) == text
+
+
+def test_the_text_is_as_high_as_the_paragraphs_that_fit():
+    title, short = "### ok\n\n", "x" * 70
+    one, two = height(title + short), height(f"{title}{short}\n\n{short}")
+    assert two - one == blueprint.PARAGRAPH
+    assert height(f"{title}{short}\n{short}") - one == blueprint.LINE
+    assert height(title + 2 * short) - one == blueprint.LINE
+    assert height(f"{title}{short}\n\n{short * 30}") == one  # whose end would be below the edge
+    assert height(title + f"{short}\n\n" * 20) <= blueprint.TALLEST

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 
 from rerun.blueprint import Blueprint
 
@@ -15,6 +16,13 @@ from inspector.recording.series import TIMELINE
 from inspector.recording.spectrogram import TOP_HZ
 from inspector.recording.unstable import Part
 
+HEAD, PARAGRAPH, LINE, FOOT = 36.0, 31.0, 15.5, 28.0
+"""Of a text, in points: from the top to the middle of its title, on to the first line of the next
+paragraph, to the next line, and from the last one to the end."""
+COLUMNS = 72
+"""Characters of a line at the left of a window of 1440 x 900, at least."""
+TALLEST = 264.0
+"""Most height of the text at the left, in points."""
 TITLES = 28.0
 """Height of a row of tabs, in points."""
 SPAN = "/span"
@@ -26,6 +34,7 @@ class Contents:
     """What a recording holds that the layout depends on.
 
     Attributes:
+        text: Findings and what is known of the run, in Markdown.
         classes: Panel of classes; None if nothing was found or annotated.
         curves: Noise, level and probability.
         spectrogram: Panel of the spectrogram.
@@ -43,6 +52,7 @@ class Contents:
         loop: Stretch of time that playing repeats, in [s].
     """
 
+    text: str
     classes: Panel | None
     curves: Sequence[Curve]
     spectrogram: Panel
@@ -82,7 +92,8 @@ def layout(contents: Contents) -> Blueprint:
 
 def _left(contents: Contents) -> Part:
     """Findings above, the robot with its scale, and samples of the worst moments below."""
-    parts: list[tuple[Part, float]] = [(unstable.text("Findings", "/report", titled=False), 214.0)]
+    text = unstable.text("Findings", "/report", titled=False)
+    parts: list[tuple[Part, float]] = [(text, height(contents.text))]
     if contents.events:
         parts.append(
             (
@@ -101,6 +112,22 @@ def _left(contents: Contents) -> Part:
         (unstable.tabs(*(each for one in contents.details for each in _detail(one))), 190.0)
     )
     return unstable.above(*parts)
+
+
+def height(markdown: str) -> float:
+    """Height of a text as far as its paragraphs fit, in points: none is cut through by the edge.
+
+    Args:
+        markdown: A title, then paragraphs and lists with a blank line between them.
+    """
+    found = HEAD
+    for paragraph in markdown.strip().split("\n\n")[1:]:
+        lines = sum(ceil(len(line.replace("**", "")) / COLUMNS) for line in paragraph.split("\n"))
+        below = found + PARAGRAPH + LINE * (lines - 1)
+        if below + FOOT > TALLEST:
+            break
+        found = below
+    return found + FOOT
 
 
 def _rows(panel: Panel, path: str, *, name: str | None = None) -> Part:

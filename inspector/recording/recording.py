@@ -87,9 +87,11 @@ def _log(
         unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
     limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
     shown = details.log(recording, analysis, moments)
-    _log_text(recording, analysis, {} if tree is None else robot.entities(tree))
+    text = report(analysis)
+    _log_text(recording, analysis, text, {} if tree is None else robot.entities(tree))
     failures = [moment for moment in moments if moment.failure]
     return Contents(
+        text=text,
         classes=shown_classes,
         curves=curves,
         spectrogram=spectrograms.log(recording, analysis, spectrum, scale),
@@ -109,7 +111,7 @@ def _log(
 
 
 def _log_text(
-    recording: rr.RecordingStream, analysis: Analysis, entities: Mapping[str, str]
+    recording: rr.RecordingStream, analysis: Analysis, text: str, entities: Mapping[str, str]
 ) -> None:
     run, links = analysis.run, analysis.links
     properties = {
@@ -123,7 +125,7 @@ def _log_text(
         "link_noise": "" if links is None else links.kind,
         "findings": len(analysis.findings),
     }
-    log_report(recording, analysis.name, linked(report(analysis), entities), properties)
+    log_report(recording, analysis.name, linked(text, entities), properties)
 
 
 def linked(markdown: str, entities: Mapping[str, str]) -> str:
