@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from inspector.text import printable
+
 
 class InspectorError(ValueError):
     """The base of every error that `inspector` expects."""
@@ -38,4 +40,7 @@ class LogError(InspectorError):
 
 def without_path(error: Exception, path: Path) -> str:
     """Text of an error without the name of the file, for lines that begin with it."""
-    return str(error).removeprefix(f"{path}: ").removeprefix(f"{path}, ")
+    text = str(error)
+    for name in (str(path), printable(str(path))):
+        text = text.removeprefix(f"{name}: ").removeprefix(f"{name}, ")
+    return text

@@ -283,6 +283,20 @@ def test_bad_input_is_one_line(tmp_path):
     assert "1 scenario" in out
 
 
+def test_a_file_that_cannot_be_read_is_named_once(tmp_path):
+    """An error of a row names its file before a comma; control characters are written out."""
+    good, bad = folder(tmp_path / "good", [1]), tmp_path / "bad"
+    bad.mkdir()
+    (bad / "row.csv").write_text("time,elbow.velocity\n0,1\n0.01,x\n0.02,3\n")
+    (bad / "new\nline.npz").write_bytes(b"nothing")
+    for command in (("diff", good), ("classify",)):
+        status, _, err = call(*command, bad)
+        assert status == 3
+        assert f"inspector: {bad}/row.csv: row 3: " in err
+        assert err.count("line.npz") == 1
+        assert "line.npz: its name has control characters; rename it\n" in err
+
+
 def test_two_runs_of_one_name_are_refused(tmp_path, library):
     before = folder(tmp_path / "before", [1])
     twice = folder(tmp_path / "twice", [1])

@@ -12,6 +12,7 @@ import numpy as np
 from inspector.analysis.analyse import Analysis, analyse, with_links
 from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import EXPECTED, work_of
+from inspector.errors import without_path
 from inspector.library import Library
 from inspector.logs.opening import open_run
 from inspector.pair.alignment import envelope
@@ -149,7 +150,7 @@ def measure_file(
     try:
         return measure(open_run(path).run, path, library, links=links, unknown=unknown)
     except EXPECTED as error:
-        return Unreadable(path, str(error).removeprefix(f"{path}: "))
+        return Unreadable(path, without_path(error, path))
     except Exception as error:  # a bug that one run shows must not hide the changes of others
         problem = f"{type(error).__name__}: {error}"
         return Unreadable(path, problem, Status.INTERNAL_ERROR, traceback.format_exc())
