@@ -131,7 +131,10 @@ def test_too_few_repetitions_are_inconclusive_and_say_how_many_it_takes(tmp_path
     after = folder(tmp_path / "after", range(3, 6), tone=0.03)
     status, out, _ = diff(before, after)
     assert status == 4
-    assert "3 and 3 runs cannot show more, at least 5 and 5 can (10 beside 3" in out
+    assert (
+        "3 and 3 runs are too few for the verdict worse: it takes 5 runs of the candidate with 5 of"
+        " the reference, or 10 with 3 of the reference\n"
+    ) in out
 
 
 def test_a_run_that_kills_its_worker_is_named_and_the_others_are_compared(sides, monkeypatch):

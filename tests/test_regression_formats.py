@@ -136,7 +136,7 @@ def test_too_few_repetitions_are_skipped_and_a_warning(tmp_path):
     status, out, _ = call("diff", tmp_path / "before", tmp_path / "after", "--format", "github")
     assert status == 4
     (warning,) = out.splitlines()
-    assert "2 and 2 runs cannot show more, at least 5 and 5 can" in warning
+    assert "2 and 2 runs are too few for the verdict worse: it takes 5 runs of" in warning
     assert warning.startswith("::warning file=")
 
 

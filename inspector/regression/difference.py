@@ -622,8 +622,11 @@ def _equal(
         reasons.append(f"{widest.name} {end:+.1f} {widest.unit} cannot be excluded")
     if not attainable(sample):
         needed = next(n for n in range(1, FEWEST_SIDE) if comb(before + n, n) * ALPHA >= 1)
-        beside = f" ({needed} beside {before} of the reference)" if needed != before else ""
-        reasons.append(f"{before} and {after} runs cannot show more, at least 5 and 5 can{beside}")
+        other = f", or {needed} with {before} of the reference" if needed != before else ""
+        reasons.append(
+            f"{before} and {after} runs are too few for the verdict worse: it takes 5 runs of the"
+            f" candidate with 5 of the reference{other}"
+        )
     return Verdict.INCONCLUSIVE, "; ".join(reasons) or "no change is significant"
 
 
