@@ -1,5 +1,6 @@
 import json
 import os
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -202,7 +203,36 @@ def test_scenarios_of_one_side_are_named_and_left_out(sides, tmp_path):
     run(3).save(after / "climb.npz")
     status, out, _ = diff(sides / "reference", after)
     assert status == 0
-    assert f"not compared, on one side only: {after / 'climb.npz'}" in out
+    assert f"only in the candidate: {after / 'climb.npz'}\n" in out
+
+
+def test_findings_of_a_run_that_the_reference_lacks_are_new(tmp_path):
+    less, more = (folder(tmp_path / name, [1]) for name in ("less", "more"))
+    run(2, tone=0.5).save(more / "climb.npz")
+    statuses = {on: diff(less, more, "--fail-on", on)[0] for on in ("new", "any", "worse")}
+    assert statuses == {"new": 1, "any": 1, "worse": 0}
+    out = diff(less, more)[1]
+    assert f"only in the candidate: {more / 'climb.npz'}\n  new: " in out
+    assert re.match("same: 1 scenario .*; findings: [1-9] new; files: 1 not paired\n", out)
+    assert "The worst pair" not in out
+
+
+def test_a_run_that_the_candidate_lacks_fails_at_any(tmp_path):
+    less, more = (folder(tmp_path / name, [1]) for name in ("less", "more"))
+    run(2).save(more / "climb.npz")
+    statuses = {on: diff(more, less, "--fail-on", on)[0] for on in ("new", "any", "worse")}
+    assert statuses == {"new": 0, "any": 1, "worse": 0}
+    assert diff(less, more, "--fail-on", "any")[0] == 0  # more than before, without a finding
+    assert f"only in the reference: {more / 'climb.npz'}\n" in diff(more, less)[1]
+
+
+def test_of_many_runs_on_one_side_only_the_first_ten_are_printed(tmp_path):
+    less, more = (folder(tmp_path / name, [1]) for name in ("less", "more"))
+    for name in "abcdefghijkl":
+        run(1).save(more / f"{name}.npz")
+    out = diff(more, less)[1]
+    assert out.count("only in the reference: ") == 10
+    assert "\nand 2 more on one side only (--format json)\n" in out
 
 
 def test_one_level_of_the_test_holds_for_all_scenarios(library, sides):
@@ -256,8 +286,9 @@ def test_what_cannot_be_compared_is_one_line_and_exit_status_3(tmp_path, changes
     panda = {"robot": "panda", "joints": tuple(joint_limits("panda"))[:2]}
     before = folder(tmp_path / "before", range(2), **(panda if "robot" in changes else {}))
     after = folder(tmp_path / "after", range(2), **changes)
-    status, _, err = diff(before, after, "--no-robot")
+    status, out, err = diff(before, after, "--no-robot")
     assert status == 3
+    assert out == "nothing is compared; files: 1 bad input\n"
     (line,) = err.splitlines()
     assert message in line
     assert line.endswith("scenario walk is not compared")

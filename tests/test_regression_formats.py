@@ -116,6 +116,55 @@ def test_markdown_of_a_difference_has_one_picture_and_a_marker_of_its_own(output
     assert not any("`reach`" in line for line in lines if line.startswith("|"))
 
 
+@pytest.fixture(scope="module")
+def unpaired(tmp_path_factory):
+    """A run of each side that the other lacks, the one of the candidate with a finding."""
+    root = tmp_path_factory.mktemp("unpaired")
+    before, after = (folder(root / name, [1]) for name in ("before", "after"))
+    folder(before, [2], name="lost")
+    folder(after, [3], name="climb", tone=0.5)
+    return before, after
+
+
+@pytest.mark.parametrize("fail_on", ["any", "worse"])
+def test_every_format_names_the_runs_of_one_side(unpaired, fail_on):
+    lost, climb = unpaired[0] / "lost.npz", unpaired[1] / "climb.npz"
+    out = {}
+    for name in FORMATS:
+        given = "diff", *unpaired, "--fail-on", fail_on, "--format", name
+        status, out[name], _ = call(*given)
+        assert status == (fail_on == "any")
+    fails = fail_on == "any"
+    suite = ET.fromstring(out["junit"]).find("testsuite")
+    told = suite.findall("testcase/failure" if fails else "testcase/skipped")
+    assert told[0].get("message") == "only in the reference"
+    assert told[1].get("message").startswith("new: osc" if fails else "only in the candidate")
+    kind = "error" if fails else "warning"
+    assert f"::{kind} file={lost}::not-paired: only in the reference" in out["github"].splitlines()
+    assert f"::{kind} file={climb}::not-paired: " in out["github"]
+    assert f"| `{lost}` | not paired | only in the reference |" in out["markdown"]
+    assert f"| `{climb}` | not paired | " in out["markdown"]
+    found = json.loads(out["json"])
+    schema = json.loads(SCHEMA.read_text())
+    jsonschema = pytest.importorskip("jsonschema", reason="needs jsonschema")
+    jsonschema.Draft202012Validator(schema).validate(found)
+    assert found["not_paired"] == [str(lost), str(climb)]
+    assert [each["side"] for each in found["unpaired"]] == ["reference", "candidate"]
+    assert found["unpaired"][0]["findings"] == []
+    news = found["unpaired"][1]["findings"]
+    assert "oscillations" in [each["label"] for each in news]
+    assert found["counts"]["findings"] == {"new": len(news), "louder": 0, "resolved": 0}
+
+
+def test_annotations_of_a_difference_without_a_change_are_its_counts(tmp_path):
+    before = folder(tmp_path / "before", [1])
+    status, out, _ = call("diff", before, before, "--format", "github")
+    assert (status, out) == (
+        0,
+        "::notice title=noise-inspector::same: 1 scenario (1 same), paired by file name\n",
+    )
+
+
 def test_bad_input_of_a_difference_is_ignored_on_request(sides):
     given = "diff", sides / "before", sides / "after", "--on-bad-input", "ignore"
     status, out, err = call(*given, "--format", "junit")
@@ -127,7 +176,7 @@ def test_bad_input_of_a_difference_is_ignored_on_request(sides):
     (bad / "walk-0.npz").write_bytes(b"nothing")
     status, out, _ = call("diff", sides / "before", bad, "--on-bad-input", "ignore")
     assert status == 3  # nothing was compared
-    assert out.startswith("inconclusive: 0 scenarios; files: 1 bad input")
+    assert out == "nothing is compared; files: 1 bad input\n"
 
 
 def test_too_few_repetitions_are_skipped_and_a_warning(tmp_path):

@@ -43,7 +43,8 @@ def diff(
         FailOn,
         typer.Option(
             "--fail-on",
-            help="Exit status 1 at new or louder findings, at a verdict worse, or at any of both.",
+            help="Exit status 1 at new or louder findings, at a verdict worse, or at any: both,"
+            " and runs that only the reference has.",
         ),
     ] = FailOn.WORSE,
     margin: Annotated[
@@ -83,11 +84,12 @@ def diff(
 
     Runs are paired by scenario and seed of their meta, or by file name:
     walk-1 and walk-2 are repetitions. "Worse" takes 5 and 5 of a scenario.
+    Findings of a scenario that only the candidate has are new.
 
     Exit status:
 
       0  nothing that --fail-on names
-      1  worse, or new findings
+      1  worse, new findings, or runs that are missing, as --fail-on says
       2  wrong usage
       3  bad input: a file cannot be read, nothing can be paired, or no cluster is reached
       4  cannot tell: too few repetitions of every scenario
@@ -129,12 +131,13 @@ def diff(
     for bad in unreadable:
         typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.problem}", err=True)
     roots = (reference, candidate)
-    pairing = paired(before, after, roots) if before and after else Pairing("file name", (), ())
+    pairing = paired(before, after, roots) if before and after else Pairing("file name", ())
     found = difference(pairing, margin=margin, unreadable=unreadable)
     gate = Gate(
         new=fail_on is not FailOn.WORSE,
         worse=fail_on is not FailOn.NEW,
         unreadable=on_bad_input is BadInput.FAIL,
+        missing=fail_on is FailOn.ANY,
     )
     drawn = report / reporting.PICTURE if report and found.scenarios else None
     address = published(drawn, report, report_url)

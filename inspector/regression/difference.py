@@ -12,7 +12,14 @@ import numpy as np
 from inspector.analysis.status import EXIT, Status
 from inspector.analysis.status import worst as worst_code
 from inspector.pair.changes import NEW
-from inspector.regression.findings import LOUDER, ChangedFinding, aligned, changed_findings, lag
+from inspector.regression.findings import (
+    LOUDER,
+    ChangedFinding,
+    aligned,
+    changed_findings,
+    lag,
+    new_findings,
+)
 from inspector.regression.levels import Levels, edges
 from inspector.regression.measure import Measured, Unreadable
 from inspector.regression.pairing import Pairing, Scenario
@@ -167,14 +174,31 @@ class Gate:
     """What fails.
 
     Attributes:
-        new: Whether new or louder findings do.
+        new: Whether new or louder findings do, those of runs without a reference too.
         worse: Whether a verdict "worse" does.
         unreadable: Whether files that cannot be read do; they always do if there are no others.
+        missing: Whether runs that the candidate lacks do.
     """
 
     new: bool = False
     worse: bool = True
     unreadable: bool = True
+    missing: bool = False
+
+
+@dataclass(frozen=True)
+class Unpaired:
+    """A run of a scenario that only one side has.
+
+    Attributes:
+        path: Its file.
+        side: "reference" or "candidate".
+        findings: Those of a run of the candidate, all of them new.
+    """
+
+    path: Path
+    side: str
+    findings: tuple[ChangedFinding, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,9 +242,23 @@ class Difference:
 
     @property
     def new(self) -> tuple[ChangedFinding, ...]:
-        """Findings that are new or louder."""
+        """Findings of scenarios that are new or louder."""
         found = chain.from_iterable(row.findings for row in self.scenarios)
         return tuple(each for each in found if each.kind in (NEW, LOUDER))
+
+    @property
+    def unpaired(self) -> tuple[Unpaired, ...]:
+        """Runs that only one side has, those of the reference first."""
+        return (
+            *(Unpaired(run.path, "reference") for run in self.pairing.missing),
+            *(Unpaired(run.path, "candidate", new_findings(run)) for run in self.pairing.added),
+        )
+
+    def status_unpaired(self, run: Unpaired) -> Status:
+        """What a run that only one side has is for a test."""
+        missing = self.gate.missing and run.side == "reference"
+        fails = missing or (self.gate.new and run.findings)
+        return Status.FINDINGS if fails else Status.OK
 
     @property
     def testable(self) -> bool:
@@ -250,7 +288,8 @@ class Difference:
         Scenarios with too few repetitions are 4 only if all scenarios are such.
         """
         codes = [EXIT[each.status] for each in self.unreadable if not self.ignored(each)]
-        if any(self.status(row) is Status.FINDINGS for row in self.rows):
+        own = [*map(self.status, self.rows), *map(self.status_unpaired, self.unpaired)]
+        if Status.FINDINGS in own:
             codes.append(EXIT[Status.FINDINGS])
         if self.gate.worse and not self.testable and self.verdict is not Verdict.SAME:
             codes.append(EXIT[Status.CANNOT_TELL])

@@ -92,6 +92,11 @@ def changed_findings(
     return tuple(sorted(found, key=lambda change: rank.index(change.kind)))
 
 
+def new_findings(run: Measured) -> tuple[ChangedFinding, ...]:
+    """The findings of a run of the candidate that has no reference: all of them are new."""
+    return tuple(_changed(NEW, run, finding) for finding in run.findings)
+
+
 def aligned(before: Measured, after: Measured) -> Alignment:
     """Lay the motion of a run beside that of another."""
     one, other = before.motion, after.motion

@@ -2,7 +2,7 @@
 
 import json
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from inspector.regression.difference import (
     Change,
     Compared,
     Difference,
+    Unpaired,
     Verdict,
     worst,
     worst_runs,
@@ -24,8 +25,8 @@ from inspector.report.cases import DIFF_MARKER, Case, Job, Outcome
 from inspector.version import program_version
 
 FORMAT = "noise-diff/1"
-FINDINGS, CHANGES = 10, 5
-"""Most findings and changes of a scenario that are printed as text."""
+FINDINGS, CHANGES, UNPAIRED = 10, 5, 10
+"""Most findings and changes of a scenario, and most unpaired runs, that are printed as text."""
 HEAD = ("scenario", "runs", "verdict", "clearest change", "change", "interval", "p", "findings")
 
 
@@ -50,7 +51,15 @@ def as_json(found: Difference) -> str:
             "scenarios": [_row(row) for row in found.scenarios],
             "together": None if found.together is None else _row(found.together),
             "picture": None if found.picture is None else str(found.picture),
-            "not_paired": [str(path) for path in found.pairing.alone],
+            "not_paired": [str(each.path) for each in found.unpaired],
+            "unpaired": [
+                {
+                    "run": str(each.path),
+                    "side": each.side,
+                    "findings": [_finding(finding) for finding in each.findings],
+                }
+                for each in found.unpaired
+            ],
             "failed": {str(each.path): each.problem for each in found.unreadable},
         },
         indent=2,
@@ -60,7 +69,7 @@ def as_json(found: Difference) -> str:
 
 
 def junit(found: Difference) -> str:
-    """Write verdicts as JUnit XML: a test case per scenario, and one per file that is no run."""
+    """Write verdicts as JUnit XML: a test case per scenario, run of one side, and bad file."""
     return cases.junit(_job(found))
 
 
@@ -96,10 +105,11 @@ def counts(found: Difference) -> dict[str, dict[str, int]]:
     Returns:
         `scenarios`, by verdict; `findings`, by what became of them; `files`: runs that are
         compared, files that only one side has, and those that cannot be compared. Each has all its
-        keys.
+        keys. Findings of runs that only the candidate has are new.
     """
     verdicts = Counter(row.verdict for row in found.scenarios)
     kinds = Counter(each.kind for row in found.scenarios for each in row.findings)
+    kinds.update(each.kind for run in found.unpaired for each in run.findings)
     compared = sum(len(row.reference) + len(row.candidate) for row in found.scenarios)
     bugs = sum(each.status is Status.INTERNAL_ERROR for each in found.unreadable)
     return {
@@ -107,7 +117,7 @@ def counts(found: Difference) -> dict[str, dict[str, int]]:
         "findings": {kind: kinds[kind] for kind in (NEW, LOUDER, RESOLVED)},
         "files": {
             "compared": compared,
-            "not-paired": len(found.pairing.alone),
+            "not-paired": len(found.unpaired),
             "bad-input": len(found.unreadable) - bugs,
             "internal-error": bugs,
         },
@@ -118,9 +128,12 @@ def summary(found: Difference) -> str:
     """Count scenarios by verdict, findings and files by what became of them, in a line."""
     number = counts(found)
     total = len(found.scenarios)
-    parts = [f"{found.verdict}: {total} scenario{'s' * (total != 1)}"]
+    parts = ["nothing is compared"]
     if total:
-        parts[0] += f" ({_listed(number['scenarios'])}), paired by {found.pairing.by}"
+        parts = [
+            f"{found.verdict}: {total} scenario{'s' * (total != 1)}"
+            f" ({_listed(number['scenarios'])}), paired by {found.pairing.by}"
+        ]
     parts += (
         [f"findings: {_listed(number['findings'])}"] if any(number["findings"].values()) else []
     )
@@ -138,6 +151,7 @@ def _job(found: Difference) -> Job:
     own = {row.verdict for row in found.scenarios}
     if found.together is not None and found.verdict not in own:
         shown.append(_case(found, found.together))  # what no scenario shows by itself
+    shown += [_unpaired_case(found, each) for each in found.unpaired]
     shown += [
         Case(
             name=str(each.path),
@@ -181,8 +195,29 @@ def _case(found: Difference, row: Compared) -> Case:
     )
 
 
+def _unpaired_case(found: Difference, each: Unpaired) -> Case:
+    status = found.status_unpaired(each)
+    fails = status is Status.FINDINGS
+    findings = tuple(map(str, each.findings))
+    return Case(
+        name=str(each.path),
+        path=each.path,
+        status="not-paired",
+        words="not paired",
+        outcome=Outcome.FAILURE if fails else Outcome.SKIPPED,
+        rank=(list(EXIT).index(status), len(Verdict)),
+        kind="new finding" if findings else "missing run",
+        sentences=findings if fails else (),
+        message=f"only in the {each.side}",
+        notes=() if fails else findings,
+    )
+
+
 def _lines(found: Difference) -> Iterator[str]:
     yield summary(found)
+    yield from _unpaired_lines(found)
+    if not found.scenarios:
+        return
     yield ""
     rows = [HEAD, *(_cells(row) for row in found.rows)]
     widths = [max(len(row[place]) for row in rows) for place in range(len(HEAD))]
@@ -192,10 +227,6 @@ def _lines(found: Difference) -> Iterator[str]:
     yield ""
     for row in found.rows:
         yield from _details(row)
-    alone = found.pairing.alone
-    if alone:
-        more = f" and {len(alone) - 3} more" if len(alone) > 3 else ""
-        yield f"not compared, on one side only: {', '.join(map(str, alone[:3]))}{more}"
     yield (
         f"worse and better: p ≤ {ALPHA:g} for all quantities of a family in all scenarios together;"
         f" same: no change by {found.margin:g} dB within intervals of {CONFIDENCE:.0%}"
@@ -203,6 +234,20 @@ def _lines(found: Difference) -> Iterator[str]:
     if found.new or found.verdict is Verdict.WORSE:
         before, after = worst_runs(worst(found))
         yield f"The worst pair: inspector view {before.path} {after.path}"
+
+
+def _unpaired_lines(found: Difference) -> Iterator[str]:
+    for each in found.unpaired[:UNPAIRED]:
+        yield f"only in the {each.side}: {each.path}"
+        yield from _finding_lines(each.findings)
+    if len(found.unpaired) > UNPAIRED:
+        yield f"and {len(found.unpaired) - UNPAIRED} more on one side only (--format json)"
+
+
+def _finding_lines(findings: Sequence[ChangedFinding]) -> Iterator[str]:
+    yield from (f"  {finding}" for finding in findings[:FINDINGS])
+    if (left := len(findings) - FINDINGS) > 0:
+        yield f"  and {left} more finding{'s' * (left > 1)} (--format json)"
 
 
 def _cells(row: Compared) -> tuple[str, ...]:
@@ -235,9 +280,7 @@ def _details(row: Compared) -> Iterator[str]:
     yield f"{row.name}: {row.verdict}, {row.reason}"
     if row.verdict in (Verdict.WORSE, Verdict.BETTER):
         yield from (f"  {sentence}" for sentence in _significant(row))
-    yield from (f"  {finding}" for finding in row.findings[:FINDINGS])
-    if len(row.findings) > FINDINGS:
-        yield f"  and {len(row.findings) - FINDINGS} more findings (--format json)"
+    yield from _finding_lines(row.findings)
     yield from (f"  {remark}" for remark in row.remarks)
 
 

@@ -42,12 +42,14 @@ class Pairing:
     Attributes:
         by: "scenario and seed" or "file name".
         scenarios: In order of their names.
-        alone: Files of scenarios that only one side has.
+        missing: Runs of scenarios that only the reference has.
+        added: Runs of scenarios that only the candidate has.
     """
 
     by: str
     scenarios: tuple[Scenario, ...]
-    alone: tuple[Path, ...]
+    missing: tuple[Measured, ...] = ()
+    added: tuple[Measured, ...] = ()
 
 
 def files_in(path: Path) -> tuple[Path, ...]:
@@ -91,7 +93,7 @@ def paired(
             return _pairing("scenario and seed", keys[0], keys[1], seeds=True)
     if all(len(side) == 1 for side in sides) and (reference[0].path, candidate[0].path) == roots:
         alone = Scenario(candidate[0].path.stem, tuple(reference), tuple(candidate), paired=False)
-        return Pairing("file name", (alone,), ())  # as they were named
+        return Pairing("file name", (alone,))  # as they were named
     named = [_by_name(side, root) for side, root in zip(sides, roots, strict=True)]
     found = _pairing("file name", named[0], named[1], seeds=False)
     if not found.scenarios:
@@ -153,13 +155,11 @@ def _pairing(
                 paired=seeds and before.keys() == after.keys(),
             )
         )
-    alone = [
-        run.path
+    missing, added = (
+        tuple(run for name in sorted(side.keys() - other.keys()) for run in side[name].values())
         for side, other in ((others, ours), (ours, others))
-        for name in sorted(side.keys() - other.keys())
-        for run in side[name].values()
-    ]
-    return Pairing(by, tuple(scenarios), tuple(alone))
+    )
+    return Pairing(by, tuple(scenarios), missing, added)
 
 
 def _scenarios(runs: Mapping[tuple[str, str], Measured]) -> dict[str, dict[str, Measured]]:

@@ -148,7 +148,9 @@ def junit(job: Job) -> str:
 
 
 def github(job: Job) -> str:
-    """Write a job as GitHub workflow commands: the ten worst, and the counts of several cases.
+    """Write a job as GitHub workflow commands: the ten worst, and the counts.
+
+    One case that is annotated needs no counts.
 
     Of ten errors, those that cannot be read take five at most where others fail, so that they hide
     none. Cases that are skipped are warnings.
@@ -163,7 +165,7 @@ def github(job: Job) -> str:
     lines += [f"::notice::{_escaped(remark)}" for remark in job.remarks]
     left = len(bad) + len(failed) - len(shown)
     more = f"; {left} more are not shown here" if left else ""
-    if job.summed:
+    if job.summed or not lines:
         lines += [f"::notice title=noise-inspector::{_escaped(job.summary)}{more}"]
     return "\n".join(lines)
 
