@@ -135,6 +135,16 @@ def test_runs_that_cannot_be_read_are_named_and_the_others_are_shown(tmp_path):
     assert "a: " in out
     assert "b: " in out
     assert "/curves/001" in entities(saved)
+    alone = tmp_path / "alone.rrd"
+    status, out, err = call("view", good[0], tmp_path / "torn.npz", "--save", alone)
+    assert status == 3
+    assert err.startswith(f"inspector: {tmp_path / 'torn.npz'}: ")
+    assert f"{good[0]}: " in out
+    assert "→" not in out
+    assert alone.exists()
+    status, _, err = call("view", "x.npz", "y.npz", "--save", tmp_path / "none.rrd")
+    assert status == 3
+    assert "none of 2 runs can be read" in err
     status, _, err = call("view", "x.npz", "y.npz", "z.npz", "--save", tmp_path / "none.rrd")
     assert status == 3
     assert "none of 3 runs can be read" in err

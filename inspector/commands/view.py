@@ -101,19 +101,20 @@ def view(
     refuse_existing(target, overwrite=overwrite, read=paths)
     library = load_library(assets.model_files(model))
     robot, unread, seconds = not no_robot, False, None
-    if len(paths) > 2:
-        found, unread = _read(paths, reading)
-        _several(found, target, library, from_start=align is not Aligned.NONE, overwrite=overwrite)
+    if len(paths) == 1:
+        found = [opened(paths[0], reading, said=False)]  # remarks say it
     else:
-        first, *second = (opened(path, reading, said=False) for path in paths)  # remarks say it
-        if second:
-            both, how = (first, second[0]), align or Aligned.AUTO
-            _two(both, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
-        else:
-            links = kind if robot else ""
-            seconds = _one(
-                first, target, library, links, terms=terms, floor=floor, overwrite=overwrite
-            )
+        found, unread = _read(paths, reading)
+    if len(found) == 1:
+        links = kind if robot else ""
+        seconds = _one(
+            found[0], target, library, links, terms=terms, floor=floor, overwrite=overwrite
+        )
+    elif len(paths) == 2:
+        both, how = (found[0], found[1]), align or Aligned.AUTO
+        _two(both, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
+    else:
+        _several(found, target, library, from_start=align is not Aligned.NONE, overwrite=overwrite)
     _show(target, seconds, web=web, port=port, saved=save is not None)
     if unread:
         raise typer.Exit(EXIT[Status.BAD_INPUT])
