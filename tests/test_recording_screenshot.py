@@ -3,8 +3,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import call
 
 from inspector.analysis.analyse import analyse_file
+from inspector.assets import demo_run
 from inspector.cli import main
 from inspector.errors import InspectorError
 from inspector.recording import screenshot
@@ -89,4 +91,22 @@ def test_what_cannot_be_shot_is_one_line(arguments, text, tmp_path, monkeypatch,
     err = capsys.readouterr().err
     assert (end.value.code, err.count("\n")) == (3, 1)
     assert text in err
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["shot", demo_run(), "-o", "s.jpg"], "s.jpg: only .png is written; name a .png file"),
+        (["view", demo_run(), "--save", "v.png"], "v.png: only .rrd is written; name a .rrd file"),
+        (["shot", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the run lasts from 0.00 s"),
+        (["shot", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the run lasts from 0.00 s"),
+    ],
+)
+def test_a_wrong_suffix_or_time_is_wrong_usage(arguments, text, tmp_path, monkeypatch):
+    monkeypatch.setattr(screenshot, "require", lambda: None)
+    monkeypatch.chdir(tmp_path)
+    status, _, err = call(*arguments)
+    assert status == 2
+    assert text in " ".join(err.replace("│", " ").split())
     assert not list(tmp_path.iterdir())

@@ -15,6 +15,7 @@ from inspector.commands.options import (
     opened,
     reads_logs,
 )
+from inspector.commands.outputs import check_suffix
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
@@ -28,7 +29,10 @@ def shot(
     output: Output,
     at: Annotated[
         float | None,
-        typer.Option("--at", help="Time in seconds; by default that of the worst finding."),
+        typer.Option(
+            "--at",
+            help="Time in seconds; by default that of a run's worst finding, 0 of a recording.",
+        ),
     ] = None,
     size: Annotated[str, typer.Option("--size", help="Width and height in pixels.")] = "1440x900",
     model: ModelFiles = None,
@@ -50,6 +54,7 @@ def shot(
     from inspector.sound.clip import worst_time
     from noisemodel.atomic import refuse_existing
 
+    check_suffix(output, ".png")
     shooting.require()
     refuse_existing(output, overwrite=overwrite)
     points = shooting.parse_size(size)
@@ -57,7 +62,13 @@ def shot(
         recording, seconds = run, at or 0.0
         if run.suffix != ".rrd":
             library = load_library(assets.model_files(model))
-            found = analyse_file(opened(run, reading), library, kind=kind)
+            source = opened(run, reading)
+            first, last = (float(source.run.time[place]) for place in (0, -1))
+            if at is not None and not first <= at <= last:
+                raise typer.BadParameter(
+                    f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s"
+                )
+            found = analyse_file(source, library, kind=kind)
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
             write(found, recording, floor=floor)

@@ -17,6 +17,7 @@ from inspector.commands.options import (
     opened,
     reads_logs,
 )
+from inspector.commands.outputs import check_suffix
 
 if TYPE_CHECKING:
     from inspector.library import Library
@@ -42,7 +43,7 @@ def view(
     ] = None,
     save: Annotated[
         Path | None,
-        typer.Option("--save", help="Write the recording to this file, open no viewer."),
+        typer.Option("--save", help="Write the recording to this .rrd file, open no viewer."),
     ] = None,
     model: ModelFiles = None,
     no_robot: Annotated[
@@ -96,6 +97,8 @@ def view(
         from inspector.recording import web as browser
 
         browser.free_port(port)
+    if save:
+        check_suffix(save, ".rrd")
     target = save or viewer.scratch_path(_together(paths))
     overwrite = overwrite or save is None
     refuse_existing(target, overwrite=overwrite, read=paths)
