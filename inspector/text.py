@@ -1,4 +1,4 @@
-"""Text from files, where a terminal, a CI's log or a spreadsheet would take it for more."""
+"""Text: what of files a terminal, a CI's log or a spreadsheet would take for more; numbers."""
 
 import re
 
@@ -21,3 +21,13 @@ def cell(text: str) -> str:
 def uncell(text: str) -> str:
     """The text that `cell` was given."""
     return text[1:] if text.startswith(tuple(f"'{each}" for each in (*FORMULA, "'"))) else text
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with its noun, whose plural takes an s: "1 finding", "2 findings"."""
+    return f"{number} {noun}{'s' * (number != 1)}"
+
+
+def plain(value: float, digits: int = 3) -> str:
+    """A number rounded to significant digits, without an exponent up to a million: "3540"."""
+    return f"{float(f'{value:.{digits}g}'):g}"

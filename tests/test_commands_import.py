@@ -48,7 +48,7 @@ def test_contents_are_listed_and_nothing_written(importing, bag, tmp_path):
     assert status == 0
     assert "bag: ROS bag" in out
     assert "/joint_states  sensor_msgs/msg/JointState  400 messages  100.251 Hz  read" in out
-    assert "/stop  std_msgs/msg/Bool  1 messages  not read" in out
+    assert "/stop  std_msgs/msg/Bool  1 message  not read" in out
     assert "log.csv: CSV" in out
     assert "elbow.position  position of elbow" in out
     assert sorted(tmp_path.rglob("*")) == sorted([*before, tmp_path / "log.csv"])

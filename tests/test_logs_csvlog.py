@@ -73,7 +73,7 @@ HEAD = "time,a.velocity,b.velocity\n"
     [
         ("", "log.csv: the log is empty; expected a header"),
         (HEAD, "log.csv: 0 samples; a run needs at least 2"),
-        (HEAD + "0,1,2\n", "log.csv: 1 samples; a run needs at least 2"),
+        (HEAD + "0,1,2\n", "log.csv: 1 sample; a run needs at least 2"),
         (HEAD + "0,1,2\n0.1,1,2\n0.05,1,2\n", "row 4: time runs backwards: 0.05 comes after 0.1"),
         (HEAD + "0,1,2\n\n0.1,1,2\n0.1,1,2\n", "row 5: time stands still: 0.1 comes after 0.1"),
         (HEAD + "0,1,2\n0.1,nan,2\n", "row 3: column 'a.velocity' is empty; 1 of 2 rows have no"),

@@ -1,6 +1,7 @@
 """A run file or any log is opened by every command that takes runs."""
 
 import json
+import re
 import shutil
 from pathlib import Path
 from xml.etree import ElementTree as ET
@@ -113,7 +114,8 @@ def test_a_folder_without_logs_is_refused(tmp_path):
 
 def test_a_single_run_is_not_chosen_from_several(tmp_path, run):
     log(tmp_path)
-    with pytest.raises(LogError, match=r"holds 2 logs \(log.csv, run.npz\); name one of them"):
+    told = f"holds 2 logs (log.csv, run.npz); name what to open, such as {tmp_path / 'log.csv'}"
+    with pytest.raises(LogError, match=re.escape(told)):
         open_run(tmp_path)
 
 

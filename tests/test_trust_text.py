@@ -18,6 +18,7 @@ from inspector.live.feeding import reader_of
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import read_log
 from inspector.logs.signals import column_signal, time_column
+from inspector.text import counted, plain
 from inspector.training import tuningfile
 from models import jsontext, noisytest
 from noisemodel import Block, Run
@@ -202,3 +203,16 @@ def test_a_sample_whose_texts_are_arrays_is_refused_before_they_are_printed(tmp_
 def test_a_pipe_is_no_log_of_two_columns(tmp_path):
     os.mkfifo(tmp_path / "a.log")
     assert classify_file(tmp_path / "a.log", {}).status is Status.BAD_INPUT
+
+
+def test_numbers_are_counted_in_singular_and_plural():
+    assert [counted(number, "finding") for number in (0, 1, 2)] == [
+        "0 findings", "1 finding", "2 findings",
+    ]  # fmt: skip
+
+
+def test_frequencies_are_rounded_and_have_no_exponent():
+    assert [plain(value) for value in (0.01234, 31.25, 3542.0, 98765.0)] == [
+        "0.0123", "31.2", "3540", "98800",
+    ]  # fmt: skip
+    assert plain(12345.6, 4) == "12350"

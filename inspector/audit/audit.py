@@ -14,6 +14,7 @@ from inspector.audit.placeholder import placeholder
 from inspector.audit.units import unit_warnings
 from inspector.hold import hold_length, without_hold
 from inspector.library import for_robot, signals_of
+from inspector.text import counted, plain
 from inspector.wrongrobot import check_joints, limit_warnings
 from noisemodel import Run
 from noisemodel.ondemand import pieces
@@ -38,10 +39,8 @@ class Gaps:
         """Format as a clause."""
         if not self.count:
             return "no gaps"
-        plural = "" if self.count == 1 else "s"
-        return (
-            f"{self.count} gap{plural}, {self.total:.3g} s in all, {self.longest:.3g} s the longest"
-        )
+        gaps = counted(self.count, "gap")
+        return f"{gaps}, {self.total:.3g} s in all, {self.longest:.3g} s the longest"
 
 
 @dataclass(frozen=True)
@@ -137,36 +136,36 @@ def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
     if reach.hold > 1:
         yield (
             f"measured values have a zero-order hold of {reach.hold:.3g} samples:"
-            f" they come at {run.rate / reach.hold:.4g} Hz"
+            f" they come at {plain(run.rate / reach.hold, 4)} Hz"
         )
     if reach.corner:
-        yield f"velocities look filtered from {reach.corner:.3g} Hz on"
+        yield f"velocities look filtered from {plain(reach.corner)} Hz on"
 
 
 def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
     if reach.differentiator:
         yield (
             f"velocities are differentiated positions ({reach.differentiator.name}),"
-            f" attenuated above {reach.differentiator.corner(run.rate):.3g} Hz"
+            f" attenuated above {plain(reach.differentiator.corner(run.rate))} Hz"
         )
     if run.velocity_desired is None:
         yield "there is no desired motion"
     elif (hold := hold_length(run.velocity_desired, run.mask)) > 1:
         yield (
             f"desired velocities have a zero-order hold of {hold:.3g} samples"
-            f" ({run.rate / hold:.4g} Hz)"
+            f" ({plain(run.rate / hold, 4)} Hz)"
         )
     if reach.floor_from is not None:
         unit = "rad" if reach.differentiator else "rad/s"
         yield (
-            f"above {reach.floor_from:.3g} Hz the spectrum is at the quantisation floor (step"
-            f" {reach.step:.2g} {unit}), which masks oscillations up to"
+            f"above {plain(reach.floor_from)} Hz the spectrum is at the quantisation floor"
+            f" (step {reach.step:.2g} {unit}), which masks oscillations up to"
             f" {reach.floor_amplitude:.2g} rad/s"
         )
     elif reach.quiet_from is not None:
         yield (
-            f"above {reach.quiet_from:.3g} Hz the level is below any encoder's noise: filtered, or"
-            " simulated without sensor noise"
+            f"above {plain(reach.quiet_from)} Hz the level is below any encoder's noise: filtered,"
+            " or simulated without sensor noise"
         )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from inspector.audit.audit import Audit
 from inspector.audit.observability import MASKED, ClassObservability, Observability
+from inspector.text import plain
 
 ROUNDING = 1e-9
 """Deviation of a stamp that is rounding, in [s]: stamps have nanoseconds at best."""
@@ -69,7 +70,7 @@ def _lines(audit: Audit) -> Iterator[str]:
         off = f"stamps were off by {rms:.3g} ms rms, {largest:.3g} ms at most"
     yield f"  rate: {audit.rate:g} Hz, {off}"
     yield f"  missing: {audit.gaps}"
-    yield f"  bandwidth: up to {audit.bandwidth.usable:.4g} Hz ({audit.bandwidth.limit})"
+    yield f"  bandwidth: up to {plain(audit.bandwidth.usable, 4)} Hz ({audit.bandwidth.limit})"
     yield from (f"  warning: {warning}" for warning in audit.warnings)
     yield from (f"  note: {note}" for note in audit.notes)
     yield from (f"  {each}" for each in audit.classes)
@@ -96,11 +97,11 @@ def _limit(each: ClassObservability, audit: Audit) -> tuple[str, str]:
         needed = f"; requires {each.needed:g} Hz" if each.needed else ""
         return "", f"cannot be observed ({each.reason}{needed})"
     if each.reason.startswith(MASKED):
-        return "", f"only from {each.low:.3g} to {each.high:.4g} Hz ({each.reason})"
-    above = f"above {each.high:.4g} Hz cannot be seen"
+        return "", f"only from {plain(each.low)} to {plain(each.high, 4)} Hz ({each.reason})"
+    above = f"above {plain(each.high, 4)} Hz cannot be seen"
     reach = audit.bandwidth
     if each.reason == reach.limit and reach.usable == reach.nyquist / reach.hold:
-        return f"at {2 * reach.usable:.4g} Hz, ", above
+        return f"at {plain(2 * reach.usable, 4)} Hz, ", above
     needed = f"; all of it requires {each.needed:g} Hz" if each.needed else ""
     return "", f"{above} ({each.reason}{needed})"
 

@@ -27,6 +27,7 @@ import numpy as np
 import models
 from inspector.audit.bandwidth import Bandwidth
 from inspector.library import Library, nearest
+from inspector.text import plain
 from models import Profile
 from models.logbands import FEWEST, HIGHEST, LOWEST
 from noisemodel.types import Array, Mask
@@ -69,7 +70,7 @@ class ClassObservability:
 
     def __str__(self) -> str:
         """Format as a line."""
-        band = f", {self.low:.3g} to {self.high:.4g} Hz" if self.high else ""
+        band = f", {plain(self.low)} to {plain(self.high, 4)} Hz" if self.high else ""
         reason = f": {self.reason}" if self.reason else ""
         needed = f"; needs {self.needed:g} Hz" if self.needed else ""
         return f"{self.label}: {self.observability}{band}{reason}{needed}"
@@ -163,7 +164,7 @@ def _observability(
     if bandwidth.floor_from is not None and bandwidth.floor_from < high:
         reason = (
             f"{MASKED} below {bandwidth.floor_amplitude:.2g} rad/s"
-            f" above {bandwidth.floor_from:.3g} Hz"
+            f" above {plain(bandwidth.floor_from)} Hz"
         )
         return ClassObservability(label, Observability.PARTLY, low, high, reason=reason)
     return ClassObservability(label, Observability.OBSERVABLE, low, high)

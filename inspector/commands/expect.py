@@ -8,6 +8,7 @@ import typer
 
 from inspector.analysis.status import EXIT, Status, worst
 from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
+from inspector.text import counted
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
@@ -61,8 +62,7 @@ def expect(
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(content, encoding="utf-8")
     number = sum(len(each.events) for each in verdicts)
-    findings = "1 finding" if number == 1 else f"{number} findings"
-    of = "1 run" if len(verdicts) == 1 else f"{len(verdicts)} runs"
+    findings, of = counted(number, "finding"), counted(len(verdicts), "run")
     became = "required" if required else "allowed"
     typer.echo(f"{path}: {findings} of {of} {became}; edit it, then")
     typer.echo(f"  inspector classify {' '.join(map(str, runs))}")

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inspector.commands.options import Overwrite, RunFile, opened, reads_logs
+from inspector.text import counted
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
@@ -56,4 +57,4 @@ def labels(
     for block in recorded.blocks:
         typer.echo(f"{block.label} from {block.start:.2f} s to {block.stop:.2f} s")
     if output or to:
-        typer.echo(f"{output or to}: {len(recorded.blocks)} labels")
+        typer.echo(f"{output or to}: {counted(len(recorded.blocks), 'label')}")

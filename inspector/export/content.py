@@ -7,6 +7,7 @@ from inspector.analysis.analyse import Analysis, analyse, robot_known
 from inspector.analysis.level import estimate
 from inspector.audit import summary
 from inspector.library import Library
+from inspector.text import counted
 from noisemodel.types import Array
 
 
@@ -35,9 +36,9 @@ class Content:
         labels = self.analysis.labels
         parts = [
             f"{len(self.time)} samples of noise{'' if self.extended is None else ' of two kinds'}",
-            f"{0 if labels is None else len(labels)} frames",
-            f"{len(self.analysis.findings)} findings",
-            f"{len(self.analysis.run.blocks)} annotated blocks",
+            counted(0 if labels is None else len(labels), "frame"),
+            counted(len(self.analysis.findings), "finding"),
+            counted(len(self.analysis.run.blocks), "annotated block"),
         ]
         return ", ".join(parts)
 

@@ -34,6 +34,7 @@ from inspector.logs.signals import (
     UNITS as SIGNAL_UNITS,
 )
 from inspector.logs.timestamps import UNITS, unit_of
+from inspector.text import counted
 from noisemodel.bounds import beyond, limit
 from noisemodel.types import Array
 
@@ -198,7 +199,7 @@ def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) 
         if named:
             joints.add(tuple(cells[place] for place in named))
     if len(rows) < 2:
-        raise LogError(path, f"{len(rows)} samples; a run needs at least 2")
+        raise LogError(path, f"{counted(len(rows), 'sample')}; a run needs at least 2")
     table = np.frombuffer(numbers).reshape(len(rows), len(wanted))
     if time is None:
         assert options.rate is not None  # else there is an error above

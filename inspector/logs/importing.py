@@ -16,6 +16,7 @@ from inspector.logs.resample import UNIFORM, Clock, TimedTrack, clock_of, common
 from inspector.logs.signals import listed
 from inspector.logs.synchronisation import Synchronised, no_overlap, synchronise
 from inspector.logs.targets import without_held_targets
+from inspector.text import counted
 from noisemodel import Robot, Run
 from noisemodel.types import Array, Mask
 
@@ -175,7 +176,7 @@ def _remarks(logs: Sequence[PreparedLog], synchronised: Synchronised) -> Iterato
             yield f"{name}: {unordered}"
         yield from (f"{name}: {remark}" for remark in log.remarks)
         if log.not_read:
-            yield f"{name}: {_counted(log.not_read, 'column')} not read: {listed(log.not_read)}"
+            yield f"{name}: {counted(len(log.not_read), 'column')} not read: {listed(log.not_read)}"
     if synchronised.remark:
         yield f"{logs[-1].path.name}: {synchronised.remark}"
 
@@ -201,14 +202,10 @@ def _of_clock(track: TimedTrack) -> Iterator[str]:
     if clock.gaps:
         total = sum(stop - start for start, stop in clock.gaps)
         yield (
-            f"{_counted(clock.gaps, 'gap')}, {total:.3g} s in all, the first at"
+            f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all, the first at"
             f" {clock.gaps[0][0]:.6g} s, marked as not valid"
         )
 
 
 def _extent(meta: dict[str, Any]) -> str:
     return "both logs" if len(meta["source"]) > 1 else "all its signals"
-
-
-def _counted(things: Sequence[object], word: str) -> str:
-    return f"{len(things)} {word}{'' if len(things) == 1 else 's'}"

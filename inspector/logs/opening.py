@@ -108,7 +108,8 @@ def open_run(
     if len(found) != 1:
         what = "episodes" if any(each.episode for each in found) else "logs"
         names = listed([each.episode or each.path.name for each in found])
-        how = "choose one (--episode)" if what == "episodes" else "name one of them"
+        named = f"name what to open, such as {found[0].path}"
+        how = "choose one (--episode)" if what == "episodes" else named
         raise LogError(Path(path), f"holds {len(found)} {what} ({names}); {how}")
     return open_source(found[0], reading, progress=progress)
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from inspector.hold import hold_length, updates
 from inspector.logs.resample import TimedTrack, clock_of
+from inspector.text import plain
 from noisemodel.types import Array, Indices
 
 SLOWER = 1.5
@@ -50,7 +51,7 @@ def without_held_targets(
             hold = _hold(each)
             remarks.append(
                 f"position_desired: each target is held for {hold:.3g} samples"
-                f" ({each.clock.nominal / hold:.4g} Hz); interpolated from target to target"
+                f" ({plain(each.clock.nominal / hold, 4)} Hz); interpolated from target to target"
             )
         found.append(joined or each)
     return tuple(found), tuple(remarks)

@@ -33,6 +33,7 @@ from inspector.regression.statistic import (
     p_values,
     shift,
 )
+from inspector.text import counted
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
 
@@ -652,7 +653,7 @@ def _equal(
         limit = FINDINGS_MARGIN if change.kind == FINDINGS.name else margin
         return max(change.high, -change.low) / limit
 
-    reasons = [f"{news} new or louder finding{'s' * (news > 1)}"] if news else []
+    reasons = [counted(news, "new or louder finding")] if news else []
     if confidence >= CONFIDENCE:
         widest = max(changes, key=excess)
         if not news and excess(widest) < 1:

@@ -22,6 +22,7 @@ from inspector.regression.findings import LOUDER, ChangedFinding
 from inspector.regression.statistic import ALPHA, CONFIDENCE
 from inspector.report import cases
 from inspector.report.cases import DIFF_MARKER, Case, Job, Outcome
+from inspector.text import counted
 from inspector.version import program_version
 
 FORMAT = "noise-diff/1"
@@ -131,7 +132,7 @@ def summary(found: Difference) -> str:
     parts = ["nothing is compared"]
     if total:
         parts = [
-            f"{found.verdict}: {total} scenario{'s' * (total != 1)}"
+            f"{found.verdict}: {counted(total, 'scenario')}"
             f" ({_listed(number['scenarios'])}), paired by {found.pairing.by}"
         ]
     parts += (
@@ -247,7 +248,7 @@ def _unpaired_lines(found: Difference) -> Iterator[str]:
 def _finding_lines(findings: Sequence[ChangedFinding]) -> Iterator[str]:
     yield from (f"  {finding}" for finding in findings[:FINDINGS])
     if (left := len(findings) - FINDINGS) > 0:
-        yield f"  and {left} more finding{'s' * (left > 1)} (--format json)"
+        yield f"  and {counted(left, 'more finding')} (--format json)"
 
 
 def _cells(row: Compared) -> tuple[str, ...]:

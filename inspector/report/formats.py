@@ -12,6 +12,7 @@ from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.analysis.verdict import Verdict, counts, exit_status
 from inspector.report import cases
 from inspector.report.cases import Case, Job, Outcome
+from inspector.text import counted
 from inspector.version import program_version
 from models import Event
 from models.labels import interval
@@ -40,8 +41,7 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     ignored = sum(verdict.ignored for verdict in verdicts)
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
     found = [f"{n} {_words(name)}" for name, n in number["findings"].items() if n]
-    one = "1 run" if len(verdicts) == 1 else f"{len(verdicts)} runs"
-    return f"{one}: {', '.join(runs) or 'none'}" + (
+    return f"{counted(len(verdicts), 'run')}: {', '.join(runs) or 'none'}" + (
         f"; findings: {', '.join(found)}" if found else ""
     )
 

@@ -4,6 +4,7 @@ from inspector.analysis.analyse import Analysis
 from inspector.localisation.links import fault_links
 from inspector.localisation.localise import has_stages
 from inspector.report.localisation import words
+from inspector.text import counted
 from models import UNKNOWN, Event
 from models.labels import interval
 from noisemodel import Block
@@ -34,7 +35,7 @@ def report(analysis: Analysis) -> str:
     run = analysis.run
     facts = [
         f"{run.duration:.2f} s at {run.rate:g} Hz",
-        f"{len(run.joint_names)} joints",
+        counted(len(run.joint_names), "joint"),
         run.robot or "robot not named",
         f"model {analysis.model or 'none'}",
         *(f"{key} {run.meta[key]}" for key in ("scenario", "seed") if key in run.meta),

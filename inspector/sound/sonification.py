@@ -12,6 +12,7 @@ from inspector.errors import InspectorError
 from inspector.sound.components import components
 from inspector.sound.mixing import LOWEST_AUDIBLE, mix
 from inspector.sound.sound import SILENCE, Sound, scale
+from inspector.text import plain
 from noisemodel.atomic import refuse_existing, replacing
 
 HEADROOM_DB = 1.0
@@ -165,14 +166,14 @@ def _remarks(run: nm.Run, speed: float) -> list[str]:
     from inspector.audit.bandwidth import bandwidth
 
     reach = bandwidth(run)
-    span = f"{LOWEST_AUDIBLE / speed:.3g} Hz to {reach.usable:.4g} Hz"
+    span = f"{plain(LOWEST_AUDIBLE / speed)} Hz to {plain(reach.usable, 4)} Hz"
     remarks = [f"Audible: {span} of the motion ({reach.limit})."]
     if speed != 1.0:
         remarks.append(f"Played {speed:g} times as fast: frequencies are {speed:g} times as high.")
     if reach.usable < OSCILLATIONS / 2:
         remarks.append(
-            f"The log has no content above {reach.usable:.4g} Hz: silence there does not mean that"
-            " there is no noise."
+            f"The log has no content above {plain(reach.usable, 4)} Hz: silence there does not mean"
+            " that there is no noise."
         )
     if run.velocity_desired is None:
         remarks.append(

@@ -18,6 +18,7 @@ from inspector.logs.ros.messages import (
     topic_reader,
 )
 from inspector.logs.signals import listed
+from inspector.text import counted
 from noisemodel.archive import ArchiveError
 
 LATEST = 2**62
@@ -125,7 +126,7 @@ def _listing(path: Path) -> tuple[str, ...]:
 def _rows(bag: Bag) -> tuple[str, ...]:
     rows = []
     for topic in sorted(bag.topics.values(), key=lambda each: each.name):
-        count = f"{topic.count} messages" if topic.count >= 0 else "not counted"
+        count = counted(topic.count, "message") if topic.count >= 0 else "not counted"
         rate = f"{topic.count / bag.seconds:.6g} Hz" if topic.count > 1 and bag.seconds else ""
         read = "read" if _is_read(topic) else "not read"
         rows.append("  ".join(filter(None, (topic.name, topic.type, count, rate, read))))
