@@ -180,6 +180,21 @@ def test_a_finding_that_a_repetition_of_the_reference_has_is_not_new(tmp_path):
     assert "louder: oscillations" in out
 
 
+def test_diff_and_view_say_how_they_match_findings_of_different_motions(tmp_path):
+    """Of one motion, both match in time; of another, `diff` at any time."""
+    first = run(7, tone=0.5)
+    other = first.velocity + 2 * np.sin(2.5 * first.time)[:, None]
+    first.save(tmp_path / "first.npz")
+    run(8, tone=0.5).save(tmp_path / "alike.npz")
+    replace(first, velocity=other).save(tmp_path / "other.npz")
+    for name, said in (("alike", False), ("other", True)):
+        pair = tmp_path / "first.npz", tmp_path / f"{name}.npz"
+        compared = diff(*pair, "--no-robot")[1]
+        viewed = call("view", *pair, "--no-robot", "--save", tmp_path / f"{name}.rrd")[1]
+        assert ("Findings of different motions are matched by their class" in compared) == said
+        assert ("Findings at the same time are matched; `inspector diff`" in viewed) == said
+
+
 def test_runs_are_paired_by_scenario_and_seed_whatever_their_names(tmp_path):
     before = folder(tmp_path / "before", [4, 3], name="a{}", scenario="walk")
     after = folder(tmp_path / "after", [3, 4], name="b{}", scenario="walk")

@@ -16,6 +16,8 @@ from noisemodel.types import Array
 
 CORRELATION = 0.6
 """Correlation of the envelopes below which an alignment is refused."""
+ALIKE = 0.9
+"""Correlation of envelopes from which two runs are of one motion: less is a motion like it."""
 RIVAL = 0.95
 """Share of it that the next best lag may reach: steps and strokes resemble each other."""
 STILL = 1e-9
@@ -52,6 +54,11 @@ class Alignment:
     correlation: float = float("nan")
     rival: float = float("nan")
     refused: bool = False
+
+    @property
+    def alike(self) -> bool:
+        """Whether both runs are known to be of one motion."""
+        return self.how is Align.AUTO and self.correlation >= ALIKE
 
     def __str__(self) -> str:
         measured = f"correlation {self.correlation:.2f}, next best {self.rival:.2f}"

@@ -15,6 +15,10 @@ from noisemodel.links import LinkNoise, vibrating
 from noisemodel.types import Array, Mask
 
 SIDES = ("before", "after")
+TIMED = (
+    "Findings at the same time are matched; `inspector diff` matches those of different motions by"
+    " their class, at any time."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,7 @@ def compare(
             *remarks,
             *left_out,
             *([missing] if missing else []),
+            *([TIMED] if not alignment.alike and any(side.findings for side in sides) else []),
             *(f"{_who(*has)}: {remark}" for remark, has in both),
         ),
     )

@@ -42,6 +42,10 @@ RANGE_DB = 40.0
 MARGIN_DB = 6.0
 """A change within this is the same: less than twice the amplitude, in [dB]."""
 ALL = "all scenarios"
+UNTIMED = (
+    "Findings of different motions are matched by their class, at any time; `inspector view`"
+    " matches those at the same time."
+)
 
 
 class Verdict(StrEnum):
@@ -577,8 +581,10 @@ def _compared(each: _Prepared, p: PValues, *, margin: float) -> Compared:
     runs = (*scenario.reference, *scenario.candidate)
     changes = _changes(each.quantities, moved, p)
     findings: tuple[ChangedFinding, ...] = ()
+    remarks = each.remarks
     if _findings_comparable(runs):
-        findings = changed_findings(scenario.reference, scenario.candidate)
+        findings, untimed = changed_findings(scenario.reference, scenario.candidate)
+        remarks += (UNTIMED,) * untimed
     news = sum(finding.kind in (NEW, LOUDER) for finding in findings)
     verdict, reason = _significant(changes)
     if verdict is Verdict.INCONCLUSIVE:
@@ -594,7 +600,7 @@ def _compared(each: _Prepared, p: PValues, *, margin: float) -> Compared:
         testable=attainable(each.sample),
         changes=changes,
         findings=findings,
-        remarks=each.remarks,
+        remarks=remarks,
     )
 
 

@@ -15,8 +15,6 @@ from noisemodel import decimated
 LOUDER = "louder"
 LOUDER_DB = 3.0
 """A finding this much above the loudest of the reference at the same time is louder."""
-ALIKE = 0.9
-"""Correlation of envelopes from which two runs are of one motion: less is a motion like it."""
 COVERED = 0.8
 """Share of the shorter run that has to lie within the other: parts of motions are often alike."""
 SLACK = 0.1
@@ -54,7 +52,7 @@ class ChangedFinding:
 
 def changed_findings(
     reference: Sequence[Measured], candidate: Sequence[Measured]
-) -> tuple[ChangedFinding, ...]:
+) -> tuple[tuple[ChangedFinding, ...], bool]:
     """Compare the findings of all repetitions of a scenario.
 
     A finding is new if no repetition of the reference has one of its class at its time, and
@@ -67,14 +65,16 @@ def changed_findings(
         candidate: The runs after it.
 
     Returns:
-        The changes, run by run, the new ones first.
+        The changes, run by run, the new ones first; and whether the time of some findings did not
+        count.
     """
     lags = {
         (before.path, after.path): lag(before, after) for before in reference for after in candidate
     }
-    found = []
+    found, untimed = [], False
     for after in candidate:
         offsets = [(r, lags[r.path, after.path]) for r in reference]
+        untimed |= bool(after.findings) and not _timed(offsets)
         for finding in after.findings:
             twins = _twins(finding, after, offsets, direction=1)
             if not twins:
@@ -83,13 +83,14 @@ def changed_findings(
                 found.append(_changed(LOUDER, after, finding, change))
     for before in reference:
         offsets = [(c, lags[before.path, c.path]) for c in candidate]
+        untimed |= bool(before.findings) and not _timed(offsets)
         found += [
             _changed(RESOLVED, before, finding)
             for finding in before.findings
             if not _twins(finding, before, offsets, direction=-1)
         ]
     rank = (NEW, LOUDER, RESOLVED)
-    return tuple(sorted(found, key=lambda change: rank.index(change.kind)))
+    return tuple(sorted(found, key=lambda change: rank.index(change.kind))), untimed
 
 
 def new_findings(run: Measured) -> tuple[ChangedFinding, ...]:
@@ -113,8 +114,12 @@ def lag(before: Measured, after: Measured) -> float | None:
     seconds = alignment.seconds
     both = min(before.duration, seconds + after.duration) - max(0.0, seconds)
     covered = both >= COVERED * min(before.duration, after.duration)
-    alike = not alignment.refused and alignment.correlation >= ALIKE
-    return seconds if alike and covered else None
+    return seconds if alignment.alike and covered else None
+
+
+def _timed(others: Sequence[tuple[Measured, float | None]]) -> bool:
+    """Whether any other run is of the same motion, so that the time of findings counts."""
+    return any(seconds is not None for _, seconds in others)
 
 
 def _twins(
@@ -125,7 +130,7 @@ def _twins(
     direction: int,
 ) -> list[Finding]:
     """Findings of one class at one time in the runs of the other side."""
-    timed = any(seconds is not None for _, seconds in others)
+    timed = _timed(others)
     found = []
     for other, seconds in others:
         if timed and seconds is None:
