@@ -199,7 +199,7 @@ def _case(found: Difference, row: Compared) -> Case:
 def _unpaired_case(found: Difference, each: Unpaired) -> Case:
     status = found.status_unpaired(each)
     fails = status is Status.FINDINGS
-    findings = tuple(map(str, each.findings))
+    alone, findings = f"only in the {each.side}", tuple(map(str, each.findings))
     return Case(
         name=str(each.path),
         path=each.path,
@@ -208,8 +208,8 @@ def _unpaired_case(found: Difference, each: Unpaired) -> Case:
         outcome=Outcome.FAILURE if fails else Outcome.SKIPPED,
         rank=(list(EXIT).index(status), len(Verdict)),
         kind="new finding" if findings else "missing run",
-        sentences=findings if fails else (),
-        message=f"only in the {each.side}",
+        sentences=(alone, *findings) if fails else (),
+        message="" if fails else alone,
         notes=() if fails else findings,
     )
 
