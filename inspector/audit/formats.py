@@ -7,7 +7,7 @@ from typing import Any
 
 from inspector.audit.audit import Audit
 from inspector.audit.observability import MASKED, ClassObservability, Observability
-from inspector.text import plain
+from inspector.text import counted, plain
 
 ROUNDING = 1e-9
 """Deviation of a stamp that is rounding, in [s]: stamps have nanoseconds at best."""
@@ -21,7 +21,7 @@ def text(name: str, audit: Audit, assumed: str = "") -> str:
         audit: Its audit.
         assumed: What was assumed when its log was read, in a line; empty of a run file.
     """
-    head = f"{name}: {audit.duration:.2f} s, {audit.joints} joints"
+    head = f"{name}: {audit.duration:.2f} s, {counted(audit.joints, 'joint')}"
     return "\n".join([head, *([f"  {assumed}"] if assumed else []), *_lines(audit)])
 
 

@@ -28,6 +28,7 @@ from inspector.logs.arrays import (
 from inspector.logs.log import Log, LogReader
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import TIMES, listed
+from inspector.text import counted
 from models.jsontext import from_json
 from noisemodel.archive import ArchiveError, check_unpacked
 
@@ -223,7 +224,7 @@ def _positive(rate: float) -> float | None:
 
 
 def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...]:
-    rows = [f"{len(episodes)} episodes: {listed(episodes)}"] if episodes[0] else []
+    rows = [f"{counted(len(episodes), 'episode')}: {listed(episodes)}"] if episodes[0] else []
 
     def add(name: str, each: Any) -> None:
         if isinstance(each, h5py.Dataset):

@@ -15,6 +15,7 @@ from inspector.logs import parquet
 from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import listed
+from inspector.text import counted
 from models.jsontext import from_json, text_of
 
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
@@ -212,7 +213,7 @@ def _folder(path: Path) -> Path:
 
 
 def _listing(info: dict[str, Any], episodes: int) -> tuple[str, ...]:
-    rows = [f"{episodes} episodes at {info.get('fps', 'unknown')} Hz"]
+    rows = [f"{counted(episodes, 'episode')} at {info.get('fps', 'unknown')} Hz"]
     for name, feature in info["features"].items():
         names = listed(tuple(_flat(feature.get("names"))))
         rows.append(f"{name}  {feature.get('dtype')} {feature.get('shape')}  {names}".rstrip())

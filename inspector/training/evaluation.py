@@ -14,6 +14,7 @@ from inspector.analysis.analyse import extents
 from inspector.colors import SERIES, Color, of_classes
 from inspector.comparison import picture
 from inspector.progress import progress
+from inspector.text import counted
 from inspector.training.part import Part
 from inspector.training.recordings import classified, count
 from models import Assessment
@@ -172,7 +173,7 @@ def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = Fa
     _trade_off(trade_off, assessment)
     seen = f", NOT A TEST: {len(assessment.seen)} were trained on" if assessment.seen else ""
     figure.suptitle(
-        f"{title}: {assessment.runs} runs of {assessment.groups} groups,"
+        f"{title}: {counted(assessment.runs, 'run')} of {counted(assessment.groups, 'group')},"
         f" {assessment.events.ok_hours:.3g} h of ok motion{seen}"
     )
     with replacing(path, overwrite=overwrite) as temporary:
