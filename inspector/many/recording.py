@@ -32,8 +32,9 @@ LOWEST = 20.0
 """Height of a run's row below which classes and levels lie behind each other in tabs."""
 HIGHEST = 36.0
 """Height of a row at most; the rest is for the table, above all panels."""
-TABLE = 240.0
-"""Least height of the table above the panels; with less, it stands at their left."""
+TABLE, ENTRY = 142.0, 23.0
+"""Height of the table with its title, and of each run in it; with less room above the panels, it
+stands at their left."""
 NAMED = 16.0
 """Least distance of two names."""
 LINE = 8.0
@@ -106,7 +107,7 @@ def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
     over_time.append((axes.part(panel, curves), panel.height))
     text = unstable.text("Runs", "/report", titled=False)
     rest = WHOLE - sum(height for _, height in over_time)
-    if rest >= TABLE:
+    if rest > TABLE + ENTRY * len(several.names) - 1.0:
         whole = unstable.above((text, rest), *over_time)
     else:
         whole = unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
@@ -160,8 +161,9 @@ def _loop(several: Several) -> tuple[float, float] | None:
 def _height(count: int) -> float:
     """Height of a run's row."""
     both = (WHOLE - CURVE - 2 * axes.AXIS) / 2 / count
+    below = both - (TABLE + ENTRY * count) / 2 / count  # the table
     if both >= LOWEST:
-        return min(both, HIGHEST)
+        return min(below if below >= LOWEST else both, HIGHEST)
     return (WHOLE - CURVE - TITLES - axes.AXIS) / count
 
 
