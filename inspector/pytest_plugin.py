@@ -5,8 +5,9 @@ recording and a picture below ``noise-artefacts``. ``pytest --noise-update`` sto
 Files are named after tests, so that the processes of pytest-xdist do not meet.
 """
 
+import hashlib
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -24,6 +25,10 @@ Allowed: TypeAlias = "str | tuple[str, float, float]"
 """A class of findings; or a class, and from when to when, in [s]."""
 LONGEST = 120
 """Most characters of a file name that a test's name may take."""
+PLAIN = re.compile(
+    r"(\w+/)*\w+\.py(::[A-Z]\w*)*::[a-z_]\w*(\[[A-Za-z_]\w*(-[A-Za-z_]\w*)*\])?", re.ASCII
+)
+"""Node ids that a file name tells apart: what are folders, classes, test and parameters is seen."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -85,8 +90,7 @@ class Noise:
         from inspector.analysis.analyse import analyse, analyse_file, with_links
         from inspector.analysis.status import Status
 
-        stem = self._stem()
-        recording, picture = self._artefacts(stem)
+        recording, picture = self._artefacts(self._names()[0])
         if isinstance(run, (str, Path)):
             found, name = analyse_file(Path(run), self._library), str(run)
         else:
@@ -132,12 +136,11 @@ class Noise:
         from inspector.regression.pairing import Pairing, repetitions
         from noisemodel import Run
 
-        stem = _slug(name) if name else self._stem()
+        stem, folder = self._names(name)
         given = [runs] if isinstance(runs, (Run, str, Path)) else list(runs)
         if not given:
             raise ValueError("no run to compare with the reference; expected one at least")
         loaded = [each if isinstance(each, Run) else Run.load(each) for each in given]
-        folder = self._reference() / stem
         stored = sorted(folder.glob("*.npz")) if folder.is_dir() else []
         if self._config.getoption("--noise-update"):
             _store(loaded, folder, stored)
@@ -188,16 +191,21 @@ class Noise:
             self._config.stash[_LIBRARY] = load_library(files)
         return self._config.stash[_LIBRARY]
 
-    def _stem(self) -> str:
-        """Name of the files of an assertion: the test's, and which one of it."""
-        self._count += 1
-        stem = _slug(self._node.nodeid.rpartition("/")[2].replace(".py", ""))
-        return stem if self._count == 1 else f"{stem}-{self._count}"
-
-    def _reference(self) -> Path:
+    def _names(self, name: str = "") -> tuple[str, Path]:
+        """Name of the artefacts of an assertion, and folder of its reference."""
+        whole = self._node.nodeid
+        file, colons, test = whole.partition("::")
+        own = f"{file.rpartition('/')[2]}{colons}{test}"
+        if name:
+            stem = alone = _file_name(name, plain=name == _slug(name))
+        else:
+            self._count += 1
+            which = "" if self._count == 1 else f"-{self._count}"
+            stem, alone = f"{name_of(whole)}{which}", f"{name_of(own)}{which}"
         named = self._config.getoption("--noise-reference")
-        beside = Path(self._node.path).parent / "noise-reference"
-        return self._config.rootpath / named if named else beside
+        if named:
+            return stem, self._config.rootpath / named / stem
+        return stem, Path(self._node.path).parent / "noise-reference" / alone
 
     def _artefacts(self, stem: str) -> tuple[Path, Path | None]:
         """Paths of recording and picture, earlier ones removed; no picture without matplotlib."""
@@ -249,10 +257,25 @@ def _store(runs: Sequence["Run"], folder: Path, stored: Iterable[Path]) -> None:
         path.unlink()
 
 
+def name_of(test: str) -> str:
+    """Name the files of a test, those of no two tests alike: its node id.
+
+    Args:
+        test: The node id. Where its name could be that of another, a hash of it is added.
+    """
+    shown = test.replace(".py::", "::").replace("/", ".")
+    return _file_name(test, shown, plain=PLAIN.fullmatch(test) is not None)
+
+
+def _file_name(whole: str, shown: str = "", *, plain: bool) -> str:
+    """A name of a file, with a hash of the whole name unless that is plain and short."""
+    name = _slug(shown or whole)
+    if plain and len(name) <= LONGEST:
+        return name
+    return f"{name[:LONGEST]}~{hashlib.sha256(whole.encode()).hexdigest()[:12]}"
+
+
 def _slug(name: str) -> str:
-    """A name of a file: letters, digits, ``.``, ``-`` and ``_``; others are ``-``."""
-    return "-".join(_words(name))[:LONGEST] or "run"
-
-
-def _words(name: str) -> Iterator[str]:
-    yield from (word for word in re.split(r"[^\w.]+", name, flags=re.ASCII) if word)
+    """Letters, digits, ``.``, ``-`` and ``_`` of a name; others are ``-``."""
+    words = re.split(r"[^\w.]+", name, flags=re.ASCII)
+    return "-".join(word for word in words if word).lstrip(".") or "run"

@@ -1,12 +1,17 @@
 """The plugin, in a pytest of its own."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from inspector.pytest_plugin import name_of
 
 ROOT = Path(__file__).parents[1]
 RUNS = """
@@ -115,6 +120,67 @@ def test_runs_are_compared_with_stored_ones(project, tmp_path, processes):
     assert {"reach.rrd", "reach.png", "reach-run-1.npz", "test_robot-test_one.rrd"} <= left
     assert project(WORSE.format(tone=0.5, first=5), "--noise-update", *processes)[0] == 0
     assert project(WORSE.format(tone=0.5, first=5), *processes)[0] == 0
+
+
+NODES = st.builds(
+    "{}{}.py{}::{}{}".format,
+    st.sampled_from(["", "a/", "a/b/", "a.b/", "../"]),
+    st.sampled_from(["a", "b", "a-b"]),
+    st.sampled_from(["", "::A", "::A::B", "::b"]),
+    st.sampled_from(["a", "b", "A"]),
+    st.one_of(st.just(""), st.builds("[{}]".format, st.text("abA2-_ /.:[]~", max_size=4))),
+)
+
+
+@given(NODES, NODES, st.sampled_from(["", "-2", "-3"]), st.sampled_from(["", "-2", "-3"]))
+@example("t.py::good[logs/a.npz]", "t.py::other[logs/a.npz]", "", "")
+@example("t.py::good[a b]", "t.py::good[a-b]", "", "")
+@example("t.py::good[a]", "t.py::good[a-2]", "-2", "")
+@example("t.py::good[pick/a.npz]", "t.py::good[press/a.npz]", "", "")
+@example(f"t.py::{'a' * 200}b", f"t.py::{'a' * 200}c", "", "")
+def test_no_two_tests_have_files_of_one_name(one, other, which, second):
+    names = [name_of(one) + which, name_of(other) + second]
+    assert (names[0] == names[1]) is ((one, which) == (other, second))
+    assert all(re.fullmatch(r"\w[\w.~-]*", name) and len(name) < 200 for name in names)
+
+
+@pytest.mark.parametrize(
+    ("test", "name"),
+    [
+        ("test_arm.py::test_one", "test_arm-test_one"),
+        ("test_arm.py::TestArm::test_one", "test_arm-TestArm-test_one"),
+        ("test_arm.py::test_one[fast]", "test_arm-test_one-fast"),
+        ("test_arm.py::test_one[fast-left]", "test_arm-test_one-fast-left"),
+        ("tests/test_arm.py::test_one", "tests.test_arm-test_one"),
+    ],
+)
+def test_files_of_plain_tests_are_named_by_their_node_ids(test, name):
+    assert name_of(test) == name
+
+
+def test_a_reference_is_never_that_of_another_parameter(project, tmp_path):
+    tests = """
+@pytest.mark.parametrize("log", ["pick/a.npz", "press/a.npz"])
+def test_good(noise, log):
+    noise.assert_no_worse(run(0))
+
+def test_named(noise):
+    for name in ("pick/a.npz", "pick-a.npz", "..", "reach"):
+        noise.assert_no_worse(run(0), name=name)
+"""
+    assert project(tests, "--noise-update")[0] == 0
+    left = sorted(path.parent.name for path in tmp_path.rglob("run-1.npz"))
+    assert {path.parents[1] for path in tmp_path.rglob("run-1.npz")} == {
+        tmp_path / "noise-reference"
+    }
+    assert [name.partition("~")[0] for name in left] == [
+        "pick-a.npz",
+        "pick-a.npz",
+        "reach",
+        "run",
+        "test_robot-test_good-pick.a.npz",
+        "test_robot-test_good-press.a.npz",
+    ]
 
 
 def test_a_run_that_cannot_be_classified_is_not_quiet(project):
