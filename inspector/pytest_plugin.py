@@ -74,14 +74,16 @@ class Noise:
         self._node, self._config = request.node, request.config
         self._count = 0
 
-    def assert_quiet(self, run: "Run | str | Path", *, allow: Iterable[Allowed] = ()) -> "Analysis":
+    def assert_quiet(
+        self, run: "Run | str | Path", *, allow: "str | Iterable[Allowed]" = ()
+    ) -> "Analysis":
         """Fail if a run has a finding, or cannot be classified.
 
         Args:
             run: A run, or its file.
-            allow: Classes of findings that may be there; or class, start and stop in [s] of a
-                stretch that such a finding has to lie in. "cannot-tell" allows runs that no model
-                can classify.
+            allow: A class of findings that may be there, or several; or class, start and stop in
+                [s] of a stretch that such a finding has to lie in. "cannot-tell" allows runs that
+                no model can classify.
 
         Returns:
             The analysis.
@@ -90,13 +92,13 @@ class Noise:
         from inspector.analysis.analyse import analyse, analyse_file, with_links
         from inspector.analysis.status import Status
 
+        allowed = self._allowed(allow)
         recording, picture = self._artefacts(self._names()[0])
         if isinstance(run, (str, Path)):
             found, name = analyse_file(Path(run), self._library), str(run)
         else:
             analysis = analyse(run, self._library, name=self._node.name)
             found, name = with_links(analysis, "normal"), "the run"
-        allowed = tuple(allow)
         if found.status is Status.CANNOT_TELL and Status.CANNOT_TELL not in allowed:
             pytest.fail(f"cannot tell whether {name} is quiet: {found.reason}", pytrace=False)
         events = [event for event in found.findings if not _allows(allowed, event)]
@@ -178,6 +180,26 @@ class Noise:
         lines += [f"  {finding}" for finding in found.new]
         self._fail([*lines, *row.remarks], recording, picture)
         return found
+
+    def _allowed(self, allow: "str | Iterable[Allowed]") -> tuple[Allowed, ...]:
+        """What may be there, of classes that there are."""
+        __tracebackhide__ = True
+        from inspector.analysis.status import Status
+        from inspector.expectations.expectations import classes_found
+        from noisemodel.errors import hint
+
+        known = (*classes_found(self._library), Status.CANNOT_TELL.value)
+        allowed = (allow,) if isinstance(allow, str) else tuple(allow)
+        for each in allowed:
+            match each:
+                case str(name) | (str(name), float() | int(), float() | int()):
+                    if name in known:
+                        continue
+                    told = f"{name!r} is none of {', '.join(known)}{hint(name, known)}"
+                case _:
+                    told = f"{each!r}, expected a class, or (class, from, to) in [s]"
+            pytest.fail(f"allow: {told}", pytrace=False)
+        return allowed
 
     @property
     def _library(self) -> "Library":

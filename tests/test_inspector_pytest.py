@@ -201,6 +201,30 @@ def test_allowed(noise):
     assert "cannot tell whether the run is quiet: " in out
 
 
+def test_a_class_that_is_allowed_has_to_be_one(project):
+    tests = """
+@pytest.mark.parametrize("allow", ["impakt", ["impakt"], [("impakt", 0.0, 1.0)]])
+def test_unknown(noise, allow):
+    noise.assert_quiet(run(0), allow=allow)
+
+@pytest.mark.parametrize("allow", [("impact", 0.0, 1.0), [("impact", 1.0)], [3]])
+def test_no_list(noise, allow):
+    noise.assert_quiet(run(0), allow=allow)
+
+def test_one(noise):
+    noise.assert_quiet(run(0, tone=0.5), allow="oscillations")
+"""
+    status, out = project(tests)
+    assert status == 1
+    assert "6 failed, 1 passed" in out
+    lines = out.splitlines()
+    known = "impact, highaccelerations, oscillations, unknown, cannot-tell"
+    told = f"allow: 'impakt' is none of {known} (did you mean 'impact'?)"
+    assert lines.count(told) == 3
+    assert sum("expected a class, or (class, from, to) in [s]" in line for line in lines) >= 3
+    assert "pytest_plugin.py" not in out
+
+
 def test_a_reference_of_other_joints_fails_in_one_line(project):
     tests = """
 from dataclasses import replace
