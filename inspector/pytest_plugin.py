@@ -7,7 +7,8 @@ Files are named after tests, so that the processes of pytest-xdist do not meet.
 
 import hashlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from inspector.analysis.analyse import Analysis
     from inspector.library import Library
     from inspector.regression.difference import Difference
-    from inspector.regression.measure import Measured
     from models import Event
     from noisemodel import Run
 
@@ -94,11 +94,12 @@ class Noise:
 
         allowed = self._allowed(allow)
         recording, picture = self._artefacts(self._names()[0])
-        if isinstance(run, (str, Path)):
-            found, name = analyse_file(Path(run), self._library), str(run)
-        else:
-            analysis = analyse(run, self._library, name=self._node.name)
-            found, name = with_links(analysis, "normal"), "the run"
+        with _readable():
+            if isinstance(run, (str, Path)):
+                found, name = analyse_file(Path(run), self._library), str(run)
+            else:
+                analysis = analyse(run, self._library, name=self._node.name)
+                found, name = with_links(analysis, "normal"), "the run"
         if found.status is Status.CANNOT_TELL and Status.CANNOT_TELL not in allowed:
             pytest.fail(f"cannot tell whether {name} is quiet: {found.reason}", pytrace=False)
         events = [event for event in found.findings if not _allows(allowed, event)]
@@ -142,7 +143,8 @@ class Noise:
         given = [runs] if isinstance(runs, (Run, str, Path)) else list(runs)
         if not given:
             raise ValueError("no run to compare with the reference; expected one at least")
-        loaded = [each if isinstance(each, Run) else Run.load(each) for each in given]
+        with _readable():
+            loaded = [each if isinstance(each, Run) else Run.load(each) for each in given]
         stored = sorted(folder.glob("*.npz")) if folder.is_dir() else []
         if self._config.getoption("--noise-update"):
             _store(loaded, folder, stored)
@@ -158,10 +160,10 @@ class Noise:
         ]
         for target in targets:
             target.unlink(missing_ok=True)
-        sides: list[list[Measured]] = [
-            [measure(Run.load(path), path, self._library) for path in stored],
-            [measure(run, path, self._library) for run, path in zip(loaded, paths, strict=True)],
-        ]
+        now = list(zip(loaded, paths, strict=True))
+        with _readable():
+            before = [(Run.load(path), path) for path in stored]
+            sides = [[measure(*each, self._library) for each in side] for side in (before, now)]
         scenario = repetitions(stem, *sides)
         found = difference(Pairing("test", (scenario,), ()))
         if found.unreadable:
@@ -172,11 +174,13 @@ class Noise:
         from inspector.regression.report import write_pair
 
         (row,) = found.scenarios
-        for run, path, target in zip(loaded, paths, targets, strict=True):
+        for (run, path), target in zip(now, targets, strict=True):
             if path == target:
                 run.save(target)
         write_pair(row, recording, picture, self._library, overwrite=True)
-        lines = [f"worse than {folder}: {row.verdict}, {row.reason}"]
+        number = f"{len(found.new)} new or louder finding{'s' * (len(found.new) > 1)}"
+        worse = row.verdict is Verdict.WORSE
+        lines = [f"worse than {folder}: {row.reason if worse else number}"]
         lines += [f"  {finding}" for finding in found.new]
         self._fail([*lines, *row.remarks], recording, picture)
         return found
@@ -249,6 +253,18 @@ class Noise:
             self._node.user_properties.append((f"noise_{what}", str(path)))
         shown = [f"{what}: {path}" for what, path in left.items()]
         pytest.fail("\n".join([*lines, *shown]), pytrace=False)
+
+
+@contextmanager
+def _readable() -> Iterator[None]:
+    """Fail in one line if a run cannot be read, or not be analysed."""
+    __tracebackhide__ = True
+    from inspector.analysis.verdict import EXPECTED
+
+    try:
+        yield
+    except EXPECTED as error:
+        raise pytest.fail.Exception(str(error), pytrace=False) from None
 
 
 _LIBRARY: "pytest.StashKey[Library]" = pytest.StashKey()

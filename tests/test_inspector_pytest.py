@@ -115,7 +115,9 @@ def test_runs_are_compared_with_stored_ones(project, tmp_path, processes):
     assert status == 1
     assert "2 failed" in out
     assert "new: oscillations" in out
-    assert "worse, wrist, 45 to 91 Hz +" in out
+    assert re.search(r"^worse than .*/reach: wrist, 45 to 91 Hz \+", out, re.MULTILINE)
+    assert re.search(r"^worse than .*test_one: [1-9] new or louder finding", out, re.MULTILINE)
+    assert "inconclusive" not in out
     left = {path.name for path in (tmp_path / "noise-artefacts").iterdir()}
     assert {"reach.rrd", "reach.png", "reach-run-1.npz", "test_robot-test_one.rrd"} <= left
     assert project(WORSE.format(tone=0.5, first=5), "--noise-update", *processes)[0] == 0
@@ -223,6 +225,37 @@ def test_one(noise):
     assert lines.count(told) == 3
     assert sum("expected a class, or (class, from, to) in [s]" in line for line in lines) >= 3
     assert "pytest_plugin.py" not in out
+
+
+def test_a_log_that_cannot_be_read_fails_in_one_line(project, tmp_path):
+    (tmp_path / "broken.npz").write_text("no archive")
+    tests = """
+FILES = [f"{FOLDER}/missing.npz", f"{FOLDER}/missing.csv", f"{FOLDER}/broken.npz"]
+
+@pytest.mark.parametrize("path", FILES)
+def test_quiet(noise, path):
+    noise.assert_quiet(path)
+
+@pytest.mark.parametrize("path", FILES)
+def test_no_worse(noise, path):
+    noise.assert_no_worse(path)
+
+def test_reference(noise):
+    noise.assert_no_worse(run(0), name="reach")
+"""
+    reference = tmp_path / "noise-reference" / "reach" / "run-1.npz"
+    reference.parent.mkdir(parents=True)
+    reference.write_text("no archive")
+    status, out = project(f"FOLDER = {str(tmp_path)!r}\n{tests}")
+    assert status == 1
+    assert "7 failed" in out
+    lines = out.splitlines()
+    for name, problem in (("missing.npz", "cannot be read"), ("broken.npz", "not a run file")):
+        assert sum(line.startswith(f"{tmp_path}/{name}: {problem}") for line in lines) == 2
+    assert sum(line.startswith(f"{reference}: not a run file") for line in lines) == 1
+    assert len(lines) < 40
+    assert "Traceback" not in out
+    assert ".py:" not in out.partition("short test summary")[0].replace("test_robot.py::", "")
 
 
 def test_a_reference_of_other_joints_fails_in_one_line(project):
