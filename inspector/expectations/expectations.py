@@ -4,7 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from fnmatch import fnmatchcase
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -332,7 +332,7 @@ class _Row:
             " ".join(self.words("reason")),
             self.until(),
             None if most is None else int(most),
-            self.number("percent", low=0.0),
+            self.number("percent", low=0.0, high=100.0),
         )
 
     def error(self, problem: str) -> ExpectationError:
@@ -341,20 +341,23 @@ class _Row:
     def words(self, key: str) -> tuple[str, ...]:
         given = self.content.get(key, [])
         values = given if isinstance(given, list) else [given]
+        if key in self.content and not values:
+            raise self.error(f"{key} = [], expected one at least, or no {key!r}")
         whole = key == "scenario"  # of our own simulator these are numbers
         if not all(isinstance(value, str) or (whole and type(value) is int) for value in values):
             raise self.error(f"{key} = {given!r}, expected a text or a list of them")
         return tuple(map(str, values))
 
-    def number(self, key: str, *, low: float | None = None) -> float | None:
+    def number(self, key: str, *, low: float = -inf, high: float = inf) -> float | None:
         value = self.content.get(key)
         if value is None:
             return None
         whole = key == "findings"
         kinds = (int,) if whole else (int, float)
-        small = low is not None and isinstance(value, kinds) and value < low
-        if isinstance(value, bool) or not isinstance(value, kinds) or small or not isfinite(value):
-            bound = "" if low is None else f" of {low:g} or more"
+        number = isinstance(value, kinds) and not isinstance(value, bool) and isfinite(value)
+        if not number or not low <= value <= high:
+            least = f" of {low:g} or more" if low > -inf else ""
+            bound = f" from {low:g} to {high:g}" if high < inf else least
             raise self.error(f"{key} = {value!r}, expected a {'whole ' * whole}number{bound}")
         return float(value)
 
