@@ -68,6 +68,7 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
         ),
         ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another type"),
         ('format = "noise-mapping/1"\nrate = -1', "the rate is -1 Hz; expected a number above 0"),
+        ('format = "noise-mapping/1"\nrate = 2027-01-31', "rate = 2027-01-31 is of another type"),
         ('format = "noise-mapping/1"\njoints = "a"', "joints = 'a' is of another type"),
         ('format = "noise-mapping/1"\nunits = "miles"', "no units 'miles'; there are radians, deg"),
         ('format = "noise-mapping/1"\nmap = 3', "m.toml: "),

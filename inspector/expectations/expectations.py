@@ -10,7 +10,7 @@ from typing import Any
 
 from inspector.errors import FileError
 from inspector.library import Library
-from models.jsontext import from_toml, text_of
+from models.jsontext import from_toml, text_of, toml_shown
 from models.labels import UNKNOWN
 
 NAME = "expect.toml"
@@ -234,10 +234,10 @@ def read(path: Path) -> Expectations:
         raise ExpectationError(path, f"no TOML ({error})") from error
     form = content.pop("format", FORMAT)
     if form != FORMAT:
-        raise ExpectationError(path, f"of format {form!r}, expected {FORMAT!r}")
+        raise ExpectationError(path, f"of format {toml_shown(form)}, expected {FORMAT!r}")
     others = content.pop("others", "fail")
     if others not in ("fail", "allow"):
-        raise ExpectationError(path, f'others = {others!r}, expected "fail" or "allow"')
+        raise ExpectationError(path, f'others = {toml_shown(others)}, expected "fail" or "allow"')
     _check_keys(path, "the file", content, ("format", "others", *KINDS))
     entries = []
     for kind in KINDS:
@@ -345,7 +345,7 @@ class _Row:
             raise self.error(f"{key} = [], expected one at least, or no {key!r}")
         whole = key == "scenario"  # of our own simulator these are numbers
         if not all(isinstance(value, str) or (whole and type(value) is int) for value in values):
-            raise self.error(f"{key} = {given!r}, expected a text or a list of them")
+            raise self.error(f"{key} = {toml_shown(given)}, expected a text or a list of them")
         return tuple(map(str, values))
 
     def number(self, key: str, *, low: float = -inf, high: float = inf) -> float | None:
@@ -358,7 +358,9 @@ class _Row:
         if not number or not low <= value <= high:
             least = f" of {low:g} or more" if low > -inf else ""
             bound = f" from {low:g} to {high:g}" if high < inf else least
-            raise self.error(f"{key} = {value!r}, expected a {'whole ' * whole}number{bound}")
+            raise self.error(
+                f"{key} = {toml_shown(value)}, expected a {'whole ' * whole}number{bound}"
+            )
         return float(value)
 
     def time(self) -> tuple[float, float] | None:
@@ -367,11 +369,13 @@ class _Row:
             return None
         numbers = isinstance(given, list) and all(type(each) in (int, float) for each in given)
         if not numbers or len(given) != 2 or not given[0] < given[1]:
-            raise self.error(f"time = {given!r}, expected [from, to] in seconds")
+            raise self.error(f"time = {toml_shown(given)}, expected [from, to] in seconds")
         return float(given[0]), float(given[1])
 
     def until(self) -> date | None:
         given = self.content.get("until")
         if given is None or (isinstance(given, date) and not isinstance(given, datetime)):
             return given
-        raise self.error(f"until = {given!r}, expected a date without quotes, such as 2027-01-31")
+        raise self.error(
+            f"until = {toml_shown(given)}, expected a date without quotes, such as 2027-01-31"
+        )

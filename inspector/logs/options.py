@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from inspector.errors import InspectorError
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS
-from models.jsontext import from_toml, text_of
+from models.jsontext import from_toml, text_of, toml_shown
 from noisemodel.atomic import replacing
 
 FORMAT = "noise-mapping/1"
@@ -195,7 +195,7 @@ def _setting(name: str, value: Any) -> Any:
     else:
         correct = isinstance(value, str)
     if not correct:
-        raise InspectorError(f"{name} = {value!r} is of another type than expected")
+        raise InspectorError(f"{name} = {toml_shown(value)} is of another type than expected")
     return value
 
 
