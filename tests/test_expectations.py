@@ -287,6 +287,21 @@ def test_a_class_that_no_model_has_is_refused_with_those_that_there_are(tmp_path
     assert "ok" not in classes_found(LIBRARY)
 
 
+@pytest.mark.parametrize(
+    ("name", "meant"),
+    [
+        ("high accelerations", "highaccelerations"),
+        ("High accelerations", "highaccelerations"),
+        ("impacts", "impact"),
+        ("oscillation", "oscillations"),
+    ],
+)
+def test_the_class_that_is_meant_is_suggested(tmp_path, name, meant):
+    found = expected(tmp_path, f'[[allow]]\nclass = "{name}"')
+    with pytest.raises(ExpectationError, match=rf"\(did you mean '{meant}'\?\)$"):
+        found.check_classes(LIBRARY)
+
+
 def test_the_nearest_file_counts_up_to_the_top_of_a_repository(tmp_path):
     deep = tmp_path / "repository" / "runs" / "arm"
     deep.mkdir(parents=True)

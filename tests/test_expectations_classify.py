@@ -191,6 +191,13 @@ def test_a_picture_never_replaces_its_run(runs, command):
     assert "is read, too" in err
 
 
+def test_a_class_as_reports_write_it_is_answered_with_its_name(runs):
+    status, out, err = call("classify", runs / "demo.npz", "--fail-on-class", "high accelerations")
+    assert (status, out) == (2, "")
+    words = " ".join(err.replace("│", " ").split())  # it stands in a box
+    assert "unknown (did you mean 'highaccelerations'?)" in words
+
+
 def test_bad_input_is_ignored_on_request_unless_there_is_nothing_else(runs):
     ignore = ("--on-bad-input", "ignore")
     assert call("classify", runs)[0] == 3

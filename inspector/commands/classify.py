@@ -227,13 +227,15 @@ def classify(
 def _classes(given: Sequence[str], library: "Library") -> tuple[str, ...]:
     """The classes that fail a run."""
     from inspector.expectations.expectations import classes_found
+    from noisemodel.errors import hint
 
     known = classes_found(library)
     names = [name for each in given for name in each.split(",")]
     for name in names:
         if name not in known:
             raise typer.BadParameter(
-                f"{name!r} is none of {', '.join(known)}", param_hint="'--fail-on-class'"
+                f"{name!r} is none of {', '.join(known)}{hint(name, known)}",
+                param_hint="'--fail-on-class'",
             )
     return tuple(names)
 

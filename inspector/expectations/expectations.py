@@ -12,6 +12,7 @@ from inspector.errors import FileError
 from inspector.library import Library
 from models.jsontext import from_toml, text_of, toml_shown
 from models.labels import UNKNOWN
+from noisemodel.errors import hint
 
 NAME = "expect.toml"
 FORMAT = "noise-expect/1"
@@ -194,7 +195,7 @@ class Expectations:
                     raise ExpectationError(
                         self.path,
                         f"{entry.name}: no model has the class {name!r}; there are"
-                        f" {', '.join(possible)}",
+                        f" {', '.join(possible)}{hint(name, possible)}",
                     )
 
 
