@@ -55,8 +55,22 @@ def test_expect_names_a_bad_file_and_writes_the_others(runs):
     status, out, err = call("expect", runs, "--required")
     assert status == 3
     assert f"{runs}/broken.npz: not a run file" in err
-    assert "1 finding of 3 runs required" in out
+    assert "1 finding of 2 runs required" in out
     assert '[[require]]\nruns = "demo.npz"' in (runs / "expect.toml").read_text()
+
+
+def test_expect_writes_nothing_if_no_run_can_be_read(runs, tmp_path):
+    junk = tmp_path / "junk"
+    junk.mkdir()
+    for name in ("a.npz", "b.csv"):
+        shutil.copy(runs / "broken.npz", junk / name)
+    status, out, err = call("expect", junk)
+    assert (status, out) == (3, "")
+    assert [line.partition(": ")[2].partition(": ")[0] for line in err.splitlines()] == [
+        f"{junk}/a.npz",
+        f"{junk}/b.csv",
+    ]
+    assert not (junk / "expect.toml").exists()
 
 
 def test_expect_asks_for_a_file_if_runs_lie_in_several_folders(runs, tmp_path):

@@ -38,7 +38,7 @@ def expect(
     `classify` applies the nearest expect.toml: beside a run, or in a folder above it. Edit it:
     allow, require, forbid, waive until a date, or set a budget (docs/expectations.md).
 
-    The exit status is 3 if a run cannot be read, 70 at a bug; the others are written.
+    The exit status is 3 if a run cannot be read, 70 at a bug; the others are written, if any.
     """
     from inspector import assets
     from inspector.analysis.verdict import classify_files
@@ -58,13 +58,16 @@ def expect(
     bad = [each for each in verdicts if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)]
     for each in bad:
         typer.echo(f"{each.trace}inspector: {each.path}: {each.message}", err=True)
+    status = worst(EXIT[each.status] for each in bad)
+    read = len(verdicts) - len(bad)
+    if not read:
+        raise typer.Exit(status)
     content = first(verdicts, path.parent, required=required, today=date.today())
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(content, encoding="utf-8")
     number = sum(len(each.events) for each in verdicts)
-    findings, of = counted(number, "finding"), counted(len(verdicts), "run")
+    findings, of = counted(number, "finding"), counted(read, "run")
     became = "required" if required else "allowed"
     typer.echo(f"{path}: {findings} of {of} {became}; edit it, then")
     typer.echo(f"  inspector classify {' '.join(map(str, runs))}")
-    if bad:
-        raise typer.Exit(worst(EXIT[each.status] for each in bad))
+    raise typer.Exit(status)
