@@ -51,6 +51,18 @@ def test_what_expect_writes_makes_classify_pass(runs):
     assert "exists already" in err
 
 
+@pytest.mark.parametrize("place", ["my-expect.toml", "runs/mine.toml", "expect.toml"])
+def test_what_expect_says_to_type_next_applies_its_file(runs, tmp_path, monkeypatch, place):
+    monkeypatch.chdir(tmp_path)
+    status, out, _ = call("expect", "runs/demo.npz", "-o", place)
+    assert status == 0
+    command = out.splitlines()[1].split()
+    assert ("--expect" in command) is (place != "expect.toml")
+    status, out, _ = call(*command[1:])
+    assert status == 0
+    assert out.startswith(f"runs/demo.npz: ok [general], by {place}\n")
+
+
 def test_expect_names_a_bad_file_and_writes_the_others(runs):
     status, out, err = call("expect", runs, "--required")
     assert status == 3

@@ -1,5 +1,6 @@
 """`inspector expect`: a first file of expectations."""
 
+import shlex
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -42,6 +43,7 @@ def expect(
     """
     from inspector import assets
     from inspector.analysis.verdict import classify_files
+    from inspector.expectations.expectations import is_nearest
     from inspector.expectations.first import first, path_for
     from inspector.library import load_library
     from inspector.logs.opening import sources
@@ -69,5 +71,7 @@ def expect(
     findings, of = counted(number, "finding"), counted(read, "run")
     became = "required" if required else "allowed"
     typer.echo(f"{path}: {findings} of {of} {became}; edit it, then")
-    typer.echo(f"  inspector classify {' '.join(map(str, runs))}")
+    by_itself = all(is_nearest(path, each.shown) for each in found)
+    named = [] if by_itself else ["--expect", str(path)]
+    typer.echo(f"  {shlex.join(['inspector', 'classify', *map(str, runs), *named])}")
     raise typer.Exit(status)

@@ -278,6 +278,12 @@ def found_for(runs: Iterable[Path]) -> dict[Path, Expectations]:
     return found
 
 
+def is_nearest(path: Path, run: Path) -> bool:
+    """Whether a file is the one that `found_for` reads for a run."""
+    found = next(_above(run.parent), None)
+    return found is not None and found.resolve() == path.resolve()
+
+
 def _above(folder: Path) -> Iterator[Path]:
     """List the files for runs of a folder, the nearest first, as people would type their paths."""
     full, here = folder.resolve(), Path.cwd()
