@@ -126,6 +126,77 @@ def test_a_log_that_is_missing_from_a_folder_lacks_its_required_finding(runs):
     assert call("classify", runs / "demo.npz")[0] == 0  # not the whole folder
 
 
+REQUIRED = '[[allow]]\n[[require]]\nclass = "impact"\n'
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    """A folder with the demo run, in a folder of its own, from which commands are called."""
+    folder = tmp_path / "runs" / "arm"
+    folder.mkdir(parents=True)
+    shutil.copy(demo_run(), folder / "demo.npz")
+    monkeypatch.chdir(tmp_path)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("entry", "status"),
+    [
+        ('runs = "grasp-*.npz"', 1),
+        ('runs = "arm/grasp.npz"', 1),
+        ('runs = "a*/grasp.npz"', 1),
+        ('runs = "*/leg/grasp.npz"', 1),
+        ('runs = ["leg/*.npz", "arm/[gp]*.npz"]', 1),
+        ('scenario = "grasp"', 1),
+        ('runs = "leg/grasp.npz"', 0),  # of another folder
+        ('runs = "ar/*.npz"', 0),
+        ('runs = "arm2/*.npz"', 0),
+        ('runs = "leg*/grasp.npz"', 0),
+        ('runs = "*/demo.npz"', 0),
+        ('runs = "demo.npz"', 0),
+    ],
+)
+def test_a_log_that_a_file_above_the_folder_requires_is_missing(arm, entry, status):
+    Path("runs/expect.toml").write_text(REQUIRED + entry)
+    assert call("classify", "runs/arm")[0] == status
+    assert call("classify", "runs/arm", "--expect", "runs/expect.toml")[0] == status
+    assert call("classify", "runs/arm/demo.npz")[0] == 0
+
+
+def test_a_log_that_a_file_elsewhere_requires_is_missing_from_a_folder(arm):
+    Path("ours.toml").write_text(REQUIRED + 'runs = "grasp.npz"')
+    status, out, _ = call("classify", "runs", "--expect", "ours.toml")
+    assert status == 1
+    assert "  missing: impact (required: [[require]] 1: no run is grasp.npz)" in out
+    Path("other").mkdir()
+    Path("ours.toml").rename("other/ours.toml")
+    assert call("classify", "runs", "--expect", "other/ours.toml")[0] == 1
+    assert call("classify", "runs/arm/demo.npz", "--expect", "other/ours.toml")[0] == 0
+    assert call("classify", "runs", "--no-expect")[0] == 1  # the finding of the demo
+    Path("other/ours.toml").write_text(REQUIRED + 'runs = "demo.npz"')
+    assert call("classify", "runs", "--expect", "other/ours.toml")[0] == 0
+
+
+def test_a_log_is_missing_where_all_that_are_there_have_a_nearer_file(arm):
+    Path("runs/expect.toml").write_text(REQUIRED + 'runs = "grasp.npz"')
+    (arm / "expect.toml").write_text("[[allow]]")
+    assert call("classify", "runs/arm")[0] == 0
+    status, out, _ = call("classify", "runs")
+    assert status == 1
+    assert "no run is grasp.npz" in out
+
+
+def test_a_log_that_is_a_folder_lacks_no_other_log(arm):
+    bag = arm / "bag"
+    bag.mkdir()
+    (bag / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")
+    (arm / "expect.toml").write_text(REQUIRED + 'runs = "grasp.npz"')
+    status, out, err = call("classify", "runs/arm/bag")
+    assert status == 3
+    assert "runs/arm/bag: " in err
+    assert "grasp" not in out
+
+
 @pytest.mark.parametrize(
     ("text", "problem"),
     [

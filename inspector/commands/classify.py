@@ -1,6 +1,6 @@
 """`inspector classify`: the verdicts on runs."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
 from enum import StrEnum
@@ -155,7 +155,14 @@ def classify(
     shown = [each.shown for each in found]
     for path in files:
         refuse_existing(path, overwrite=overwrite, read=shown)
-    expected = {} if no_expect else _expected(shown, expect, library)
+    logs = {each.path for each in found}  # some are folders
+    folders = {
+        each: each / NAME
+        for each in runs
+        if each.is_dir() and (each not in logs or (each / NAME).is_file())
+    }
+    expected = {} if no_expect else _expected([*shown, *folders.values()], expect, library)
+    applied = {each.path: each for each in expected.values()}.values()
     today = date.today()
     targets = {}
     if labels_to:
@@ -172,7 +179,7 @@ def classify(
     settings: dict[str, Any] = {
         "reading": reading,
         "unknown": unknown,
-        "localise": localise or any(each.by_joint for each in expected.values()),
+        "localise": localise or any(each.by_joint for each in applied),
         "draw": draw,
         "jobs": jobs_or_dask(jobs, dask),
     }
@@ -192,13 +199,19 @@ def classify(
         )
         for each in sorted(classified, key=lambda each: place[each.path])
     ]
-    for expectations in _whole(runs, expected.values()) if expect is None else ():
-        if (absent := without_run(verdicts, expectations)) is not None:
+    for expectations in applied:
+        full = expectations.path.resolve()
+        about = [
+            folder
+            for folder, beside in folders.items()
+            if expected.get(beside) == expectations or full.is_relative_to(folder.resolve())
+        ]
+        if (absent := without_run(verdicts, expectations, about)) is not None:
             verdicts.append(absent)
     if unread := [path for path in others if path.name != NAME]:
         typer.echo(f"inspector: {left_out(unread)}", err=True)
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
-    for expectations in {each.path: each for each in expected.values()}.values():
+    for expectations in applied:
         for remark in expectations.remarks(today):
             typer.echo(f"inspector: {remark}", err=True)
     lost = [line for verdict in verdicts for line in verdict.lost]
@@ -243,7 +256,7 @@ def _classes(given: Sequence[str], library: "Library") -> tuple[str, ...]:
 def _expected(
     runs: Sequence[Path], chosen: Path | None, library: "Library"
 ) -> "dict[Path, Expectations]":
-    """The expectations of each run that has some."""
+    """The expectations of each run, or file of a folder, that has some."""
     from inspector.expectations.expectations import found_for, read
 
     if chosen is None:
@@ -254,11 +267,3 @@ def _expected(
     for expectations in expected.values():
         expectations.check_classes(library)
     return expected
-
-
-def _whole(given: Sequence[Path], expected: "Iterable[Expectations]") -> "Iterator[Expectations]":
-    """The expectations all of whose runs are given: their folder is, or lies in one that is."""
-    folders = [path.resolve() for path in given if path.is_dir()]
-    for each in {each.path: each for each in expected}.values():
-        if any(each.path.resolve().is_relative_to(folder) for folder in folders):
-            yield each

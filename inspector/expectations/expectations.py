@@ -1,5 +1,6 @@
 """The file of expectations, ``expect.toml``: which findings of which runs are expected."""
 
+import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
@@ -99,6 +100,20 @@ class Entry:
             return False
         names = {run.as_posix(), run.name}
         return not self.runs or any(_any(name, self.runs) for name in names)
+
+    def asked_in(self, folder: str) -> bool:
+        """Whether runs of a folder may be what it is about: its patterns name no other folder.
+
+        Args:
+            folder: The folder, relative to that of the file, with a slash at its end; empty for
+                that of the file, and for folders elsewhere.
+        """
+        for pattern in self.runs or ("*",):
+            literal = re.split(r"[*?[]", pattern, maxsplit=1)[0]
+            open_end = literal != pattern and folder.startswith(literal)
+            if "/" not in pattern or literal.startswith(folder) or open_end:
+                return True
+        return False
 
     def matches(self, label: str, start: float, stop: float, joint: str | None) -> bool:
         """Whether it is about a finding of such a run.

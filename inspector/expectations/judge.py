@@ -1,9 +1,10 @@
 """What becomes of the findings of a run by what is expected of it, and by the bounds of a gate."""
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from pathlib import Path
 
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict
@@ -88,21 +89,27 @@ def judge(
     return judged
 
 
-def without_run(verdicts: Sequence[Verdict], expectations: Expectations) -> Verdict | None:
+def without_run(
+    verdicts: Sequence[Verdict], expectations: Expectations, folders: Iterable[Path]
+) -> Verdict | None:
     """Give the verdict on required findings of runs that there are none of: a log is missing.
 
     Args:
-        verdicts: Those on all runs below the folder of the expectations.
+        verdicts: Those on all runs.
         expectations: What is expected of them.
+        folders: Folders all of whose runs these are.
 
     Returns:
         A verdict on the file of expectations, with what is missing; None if nothing is.
     """
+    top = expectations.path.parent.resolve()
+    below = {folder.resolve() for folder in folders}
+    names = {f"{each.relative_to(top)}/" if top in each.parents else "" for each in below}
     covered = {entry for each in verdicts for entry in expectations.of(each.path, each.scenario)}
     missing = tuple(
         _lacking(entry, f"{entry.name}: no run is {' or '.join(entry.runs or entry.scenario)}")
         for entry in expectations.entries
-        if entry.kind == "require" and entry not in covered
+        if entry.kind == "require" and entry not in covered and any(map(entry.asked_in, names))
     )
     if not missing:
         return None
