@@ -129,6 +129,33 @@ def test_a_log_that_is_missing_from_a_folder_lacks_its_required_finding(runs):
 REQUIRED = '[[allow]]\n[[require]]\nclass = "impact"\n'
 
 
+def test_a_missing_log_has_its_reason_and_is_no_run(runs, tmp_path):
+    (runs / "broken.npz").unlink()
+    entry = '[[require]]\nruns = "{}-*.npz"\nclass = "impact"\nreason = "the {} closes"\n'
+    expectations = "".join(entry.format(name, name) for name in ("pick", "grip"))
+    (runs / "expect.toml").write_text(f"[[allow]]\n{expectations}")
+    junit, page = tmp_path / "junit.xml", tmp_path / "report"
+    written = ("--write", f"junit={junit}", "--report", page)
+    status, out, _ = call("classify", runs, *written)
+    assert status == 1
+    told = "missing: impact (required: the {0} closes; [[require]] {1}: no run is {0}-*.npz)"
+    place = out.splitlines().index(f"{runs}/expect.toml: findings")
+    assert out.splitlines()[place + 1 :] == [
+        f"  {told.format('pick', 1)}",
+        f"  {told.format('grip', 2)}",
+        "2 runs: 1 cannot tell, 1 ok; no log for 2 required findings;"
+        " findings: 2 missing, 1 allowed",
+    ]
+    suite = ET.parse(junit).getroot().find("testsuite")
+    assert [suite.get(each) for each in ("tests", "failures", "skipped")] == ["3", "1", "1"]
+    html = (page / "index.html").read_text()
+    assert "2 runs: 1 cannot tell, 1 ok; no log for 2 required findings" in html
+    assert told.format("pick", 1) in html
+    assert "<strong>1</strong>with findings" not in html
+    counts = json.loads(call("classify", runs, "--format", "json")[1])["counts"]
+    assert (sum(counts["runs"].values()), counts["findings"]["missing"]) == (2, 2)
+
+
 @pytest.fixture
 def arm(tmp_path, monkeypatch):
     """A folder with the demo run, in a folder of its own, from which commands are called."""

@@ -141,6 +141,11 @@ class Verdict:
     trace: str = ""
     begin: float = 0.0
 
+    @property
+    def of_run(self) -> bool:
+        """Whether it is on a run; if not, on a file of expectations that requires missing logs."""
+        return str(self.path) != self.expectations
+
     def ruled(self, event: Event) -> Ruled:
         """Give what became of a finding."""
         return self.rulings.get(event, Ruled())
@@ -324,7 +329,7 @@ def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
     runs: Counter[str] = Counter()
     found: Counter[str] = Counter()
     for verdict in verdicts:
-        runs[verdict.status.value] += 1
+        runs[verdict.status.value] += verdict.of_run
         found["failing"] += len(verdict.failing)
         found["missing"] += len(verdict.missing)
         found.update(verdict.ruled(event).ruling.value for event in verdict.excused)

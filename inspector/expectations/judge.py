@@ -107,7 +107,7 @@ def without_run(
     names = {f"{each.relative_to(top)}/" if top in each.parents else "" for each in below}
     covered = {entry for each in verdicts for entry in expectations.of(each.path, each.scenario)}
     missing = tuple(
-        _lacking(entry, f"{entry.name}: no run is {' or '.join(entry.runs or entry.scenario)}")
+        _lacking(entry, "; ".join(filter(None, (entry.reason, _no_run(entry)))))
         for entry in expectations.entries
         if entry.kind == "require" and entry not in covered and any(map(entry.asked_in, names))
     )
@@ -115,6 +115,10 @@ def without_run(
         return None
     path = expectations.path
     return Verdict(path, Status.FINDINGS, missing=missing, expectations=str(path))
+
+
+def _no_run(entry: Entry) -> str:
+    return f"{entry.name}: no run is {' or '.join(entry.runs or entry.scenario)}"
 
 
 def _rulings(

@@ -40,10 +40,12 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     runs = [f"{n} {WORDS[Status(name)]}" for name, n in number["runs"].items() if n]
     ignored = sum(verdict.ignored for verdict in verdicts)
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
+    absent = sum(len(verdict.missing) for verdict in verdicts if not verdict.of_run)
+    logs = f"; no log for {counted(absent, 'required finding')}" if absent else ""
     found = [f"{n} {_words(name)}" for name, n in number["findings"].items() if n]
-    return f"{counted(len(verdicts), 'run')}: {', '.join(runs) or 'none'}" + (
-        f"; findings: {', '.join(found)}" if found else ""
-    )
+    total = counted(sum(verdict.of_run for verdict in verdicts), "run")
+    findings = f"; findings: {', '.join(found)}" if found else ""
+    return f"{total}: {', '.join(runs) or 'none'}{logs}{findings}"
 
 
 def text(verdicts: Sequence[Verdict]) -> str:
@@ -56,7 +58,7 @@ def text(verdicts: Sequence[Verdict]) -> str:
         if verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
             continue
         model = f" [{verdict.model}]" if verdict.model else ""
-        expected = f", by {verdict.expectations}" if verdict.expectations else ""
+        expected = f", by {verdict.expectations}" if verdict.expectations and verdict.of_run else ""
         message = f": {verdict.message}" if verdict.message else ""
         lines.append(f"{verdict.path}: {verdict.status}{model}{expected}{message}")
         lines += [f"  {sentence}" for sentence in (*failing(verdict), *excused(verdict))]

@@ -157,11 +157,12 @@ def page(verdicts: Sequence[Verdict]) -> str:
 def _add_counts(body: ET.Element, ranked: Sequence[Verdict]) -> None:
     """Add the number of runs of each status, a link to the first of them."""
     line = ET.SubElement(body, "p", {"class": "counts"})
-    first = {each.status: number for number, each in reversed(list(enumerate(ranked, 1)))}
+    runs = [(number, each) for number, each in enumerate(ranked, 1) if each.of_run]
+    first = {each.status: number for number, each in reversed(runs)}
     for status, number in sorted(first.items(), key=lambda item: item[1]):
         link = ET.SubElement(line, "a", href=f"#run-{number}")
         badge = ET.SubElement(link, "span", {"class": f"status {status}"})
-        add_text(badge, "strong", str(sum(each.status is status for each in ranked)))
+        add_text(badge, "strong", str(sum(each.status is status for _, each in runs)))
         badge[-1].tail = WORDS[status]
 
 
