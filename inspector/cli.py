@@ -9,6 +9,7 @@ from contextlib import suppress
 from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from inspector.analysis.status import EXIT, OUTPUT_LOST, Status
 from inspector.commands.adapt import adapt
@@ -35,7 +36,20 @@ from inspector.commands.tune import tune
 from inspector.commands.view import view
 from inspector.text import printable
 
+
+class _Group(TyperGroup):
+    """Commands; what they say of a wrong value begins with the value."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = error.message.removeprefix("Value error, ")  # of pydantic
+            raise
+
+
 app = typer.Typer(
+    cls=_Group,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     epilog="Example: inspector view",

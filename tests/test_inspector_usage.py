@@ -40,6 +40,15 @@ def test_a_kind_that_does_not_exist_is_a_usage_error(command):
     assert "'D' is none of normal, rms, mean, paper, A, B, C" in result.output
 
 
+@pytest.mark.parametrize(
+    "command", [["classify", "run.npz", "--format"], ["simulate", "dataset", "--format"]]
+)
+def test_a_choice_that_does_not_exist_is_answered_with_those_that_do(command):
+    result = CliRunner().invoke(app, [*command, "xml"], env={"COLUMNS": "300"})
+    assert result.exit_code == 2
+    assert f"Invalid value for '{command[-1]}': 'xml' is not one of '" in result.output
+
+
 def commands(group=None, path=()):
     """All commands and groups by the words that call them, without `inspector` itself."""
     for name, command in (group or typer.main.get_command(app)).commands.items():
