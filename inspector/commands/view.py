@@ -101,7 +101,7 @@ def view(
         check_suffix(save, ".rrd")
     target = save or viewer.scratch_path(_together(paths))
     overwrite = overwrite or save is None
-    refuse_existing(target, overwrite=overwrite, read=paths)
+    refuse_existing(target, overwrite=overwrite)
     library = load_library(assets.model_files(model))
     robot, unread, seconds = not no_robot, False, None
     if len(paths) == 1:
