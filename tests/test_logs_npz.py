@@ -155,3 +155,10 @@ def test_a_damaged_archive_is_an_error_of_one_line(tmp_path):
     path.write_bytes(data[:-100])
     with pytest.raises(LogError, match="not an archive of plain arrays"):
         read_log(path)
+
+
+def test_the_noise_of_a_simulated_run_is_no_log(tmp_path):
+    path = tmp_path / "sample.npz"
+    np.savez(path, format="noise-sample/3", measured=np.zeros(9))
+    with pytest.raises(LogError, match="holds the noise of a simulated run, not its motion"):
+        read_log(path)

@@ -46,7 +46,7 @@ def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -
     files = {}
     for each in given:
         name, equals, path = each.partition("=")
-        if name not in known or not equals or not path:
+        if name not in known or not equals or path in ("", "-"):
             raise typer.BadParameter(
                 f"{each!r}: expected FORMAT=FILE, with one of {', '.join(known)}",
                 param_hint="'--write'",

@@ -19,6 +19,12 @@ OBJECTS = (
     " np.savez(path, time=times, position=positions, velocity=velocities)"
 )
 
+SAMPLE = "noise-sample/"
+SAMPLE_PROBLEM = (
+    "holds the noise of a simulated run, not its motion: the folder of the data set is for"
+    " `inspector train`, `tune` and `evaluate`; `inspector simulate run` writes runs"
+)
+
 ALONE = "array"
 """Name of the array in a .npy file, for a mapping."""
 
@@ -34,6 +40,8 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
         LogError: If it is not an archive of plain arrays.
     """
     arrays = _arrays(path)
+    if str(arrays.get("format", "")).startswith(SAMPLE):
+        raise LogError(path, SAMPLE_PROBLEM)
     run = None
     if _is_run(arrays) and not (options.entries or options.units or options.joints):
         run = lambda: Run.load(path)  # noqa: E731
