@@ -271,6 +271,7 @@ def test_entries_that_name_joints_are_applied(runs):
         (["--expect", "x.toml", "--no-expect"], 2),
         (["--write", "excel=x"], 2),
         (["--write", "junit"], 2),
+        (["--write", "junit=-"], 2),
         (["--write", "junit=a.out", "--write", "json=a.out"], 2),
         (["--min-score", "nan"], 2),
         (["--min-duration", "inf"], 2),
