@@ -1,5 +1,6 @@
 """How a recording is laid out: findings, robot and details at the left, time at the right."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil
@@ -23,8 +24,9 @@ COLUMNS = 72
 """Characters of a line at the left of a window of 1440 x 900, at least."""
 TALLEST = 264.0
 """Most height of the text at the left, in points."""
-TITLES = 28.0
-"""Height of a row of tabs, in points."""
+WHOLE, EVENTS, EVENT, DETAILS, TITLES = 836.0, 84.0, 23.0, 190.0, 28.0
+"""Heights of the whole window's parts, of the list of events without and for each, of the samples
+of a moment, and of a row of tabs, in points."""
 SPAN = "/span"
 """What makes every plot reach from the start of the run to its end."""
 
@@ -95,39 +97,36 @@ def _left(contents: Contents) -> Part:
     text = unstable.text("Findings", "/report", titled=False)
     parts: list[tuple[Part, float]] = [(text, height(contents.text))]
     if contents.events:
-        parts.append(
-            (
-                unstable.events("Click a time to go there", "/events"),
-                76.0 + 23.0 * min(contents.events, 4),
-            )
-        )
+        events = unstable.events("Click a time to go there", "/events")
+        parts.append((events, EVENTS + EVENT * min(contents.events, 4)))
     if contents.camera is not None:
         title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
         robot = unstable.robot(title, "/robot", contents.camera)
         if contents.links:
             key = unstable.drawing("/axis/key/right")
             robot = unstable.beside((robot, 88.0), (key, 12.0))
-        parts.append((robot, 300.0))
-    parts.append(
-        (unstable.tabs(*(each for one in contents.details for each in _detail(one))), 190.0)
-    )
-    return unstable.above(*parts)
+        parts.append((robot, WHOLE - DETAILS - sum(size for _, size in parts)))
+    details = unstable.tabs(*(each for one in contents.details for each in _detail(one)))
+    return unstable.above(*parts, (details, DETAILS))
 
 
 def height(markdown: str) -> float:
-    """Height of a text as far as its paragraphs fit, in points: none is cut through by the edge.
+    """Height of a text as far as its parts fit, in points: none is cut through by the edge.
 
     Args:
-        markdown: A title, then paragraphs and lists with a blank line between them.
+        markdown: A title, then paragraphs and lists with a blank line between them. A list belongs
+            to what is above it.
     """
-    found = HEAD
-    for paragraph in markdown.strip().split("\n\n")[1:]:
-        lines = sum(ceil(len(line.replace("**", "")) / COLUMNS) for line in paragraph.split("\n"))
-        below = found + PARAGRAPH + LINE * (lines - 1)
+    found = HEAD - PARAGRAPH
+    for part in re.split(r"\n\n(?!- )", markdown.strip()):
+        below = found
+        for paragraph in part.split("\n\n"):
+            rows = paragraph.replace("**", "").split("\n")
+            below += PARAGRAPH + LINE * (sum(ceil(len(row) / COLUMNS) for row in rows) - 1)
         if below + FOOT > TALLEST:
             break
         found = below
-    return found + FOOT
+    return max(found, HEAD) + FOOT
 
 
 def _rows(panel: Panel, path: str, *, name: str | None = None) -> Part:
