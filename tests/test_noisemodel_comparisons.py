@@ -411,6 +411,12 @@ def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
         ({"jobs": 0}, NoiseModelError, "jobs is 0, expected 1 or more"),
         ({"events": [(0, 9)]}, NoiseModelError, "events are samples of q and v"),
         ({"q": np.zeros((9, 9))}, NoiseModelError, "expected q, v and their rate"),
+        ({"v": np.zeros((9, 9)), "rate": 1e3}, NoiseModelError, "expected q, v and their rate"),
+        (
+            {"q": np.zeros((9, 9)), "v": np.zeros((9, 9)), "rate": 1e3, "motion": "excitation"},
+            NoiseModelError,
+            "expected q, v and their rate, and no other motion",
+        ),
         (
             {"q": np.zeros((9, 9)), "v": np.zeros((9, 9)), "rate": 1e3},
             NoiseModelError,
@@ -481,6 +487,9 @@ def test_a_table_prints_the_numbers_of_the_comparison(thrice):
     numbers = [f"{n:.2f}" for n in one.comparison.correlation[2, :2]]
     numbers += [f"{n:.1f}" for n in one.comparison.distance[2, :2]]
     assert row.split()[1:8] == [*shares, *numbers]
+    lines = str(one.comparison).splitlines()
+    loudest = [line.split()[0] for line in lines if line.split()[0] in one.comparison.names]
+    assert loudest[0] == one.comparison.loudest[0]
     assert row.endswith(one.comparison.loudest[0])
 
 

@@ -42,6 +42,8 @@ def test_the_corner_of_a_sphere_is_where_its_efficiency_is_half(tmp_path):
     _, surface = slider(tmp_path, SPHERE, BAR, "")
     corners = corner_frequencies(surface, sound_speed=343.2)
     assert corners[0] == pytest.approx(np.sqrt(2) * 343.2 / (2 * np.pi * 0.1), rel=1e-2)
+    radius = np.sqrt(surface.area / (4 * np.pi))[:2]
+    np.testing.assert_allclose(corners[:2] * radius, np.sqrt(2) * 343.2 / (2 * np.pi), rtol=1e-12)
     assert corners[2] == np.inf
 
 

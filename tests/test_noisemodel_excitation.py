@@ -52,14 +52,16 @@ def test_both_shakes_are_equally_fast(tmp_path):
     robot = chain(tmp_path, "revolute", "revolute", "revolute")
     run = excitation(robot)
     near, far = ends(robot)
-    energies = []
+    energies, loudest = [], []
     for label, name in zip(SHAKES, (near, far), strict=True):
         (block,) = [block for block in run.blocks if block.label == label]
         inside = (run.time >= block.start) & (run.time < block.stop)
         velocity = run.velocity[inside, robot.joint_names.index(name)]
         spectrum = np.abs(np.fft.rfft(velocity * np.hanning(len(velocity))))
         energies.append(spectrum[30:].max())
+        loudest.append((30 + spectrum[30:].argmax()) * run.rate / len(velocity))
     assert energies[0] == pytest.approx(energies[1], rel=0.1)
+    assert 40.0 <= loudest[0] == loudest[1] <= 200.0
 
 
 def test_the_near_joint_carries_most_and_the_far_one_ends_the_chain(tmp_path):

@@ -77,6 +77,10 @@ def test_missing_velocities_are_differentiated_from_positions():
             {"velocity": np.zeros(2), "base_pose": np.zeros(6)},
             r"base_pose: shape \(6,\), expected \(7,\)",
         ),
+        (
+            {"velocity": np.zeros(2), "base_velocity": np.zeros(7)},
+            r"base_velocity: shape \(7,\), expected \(6,\)",
+        ),
         ({"effort": np.zeros(2)}, "velocity: missing, and position too; the sample has effort"),
         ({}, "velocity: missing, and position too; the sample has nothing"),
         ({"velocity": np.zeros(2), "time": np.nan}, "time: nan in sample 1"),

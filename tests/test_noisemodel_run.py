@@ -125,7 +125,9 @@ def test_only_signals_whose_axes_are_exchanged_are_said_to_be_transposed():
         assert str(caught.value).endswith("; samples come first, is it transposed?") == hint
 
 
-def test_blocks_may_touch_and_reach_the_end_of_the_last_sample():
+def test_blocks_may_touch_and_reach_the_end_of_the_last_sample_and_no_further():
+    with pytest.raises(RunError, match="block 'ok'"):
+        run(blocks=(Block(0.0, 0.102, "ok"),))
     assert len(run(blocks=(Block(0.0, 0.05, "ok"), Block(0.05, 0.1, "impact"))).blocks) == 2
 
 
