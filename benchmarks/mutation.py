@@ -160,10 +160,10 @@ def changed(mutant: Mutant) -> str | None:
     from cosmic_ray.mutating import mutate_code
 
     operator = plugins.get_operator(mutant.operator)()
-    source = mutate_code(Path(mutant.path).read_text(), operator, mutant.occurrence)
     try:
+        source = mutate_code(Path(mutant.path).read_text(), operator, mutant.occurrence)
         compile(source, mutant.path, "exec")
-    except SyntaxError:
+    except (SyntaxError, AttributeError):  # the latter of cosmic-ray, at some exceptions
         return None
     return str(source)
 
