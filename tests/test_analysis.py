@@ -22,7 +22,7 @@ from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.formats import FORMATS
 from models import Event, Labels
-from noisemodel import Run
+from noisemodel import Robot, Run
 from noisemodel.differentiate import METHOD, joint_velocity
 
 LIBRARY = load_library(model_files())
@@ -410,3 +410,23 @@ def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
     (tmp_path / "b.npz").write_bytes(bytes(500_000))
     found = [tmp_path / "a.npz", tmp_path / "b.npz", tmp_path / "gone.npz", tmp_path]
     assert work_of(found) == pytest.approx(0.03, rel=1e-12)
+
+
+def test_a_base_that_floats_makes_noise_by_its_own_motion():
+    from inspector.analysis.level import estimate
+
+    robot = Robot.load("solo12")
+    time = np.arange(200) / 1000
+    still = np.zeros((200, len(robot.joint_names)))
+    pose = np.tile([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], (200, 1))
+    run = Run(
+        time=time,
+        velocity=still,
+        position=still,
+        joint_names=robot.joint_names,
+        robot="solo12",
+        base_pose=pose,
+        base_velocity=np.tile([0.0, 0.0, 1.0, 0.0, 0.0, 0.0], (200, 1)),
+    )
+
+    assert (estimate(run, "normal").pressure > 0.0).all()
