@@ -100,15 +100,15 @@ def places() -> list[list[Mutant]]:
         typed = unread(ast.parse(source))
         for node in ast_nodes(get_ast(source)):
             for name, operator in operators.items():
-                if "BinaryOperator" in name and (
-                    node.type != "operator" or node.parent.type == "parameters"
-                ):
+                if "BinaryOperator" in name and node.type != "operator":
                     continue
                 if "ComparisonOperator" in name and node.type != "comparison":
                     continue
                 for (line, column), _ in operator.mutation_positions(node):
                     mutant = Mutant(str(path), line, column, name, seen[name])
                     seen[name] += 1
+                    if node.parent and node.parent.type == "parameters":  # the * before names
+                        continue
                     if not any(start <= (line, column) < stop for start, stop in typed):
                         found[str(path), line, column].append(mutant)
     return [found[key] for key in sorted(found)]
