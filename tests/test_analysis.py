@@ -430,3 +430,12 @@ def test_a_base_that_floats_makes_noise_by_its_own_motion():
     )
 
     assert (estimate(run, "normal").pressure > 0.0).all()
+
+
+def test_the_papers_sum_is_given_where_a_robot_and_its_positions_are_known():
+    from inspector.analysis.level import default_kinds
+
+    whole = replace(moving(), robot="panda", position=np.zeros_like(moving().velocity))
+    assert default_kinds(whole) == ("simplified", "paper")
+    assert default_kinds(replace(whole, position=None)) == ("simplified",)
+    assert default_kinds(replace(whole, robot="no such robot")) == ("simplified",)

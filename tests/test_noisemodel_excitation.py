@@ -99,3 +99,18 @@ def test_the_rate_changes_the_samples_and_not_the_events(tmp_path):
 def test_a_rate_or_a_seed_that_cannot_be_is_refused(tmp_path, options, message):
     with pytest.raises(NoiseModelError, match=message):
         excitation(chain(tmp_path, "revolute"), **options)
+
+
+def test_the_motion_of_a_seed_is_that_of_every_version(tmp_path):
+    """Published comparisons of robots are of this motion."""
+    run = excitation(chain(tmp_path, "revolute", "revolute"), rate=1000.0, seed=3)
+    rows = [0, 500, 1400, 2600, 3000, 3900]
+    velocity = [
+        [-0.07680895, 0.54502649],
+        [0.01674567, 0.47425227],
+        [-0.43822055, -0.24924171],
+        [-0.4288232, 0.09651234],
+        [-0.31210099, 0.29743893],
+        [-0.67597647, -0.12145249],
+    ]
+    np.testing.assert_allclose(run.velocity[rows], velocity, atol=1e-7)

@@ -66,8 +66,9 @@ def test_where_the_robot_moves_power_is_right_to_a_hundredth(solo):
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=2e-3)
 
 
+@pytest.mark.parametrize("offset", [0.0, 0.7])
 @pytest.mark.parametrize("kind", ["normal", "paper"])
-def test_the_noise_of_a_floating_robot_is_the_extended_one(solo, kind):
+def test_the_noise_of_a_floating_robot_is_the_extended_one(solo, kind, offset):
     robot, surface = solo
     q, v = vibration(robot, 400, moving=True)
     q[:, :3] = [0.3, -0.2, 0.5]
@@ -76,7 +77,7 @@ def test_the_noise_of_a_floating_robot_is_the_extended_one(solo, kind):
         velocity=v[:, 6:],
         position=q[:, 7:],
         velocity_desired=v[:, :5:-1],
-        position_desired=q[:, :6:-1],
+        position_desired=q[:, :6:-1] + offset,
         joint_names=robot.joint_names,
         desired_joint_names=robot.joint_names[::-1],
         base_pose=q[:, :7],
