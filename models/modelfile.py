@@ -102,7 +102,7 @@ def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
     if path.exists() and not overwrite:
         raise OutputError(path, EXISTS)
     if path.is_symlink():  # the link stays
-        path = path.resolve()
+        path = Path(os.path.realpath(path))
     temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")  # swept by `noisemodel`
     try:
         file = temporary.open("xb")

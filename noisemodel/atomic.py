@@ -42,7 +42,7 @@ def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     path = Path(path)
     refuse_existing(path, overwrite=overwrite)
     if path.is_symlink():
-        path = path.resolve()
+        path = Path(os.path.realpath(path))
     _sweep(path.parent.absolute())
     temporary = path.with_name(f".noise-inspector-{_machine()}{uuid4().hex[:8]}")
     try:  # with the permissions that the umask leaves to any file

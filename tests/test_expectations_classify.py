@@ -283,6 +283,8 @@ def test_options_name_the_findings_that_fail_a_run(runs, options, status):
 
 def test_a_run_that_is_named_twice_is_classified_once(runs):
     (runs / "link.npz").symlink_to("demo.npz")
+    (runs / "loop.npz").symlink_to("loop.npz")
+    assert call("classify", runs / "loop.npz", runs / "loop.npz")[0] == 3
     demo = runs / "demo.npz"
     status, out, _ = call("classify", demo, runs / "link.npz", demo, "--format", "json")
     assert status == 1

@@ -96,6 +96,15 @@ def test_a_link_stays_and_what_it_leads_to_is_written(tmp_path):
 
 
 @pytest.mark.parametrize("save", [write, save_model], ids=["file", "model"])
+def test_a_link_to_itself_is_one_error_or_replaced(tmp_path, save):
+    (tmp_path / "link").symlink_to("link")
+    with pytest.raises(ValueError, match="link: exists already"):
+        save(tmp_path / "link", "")
+    save(tmp_path / "link", "whole", overwrite=True)
+    assert (tmp_path / "link").is_file()
+
+
+@pytest.mark.parametrize("save", [write, save_model], ids=["file", "model"])
 def test_a_pipe_is_not_replaced(tmp_path, save):
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(ValueError, match="pipe: is no regular file; name one"):

@@ -1,6 +1,7 @@
 """A run file or any log, opened as a run in memory: what all commands read their inputs by."""
 
 import hashlib
+import os
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -169,12 +170,12 @@ def sources(
     reading = reading or Reading()
     found: list[Source] = []
     others: list[Path] = []
-    seen: set[Path] = set()
+    seen: set[str] = set()
     for path in paths:
         logs, rest = logs_in(path)
         others += rest
-        new = [log for log in logs if log.resolve() not in seen]
-        seen.update(log.resolve() for log in new)
+        new = [log for log in logs if os.path.realpath(log) not in seen]  # may link to itself
+        seen.update(map(os.path.realpath, new))
         found += (each for log in new for each in _episodes(log, reading))
     if reading.desired and len(found) > 1:
         raise InspectorError(
