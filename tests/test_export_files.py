@@ -180,6 +180,7 @@ def test_mcap_has_a_summary_schemas_and_all_messages(exported, demo):
             assert schema.name == "sensor_msgs/msg/JointState"
 
 
+@pytest.mark.slow
 def test_an_exported_run_is_imported_again_to_the_bit(exported, demo, tmp_path):
     folder, _ = exported
     status, out, err = call(
@@ -220,6 +221,7 @@ def test_each_finding_is_a_line_of_the_log(exported):
     assert line["message"] == f"impact from {event.start:.2f} s to {event.stop:.2f} s"
 
 
+@pytest.mark.slow
 def test_mcap_holds_the_noise_to_the_bit(exported, demo):
     folder, content = exported
     stamps, noise = zip(*messages(folder / "demo.mcap", "/noise"), strict=True)

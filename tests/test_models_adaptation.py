@@ -119,6 +119,7 @@ def test_scores_that_all_equal_the_highest_one_are_no_alarms(general):
     assert alarms(model, recordings) == 0
 
 
+@pytest.mark.slow
 def test_a_larger_budget_never_finds_less(general, motion):
     recordings = [good(seed, **ROBOT) for seed in range(100, 106)]
     budgets = (1.0, 2.0, 50.0)
@@ -221,6 +222,7 @@ def test_only_what_is_annotated_ok_is_learnt_from(general):
     assert "of 4 runs with annotations, the part annotated `ok` alone" in str(learnt)
 
 
+@pytest.mark.slow
 def test_a_split_that_only_sets_missing_features_apart_can_be_saved(tmp_path):
     recordings = [faulty(seed, "tone", 1.0) for seed in range(6)]
     frames = models.Frames.joined(models.frames_of(recordings, RECIPE))

@@ -77,6 +77,7 @@ def test_every_command_ends_with_5_if_the_reader_of_standard_output_is_gone(argu
     assert "Traceback" not in done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "limit"),
     [
