@@ -144,7 +144,7 @@ def test_a_heap_that_libhdf5_searches_for_ever_is_given_up(tmp_path, monkeypatch
     free = first + 16 + -(-len(ARGUMENTS) // 8) * 8
     data[free + 8 : free + 16] = bytes(8)  # the size of what is free: none
     path.write_bytes(data)
-    monkeypatch.setattr("inspector.logs.hdf5.PATIENCE", 1.0)
+    monkeypatch.setattr("inspector.logs.hdf5.TIMEOUT", 1.0)
     with pytest.raises(LogError, match="damaged: env_args is not found in 1 s$"):
         read_log(path)
 

@@ -49,15 +49,16 @@ SMALL = 8 * 2**20
 
 NAMES = {*TIMES, *EPISODE_ENDS}
 
-SEARCHED = """
+# What reads a text of any length, in a process of its own, which can be ended.
+PRINT_TEXT = """
 import sys, h5py
 file = h5py.File(sys.argv[1])
 text = file.get(sys.argv[2], file).attrs[sys.argv[3]]
 text = text.encode("utf-8", "surrogateescape") if isinstance(text, str) else text
 sys.stdout.buffer.write(text)
 """
-PATIENCE = 10.0
-"""Time in [s] for a text of any length: in a damaged heap libhdf5 searches it for ever."""
+TIMEOUT = 10.0
+"""Time in [s] to read a text of any length: in a damaged heap libhdf5 searches it for ever."""
 
 CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
 """Type of the controller of an arm in robosuite's arguments."""
@@ -154,11 +155,11 @@ def _arguments(path: Path, attributes: Any) -> str:
     text = h5py.check_string_dtype(about.dtype) is not None and about.shape == ()
     if not text or about.get_storage_size() > SMALL:
         return ""
-    command = [sys.executable, "-P", "-c", SEARCHED, str(path), EPISODES, ARGUMENTS]
+    command = [sys.executable, "-P", "-c", PRINT_TEXT, str(path), EPISODES, ARGUMENTS]
     try:
-        done = subprocess.run(command, capture_output=True, timeout=PATIENCE)
+        done = subprocess.run(command, capture_output=True, timeout=TIMEOUT)
     except subprocess.TimeoutExpired as error:
-        raise LogError(path, f"damaged: {ARGUMENTS} is not found in {PATIENCE:g} s") from error
+        raise LogError(path, f"damaged: {ARGUMENTS} is not found in {TIMEOUT:g} s") from error
     if done.returncode:
         raise LogError(path, f"damaged: {ARGUMENTS} cannot be read")
     return done.stdout.decode("utf-8", "surrogateescape")
