@@ -1,6 +1,6 @@
 """Mutation testing: the share of small changes to the code that the tests notice.
 
-    python -m benchmarks.mutation FOLDER [--seed 26] [--from 0] [--number 500]
+    python -m benchmarks.mutation FOLDER [--seed 26] [--from 0] [--number 500] [--only FILE ...]
 
 The mutants are cosmic-ray's (extra `mutation`), in `noisemodel`, `models` and `inspector/analysis`.
 All places that it can change stand in one random order; at each, one of its changes is drawn, too.
@@ -168,10 +168,12 @@ def changed(mutant: Mutant) -> str | None:
     return str(source)
 
 
-def drawn(seed: int, first: int, number: int) -> Iterator[tuple[int, Mutant, str]]:
-    """Mutants of the seeded order: index, mutant, changed source."""
+def drawn(
+    seed: int, first: int, number: int, only: Sequence[str] = ()
+) -> Iterator[tuple[int, Mutant, str]]:
+    """Mutants of the seeded order, of some files only if named: index, mutant, changed source."""
     dice = random.Random(seed)
-    found = places()
+    found = [each for each in places() if not only or each[0].path in only]
     dice.shuffle(found)
     index = 0
     for each in found:
@@ -308,7 +310,8 @@ class Mutating:
         end = time.monotonic() + 60.0 * self.args.minutes
         results = self.folder / "results.jsonl"
         done = {row["index"] for row in rows_of(results)}
-        for index, mutant, source in drawn(self.args.seed, self.args.first, self.args.number):
+        args = self.args
+        for index, mutant, source in drawn(args.seed, args.first, args.number, args.only):
             if index in done:
                 continue
             if time.monotonic() > end:
@@ -601,6 +604,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=SEED, help="of the random order")
     parser.add_argument("--from", type=int, default=0, dest="first", help="first of the order")
     parser.add_argument("--number", type=int, default=500, help="how many")
+    parser.add_argument("--only", nargs="+", default=(), help="files, as noisemodel/mjcf.py")
     parser.add_argument(
         "--seconds", type=float, nargs="+", default=[5.0, 40.0], help="CPU time of tests, see above"
     )
