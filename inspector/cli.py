@@ -110,7 +110,7 @@ app.add_typer(simulate, name="simulate", rich_help_panel="Simulate")
 
 
 def main() -> None:
-    """Run the command line: expected errors end as one line with 3 or 5, bugs with 70."""
+    """Run the command line: expected errors end as one line with 2, 3 or 5, bugs with 70."""
     # Matrices are small here: more threads mostly wait, and waiting takes processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Of a file that it cannot write, rerun tells in several lines; we do in one.
@@ -187,11 +187,14 @@ def _failed(error: Exception) -> int:
         import models
         import noisemodel
         from inspector.analysis.verdict import EXPECTED
+        from inspector.errors import OptionError
         from inspector.recording.viewer import DisplayError
         from scenarios import ScenarioError
 
         if isinstance(error, (*EXPECTED, ScenarioError)):
             typer.echo(f"inspector: {printable(str(error))}", err=True)
+            if isinstance(error, (OptionError, noisemodel.UnknownKindError)):
+                return 2
             output = isinstance(error, (noisemodel.OutputError, models.OutputError))
             lost = output and isinstance(error.__cause__, OSError)
             return OUTPUT_LOST if lost or isinstance(error, DisplayError) else 3

@@ -9,6 +9,10 @@ class InspectorError(ValueError):
     """The base of every error that `inspector` expects."""
 
 
+class OptionError(InspectorError):
+    """A value of an option that suits no run: the command was called wrongly."""
+
+
 class FileError(InspectorError):
     """A file of the inspector's own that is wrong; subclasses say what to do about it.
 

@@ -167,11 +167,16 @@ def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
     state, other = tmp_path / "state.jsonl", tmp_path / "other.npz"
     shutil.copy(assets.model_files()[0], other)
     call("classify", demo_run(), "--resume", state)
-    status, _, err = call("classify", demo_run(), "--resume", state, "--unknown", "ignore")
-    assert (status, err) == (
-        3,
-        f"inspector: {state}: is of other settings; name another file, or delete it\n",
-    )
+    for options, differs in [
+        (("--unknown", "ignore"), "--unknown"),
+        (("--localise", "--format", "json", "--robot", "panda"), "how logs are read, --localise"),
+    ]:
+        status, _, err = call("classify", demo_run(), "--resume", state, *options)
+        advice = "name another file, or delete it"
+        assert (status, err) == (
+            3,
+            f"inspector: {state}: is of other settings ({differs}); {advice}\n",
+        )
     status, _, err = call("classify", demo_run(), "--resume", state, "--model", other)
     assert status == 3
     assert err == f"inspector: {state}: is of other models; name another file, or delete it\n"

@@ -335,7 +335,7 @@ def test_a_layout_has_no_panel_for_what_is_not_there(tmp_path):
 def test_layouts_are_for_mcap_and_replace_nothing_unasked(tmp_path):
     plain_run().save(tmp_path / "run.npz")
     status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "a.csv", "--layouts")
-    assert (status, err) == (3, f"inspector: {tmp_path / 'a.csv'}: layouts are for .mcap\n")
+    assert (status, err) == (2, f"inspector: {tmp_path / 'a.csv'}: layouts are for .mcap\n")
     (tmp_path / "run.foxglove.json").write_text("mine")
     status, _, err = call("export", tmp_path / "run.npz", "-o", tmp_path / "run.mcap", "--layouts")
     assert status == 3
@@ -347,17 +347,17 @@ def test_layouts_are_for_mcap_and_replace_nothing_unasked(tmp_path):
 # --- bad input
 
 
-def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
+def test_what_cannot_be_exported_is_an_error_of_one_line(tmp_path):
     (tmp_path / "there.csv").write_text("mine")
-    for arguments, expected in [
-        ([demo_run(), "-o", tmp_path / "run.bag"], "there are .mcap, .csv, .parquet"),
-        ([demo_run(), "-o", tmp_path / "there.csv"], "exists already"),
-        ([demo_run(), "-o", tmp_path / "no" / "run.csv"], "cannot be written"),
-        ([demo_run(), "-o", tmp_path / "run.csv", "--kind", "loud"], "no kind 'loud' of noise"),
-        ([tmp_path / "none.npz", "-o", tmp_path / "run.csv"], "cannot be read"),
+    for arguments, expected, code in [
+        ([demo_run(), "-o", tmp_path / "run.bag"], "there are .mcap, .csv, .parquet", 2),
+        ([demo_run(), "-o", tmp_path / "there.csv"], "exists already", 3),
+        ([demo_run(), "-o", tmp_path / "no" / "run.csv"], "cannot be written", 3),
+        ([demo_run(), "-o", tmp_path / "run.csv", "--kind", "loud"], "no kind 'loud' of noise", 2),
+        ([tmp_path / "none.npz", "-o", tmp_path / "run.csv"], "cannot be read", 3),
     ]:
         status, out, err = call("export", *arguments)
-        assert (status, out) == (3, "")
+        assert (status, out) == (code, "")
         assert expected in err
         assert len(err.splitlines()) == 1
     assert [path.name for path in tmp_path.iterdir()] == ["there.csv"]

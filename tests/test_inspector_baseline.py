@@ -168,10 +168,8 @@ def test_bad_input_is_one_line(folder, tmp_path):
     replace(run_of(1), blocks=(Block(0.0, 6.0, "impact"),)).save(failing)
     run_of(2, seconds=3.0).save(tmp_path / "short.npz")
     for arguments, message in [
-        ((good, "--alarms", 0), "0 alarms per hour, expected more than 0: say, 1"),
         ((failing,), "no good frame in 1 recordings"),
         ((tmp_path / "short.npz",), "3 s of good motion are too short to learn from"),
-        ((good, "--profile", "paper-rbf"), "a baseline has no profile 'paper-rbf'"),
         ((good, "--rate", 2000), "recorded at 1000 Hz, the model needs 2000 Hz"),
         ((good, "--part", "training"), "no run in "),  # its name is held out
         ((good, good), "two recordings are called 'good0'; name them apart"),
@@ -179,6 +177,14 @@ def test_bad_input_is_one_line(folder, tmp_path):
     ]:
         status, out, err = call("baseline", *arguments, "-o", output)
         assert (status, out, err.count("\n")) == (3, "", 1), (arguments, err)
+        assert message in err
+    for option, value, message in [
+        ("--alarms", 0, "0 is not above 0: say, 1"),
+        ("--alarms", "nan", "nan is not above 0"),
+        ("--profile", "paper-rbf", "a baseline has no profile 'paper-rbf'"),
+    ]:
+        status, out, err = call("baseline", good, option, value, "-o", output)
+        assert (status, out) == (2, "")
         assert message in err
     status, _, err = call("baseline", good, "-o", folder / "robot.npz")
     assert status == 3

@@ -185,8 +185,8 @@ def test_runs_without_robot_are_one_line_and_nothing_else_is_left(inspector, tmp
     ("arguments", "status", "message"),
     [
         ([], 2, "name run files, or robots with --robots"),
-        (["--robots", "panda", "--kinds", "paper,loud"], 3, "no kind 'loud' of noise"),
-        (["--robots", "panda", "--geometry", "skin"], 3, "geometry 'skin' is not known"),
+        (["--robots", "panda", "--kinds", "paper,loud"], 2, "no kind 'loud' of noise"),
+        (["--robots", "panda", "--geometry", "skin"], 2, "'skin' is none of visual, collision"),
         (["--robots", "panda", "--csv", "/no/such/folder/x.csv"], 3, "cannot be written"),
         (["--robots", "robby"], 3, "no robot 'robby'"),
         (["--robots", "all", "--save", "x.rrd"], 3, "x.rrd: a recording holds 8 robots and runs"),

@@ -11,7 +11,9 @@ from typer.testing import CliRunner
 
 import noisemodel
 from inspector.cli import app
+from inspector.commands.compare import GEOMETRIES
 from inspector.commands.options import KINDS
+from noisemodel import geometry
 
 
 def test_the_version_is_that_of_the_distribution(monkeypatch):
@@ -29,8 +31,9 @@ def test_the_version_option_states_that_a_source_tree_is_not_installed(monkeypat
     assert (result.exit_code, result.output) == (0, "inspector, not installed\n")
 
 
-def test_the_kinds_are_those_of_the_noise_model():
+def test_kinds_and_geometries_are_those_of_the_noise_model():
     assert set(KINDS) == set(noisemodel.KINDS)
+    assert set(GEOMETRIES) == set(geometry.GEOMETRIES)
 
 
 @pytest.mark.parametrize("command", [["view"], ["shot", "run.npz", "-o", "shot.png"]])

@@ -183,6 +183,6 @@ def test_paths_of_findings_are_checked_before_classification(tmp_path):
     status, _, err = call(
         "classify", twin, "--labels-to", tmp_path / "found", "--labels-format", "excel"
     )
-    assert status == 3
+    assert status == 2
     assert "no format 'excel' of labels" in err
     assert not (tmp_path / "found").exists()

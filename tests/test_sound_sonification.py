@@ -299,11 +299,17 @@ def test_the_command_writes_runs_at_one_gain(inspector, tmp_path):
 
 def test_the_command_refuses_wrong_settings_in_one_line(inspector, tmp_path):
     run_of(tone(440)).save(tmp_path / "run.npz")
-    for wrong in (["--joint", "knee"], ["--kind", "A"], ["--link", "hand"], ["--speed", "0"]):
+    for wrong, code in (
+        (["--joint", "knee"], 3),
+        (["--kind", "A"], 3),
+        (["--kind", "A", "--link", "hand"], 3),
+        (["--link", "hand"], 3),
+        (["--speed", "0"], 2),
+    ):
         status, out, err = inspector(
             "listen", tmp_path / "run.npz", "-o", tmp_path / "o.wav", *wrong
         )
-        assert (status, out, err.count("\n")) == (3, "", 1)
+        assert (status, out, err.count("\n")) == (code, "", 1)
     assert not (tmp_path / "o.wav").exists()
 
 

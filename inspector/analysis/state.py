@@ -13,6 +13,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from pathlib import Path
 from time import monotonic, sleep
 from typing import IO, Any
@@ -31,6 +32,9 @@ FORMAT = f"{KIND}1"
 
 PATIENCE = 2.0
 """How long a file that another process holds is waited for, in [s]."""
+
+SETTINGS = ("how logs are read", "--unknown", "--localise", "--report")
+"""The first settings of a header; what follows are files that options name."""
 
 MAX_BYTES = 256 * 2**20
 """Most bytes of a state file that is read: those of some hundred thousand runs."""
@@ -179,8 +183,18 @@ def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
     there = {"version": header.get("version"), **there}  # 0.5.0 wrote none
     for name, value in header.items():
         if there.get(name) != value:
-            both = f" ({there.get(name)}, this is {value})" if name == "version" else ""
-            raise StateError(path, f"is of {'another' if both else 'other'} {name}{both}")
+            raise StateError(path, f"is of {_difference(name, there.get(name), value)}")
+
+
+def _difference(name: str, there: Any, here: Any) -> str:
+    """What of a header differs, in words."""
+    if name == "version":
+        return f"another version ({there}, this is {here})"
+    if name != "settings" or not isinstance(there, list):
+        return f"other {name}"
+    differs = [one != two for one, two in zip_longest(there, here)]
+    named = [what for what, other in zip(SETTINGS, differs, strict=False) if other]
+    return f"other settings ({', '.join(named or ['the file of an option'])})"
 
 
 def _as_dict(verdict: Verdict) -> dict[str, Any]:

@@ -6,7 +6,10 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import Limits, Overwrite, PackageRoot
+from inspector.commands.options import Limits, Overwrite, PackageRoot, one_of
+
+GEOMETRIES = ("visual", "collision", "hull", "auto")
+"""Those of ``noisemodel.compare``, which would take too long to import here."""
 
 
 def compare(
@@ -21,7 +24,9 @@ def compare(
     kinds: Annotated[
         str, typer.Option(help="Some of simplified, paper, A, B, C, mean, rms, normal.")
     ] = "simplified,C,paper,mean,rms,normal",
-    geometry: Annotated[str, typer.Option(help="visual, collision, hull or auto.")] = "auto",
+    geometry: Annotated[
+        str, typer.Option(callback=one_of(GEOMETRIES), help="visual, collision, hull or auto.")
+    ] = "auto",
     seed: Annotated[int, typer.Option(min=0, help="Random seed of the generated motion.")] = 0,
     csv: Annotated[Path | None, typer.Option(help="Write all numbers to this file.")] = None,
     save: Annotated[Path | None, typer.Option(help="Write a recording (.rrd).")] = None,

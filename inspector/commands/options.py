@@ -59,19 +59,35 @@ def finite(value: float | None) -> float | None:
     return value
 
 
-def _known(kind: str) -> str:
-    if kind not in KINDS:
-        raise typer.BadParameter(f"{kind!r} is none of {', '.join(KINDS)}")
-    return kind
+def one_of(names: Collection[str]) -> Callable[[str], str]:
+    """Refuse what is none of several names."""
+
+    def checked(value: str) -> str:
+        if value not in names:
+            raise typer.BadParameter(f"{value!r} is none of {', '.join(names)}")
+        return value
+
+    return checked
+
+
+def _above_zero(value: float) -> float:
+    if not value > 0.0:
+        raise typer.BadParameter(f"{value:g} is not above 0: say, 1")
+    return value
 
 
 KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
 """Those of ``noisemodel``, which would take too long to import here."""
 Kind = Annotated[
     str,
-    typer.Option("--kind", callback=_known, help=f"Extended noise, one of {', '.join(KINDS)}."),
+    typer.Option(
+        "--kind", callback=one_of(KINDS), help=f"Extended noise, one of {', '.join(KINDS)}."
+    ),
 ]
-Alarms = Annotated[float, typer.Option(help="False-alarm budget, per hour of good motion.")]
+Alarms = Annotated[
+    float,
+    typer.Option(callback=_above_zero, help="False-alarm budget, per hour of good motion."),
+]
 ModelRate = Annotated[
     float | None,
     typer.Option(

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
-from inspector.errors import InspectorError
+from inspector.errors import OptionError
 from inspector.export.content import Content, collect
 from inspector.export.layouts import foxglove, plotjuggler
 from inspector.export.mcap import write_mcap
@@ -49,18 +49,18 @@ def export(
         What was written.
 
     Raises:
-        InspectorError: If there is no such format, or it needs an extra that is not installed;
-            if there are layouts for another format than MCAP.
+        OptionError: If there is no such format, or layouts for another than MCAP.
+        InspectorError: If the format needs an extra that is not installed.
         OutputError: If the file exists or cannot be written.
         NoiseModelError: If there is no such kind of noise, or the robot cannot be read.
     """
     write = WRITERS.get(path.suffix.lower())
     if write is None:
-        raise InspectorError(
+        raise OptionError(
             f"{path}: no format of exports has this suffix; there are {', '.join(WRITERS)}"
         )
     if layouts and write is not write_mcap:
-        raise InspectorError(f"{path}: layouts are for .mcap")
+        raise OptionError(f"{path}: layouts are for .mcap")
     others = {path.with_suffix(suffix): make for suffix, make in LAYOUTS.items() if layouts}
     for each in (path, *others):
         refuse_existing(each, overwrite=overwrite)

@@ -6,7 +6,7 @@ from itertools import pairwise
 from math import inf
 from pathlib import Path
 
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from inspector.labels import audacity, csv, noisytest
 from inspector.labels.entry import Entry, EntryError, LabelFileError, Span
 from models.jsontext import text_of
@@ -45,10 +45,10 @@ def format_of(path: Path, name: str = "") -> Format:
         name: The format's name, may be empty.
 
     Raises:
-        InspectorError: If there is no such format.
+        OptionError: If there is no such format.
     """
     if name and name not in FORMATS:
-        raise InspectorError(f"no format {name!r} of labels; there are {', '.join(FORMATS)}")
+        raise OptionError(f"no format {name!r} of labels; there are {', '.join(FORMATS)}")
     if name:
         return FORMATS[name]
     for each in FORMATS.values():
@@ -70,7 +70,7 @@ def write_labels(
         overwrite: Whether a file that exists may be replaced.
 
     Raises:
-        InspectorError: If there is no such format.
+        OptionError: If there is no such format.
         LabelFileError: If the format cannot represent one of the labels.
         OutputError: If the file exists or cannot be written.
     """
@@ -95,7 +95,7 @@ def read_labels(path: Path, run: Run, *, format_name: str = "") -> tuple[Block, 
         The blocks, in order of time.
 
     Raises:
-        InspectorError: If there is no such format.
+        OptionError: If there is no such format.
         LabelFileError: If the file cannot be read or is damaged, or a label is reversed, lies
             outside of the run or overlaps another.
     """

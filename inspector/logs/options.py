@@ -8,7 +8,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Self
 
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS
 from models.jsontext import from_toml, text_of, toml_shown
 from noisemodel.atomic import replacing
@@ -87,11 +87,11 @@ class ReadOptions:
     def __post_init__(self) -> None:
         """Check the options."""
         if self.rate is not None and not (isfinite(self.rate) and self.rate > 0):
-            raise InspectorError(f"the rate is {self.rate:g} Hz; expected a number above 0")
+            raise OptionError(f"the rate is {self.rate:g} Hz; expected a number above 0")
         if self.offset is not None and not isfinite(self.offset):
-            raise InspectorError(f"the offset is {self.offset:g} s; expected a finite number")
+            raise OptionError(f"the offset is {self.offset:g} s; expected a finite number")
         if self.units and self.units not in UNITS:
-            raise InspectorError(f"no units {self.units!r}; there are {', '.join(UNITS)}")
+            raise OptionError(f"no units {self.units!r}; there are {', '.join(UNITS)}")
 
     @property
     def time(self) -> str:
@@ -160,7 +160,7 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
         The entries.
 
     Raises:
-        InspectorError: If an entry is not of that form, or a column or target is named twice.
+        OptionError: If an entry is not of that form, or a column or target is named twice.
     """
     parsed: list[Entry] = []
     for text in entries:
@@ -168,19 +168,19 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
         signal, dot, joint = target.partition(".")
         known = signal in (*JOINT_SIGNALS, *BASE_SIGNALS) or target == "time"
         if not source or not known or (dot and not joint):
-            raise InspectorError(
+            raise OptionError(
                 f"mapping {text!r}: expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2,"
                 " SIGNAL=ARRAY, such as position=qpos[7:], or time=COLUMN; signals are"
                 f" {', '.join((*JOINT_SIGNALS, *BASE_SIGNALS))}"
             )
         if joint and joint not in CONVENTIONS.get(signal, (joint,)):
-            raise InspectorError(
+            raise OptionError(
                 f"mapping {text!r}: a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
             )
         if any(entry.source == source for entry in parsed):
-            raise InspectorError(f"mapping {text!r}: column {source!r} is mapped twice")
+            raise OptionError(f"mapping {text!r}: column {source!r} is mapped twice")
         if any(entry.target == target for entry in parsed):
-            raise InspectorError(f"mapping {text!r}: {target} is mapped twice")
+            raise OptionError(f"mapping {text!r}: {target} is mapped twice")
         parsed.append(Entry(signal, joint, source))
     return tuple(parsed)
 

@@ -11,7 +11,7 @@ from ctypes.util import find_library
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from inspector.recording import viewer
 from inspector.recording.viewer import HOST, ViewerError
 from inspector.recording.web import free_port
@@ -111,11 +111,11 @@ def parse_size(text: str) -> tuple[int, int]:
         text: Width and height, such as "1440x900".
 
     Raises:
-        InspectorError: If it is none.
+        OptionError: If it is none.
     """
     numbers = re.fullmatch(r"(\d{3,4})x(\d{3,4})", text)
     if numbers is None:
-        raise InspectorError(f"a size of {text!r}, expected width and height such as 1440x900")
+        raise OptionError(f"a size of {text!r}, expected width and height such as 1440x900")
     return int(numbers[1]), int(numbers[2])
 
 

@@ -8,7 +8,7 @@ from string import ascii_lowercase
 import numpy as np
 
 import noisemodel as nm
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from inspector.sound.components import components
 from inspector.sound.mixing import LOWEST_AUDIBLE, mix
 from inspector.sound.sound import SILENCE, Sound, scale
@@ -70,7 +70,7 @@ def sound_of(run: nm.Run, settings: Settings) -> Sound:
         NoiseModelError: If the extended noise cannot be computed.
     """
     if not 0.01 <= settings.speed <= 1000.0:
-        raise InspectorError(f"a speed of {settings.speed:g}, expected 0.01 to 1000")
+        raise OptionError(f"a speed of {settings.speed:g}, expected 0.01 to 1000")
     kind = settings.kind or ("normal" if settings.link else "simplified")
     parts = components(run, kind=kind, joint=settings.joint, link=settings.link)
     signal = mix(

@@ -6,7 +6,7 @@ from itertools import chain
 from pathlib import Path
 
 import models
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from inspector.logs.opening import Reading
 from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
@@ -54,7 +54,7 @@ def train(
         ModelsError: If there is too little good motion.
     """
     if profile and profile not in PROFILES:
-        raise InspectorError(f"a baseline has no profile {profile!r}; expected general or scalar")
+        raise OptionError(f"a baseline has no profile {profile!r}; expected general or scalar")
     refuse_existing(output, overwrite=overwrite)
     found = good_runs(inputs, "a baseline", rate=rate, part=part, reading=reading, remark=remark)
     first, simulators = next(found), Simulators()

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import models
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import Simulators, classified, count, samples
@@ -122,7 +122,7 @@ def train(
     """
     if profile == ANY_RATE:
         if rate is not None:
-            raise InspectorError(f"profile {profile} is for any rate; leave out --rate {rate:g}")
+            raise OptionError(f"profile {profile} is for any rate; leave out --rate {rate:g}")
         return _train_general(inputs, output, part=part, overwrite=overwrite)
     rate = RATE if rate is None else rate
     chosen = profile_at(profile, rate)
@@ -172,16 +172,16 @@ def profile_at(name: str, rate: float) -> models.Profile:
         rate: The rate that it is to have, in [Hz].
 
     Raises:
-        InspectorError: If there is no such profile, or it does not exist at this rate.
+        OptionError: If there is no such profile, or it does not exist at this rate.
     """
     if name not in PROFILES:
-        raise InspectorError(
+        raise OptionError(
             f"no profile {name!r} of one rate; there are {', '.join(PROFILES)}, and {ANY_RATE} for"
             " any rate"
         )
     found = PROFILES[name](rate)
     if found.rate != rate:
-        raise InspectorError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")
+        raise OptionError(f"profile {name} exists at {found.rate:g} Hz only, not {rate:g}")
     return found
 
 
