@@ -8,6 +8,9 @@ from models.features import log_band_energies
 from models.profile import Profile, Resolution
 from models.types import Array, Index
 
+AT_ONCE = 2**16
+"""How many samples are transformed at once, of all rows: more leave the cache of the processor."""
+
 
 class Windows:
     """Log-band energies of a signal's windows at one resolution.
@@ -38,6 +41,7 @@ class Windows:
         self._start_of = around // len(phases) * profile.hop + phases[around % len(phases)]
         one = log_band_energies(self._windows[:, 0], profile, resolution)
         self._energies = np.zeros((self._rows, *one.shape))
+        self._at_once = max(1, AT_ONCE // (samples.shape[0] * resolution.window))
         self._done = 0  # transformed windows
 
     def begin(self) -> None:
@@ -61,9 +65,15 @@ class Windows:
             return
         cycles, first = divmod(self._done, self._rows)
         fresh = slice(first, first + complete - self._done)
-        windows = self._windows[:, self._start_of[fresh] + (cycles * self._cycle - base)]
-        found = log_band_energies(windows, self._profile, self._resolution)
-        self._energies[self._row_of[fresh]] = found
+        starts = self._start_of[fresh] + (cycles * self._cycle - base)
+        rows = self._row_of[fresh]
+        for few in range(0, len(starts), self._at_once):
+            part = slice(few, few + self._at_once)
+            one = len(starts[part]) == 1  # a slice copies nothing
+            chosen = slice(starts[few], starts[few] + 1) if one else starts[part]
+            self._energies[rows[part]] = log_band_energies(
+                self._windows[:, chosen], self._profile, self._resolution
+            )
         self._done = complete
 
     def of_frames(self, frames: Index) -> Array:
