@@ -1,10 +1,22 @@
 import json
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import models
+from models.logbands import HIGHEST, LOWEST
+from models.novelty.faults import with_fault
+from models.pooling import columns
+from models.signals import JOINTS, MOTION
+
+GENERAL = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
+
+
+LOG = {"bands": "log", "edges": (15.0, 30.0), "reference": True}
+QUICK = {"quick_window": 200, "quick_stride": 9, "quick_edges": (75.0, 150.0)}
 
 
 @pytest.mark.parametrize("recipe", [models.Profile.noisytest, models.Profile.paper])
@@ -66,9 +78,89 @@ def test_quick_bands_begin_with_the_speed_and_drop_out_where_it_does_not_fit():
     assert models.GENERAL.at(140.0).quick_window == 0
 
 
+def test_the_model_that_ships_has_the_settings_of_the_code():
+    with np.load(GENERAL, allow_pickle=False) as members:
+        manifest = json.loads(str(members["manifest"]))
+    assert models.LogBands.of(manifest["recipe"]) == models.ANY
+    assert models.Profile.of(manifest["profile"]) == models.ANY.bound(HIGHEST)
+    assert manifest["classes"] == list(models.ANY.classes)
+    # As docs/classifier.md has it: 300 rounds against `ok`, a third of them for each failure.
+    with np.load(GENERAL, allow_pickle=False) as members:
+        leaves = members["leaf"].reshape(models.ANY.rounds, len(models.CLASSES), -1)
+    grown = leaves.any(axis=2)
+    assert grown[:, 0].all()
+    assert grown[:100, 1:].all()
+    assert not grown[100:, 1:].any()
+
+
+def test_quick_bands_are_those_above_the_speed_where_that_is_none():
+    plain, fast = replace(models.GENERAL, speed=False), models.GENERAL
+    assert plain.at(1000.0).quick_edges == fast.at(1000.0).quick_edges[1:]
+    assert fast.at(150.0).quick_edges == (0.0, 75.0)  # a band and a half fit, and no less
+    assert fast.at(149.9).quick_edges == plain.at(150.0).quick_edges == ()
+
+
+def test_the_kernel_parameter_goes_with_the_number_of_features():
+    for rate in (250.0, 1000.0):
+        profile = models.LogBands().at(rate)
+        count = models.features(np.zeros((1, profile.length)), profile).shape[1]
+        assert profile.gamma * count == pytest.approx(0.5)
+
+
+def test_features_that_rise_with_a_fault_never_fall_as_it_gets_louder():
+    profile = models.ANY.bound(1000.0, (*MOTION, *JOINTS))
+    time = np.arange(profile.length) / profile.rate
+    joints = np.stack([0.5 * np.cos(2 * np.pi * f * time) for f in (0.3, 0.7)])
+    measured = joints + 1e-3 * np.random.default_rng(0).normal(size=joints.shape)
+    rows = dict(zip(JOINTS, (joints, measured, joints - measured), strict=True))
+    signals = {name: np.linalg.norm(rows[f"{name}_joints"], axis=0) for name in MOTION} | rows
+    found = []
+    for level in (1.0, 4.0):
+        louder = with_fault(signals, 1, level * np.sin(2 * np.pi * 140.0 * time))
+        frame = np.vstack([louder[name] for name in profile.signals])
+        found.append(models.features(frame[None], profile)[0])
+    change = found[1] - found[0]
+    rising = models.ANY.rising[models.ANY.places(profile)].astype(bool)
+    names = np.array(columns(profile))
+    assert change[rising].min() > -1e-3
+    # All others are free: desired motion, the speed itself, and differences that may fall.
+    fixed = re.compile(r"(relative )?(desired|error less|error_joints less)|.* 0$")
+    assert [bool(fixed.match(name)) for name in names] == (~rising).tolist()
+
+
 def test_a_rate_that_leaves_no_bands_is_refused():
-    with pytest.raises(models.ProfileError, match="rate of 50 Hz leaves 1 bands up to 25 Hz"):
-        models.LogBands().at(50.0)
+    for lowest, rate, bands in ((15.0, 50.0, 1), (15.0, 69.9, 1), (20.0, 79.0, 1)):
+        least = 2 * (lowest + 20.0)
+        text = (
+            f"a rate of {rate:g} Hz leaves {bands} bands up to {rate / 2:g} Hz, expected 2 or more:"
+            f" take a rate of {least:g} Hz at least"
+        )
+        with pytest.raises(models.ProfileError, match=f"^{re.escape(text)}$"):
+            replace(models.LogBands(), lowest=lowest).at(rate)
+        edges = replace(models.LogBands(), lowest=lowest).at(least).edges
+        assert edges == (lowest, lowest + 10.0, lowest + 20.0)
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "wrong"),
+    [("highest", (HIGHEST, 5000), (10_001.0, True)), ("softness", (1e-9,), (-1e-9, None))],
+)
+def test_numbers_of_a_recipe_lie_from_0_to_the_highest_rate(name, right, wrong):
+    with np.load(GENERAL, allow_pickle=False) as members:
+        recipe = json.loads(str(members["manifest"]))["recipe"]
+    for value in right:
+        assert getattr(models.LogBands.of(recipe | {name: value}), name) == value
+    for value in wrong:
+        text = f"{name} is {value!r}, expected a number from 0 to 10000"
+        with pytest.raises(models.ProfileError, match=f"^{re.escape(text)}$"):
+            models.LogBands.of(recipe | {name: value})
+
+
+def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
+    assert (LOWEST, HIGHEST) == (80.0, 10_000.0)  # as docs/classifier.md promises
+    recipe = models.ANY.bound(LOWEST)
+    assert recipe.edges[-1] <= LOWEST / 2
+    assert models.ANY.bound(HIGHEST).edges[-1] <= 5000.0
 
 
 @pytest.mark.parametrize(
@@ -103,11 +195,94 @@ def test_a_rate_that_leaves_no_bands_is_refused():
         ({"bands": "log"}, r"edges are \(\), expected two or more, ascending"),
         ({"bands": "log", "edges": (10.0, 6000.0)}, "to 6000 Hz, expected 0 to half the rate"),
         ({"bands": "log", "edges": (-1.0, 100.0)}, "from -1 to 100 Hz, expected 0 to half the"),
+        (
+            {"bands": "log", "edges": (9.0, 9.0)},
+            r"edges are \(9.0, 9.0\), expected two or more, asc",
+        ),
+        ({"bands": "log", "edges": (9.0,)}, r"edges are \(9.0,\), expected two or more"),
+        ({"bands": "log", "edges": (1, 2)}, r"edges is \(1, 2\), expected a tuple of float"),
+        ({"length": -4000}, "length is -4000, expected more than 0"),
+        ({"alarm": 1.5}, "alarm is 1.5, expected a probability below 1"),
+        ({"leaves": 1}, "leaves is 1, expected 2 to 16"),
+        ({"leaves": -3}, "leaves is -3, expected 2 to 16"),
+        ({"rate": True}, "rate is True, expected a finite number"),
+        ({"quick_window": -1}, "quick_window is -1, expected 0 or more"),
+        ({"signals": ()}, "signals are none, expected one or more, each once"),
+        ({"signals": ("noise", "noise")}, "signals are noise, noise, expected one or more, each"),
+        (
+            {"signals": ("measured_joints",), **LOG},
+            "are measured_joints, expected norms, and after them those that go joint by joint",
+        ),
+        (
+            {"signals": ("measured_joints", "measured"), **LOG},
+            "are measured_joints, measured, expected norms, and after them those that go joint by",
+        ),
+        (
+            {"signals": ("measured", "measured_joints"), **LOG, "reference": False},
+            "with bands 'log', relative False and reference False, expected 'log' and one of both",
+        ),
+        (
+            {"signals": ("measured", "measured_joints"), "relative": True},
+            "with bands 'adjacent', relative True and reference False, expected 'log' and one of",
+        ),
+        (
+            {"signals": ("measured", "effort_joints", "measured_joints"), **LOG},
+            "with reference True, expected effort_joints last, and True",
+        ),
+        (
+            {"signals": ("measured", "effort_joints"), **LOG, "reference": False, "relative": True},
+            "with reference False, expected effort_joints last, and True",
+        ),
+        ({"reference": True}, "reference is True with bands 'adjacent' and relative False"),
+        ({**LOG, "relative": True}, "reference is True with bands 'log' and relative True, expec"),
+        ({"classes": ("ok",)}, "classes are ok, expected 'ok' and others, each once"),
+        ({"classes": ()}, "classes are none, expected 'ok' and others, each once"),
+        ({**LOG, **QUICK, "quick_stride": 0}, "with quick_stride 0 and bands 'log', expected a st"),
+        ({**QUICK}, "quick_window is 200 with quick_stride 9 and bands 'adjacent', expected a str"),
     ],
 )
 def test_settings_that_cannot_be_are_refused(change, text):
     with pytest.raises(models.ProfileError, match=text):
         replace(models.Profile.paper(), **change)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"length": 1024},  # as long as the window
+        {"alarm": 0.999},
+        {"leaves": 2},
+        {"leaves": 16},
+        {"rate": 48_000},
+        {"bands": "log", "edges": (0.0, 5000.0)},  # from 0 to half the rate
+        {**LOG, "relative": True, "reference": False},
+        {**LOG, **QUICK, "quick_stride": 1},
+        {**LOG, "signals": ("measured", "measured_joints", "effort_joints")},
+        {**LOG, "signals": ("measured", "effort_joints")},
+        {"classes": ("ok", "impact")},
+        dict.fromkeys(("hop", "stride", "networks", "units", "epochs", "rounds"), 1),
+        dict.fromkeys(("floor", "regularization", "gamma", "learning_rate", "alarm"), 1e-09),
+        dict.fromkeys(("open_end", "widen_extra", "quick_window"), 0),
+        dict.fromkeys(("least_deviation", "decay", "penalty"), 0.0),
+    ],
+)
+def test_settings_at_their_limits_are_taken(change):
+    profile = replace(models.Profile.paper(), **change)
+    assert {name: getattr(profile, name) for name in change} == change
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
+        *("networks", "units", "epochs", "rounds", "learning_rate", "alarm"),
+    ],
+)
+def test_what_has_to_be_above_0_is_neither_0_nor_less(name):
+    kind = type(getattr(models.Profile.paper(), name))
+    for value in (kind(0), kind(-1)):
+        with pytest.raises(models.ProfileError, match=f"^{name} is {value!r}, expected more than"):
+            replace(models.Profile.paper(), **{name: value})
 
 
 def test_settings_that_are_unknown_or_missing_are_named():

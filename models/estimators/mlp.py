@@ -188,7 +188,7 @@ def _parts(targets: Index, groups: Words, networks: int) -> list[tuple[Index, In
 def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: int) -> Networks:
     """Train one network, without calibration."""
     counts = np.bincount(targets, minlength=classes)
-    weights = np.sqrt(counts.max() / np.maximum(counts, 1))[targets]
+    weights = np.sqrt(counts.max() / counts[targets])
     there = np.flatnonzero(counts)
     network = _train(seed, features, targets, weights, profile)
     # scikit-learn has no output for a class that it does not see, and of two for the second alone.
