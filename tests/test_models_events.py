@@ -106,6 +106,31 @@ def test_ok_blocks_that_touch_are_one_stretch_of_ok():
     assert false(scored(predicted("a", halves, labelled(impact=[23])))) == 1
 
 
+def test_ok_blocks_that_overlap_or_hold_each_other_count_once():
+    nested = blocks((0.0, 3.0, "ok"), (0.5, 1.0, "ok"), (2.0, 3.5, "ok"), (3.6, 4.0, "ok"))
+    matched = Matched.of([predicted("a", nested)])
+    assert matched.ok_annotated.tolist() == pytest.approx([3.9])
+    assert matched.frames.in_ok.sum() == sum(start <= 3.1 + 1e-9 for start in frames()) + 1
+
+
+def test_of_several_failures_in_a_frame_it_is_that_which_fills_most():
+    # Frame 10 lasts from 1.0 s to 1.4 s; both failures are in it as a whole.
+    both = blocks((1.02, 1.1, "impact"), (1.15, 1.35, "oscillations"), (1.9, 2.7, "impact"))
+    truth = Matched.of([predicted("a", both)]).frames.truth
+    expected = {10: "oscillations", 11: "oscillations", 7: "impact", 8: "impact", 9: "impact"}
+    assert {frame: truth[frame] for frame in expected} == expected
+    # 0.8 s long: by half, 0.2 s, from frame 17 (1.7 to 2.1 s) to 25 (2.5 to 2.9 s).
+    assert np.flatnonzero(truth == "impact")[3:].tolist() == list(range(17, 26))
+    assert truth[16] == truth[26] == ""
+    found = Matched.of([predicted("a", both), predicted("b", both[1:])])
+    first = [7, 8, 16, COUNT + 8, COUNT + 16]
+    assert found.failures.first.tolist() == first
+    assert found.failures.end.tolist() == [11, 14, 27, COUNT + 14, COUNT + 27]
+    assert found.failures.run.tolist() == [0, 0, 0, 1, 1]
+    failing = [*range(7, 14), *range(16, 27)]
+    assert np.flatnonzero(found.frames.failing[:COUNT]).tolist() == failing
+
+
 def test_a_failure_is_named_by_a_frame_of_its_own_class_alone():
     result = scored(predicted("a", IMPACT, labelled(highaccelerations=[18, 19])))
     assert (result.found.tolist(), result.named.tolist()) == ([True], [False])

@@ -1,5 +1,6 @@
 """The protocol: findings as they are reported, beside all injected faults, robots weighed alike."""
 
+import hashlib
 from dataclasses import replace
 from itertools import permutations
 
@@ -9,7 +10,7 @@ from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, m
 
 from models.evaluation import assessment, protocol, spans
 from models.evaluation.intervals import Resampling, fay_feuer, garwood
-from models.evaluation.outcomes import Outcome, confirmed_at, one_to_one
+from models.evaluation.outcomes import SHIFTS, Outcome, confirmed_at, meet, one_to_one
 from models.evaluation.predictions import Unanswered
 from models.evaluation.protocoltable import lines_of
 from models.evaluation.ranking import auc, harmonic_mean, partial_auc, run_score
@@ -164,6 +165,118 @@ def test_one_to_one_is_the_best_of_all_assignments():
     stacked = np.stack([np.eye(3, dtype=bool), np.zeros((3, 3), dtype=bool)])
     assert one_to_one(stacked).tolist() == [3.0, 0.0]
 
+    boxes = random.random((30, 2, 4)) < 0.4
+    each = [float(one_to_one(box[None])[0]) for box in boxes]
+    assert one_to_one(boxes).tolist() == each
+    assert one_to_one(boxes.swapaxes(1, 2)).tolist() == each
+    assert one_to_one(np.zeros((3, 2, 4), dtype=bool)).tolist() == [0.0] * 3
+
+
+def test_a_finding_meets_a_fault_up_to_a_fifth_of_a_second_apart():
+    wanted = np.array([[1.0, 2.0]])
+    for start, stop, met in (
+        (0.1, 1.0 - 0.2, True),
+        (0.1, 0.7999, False),
+        (2.0 + 0.2, 3.0, True),
+        (2.2001, 3.0, False),
+        (1.2, 1.3, True),
+    ):
+        assert meet(np.array([[start, stop]]), wanted).tolist() == [[met]]
+
+
+def test_a_run_is_faulty_if_it_has_a_fault():
+    swing = Fault(1.05, 3.5, "oscillations")
+    for run, faulty in ((exact("a", GOOD), 0.0), (exact("a", IMPACT), 1.0)):
+        assert Outcome.of(run).counts["faulty"] == faulty
+    two = exact("a", OSCILLATION, faults=(swing, Fault(4.0, 4.2, "impact", felt=False)))
+    counts = Outcome.of(two).counts
+    assert (counts["faulty"], counts["faults"], counts["felt"]) == (1.0, 2, 1)
+    assert (counts["found"], counts["found_felt"], counts["onset_close"]) == (1.0, 1.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("start", "stop", "kind"),
+    [
+        (1.0, 2.0310, "false"),  # shares a sample with the failure block
+        (1.0, 2.0320, "met"),  # and two
+        (2.0292, 2.0312, "met"),  # shares a sample, more than half of it
+        (2.0282, 2.0302, "unlabelled"),  # shares less than half
+        (2.75, 3.25, "false"),  # half of it lies in ok time
+        (2.74, 3.24, "unlabelled"),
+        (2.5, 3.4, "unlabelled"),  # two ok blocks overlap there, whose time counts once
+    ],
+)
+def test_a_finding_counts_by_what_it_shares_with_blocks(start, stop, kind):
+    more = blocks((3.0, 4.0, "ok"))
+    far = (Fault(4.6, 4.7, "impact"),)
+    run = reporting("a", (*IMPACT, *more), [("unknown", start, stop)], faults=far)
+    outcome = Outcome.of(run)
+    assert outcome.kind.tolist() == [kind]
+    names = ("false_alarms", "unknown_false_alarms", "alarms_in_unlabelled")
+    expected = [int(kind == each) for each in ("false", "false", "unlabelled")]
+    assert [outcome.counts[name] for name in names] == expected
+
+
+def chance_by_hand(run):
+    """Mean counts over shifts of all findings by one time, which wrap around at the end."""
+    begin, end = float(run.labels.start[0]), float(run.labels.stop[-1])
+    seed = int.from_bytes(hashlib.sha256(run.name.encode()).digest()[:8], "big")
+    offsets = np.random.default_rng(seed).uniform(0.0, end - begin, SHIFTS)
+    counts = []
+    for offset in offsets:
+        met = np.zeros((len(run.findings), len(run.events)), dtype=bool)
+        close = np.zeros_like(met)
+        for row, finding in enumerate(run.findings):
+            start = begin + (finding.start - begin + offset) % (end - begin)
+            stop = start + finding.stop - finding.start
+            pieces = [(start, min(stop, end))]
+            if stop > end:
+                pieces.append((begin, stop - (end - begin)))
+            for column, fault in enumerate(run.events):
+                met[row, column] = any(
+                    a <= fault.stop + 0.2 and b >= fault.start - 0.2 for a, b in pieces
+                )
+                close[row, column] = met[row, column] and abs(start - fault.start) <= 0.2
+        same = [[e.label == fault.label for fault in run.events] for e in run.findings]
+        felt = [fault.felt for fault in run.events]
+        counts.append(
+            {
+                "found": met.any(axis=0).sum(),
+                "found_felt": met.any(axis=0)[felt].sum(),
+                "onset_close": close.any(axis=0).sum(),
+                "matched_by_class": one_to_one(met[None] & same)[0],
+                "matched": one_to_one(met[None])[0],
+            }
+        )
+    return {name: float(np.mean([each[name] for each in counts])) for name in counts[0]}
+
+
+def test_the_level_of_chance_is_that_of_findings_shifted_one_by_one():
+    faults = (
+        Fault(0.3, 0.5, "oscillations", felt=False),
+        Fault(2.03, 2.2, "impact"),
+        Fault(4.2, 4.9, "impact"),
+    )
+    found = [("impact", 0.1, 1.3), ("oscillations", 1.9, 2.4), ("impact", 4.4, 4.6)]
+    for number in range(4):
+        run = reporting(f"a{number}", IMPACT, found[number % 2 :], faults=faults)
+        labels = run.labels
+        moved = replace(
+            run,
+            labels=replace(labels, start=labels.start + 64.0, stop=labels.stop + 64.0),
+            located=(
+                tuple(replace(e, start=e.start + 64.0, stop=e.stop + 64.0) for e in run.findings),
+            )
+            * 2,
+            events=tuple(f._replace(start=f.start + 64.0, stop=f.stop + 64.0) for f in run.events),
+        )
+        for each in (run, moved):
+            counts = Outcome.of(each).counts
+            for name, expected in chance_by_hand(each).items():
+                assert counts[f"{name}_by_chance"] == pytest.approx(expected), name
+    silent = Outcome.of(reporting("a", IMPACT, [], faults=faults)).counts
+    assert {silent[name] for name in silent if name.endswith("_by_chance")} == {0.0}
+
 
 @pytest.mark.parametrize(
     ("start", "stop", "kind"),
@@ -229,6 +342,51 @@ def probable(evidence, *, apart=()):
 def test_a_live_listener_knows_at_the_end_of_the_frame_that_confirms(evidence, delay):
     run = replace(predicted("a", IMPACT), labels=probable(evidence))
     assert Outcome.of(run).delay.tolist() == pytest.approx([delay])
+
+
+def test_what_is_known_before_a_fault_starts_has_no_delay():
+    fault = Fault(1.15, 1.2, "impact")  # the finding of frames 5 to 7 ends at 1.1 s
+    run = replace(predicted("a", GOOD), labels=probable([5, 6, 7]), events=(fault,))
+    assert Outcome.of(run).delay.tolist() == [0.0]
+    late = replace(run, events=(Fault(0.9, 1.3, "impact"), Fault(3.0, 3.1, "impact")))
+    delay = Outcome.of(late).delay.tolist()
+    assert delay[0] == pytest.approx(1.0 - 0.9)
+    assert np.isnan(delay[1])
+
+
+def test_of_two_findings_on_a_fault_the_sooner_one_is_its_delay():
+    fault = Fault(0.8, 2.6, "impact")
+    run = replace(predicted("a", GOOD), labels=probable([9, 10, 18, 19, 20]), events=(fault,))
+    assert len(run.findings) == 2
+    assert Outcome.of(run).delay.tolist() == pytest.approx([1.4 - 0.8])
+
+
+def test_stretches_are_confirmed_where_a_count_frame_by_frame_has_enough_evidence():
+    random = np.random.default_rng(4)
+    for _ in range(40):
+        text = random.choice(list("..ooOu"), size=COUNT)
+        apart = np.flatnonzero(random.random(COUNT) < 0.1)
+        labels = replace(
+            probable([], apart=apart),
+            label=np.array([{".": "ok", "u": "unknown"}.get(each, "impact") for each in text]),
+            above_threshold=np.array([each.isupper() for each in text]),
+        )
+        found, count, known = confirmed_at(labels), 0, {}
+        gap = np.append(True, labels.start[1:] > labels.stop[:-1])
+        for frame in range(COUNT):
+            if not labels.flagged[frame]:
+                continue
+            if gap[frame] or not labels.flagged[frame - 1]:
+                begin, count = frame, 0
+            beside = gap[frame] or frame == COUNT - 1 or gap[frame + 1]
+            count += (2 if beside else 1) * bool(text[frame] in "Ou")
+            if count >= 2:
+                known.setdefault(begin, frame)
+            assert found[frame] >= begin
+        assert {begin: found[begin] for begin in known} == known
+    assert confirmed_at(labels.part(slice(0, 0))).tolist() == []
+    alone = replace(labels, above_threshold=None)
+    assert confirmed_at(alone).tolist() == list(range(COUNT))
 
 
 def test_a_frame_at_the_beginning_or_beside_a_gap_confirms_itself():
