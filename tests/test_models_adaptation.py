@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import poisson
 
 import models
-from models.novelty.faults import CASES, KINDS, LEVELS, fault, recall, with_fault
+from models.novelty.adaptation import FITTED, _confirmed
+from models.novelty.faults import CASES, KINDS, LEVELS, Recall, fault, recall, with_fault
 
 RATE = 250.0
 RECIPE = replace(models.ANY, rounds=20)
@@ -165,6 +166,50 @@ def test_good_motion_is_in_distribution_after_adapting(general, adapted):
     assert all(4.5 < event.start < event.stop < 6.5 for event in found)
 
 
+def test_a_bound_is_raised_to_where_good_motion_reaches_the_limit_of_novelty(
+    general, adapted, motion
+):
+    facts = adapted.metrics["adapted"]
+    half = motion.features.shape[1] // 2
+    highest = np.quantile(motion.features[:, :half], 0.999, axis=0)
+    highest = (highest - general.mean[:half]) / general.scale[:half]
+    assert facts["novelty"] >= 2.0
+    expected = np.maximum(general.estimator.known[:half], highest + facts["novelty"] - 2.0)
+    np.testing.assert_allclose(adapted.estimator.known[:half], expected)
+    assert (expected > general.estimator.known[:half]).any()
+    np.testing.assert_array_equal(adapted.estimator.known[half:], general.estimator.known[half:])
+    assert (facts["budget"], facts["groups"], facts["runs"]) == (20.0, 6, 6)
+    assert (facts["reference"], facts["unit"]) == ("good runs", "log odds of a failure")
+    assert facts["hours"] == pytest.approx(6 * 20.0 / 3600)
+    assert 0 < facts["peaks"] <= FITTED
+    # A probability at the alarm threshold is one of the odds at the limit, but for a margin.
+    shift = adapted.estimator.calibration - general.estimator.calibration
+    alarm = general.estimator.alarm
+    assert shift[1] == pytest.approx(facts["distance"] + 1e-3 - np.log(alarm / (1.0 - alarm)))
+    assert not np.delete(shift, 1).any()
+
+
+def test_what_counts_of_a_frame_is_what_a_neighbour_reaches_too():
+    random = np.random.default_rng(0)
+    for _ in range(20):
+        score = random.normal(size=12)
+        gaps = random.choice([0.1, 0.4, 0.41], size=12)
+        gaps[random.integers(12)] = 0.5  # beside a change of runs, or not
+        start = np.cumsum(gaps)
+        runs = np.where(np.arange(12) < random.integers(1, 12), "a", "b")
+        good = models.GoodMotion(score[:, None], runs, start, start + 0.4, {})
+        expected = []
+        for frame in range(12):
+            sides = []
+            for other in (frame - 1, frame + 1):
+                low, high = sorted((frame, other))
+                there = low >= 0 and high < 12 and runs[low] == runs[high]
+                joined = there and start[high] <= start[low] + 0.4
+                sides.append(score[other] if joined else np.inf)
+            expected.append(min(score[frame], max(sides)))
+        assert _confirmed(score, good).tolist() == expected
+
+
 def test_a_robot_that_stands_does_not_alarm_whenever_it_moves_a_little(general):
     still = [good(seed, noise=1e-4, scale=0.0) for seed in range(6)]
     motion = models.GoodMotion.read(still, general.profile)
@@ -259,6 +304,118 @@ def test_a_fault_has_level_1_while_it_lasts_and_is_0_before(kind):
     lasts = (time >= 1.0) & (time < (1.1 if kind == "blow" else 2.0))
     assert not added[time < 1.0].any()
     assert np.sqrt(np.mean(added[lasts] ** 2)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_tone_has_its_frequency_and_a_blow_loses_its_strength_in_three_periods():
+    time = np.arange(4096) / 1024.0
+    tone = fault(time, "tone", 60.25, 1, start=1.0)
+    during = (time >= 1.0) & (time < 2.0)
+    np.testing.assert_allclose(
+        tone, np.where(during, np.sqrt(2) * np.sin(2 * np.pi * 60.25 * (time - 1.0)), 0.0)
+    )
+    blow = fault(time, "blow", 64.0, 1, start=1.0)
+    period = 16  # samples
+    np.testing.assert_allclose(
+        blow[1024 + 3 * period : 2048], blow[1024 : 2048 - 3 * period] / np.e, atol=1e-12
+    )
+    first = (time >= 1.0) & (time < 1.1)
+    assert np.sqrt(np.mean(blow[first] ** 2)) == pytest.approx(1.0)
+    assert blow[1024] == 0.0
+    assert blow[1025] > 0.0
+
+
+def test_band_noise_is_an_octave_wide_around_its_frequency():
+    time = np.arange(1024) / 1024.0
+    noise = fault(time, "noise", 100.0, 1, start=0.0)
+    power = np.abs(np.fft.rfft(noise)) ** 2
+    inside = np.flatnonzero(power > 1e-12 * power.max())
+    assert (inside[0], inside[-1]) == (71, 141)  # from 70.7 Hz to 141.4 Hz, in [Hz]
+    assert np.sqrt(np.mean(noise**2)) == pytest.approx(1.0)
+    np.testing.assert_array_equal(noise, fault(time, "noise", 100.0, 1, start=0.0))
+    assert np.abs(noise - fault(time, "noise", 100.0, 2, start=0.0)).max() > 0.1
+
+
+def test_the_table_of_faults_that_were_found_is_aligned():
+    found = Recall(36, {"general": (0, 1, 20, 36), "adapted": (2, 10, 30, 36)})
+    assert str(found).splitlines() == [
+        "found of 36 faults put into this motion    no fault   0.1 rad/s   0.3 rad/s     1 rad/s",
+        "  general                                         0           1          20          36",
+        "  adapted                                         2          10          30          36",
+    ]
+
+
+class Watching:
+    """Stands in for a model: notes what it classifies, and finds what its rule gives."""
+
+    def __init__(self, rule):
+        self.rule, self.seen = rule, []
+
+    def classify(self, signals, rate, *, start, valid):
+        self.seen.append((signals, rate, start, valid))
+        return self
+
+    def events(self):
+        number, row = divmod(len(self.seen) - 1, 1 + len(LEVELS))
+        return tuple(models.Event("impact", *span, 1.0) for span in self.rule(number, row))
+
+
+def test_faults_go_through_all_kinds_joints_and_levels_and_are_found_where_findings_overlap():
+    recordings = [good(seed, seconds=30.0) for seed in range(2)]
+    start = np.append(np.arange(3.0, 27.0, 0.5), np.arange(4.0, 26.0, 0.5))
+    runs = np.array(["good0"] * 48 + ["good1"] * 44)
+    where = models.GoodMotion(np.zeros((92, 1)), runs, start, start + 0.4, {})
+    places = [int(number * 92 / CASES) for number in range(CASES)]
+
+    def lasting(number):
+        begin = start[places[number]]
+        return begin, begin + (0.1 if KINDS[number % 3] == "blow" else 1.0)
+
+    before = Watching(lambda number, row: [(0.0, lasting(number)[0])])
+    after = Watching(lambda number, row: [(lasting(number)[1], 99.0)])
+    begun = Watching(lambda number, row: [(0.0, lasting(number)[0] + 1e-6)] * row)
+    loud = Watching(lambda number, row: [(lasting(number)[1] - 1e-6, 99.0)] if row == 3 else [])
+    watching = {"before": before, "after": after, "begun": begun, "loud": loud}
+    found = recall(watching, recordings, where, seed=3)
+    assert found == Recall(
+        36,
+        {
+            "before": (0, 0, 0, 0),
+            "after": (0, 0, 0, 0),
+            "begun": (0, 36, 36, 36),
+            "loud": (0, 0, 0, 36),
+        },
+    )
+    frequencies = []
+    for number, place in enumerate(places):
+        four = [
+            signals["measured_joints"] for signals, *_ in loud.seen[4 * number : 4 * number + 4]
+        ]
+        _, rate, begin, valid = loud.seen[4 * number]
+        assert (rate, len(valid)) == (RATE, 1500)
+        assert begin == pytest.approx(start[place] - 3.0)
+        assert valid.all()
+        original = recordings[int(runs[place][-1])].signal["measured_joints"]
+        first = round(begin * RATE)
+        np.testing.assert_array_equal(four[0], original[:, first : first + 1500])
+        joint = number // 3 % 3
+        added = [each - four[0] for each in four[1:]]
+        assert not np.delete(added[-1], joint, axis=0).any()
+        for level, each in zip(LEVELS, added, strict=True):
+            np.testing.assert_allclose(each, level * added[-1], atol=1e-9)
+        changed = np.flatnonzero(added[-1][joint])
+        assert changed[0] in (750, 751)  # a tone is 0 as it starts
+        if KINDS[number % 3] == "tone":
+            assert changed[-1] in (998, 999)
+            spectrum = np.abs(np.fft.rfft(added[-1][joint][750:1000]))
+            frequencies.append(int(spectrum.argmax()))
+    assert 20 <= min(frequencies) < 40
+    assert 80 < max(frequencies) <= 0.45 * RATE
+    again = Watching(lambda number, row: [])
+    recall({"again": again}, recordings, where)
+    assert recall({"again": again}, recordings, where, seed=0) == Recall(36, {"again": (0,) * 4})
+    half = len(again.seen) // 2
+    for (one, *_), (other, *_) in zip(again.seen[:half], again.seen[half:], strict=True):
+        np.testing.assert_array_equal(one["measured_joints"], other["measured_joints"])
 
 
 def test_a_fault_of_a_joint_is_in_all_signals_that_contain_the_joint():

@@ -8,7 +8,7 @@ import pytest
 import models
 from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, distance, k_centers
 from models.novelty.frames import GUARD, parts
-from models.novelty.limit import HOUR, PEAKS, alarm_peaks, limit
+from models.novelty.limit import HOUR, PEAKS, Limit, alarm_peaks, counted, limit
 
 RATE = 1000.0
 PROFILE = MOTION.at(RATE)
@@ -115,6 +115,40 @@ def test_where_there_is_motion_enough_alarms_are_counted():
     assert not found.extrapolated
     assert found.alarms == pytest.approx(40.0 * found.hours, rel=0.1)
     assert "extrapolated" not in str(found)
+
+
+def test_the_level_in_the_tail_is_the_lowest_with_as_many_alarms_as_allowed():
+    random = np.random.default_rng(5)
+    for frames in (3, 4, 12, 60, 100):
+        apart = random.exponential(1.0, frames)
+        good = motion(apart, hop=0.25)  # neighbours overlap, so that alarms merge as a level falls
+        tail = np.sort(apart)[::-1][: max(round(0.1 * frames), 1)]
+        alarms_at = [len(alarm_peaks(apart, good, level)) for level in tail]
+        for allowed in (0, 1, 2, 3):
+            fits = [max(alarms_at[: n + 1]) <= allowed for n in range(len(tail))]
+            assert counted(apart, good, allowed) == tail[fits.count(True) - 1]
+
+
+def test_a_limit_is_never_below_the_least_one():
+    still = motion(np.zeros(50))
+    assert limit(np.zeros(50), still, 1.0).distance == 0.1
+    assert limit(np.zeros(50), still, 1.0, least=0.7).distance == 0.7
+    assert limit(np.zeros(50), still, 1.0, least=-2.0).distance == 0.0
+    assert limit(np.zeros(50), still, 1.0).unit == "deviations"
+
+
+@pytest.mark.parametrize(("minutes", "shown"), [(10.0, 18.0), (2.0, 90.0)])
+def test_so_much_good_motion_shows_no_fewer_alarms(minutes, shown):
+    found = Limit(1.234, 5.0, minutes / 60.0, 2, 0.567, 30, "log odds")
+    assert found.shown == pytest.approx(shown)
+    assert str(found) == (
+        f"limit 1.23 log odds, for 5 false alarms per hour; 2 in {minutes / 60:.3g} h, each part"
+        f" classified without learning from it\n{minutes / 60:.3g} h of good motion can show no"
+        f" fewer than {shown:g} alarms per hour: the limit is extrapolated from 30 alarms beyond"
+        " 0.57 log odds, assuming an exponential tail"
+    )
+    assert not replace(found, budget=found.shown).extrapolated
+    assert "\n" not in str(replace(found, budget=found.shown))
 
 
 def test_a_smaller_budget_gives_a_larger_limit():

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
@@ -6,7 +8,8 @@ from models.evaluation.calibration import are_probabilities, reliability
 from models.evaluation.eventscore import score
 from models.evaluation.intervals import Resampling
 from models.evaluation.matching import Matched
-from models.evaluation.tradeoff import failure_score, trade_off
+from models.evaluation.tradeoff import POINTS, failure_score, trade_off
+from models.labels import Labels
 
 COUNT = len(frames())
 
@@ -75,6 +78,62 @@ def test_the_curve_counts_as_events_are_counted():
         result = score(Matched.of(moved))
         assert found.false[:, point].sum() == result.alarms.false.sum()
         assert found.found[:, point].sum() == result.found.sum()
+
+
+def confirming(name, annotated, risk, novel, apart, threshold=0.5):
+    """A recording of a model whose findings take two frames of evidence."""
+    starts = frames() + 5.0 * np.cumsum(apart)
+    scores = np.stack((1.0 - risk, risk, 0.0 * risk, 0.0 * risk), axis=1)
+    above = risk > threshold
+    label = np.where(above | (risk > 0.2), "impact", "ok")
+    label = np.where(novel & ~above, "unknown", label)
+    labels = Labels(starts, starts + 0.4, label, scores, CLASSES, above, novel)
+    return replace(predicted(name, annotated), labels=labels)
+
+
+def test_where_findings_take_two_frames_the_curve_counts_as_labels_do():
+    random = np.random.default_rng(2)
+    names = [f"talos/{name}-{seed:03d}" for name in ("good", "blow") for seed in range(6)]
+    drawn = [
+        (
+            name,
+            GOOD if "good" in name else IMPACT,
+            random.random(COUNT) ** 2,
+            random.random(COUNT) < 0.05,
+            random.random(COUNT) < 0.1,
+        )
+        for name in names
+    ]
+    found = trade_off(Matched.of([confirming(*each) for each in drawn]))
+    assert len(found.thresholds) <= POINTS
+    for point in range(0, len(found.thresholds), 3):
+        threshold = found.thresholds[point]
+        moved = [confirming(*each, threshold) for each in drawn]
+        result = score(Matched.of(moved))
+        assert found.false[:, point].sum() == result.alarms.false.sum(), threshold
+        assert found.found[:, point].sum() == result.found.sum(), threshold
+
+
+def test_thresholds_reach_from_the_highest_score_in_ok_motion_to_the_lowest():
+    recordings = noisy(10)
+    matched = Matched.of(recordings)
+    found = trade_off(matched)
+    scores = matched.frames.scores[:, 1][matched.frames.in_ok]
+    assert found.thresholds[[0, -1]].tolist() == [scores.max(), scores.min()]
+    assert 100 < len(found.thresholds) <= POINTS < len(np.unique(scores))
+    few = noisy(1)[:1]
+    assert len(trade_off(Matched.of(few)).thresholds) == COUNT
+    # At the last threshold, nothing but that score is left out.
+    failing = matched.frames.failing & (matched.frames.truth != "")
+    above = matched.frames.scores[failing, 1] > scores.min()
+    assert found.recalled[:, -1].sum() == above.sum()
+    assert found.frames.sum() == failing.sum()
+    curve = found.curve()
+    assert curve["failure_recall"][-1] == pytest.approx(above.mean())
+    hours = 10 * (5.0 + 2 * 2.0 + 1.0 + 1.4) / 3600
+    assert found.hours.sum() == pytest.approx(hours, rel=0.02)
+    rate = found.false.sum(axis=0) / found.hours.sum()
+    assert curve["false_alarms_per_hour"] == pytest.approx(rate)
 
 
 def test_what_is_read_stays_within_the_budget_and_grows_with_it():

@@ -58,12 +58,12 @@ class TradeOff:
             By name, each of shape (points,): ``threshold``, ``failure_recall`` (of frames),
             ``events_found`` and ``false_alarms_per_hour``.
         """
-        recall, found, rate = self._shares(np.ones((1, len(self.hours))))
+        recall, found, rate = self._shares(np.ones(len(self.hours)))
         return {
             "threshold": self.thresholds,
-            "failure_recall": recall[0],
-            "events_found": found[0],
-            "false_alarms_per_hour": rate[0],
+            "failure_recall": recall,
+            "events_found": found,
+            "false_alarms_per_hour": rate,
         }
 
     def at_budgets(
@@ -94,10 +94,10 @@ class TradeOff:
         ]
 
     def _shares(self, weights: Array) -> tuple[Array, Array, Array]:
-        """Compute recall, failures found and false alarms per hour, shape (sets, points) each."""
-        recall = ratio(weights @ self.recalled, (weights @ self.frames)[:, None])
-        found = ratio(weights @ self.found, (weights @ self.failures)[:, None])
-        return recall, found, ratio(weights @ self.false, (weights @ self.hours)[:, None])
+        """Compute recall, failures found and false alarms per hour, shape (..., points) each."""
+        recall = ratio(weights @ self.recalled, (weights @ self.frames)[..., None])
+        found = ratio(weights @ self.found, (weights @ self.failures)[..., None])
+        return recall, found, ratio(weights @ self.false, (weights @ self.hours)[..., None])
 
 
 def trade_off(matched: Matched) -> TradeOff:
