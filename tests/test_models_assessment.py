@@ -4,12 +4,25 @@ from math import nan
 
 import numpy as np
 import pytest
-from predicted_runs import CLASSES, GOOD, IMPACT, many, predicted
+from predicted_runs import (
+    CLASSES,
+    GOOD,
+    IMPACT,
+    OSCILLATION,
+    blocks,
+    frames,
+    many,
+    perfect,
+    predicted,
+)
 
 import models
 from models.confusion import Evaluation
-from models.evaluation.assessment import WORDS, measure, number
+from models.evaluation.assessment import WORDS, measure, number, table
 from models.evaluation.intervals import Estimate
+from models.evaluation.predictions import Unanswered
+from models.labels import Event
+from models.recording import Fault
 
 RATE = 1000.0
 PROFILE = models.LogBands(classes=("ok", "oscillations")).at(RATE)
@@ -258,3 +271,194 @@ def test_a_table_of_arrow_has_all_measures_in_long_form():
         auc = rows["protocol", "auc", None, None, domain, None, None]
         assert auc["value"] == pytest.approx(ranked.auc, nan_ok=True)
     assert found.protocol.ranked
+
+
+def sure(name, annotated, labels, confidence, findings, *, cut=None, faults=(), **facts):
+    """A recording of a model with such a confidence, and with these findings."""
+    scores = np.full((len(labels), 4), (1.0 - confidence) / 3)
+    scores[np.arange(len(labels)), [CLASSES.index(each) for each in labels]] = confidence
+    spans = tuple(Event(*each) for each in findings)
+    one = predicted(name, annotated, labels, scores=scores, cut=cut)
+    return replace(one, events=faults, facts=facts, located=(spans, spans))
+
+
+def of_two_robots():
+    """Four groups, so that shares have no interval; each kind of mistake in other numbers."""
+    calm = ["ok"] * len(frames())
+    false = ["impact" if n in (3, 4, 30, 31, 32) else "ok" for n in range(len(calm))]
+    late = ["highaccelerations" if 20 < n < 40 else "ok" for n in range(len(calm))]
+    series = blocks(*((0.5 * n + 0.1, 0.5 * n + 0.2, "impact") for n in range(6)), (3.5, 4.5, "ok"))
+    faults = (Fault(2.03, 2.2, "impact"), Fault(4.0, 4.1, "impact", felt=False))
+    stiff, soft = ({"domain": domain} for domain in ("stiff", "soft"))
+    runs = [
+        sure(
+            *("talos/good-000", GOOD, false, 0.85),
+            [("impact", 0.35, 0.75, 0.9), ("unknown", 3.0, 3.6, 0.4)],
+            cut=["impact"],
+            **stiff,
+            scenario="good",
+        ),
+        sure(
+            *("talos/blow-000", IMPACT, perfect(IMPACT), 0.95),
+            [("impact", 2.01, 2.2, 0.9)],
+            **stiff,
+            scenario="blow",
+        ),
+        sure(
+            *("talos/blow-001", IMPACT, calm, 0.75),
+            [("impact", 2.6, 2.7, 0.9)],
+            faults=faults,
+            **soft,
+            scenario="blow",
+        ),
+        sure(
+            *("go2/swing-002", OSCILLATION, late, 0.65),
+            [("highaccelerations", 2.1, 4.2, 0.9)],
+            cut=["ok", "highaccelerations", "ok"],
+            **soft,
+            scenario="swing",
+        ),
+        sure(
+            *("go2/blow-003", series, calm, 0.55),
+            [],
+            cut=["ok", *["impact"] * 4, "oscillations", "ok"],
+            **soft,
+            scenario="blow",
+        ),
+    ]
+    slow = Unanswered("a1/slow-000", {"robot": "a1", "domain": "field"}, "rate 50 Hz < 80 Hz")
+    return measure(
+        runs,
+        unanswered=[slow],
+        copies={"go2/blow-009": "go2/blow-003"},
+        known={"talos/blow-000": "a recording of this name"},
+    )
+
+
+def test_it_prints_a_small_assessment_whole():
+    assert f"{of_two_robots()}\n" == WHOLE
+
+
+def test_the_table_of_one_key_takes_the_place_of_the_others():
+    paragraphs = table(of_two_robots(), "scenario").split("\n\n")
+    assert [each for each in paragraphs if each.startswith("By ")] == [BY_SCENARIO]
+    others = [each for each in WHOLE.removesuffix("\n").split("\n\n") if each[:3] != "By "]
+    assert [each for each in paragraphs if each[:3] != "By "] == others
+
+
+WHOLE = """\
+5 runs in 4 groups (runs of a group share their motion) of 3 robots (a1, go2, talos) in 3 domains (field, soft, stiff)
+10 injected faults (9 felt), 0.00456 h of ok time, 0.00145 h unlabelled
+NOT A TEST: 1 of these runs were trained on, or share their motion with such:
+  talos/blow-000: a recording of this name
+left out, since they equal others bit for bit:
+  go2/blow-009 (go2/blow-003)
+
+At the operating point that ships: findings as `inspector classify` reports them
+                                      robots alike              all runs pooled           by chance   counts
+False alarms per hour of ok time      277 [33.5, 2229]          439 [53.2, 1586]                      2
+  by findings unknown                 138 [3.51, 2087]          220 [5.56, 1223]                      1
+Ok time flagged                       12.7%                     9.8%
+Alarms per hour of unlabelled time    1084 [27.5, 6042]         691 [17.5, 3850]                      1
+Faults found, of all injected         23.8%                     20.0%                     10.9%       2 of 10
+Faults found, of those felt           32.1%                     22.2%                     10.3%       2 of 9
+Onset right within 0.2 s, of found    50.0%                     50.0%                     31.5%       1 of 2
+Events by class, precision            12.5%                     20.0%                     2.8%        1 of 5
+  recall                              16.7%                     10.0%                     3.8%        1 of 10
+  F1                                  14.3%                     13.3%                     3.2%
+Events of any class, precision        62.5%                     40.0%                     52.8%       2 of 5
+  recall                              23.8%                     20.0%                     10.9%       2 of 10
+  F1                                  26.8%                     26.7%                     15.7%
+Delay until a live listener knows     0.96 s, 90 %: 0.96 s      0.47 s
+AUC of runs, mean over domains        100.0%                                              50.0%
+pAUC (FPR up to 10 %)                 100.0%                                              50.0%
+Score of DCASE task 2 (harmonic mean) 100.0%                                              50.0%
+Runs without a verdict                16.7%                                                           1 of 6
+
+not answered: 1 run (rate 50 Hz < 80 Hz) of a1
+
+The worst 2 of robot and scenario, by injected faults found
+  go2 blow                            0.0%                      0 of 6 injected, 0 of 6 felt
+  talos blow                          33.3%                     1 of 3 injected, 1 of 2 felt
+The worst 1 of robot and domain, by alarms per hour of ok time
+  talos stiff                         800 per hour              2 in 0.0025 h
+The worst 1 of robot and domain, by alarms per hour of unlabelled time
+  talos soft                          4337 per hour             1 in 0.000231 h
+
+By robot                             runs     ok h  false/h  ok flagged  unlab./h    found  felt found  F1 class    delay
+a1                                    0+1        0        -           -         -        -           -         -        -
+go2                                     2 0.000944        0       17.6%         0    14.3%       14.3%      0.0%   1.45 s
+talos                                   3  0.00361      554        7.7%      2169    33.3%       50.0%     28.6%   0.47 s
+(+n: runs without a verdict)
+
+By domain                            runs     ok h  false/h  ok flagged  unlab./h    found  felt found  F1 class    delay      AUC     pAUC
+field                                 0+1        0        -           -         -        -           -         -        -        -        -
+soft                                    3  0.00206        0        8.1%       822    11.1%       12.5%      0.0%   1.45 s        -        -
+stiff                                   2   0.0025      800       11.1%         0   100.0%      100.0%     50.0%   0.47 s   100.0%   100.0%
+(+n: runs without a verdict)
+
+Missed, of the faults that are felt
+  impact in talos/blow-001, 2.03 s to 2.20 s
+  impact in go2/blow-003, 0.10 s to 0.20 s
+  impact in go2/blow-003, 0.60 s to 0.70 s
+  impact in go2/blow-003, 1.10 s to 1.20 s
+  impact in go2/blow-003, 1.60 s to 1.70 s
+  and 2 more
+False alarms
+  impact in talos/good-000, 0.35 s to 0.75 s
+  unknown in talos/good-000, 3.00 s to 3.60 s
+
+Frames that are cut from annotated blocks, as the paper does
+                        recall                     precision                      frames    blocks      runs
+ok                      87.5%                      87.5%                               8         8         5
+impact                  75.0%                      85.7%                               8         8         3
+highaccelerations       -                          0.0%                                0         0         0
+oscillations            0.0%                       0.0%                                1         1         1
+Balanced accuracy       54.2%
+Failure recall          88.9%
+False alarm rate        12.5%
+
+Whole runs by frames and annotated blocks, robots not weighed (`noise-evaluation/1`)
+                        found                      by its own name              failures                runs
+impact                  12.5%                      12.5%                               8                   3
+highaccelerations       -                          -                                   0                   0
+oscillations            100.0%                     0.0%                                1                   1
+all failures            22.2%                      11.1%                               9                   4
+Delay of onset          median 0.07 s, 90th percentile 1.45 s
+False alarms            2, or 439 per hour [53.2, 1586] of ok motion
+Wrong stretches         3, or 659 per hour [136, 1925] of ok motion
+Failure recall          30.2% of all frames
+False alarm rate        6.4% of all frames
+
+As the paper measures, in shares of ALL frames
+                        false negative errors      false positive errors
+ok                      5.9%                       5.9%
+impact                  11.8%                      5.9%
+highaccelerations       0.0%                       5.9%
+oscillations            5.9%                       5.9%
+Failure detection rate  94.1%                      (calling all frames ok: 47.1%)
+Subset accuracy         76.5%
+
+Frames of row predicted                  ok             impact  highaccelerations       oscillations
+ok                                        7                  1                  0                  0
+impact                                    1                  6                  0                  1
+highaccelerations                         0                  0                  0                  0
+oscillations                              0                  0                  1                  0
+
+NOT the operating point: trade-off with thresholds chosen on these very runs
+at most                 failures found             recall of frames
+5 false alarms per h    11.1%                      5.7%
+20 false alarms per h   11.1%                      5.7%
+100 false alarms per h  11.1%                      5.7%
+Calibration error       17.1% in ten bins
+
+Brackets are 95 % confidence intervals over groups of runs.
+Measures of fewer than 5 groups have none.
+"""  # noqa: E501
+BY_SCENARIO = """\
+By scenario                          runs     ok h  false/h  ok flagged  unlab./h    found  felt found  F1 class    delay
+blow                                    3   0.0025        0        0.0%       711    11.1%       12.5%     18.2%   0.47 s
+good                                    1  0.00139     1440       20.0%         -        -           -      0.0%        -
+swing                                   1 0.000667        0       25.0%         0   100.0%      100.0%      0.0%   1.45 s
+unnamed                               0+1        0        -           -         -        -           -         -        -
+(+n: runs without a verdict)"""  # noqa: E501
