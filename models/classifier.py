@@ -77,7 +77,7 @@ class Classifier:
         examples = _examples(dataset, profile)
         there = set(examples.labels.tolist())
         classes = tuple(name for name in profile.classes if name in there)
-        if len(classes) < 2 or there != set(classes):
+        if len(classes) < 2 or there - set(classes):
             raise DatasetError(
                 f"training takes two classes or more of {', '.join(profile.classes)};"
                 f" the frames are {', '.join(sorted(there))}"

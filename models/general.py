@@ -110,7 +110,7 @@ class General:
         """
         there = set(frames.labels.tolist())
         classes = tuple(name for name in recipe.classes if name in there)
-        if len(classes) < 2 or there != set(classes):
+        if len(classes) < 2 or there - set(classes):
             raise DatasetError(
                 f"training takes two classes or more of {', '.join(recipe.classes)};"
                 f" the frames are {', '.join(sorted(there))}"

@@ -242,8 +242,6 @@ def _profile(
         )
     if not isinstance(recipe, LogBands):
         return found
-    if length < found.quick_window:
-        found = replace(found, quick_window=0)
     if length < found.window:
         bins = np.linspace(0.0, rate / 2, length // 2 + 2)
         found = replace(found, window=length, edges=tuple(bins.tolist()), quick_window=0)

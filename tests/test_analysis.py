@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import os
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -394,6 +396,165 @@ def test_a_log_of_two_numbers_a_line_is_told_from_one_with_names(tmp_path, conte
     assert _has_header(path) == names
 
 
+def test_what_is_no_regular_file_is_not_read_for_a_header(tmp_path):
+    from inspector.analysis.verdict import _has_header
+
+    os.mkfifo(tmp_path / "pipe.log")  # has no end, and is never opened
+    assert _has_header(tmp_path / "pipe.log")
+    assert _has_header(tmp_path)
+
+
+def test_a_verdict_has_localisations_where_they_are_asked_for():
+    found, other = analysed("..III..O."), Event("impact", 8.0, 9.0, 1.0)
+    (blow, *_) = found.findings
+    found.__dict__["localisations"] = {blow: "there", other: "elsewhere"}
+    path = Path("run.npz")
+    assert Verdict.of(path, found).localisations == {}
+    assert Verdict.of(path, found, localise=True).localisations == {blow: "there"}
+    assert Verdict.of(path, found).begin == 0.0
+    calm = analysed("....")
+    assert Verdict.of(path, calm, localise=True).localisations == {}
+    assert "localisations" not in calm.__dict__  # which takes time
+
+
+def test_a_file_is_analysed_with_its_links_unless_told():
+    from inspector.analysis.analyse import analyse_file
+
+    found = analyse_file(demo_run(), {})
+    assert found.links is not None
+    assert found.sha256 == hashlib.sha256(demo_run().read_bytes()).hexdigest()
+    assert found.name == demo_run().stem
+    bare = analyse_file(demo_run(), {}, links=False)
+    assert bare.links is None
+    assert bare.missing == found.missing
+    assert with_links(bare, "normal").links is not None
+    assert with_links(replace(bare, run=replace(bare.run, position=None)), "normal").links is None
+
+
+def test_what_was_computed_in_place_of_what_a_run_lacks_is_said():
+    still = np.zeros((3, 12))
+    time = np.arange(3) / 1000
+    meta = {"differentiated": {"velocity": "central", "velocity_desired": "backward"}}
+    names = Robot.load("solo12").joint_names
+    fields = {"time": time, "velocity": still, "position": still, "joint_names": names}
+    pose = np.tile([0.0, 0.0, 0.3, 0.0, 0.0, 0.0, 1.0], (3, 1))
+    run = Run(**fields, velocity_desired=still, robot="solo12", meta=meta)
+    made = [
+        f"The run had no {signal}: it was differentiated ({method})."
+        for signal, method in meta["differentiated"].items()
+    ]
+    drawn = "The run has no base pose: the robot is drawn with its base at the origin."
+    missing = [
+        with_links(analysed(".", run=each), "").missing
+        for each in (
+            run,
+            replace(run, base_pose=pose),
+            replace(run, robot="no such robot"),
+            replace(run, position=None),
+        )
+    ]
+    unknown = "No 3D robot: 'no such robot' is neither a listed robot nor a URDF or MJCF file."
+    assert missing == [
+        (drawn, *made),
+        tuple(made),
+        (unknown, *made),
+        ("No 3D robot: the run has no positions.", *made),
+    ]
+
+
+def still_and_fast(**changes):
+    """Two joints of constant speed, 3 and 4 rad/s, with a faster sample at 7 ms."""
+    velocity = np.tile([3.0, -4.0], (10, 1))
+    velocity[7] = [-6.0, 8.0]
+    fields = {"time": np.arange(10) / 1000 + 2.0, "velocity": velocity, "joint_names": ("a", "b")}
+    return Run(**(fields | changes))
+
+
+def test_the_level_of_a_run_is_that_of_its_samples():
+    from inspector.analysis.level import estimate, noise_level
+
+    run = still_and_fast()
+    found = noise_level(run, estimate(run, "simplified"))
+    assert found.rms == pytest.approx(np.sqrt((9 * 25.0 + 100.0) / 10))
+    assert (found.peak, found.peak_time) == pytest.approx((10.0, 2.007))
+    assert [name for name, _ in found.shares] == ["b", "a"]
+    assert [share for _, share in found.shares] == pytest.approx([0.64, 0.36])
+    assert str(found) == (
+        "simplified: rms 5.701 rad/s, peak 10 rad/s at 2.007 s\n   64.0%  b\n   36.0%  a"
+    )
+    gap = still_and_fast(valid=np.arange(10) != 7)
+    found = noise_level(gap, estimate(gap, "simplified"))
+    assert (found.rms, found.peak, found.peak_time) == pytest.approx((5.0, 5.0, 2.0))
+    rest = still_and_fast(velocity=np.zeros((10, 2)))
+    assert noise_level(rest, estimate(rest, "simplified")).shares == (("a", 0.0), ("b", 0.0))
+
+
+def test_parts_of_a_thousandth_are_listed_and_remarks_after_them():
+    from inspector.analysis.level import NoiseLevel
+
+    shares = (("a", 0.998), ("b", 0.001), ("c", 0.0009))
+    found = NoiseLevel("paper", "√W", 0.12345, 1.5, 0.0, shares, ("links without geometry: d",))
+    assert str(found).splitlines() == [
+        "paper: rms 0.1235 √W, peak 1.5 √W at 0.000 s",
+        "   99.8%  a",
+        "    0.1%  b",
+        "  links without geometry: d",
+    ]
+
+
+def test_the_simplified_noise_has_what_is_measured_what_is_desired_and_the_base(tmp_path):
+    from inspector.analysis.level import estimate, write_csv
+
+    base = np.tile([1.0, 2.0, 2.0, 0.0, 4.0, 0.0], (10, 1))
+    run = still_and_fast(
+        velocity_desired=np.tile([0.5, 0.25], (10, 1)),
+        base_velocity=base,
+        valid=np.arange(10) < 2,
+    )
+    found = estimate(run, "simplified")
+    assert found.parts == ("a", "b", "a, desired", "b, desired", "base")
+    assert found.power[0] == pytest.approx([9.0, 16.0, 0.25, 0.0625, 25.0])
+    write_csv(run, (found, replace(found, kind="other", unit="x")), tmp_path / "noise.csv")
+    level = f"{np.sqrt(50.3125):.9g}"
+    text = (tmp_path / "noise.csv").read_text(encoding="utf-8")
+    assert text.splitlines() == [
+        "time [s],simplified [rad/s],other [x]",
+        f"2,{level},{level}",
+        f"2.001,{level},{level}",
+    ]
+
+
+def test_noise_that_is_not_finite_names_its_time():
+    from inspector.analysis.level import Estimate, noise_level
+    from inspector.errors import InspectorError
+
+    power = np.ones((10, 1))
+    power[4:6] = np.inf
+    text = (
+        "the paper noise is inf at 2.004 s: the run's motion or the size of the robot is no robot's"
+    )
+    with pytest.raises(InspectorError, match=f"^{text}$"):
+        noise_level(still_and_fast(), Estimate("paper", "√W", power, ("a",)))
+    gap = still_and_fast(valid=~np.isin(np.arange(10), [4, 5]))
+    assert noise_level(gap, Estimate("paper", "√W", power, ("a",))).peak == 1.0
+
+
+@pytest.mark.parametrize(
+    ("robot", "kind", "text"),
+    [
+        (None, "loud", "loud"),
+        (None, "normal", "kind 'normal' needs a robot, the run names None"),
+        ("no robot", "paper", "kind 'paper' needs a robot, the run names 'no robot'"),
+    ],
+)
+def test_a_noise_that_a_run_cannot_have_is_refused(robot, kind, text):
+    from inspector.analysis.level import estimate
+    from noisemodel import NoiseModelError
+
+    with pytest.raises(NoiseModelError, match=text):
+        estimate(still_and_fast(robot=robot), kind)
+
+
 def test_noises_are_not_written_over_a_file_unasked(tmp_path):
     from inspector.analysis.level import write_csv
     from noisemodel import OutputError
@@ -401,6 +562,8 @@ def test_noises_are_not_written_over_a_file_unasked(tmp_path):
     write_csv(moving(), (), tmp_path / "noise.csv")
     with pytest.raises(OutputError, match="exists already"):
         write_csv(moving(), (), tmp_path / "noise.csv")
+    write_csv(moving(seconds=1.0), (), tmp_path / "noise.csv", overwrite=True)
+    assert len((tmp_path / "noise.csv").read_text().splitlines()) == 1 + 1000
 
 
 def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):

@@ -1,6 +1,7 @@
 """A batch that is killed and resumes."""
 
 import fcntl
+import hashlib
 import json
 import os
 import shutil
@@ -15,14 +16,17 @@ from commandline import call
 from inspector import assets
 from inspector.analysis import state, verdict
 from inspector.analysis.resuming import classify_resumed
-from inspector.analysis.status import Status
+from inspector.analysis.status import Status, Unknown
 from inspector.analysis.verdict import Verdict
 from inspector.assets import demo_run, model_files
 from inspector.errors import InspectorError
 from inspector.library import load_library
+from inspector.localisation.order import Order
+from inspector.localisation.stage import Localisation
 from inspector.logs.opening import Reading, Source, open_source
 from inspector.version import program_version
-from noisemodel import parallel
+from models import Event
+from noisemodel import OutputError, parallel
 
 ROOT = Path(__file__).parents[1]
 COUNT = 24
@@ -225,3 +229,144 @@ def test_a_state_of_other_types_is_damaged(tmp_path, change):
     path.write_text(f"{header}\n{json.dumps(json.loads(row) | change)}\n")
     with pytest.raises(state.StateError, match="is damaged in line 2"), state.opened(path, {}):
         pass
+
+
+def verdict_of(name, **more):
+    blow, rattle = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
+    found = Localisation("measured", "desired", 0.01, True, (("a", 0.7), ("b", 0.3)), None, (9, 30))
+    jump = Localisation(onset=1.25)
+    return Verdict(
+        Path(name),
+        Status.FINDINGS,
+        "general",
+        (blow, rattle),
+        "a message",
+        {rattle: found, blow: jump},
+        Unknown.IGNORE,
+        "f" * 64,
+        {rattle: Order("b", 3.0)},
+        "assumed",
+        "walk",
+        4.5,
+        0.25,
+        picture=Path("picture.png"),
+        lost=("a sentence",),
+        begin=1.5,
+        **more,
+    )
+
+
+def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
+    path, settings = tmp_path / "state", {"models": {"a": "0"}, "version": "1"}
+    plain = Verdict(Path("b.npz"), Status.OK)
+    with state.opened(path, settings) as opened:
+        opened.add(verdict_of("a.npz"), "0" * 64)
+        opened.add(plain, "1" * 64)
+        opened.add(Verdict(Path("c.npz"), Status.INTERNAL_ERROR), "2" * 64)  # tried again
+    with state.opened(path, settings) as opened:
+        found = opened.verdicts
+    assert found == {
+        (Path("a.npz"), "0" * 64): verdict_of("a.npz"),
+        (Path("b.npz"), "1" * 64): plain,
+    }
+
+
+@pytest.mark.parametrize("torn", [b'{"run": "half a li', b"{}", b"\xff"])
+def test_a_line_that_was_being_written_is_dropped(tmp_path, torn):
+    path = tmp_path / "state"
+    with state.opened(path, {"a": 1}) as opened:
+        opened.add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
+    whole = path.read_bytes()
+    path.write_bytes(whole + torn)
+    with state.opened(path, {"a": 1}) as opened:
+        assert list(opened.verdicts) == [(Path("a.npz"), "0" * 64)]
+        assert path.read_bytes() == whole
+        opened.add(Verdict(Path("b.npz"), Status.OK), "1" * 64)
+    assert path.read_bytes().startswith(whole)
+    assert len(rows(path)) == 2
+
+
+def test_a_header_that_was_being_written_is_written_again(tmp_path):
+    path = tmp_path / "state"
+    with state.opened(path, {"a": 1}):
+        whole = path.read_bytes()
+    for length in (0, 7, len(whole) - 1):
+        path.write_bytes(whole[:length])
+        with state.opened(path, {"a": 1}):
+            assert path.read_bytes() == whole
+    path.write_bytes(whole[:7] + b"x")
+    with pytest.raises(state.StateError, match="holds no state"), state.opened(path, {"a": 1}):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("settings", "problem"),
+    [
+        ({"version": "1", "models": {"a": "1"}}, "is of other models"),
+        ({"version": "2", "models": {"a": "0"}}, "is of another version (1, this is 2)"),
+        ({"version": "1", "models": {"a": "0"}, "robot": 1}, "is of other robot"),
+        ({"version": "1", "zeta": 1, "models": 0}, "is of other zeta"),
+    ],
+)
+def test_a_state_of_other_settings_says_which(tmp_path, settings, problem):
+    path = tmp_path / "state"
+    with state.opened(path, {"version": "1", "models": {"a": "0"}}):
+        pass
+    with pytest.raises(state.StateError) as caught, state.opened(path, settings):
+        pass
+    assert str(caught.value) == f"{path}: {problem}; name another file, or delete it"
+
+
+def test_a_state_that_cannot_be_a_file_is_refused(tmp_path, monkeypatch):
+    with pytest.raises(state.StateError, match="is no regular file"), state.opened(tmp_path, {}):
+        pass
+    (tmp_path / "file").touch()
+    refused = pytest.raises(
+        OutputError, match=r"file/state: cannot be written \(Not a directory\)$"
+    )
+    with refused, state.opened(tmp_path / "file" / "state", {}):
+        pass
+    with (tmp_path / "large").open("wb") as file:
+        file.truncate(2**28 + 1)
+    refused = pytest.raises(state.StateError, match="large: is larger than 268435456 bytes;")
+    with refused, state.opened(tmp_path / "large", {}):
+        pass
+
+    def full(_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full)
+    refused = pytest.raises(
+        OutputError, match=r"new: cannot be written \(No space left on device\)$"
+    )
+    with refused, state.opened(tmp_path / "new", {}):
+        pass
+
+
+def test_a_state_of_the_largest_size_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "state"
+    with state.opened(path, {"a": 1}):
+        pass
+    size = path.stat().st_size
+    monkeypatch.setattr(state, "MAX_BYTES", size)
+    with state.opened(path, {"a": 1}):
+        pass
+    monkeypatch.setattr(state, "MAX_BYTES", size - 1)
+    with pytest.raises(state.StateError, match="is larger than"), state.opened(path, {"a": 1}):
+        pass
+
+
+def test_a_digest_is_of_a_file_or_of_all_names_and_files_in_a_folder(tmp_path):
+    (tmp_path / "log" / "deep").mkdir(parents=True)
+    one, other = tmp_path / "log" / "b", tmp_path / "log" / "deep" / "a"
+    one.write_bytes(b"one")
+    other.write_bytes(b"other")
+
+    def sha256(content):
+        return hashlib.sha256(content).hexdigest()
+
+    assert state.digest(one) == sha256(b"one")
+    lines = f"b {sha256(b'one')}\ndeep/a {sha256(b'other')}"
+    assert state.digest(tmp_path / "log") == sha256(lines.encode())
+    other.rename(other.with_name("c"))
+    assert state.digest(tmp_path / "log") != sha256(lines.encode())

@@ -232,6 +232,47 @@ def test_a_header_that_states_more_than_there_is_is_refused(path):
 
 
 @pytest.mark.parametrize(
+    ("name", "kind", "shape", "content"),
+    [
+        ("intercept", "<f8", (4,), 3 * b"12345678"),
+        ("intercept", "<f8", (2,), 3 * b"12345678"),
+        ("coefficients", "<f8", (-1, -3), 3 * b"12345678"),
+        ("manifest", "<U0", (), b""),
+    ],
+)
+def test_an_array_of_another_size_than_its_header_declares_is_refused(
+    path, name, kind, shape, content
+):
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": kind, "fortran_order": False, "shape": shape}
+    )
+    with zipfile.ZipFile(path) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    members[f"{name}.npy"] = header.getvalue() + content
+    with zipfile.ZipFile(path, "w") as archive:
+        for each, there in members.items():
+            archive.writestr(each, there)
+    refused(path, f"array '{name}' is damaged: its size is not what it declares")
+
+
+def test_what_an_archive_holds_is_named_up_to_200_characters(path):
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("a" * 300, b"")
+    refused(path, f"is no model file: holds {'a' * 200}, expected ")
+
+
+def test_a_version_that_is_not_installed_is_said(monkeypatch):
+    from models import modelfile
+
+    def lacking(name):
+        raise modelfile.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(modelfile.metadata, "version", lacking)
+    assert modelfile.versions()["noise-inspector"] == "not installed"
+
+
+@pytest.mark.parametrize(
     ("changes", "reason"),
     [
         ({"intercept": np.zeros(3, np.float32)}, "array 'intercept' is of type float32"),

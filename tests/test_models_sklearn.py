@@ -147,7 +147,47 @@ def test_frames_of_another_length_than_a_profile_has_are_refused():
         NoiseFeatures(models.Profile.paper()).fit_transform(np.ones((3, 400)))
 
 
-def test_groups_of_another_length_are_refused():
+@pytest.mark.parametrize("shape", [(59,), (61,), (60, 1), (30,)])
+def test_groups_of_another_shape_are_refused(shape):
+    noise, labels, _ = frames()
+    text = f"groups of shape {shape}, expected (60,)"
+    with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
+        NoiseClassifier().fit(noise, labels, np.full(shape, "run"))
+
+
+@pytest.mark.parametrize(("length", "bins"), [(2, 2), (19, 10), (60, 31), (99, 50)])
+def test_a_frame_shorter_than_a_window_has_the_bins_of_its_own_transform(length, bins):
+    noise = np.random.default_rng(0).normal(size=(4, length))
+    found = NoiseFeatures(rate=RATE).fit(noise).profile_
+    assert (found.window, found.length, found.quick_window) == (length, length, 0)
+    assert len(found.edges) == bins + 1 == len(np.fft.rfftfreq(length)) + 1
+    assert (found.edges[0], found.edges[-1]) == (0.0, 500.0)
+    np.testing.assert_allclose(np.diff(found.edges), 500.0 / bins)
+    assert NoiseFeatures(rate=RATE).fit_transform(noise).shape[0] == 4
+
+
+def test_a_frame_as_long_as_a_window_has_the_bands_of_the_profile():
+    found = NoiseFeatures(rate=RATE).fit(np.ones((1, 100))).profile_
+    assert found == replace(models.SCALAR.at(RATE), length=100)
+
+
+def test_many_rows_have_the_features_of_each():
+    noise = np.random.default_rng(0).normal(size=(models.sklearn.CHUNK + 3, 100))
+    transformer = NoiseFeatures(rate=RATE).fit(noise)
+    found = transformer.transform(noise)
+    last = transformer.transform(noise[models.sklearn.CHUNK - 1 :])
+    np.testing.assert_array_equal(found[models.sklearn.CHUNK - 1 :], last)
+    assert len(found) == len(noise)
+
+
+def test_the_class_of_a_frame_is_that_of_the_highest_score():
     noise, labels, groups = frames()
-    with pytest.raises(ValueError, match=r"groups of shape \(59,\), expected \(60,\)"):
-        NoiseClassifier().fit(noise, labels, groups[1:])
+    classifier = NoiseClassifier(settings={"estimator": "trees", "rounds": 5, "leaves": 4})
+    classifier.fit(noise, labels, groups)
+    scores = classifier.decision_function(noise)
+    assert scores.shape == (60, 3)
+    assert classifier.predict(noise).tolist() == [
+        ("impact", "ok", "oscillations")[place] for place in scores.argmax(axis=1)
+    ]
+    with pytest.raises(ValueError, match=r"^training requires 2 classes or more; y has 1 class$"):
+        NoiseClassifier().fit(noise, np.full(60, "ok"))

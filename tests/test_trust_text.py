@@ -114,6 +114,45 @@ def test_keys_and_numbers_that_people_write_are_no_long_keys():
     assert simulated.LONG_KEY.search(text) is None
 
 
+@pytest.mark.parametrize("sign", ["", "-"])
+def test_integers_have_up_to_twenty_digits(sign):
+    most, more = f"{sign}{'9' * 20}", f"{sign}1{'0' * 20}"
+    assert jsontext.from_json(f"[{most}]") == [int(most)]
+    assert jsontext.from_toml(f"a = [{{b = {most}}}]") == {"a": [{"b": int(most)}]}
+    for read, text in ((jsontext.from_json, f"[{more}]"), (jsontext.from_toml, f"a = [{more}]")):
+        with pytest.raises(ValueError, match=r"^an integer of more than 20 digits$"):
+            read(text)
+
+
+def test_a_key_has_up_to_a_hundred_parts():
+    parts = [f"k{number}" for number in range(101)]
+    for separator in (".", " . "):
+        assert jsontext.from_toml(f"{separator.join(parts[:100])} = 1")
+        with pytest.raises(ValueError, match=r"^a key of more than 100 parts$"):
+            jsontext.from_toml(f"{separator.join(parts)} = 1")
+
+
+def test_a_text_may_be_of_64_mib_and_no_more(monkeypatch, tmp_path):
+    path = tmp_path / "text.json"
+    with path.open("wb") as file:
+        file.truncate(2**26 + 1)
+    with pytest.raises(ValueError, match=r"^67108865 bytes, the limit is 67108864$"):
+        jsontext.text_of(path)
+    monkeypatch.setattr(jsontext, "MAX_CHARACTERS", 9)
+    path.write_bytes(b"\xef\xbb\xbf[1, 2]")  # a byte order mark and six characters
+    assert jsontext.text_of(path) == "[1, 2]"
+    assert jsontext.from_json("[1, 2, 3]") == [1, 2, 3]
+    for read in (jsontext.from_json, jsontext.from_toml):
+        with pytest.raises(ValueError, match=r"^10 characters, the limit is 9$"):
+            read("[1,  2, 3]")
+
+
+def test_values_are_shown_about_as_they_stand_in_toml():
+    text = 'a = {b = [true, false], c = 1979-05-27, d = 07:32:00, e = "x", f = 1.5}'
+    shown = "{b = [true, false], c = 1979-05-27, d = 07:32:00, e = 'x', f = 1.5}"
+    assert jsontext.toml_shown(jsontext.from_toml(text)["a"]) == shown
+
+
 @pytest.mark.parametrize("settings", ["[" * 100_000, "[]", "9" * 5000, '{"format": NaN}', "\xff"])
 def test_settings_of_a_data_set_that_are_none_are_one_line(tmp_path, settings):
     (tmp_path / "dataset.json").write_text(settings, encoding="latin-1")
