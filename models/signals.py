@@ -81,7 +81,7 @@ def stacked(signals: Signals, names: Sequence[str]) -> Real:
         raise SignalError(f"a signal has another shape, {found}, expected (samples,){joints}")
     if len(chosen) == 1:
         return chosen[0]
-    return np.vstack(chosen) if chosen[-1].ndim > 1 else np.array(chosen)
+    return np.vstack(chosen)
 
 
 def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:

@@ -78,6 +78,38 @@ def test_it_prints_both_groups_and_how_they_differ():
     assert "predicting ok for all of them would detect 60.0% of failures by its measure" in text
 
 
+def test_it_prints_a_small_evaluation_whole():
+    head = "10 frames                 " + "".join(each.rjust(19) for each in CLASSES)
+    rows = {
+        "False negative errors": ("10.0%", "10.0%", "10.0%"),
+        "False positive errors": ("10.0%", "20.0%", "0.0%"),
+        "Failure detection rate": ("90.0%",),
+        "Subset accuracy": ("70.0%",),
+        "Recall": ("83.3%", "50.0%", "50.0%"),
+        "Precision": ("83.3%", "33.3%", "100.0%"),
+        "Balanced accuracy": ("61.1%",),
+        "Failure recall": ("75.0%",),
+        "False alarm rate": ("16.7%",),
+        "ok": ("5", "1", "0"),
+        "impact": ("1", "1", "0"),
+        "oscillations": ("0", "1", "1"),
+    }
+    lines = [name.ljust(26) + "".join(cell.rjust(19) for cell in row) for name, row in rows.items()]
+    foot = (
+        "The paper divides by all frames: predicting ok for all of them would detect 60.0% of"
+        " failures by its measure, and none by failure recall."
+    )
+    assert str(MIXED).split("\n") == [
+        *(head, "", "As the paper measures", *lines[:4], ""),
+        *("Of the frames in question", *lines[4:9], ""),
+        *("Frames of (row) predicted (column)", *lines[9:], "", foot),
+    ]
+    only = Evaluation.of(np.array(["ok"]), np.array(["ok"]), ("ok", "a" * 30))
+    found = str(only).split("\n")
+    assert found[0] == "1 frames".ljust(32) + "ok".rjust(19) + "a" * 30
+    assert "Recall".ljust(32) + "100.0%".rjust(19) + "-".rjust(19) in found
+
+
 def test_nothing_to_compare_is_refused():
     with pytest.raises(models.DatasetError, match="0 labels and 0 predictions"):
         Evaluation.of(np.array([]), np.array([]), CLASSES)

@@ -51,6 +51,20 @@ def test_features_relative_to_a_reference_count_spreads_from_its_location():
     np.testing.assert_allclose(found, [[0.0, 0.0], [1.0, -2.0]], atol=1e-12)
 
 
+def test_spreads_have_0_15_more_and_relative_features_reach_to_15_as_documented():
+    reference = Reference(np.array([1.0, 1.0, 1.0]), np.array([0.0, 0.35, 0.0]))
+    found = reference.relative(np.array([[1.3, 1.5, 3.24], [0.85, 0.0, -9.0]]))
+    np.testing.assert_allclose(found, [[2.0, 1.0, 2.24 / 0.15], [-1.0, -2.0, -15.0]])
+
+
+def test_a_running_reference_has_a_memory_of_a_minute():
+    # Frames come every 0.1 s; a shift within the spread fades as exp(-t / 60 s).
+    sway = np.where(np.arange(3000) % 2, 0.5, -0.5)
+    running = RunningReference()
+    running.relative((sway + 0.05 * (np.arange(3000) >= 2400))[:, None])
+    assert running._location[0] == pytest.approx(0.05 * (1.0 - np.exp(-1.0)), abs=2e-3)
+
+
 def test_relative_features_are_bounded():
     reference = Reference.of(frames())
     found = reference.relative(np.array([np.full(5, 1e6), np.full(5, -1e6)]))
