@@ -355,6 +355,44 @@ def test_each_stretch_of_flagged_frames_has_a_finding_within_its_frames(text):
     assert bool(findings) == bool(labels.events())
 
 
+OWN = {
+    "apart": ((0.3, 1.0), (0.6, 0.9), (0.4, 0.7), [("o", 0.4, 0.7), ("i", 0.6, 0.9)]),
+    "clipped": ((0.3, 1.0), (0.1, 0.9), (0.4, 1.4), [("i", 0.3, 0.9), ("o", 0.4, 1.0)]),
+    "too short": ((0.3, 1.0), (0.6, 0.65), (0.2, 0.35), [("i", 0.3, 0.65), ("o", 0.65, 1.0)]),
+    "first alone": ((0.3, 0.6), (0.0, 0.0), (0.4, 0.5), [("i", 0.3, 0.6)]),
+    "second alone": ((0.7, 1.0), (0.0, 2.0), (0.0, 0.0), [("o", 0.7, 1.0)]),
+    "neither": ((0.65, 0.65), (0.0, 2.0), (0.0, 2.0), [("o", 0.65, 0.65)]),
+}
+"""Onset and end of a stretch, and of its impact and its oscillations; what becomes of both."""
+
+
+@pytest.mark.parametrize("case", OWN)
+def test_events_lie_within_their_stretch_and_are_in_the_order_of_their_onsets(monkeypatch, case):
+    from inspector.analysis import analyse as module
+
+    # Frames of 0.4 s every 0.1 s: the impact's from 0.2 s to 0.8 s, the others' from 0.5 to 1.1 s.
+    labels = analysed("..IIIOOO..").labels
+    *around, expected = OWN[case]
+    spans = [(0.2, 1.1), (0.2, 0.8), (0.5, 1.1)]
+
+    def extent(_, first, last, *, frame, hop):
+        assert (frame, hop) == pytest.approx((0.4, 0.1))
+        place = [np.allclose((first, last), span) for span in spans]
+        return around[place.index(True)]
+
+    monkeypatch.setattr(module, "extent", extent)
+    found, findings = module.extents(moving(), labels)
+    names = {"i": "impact", "o": "oscillations"}
+    assert [each.label for each in findings] == [names[name] for name, *_ in expected]
+    times = [(each.start, each.stop) for each in findings]
+    assert times == [pytest.approx(each) for _, *each in expected]
+    assert [each.label for each in found] == [each.label for each in findings]
+    known = dict(zip(("impact", "oscillations"), spans[1:], strict=True))
+    assert [(each.start, each.stop) for each in found] == [
+        pytest.approx(known[each.label]) for each in found
+    ]
+
+
 def test_a_run_file_is_analysed_by_its_path_and_a_shipped_model_by_its_name(tmp_path):
     run = moving(tone=1.0)
     run.save(tmp_path / "shaken.npz")

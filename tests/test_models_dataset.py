@@ -1,3 +1,4 @@
+import hashlib
 from dataclasses import replace
 from math import inf
 
@@ -156,6 +157,29 @@ def test_no_frame_at_all_is_refused():
 def test_blocks_that_cannot_be_are_refused(blocks, reason):
     with pytest.raises(models.RecordingError, match=f"walk: .*{reason}"):
         recording(*blocks)
+
+
+def test_annotations_may_be_off_by_a_sample():
+    early, late = Block(-0.001, 1.001, "ok"), Block(1.0, 3.001, "impact")
+    assert recording(early, late).blocks == (early, late)
+    assert recording(Block(3.0, inf, "ok")).blocks[0].start == 3.0
+    for wrong in (
+        [Block(-0.0012, 1.0, "ok")],
+        [Block(0.0, 3.0012, "ok")],
+        [Block(0.0, 1.0012, "ok"), late],
+        [Block(1.0, 1.0, "ok")],
+    ):
+        with pytest.raises(models.RecordingError):
+            recording(*wrong)
+
+
+def test_a_recording_has_the_hash_of_its_samples_unless_one_is_given():
+    one, other = np.arange(3.0), np.arange(3.0, 6.0)
+    both = {"measured": one, "desired": other}
+    found = recording(signal=both).sha256
+    content = one.astype("<f8").tobytes() + other.astype("<f8").tobytes()
+    assert found == hashlib.sha256(content).hexdigest()
+    assert recording(signal=both, sha256="0" * 64).sha256 == "0" * 64
 
 
 def test_blocks_that_overlap_and_agree_are_accepted():

@@ -33,6 +33,10 @@ def test_clustered_events_have_wider_intervals_than_single_ones():
     exact = np.array(garwood(20)) / 5.0
     assert resampling.rate(alone, hours).low == pytest.approx(exact[0])
     assert resampling.rate(crowd, hours).high > 1.3 * exact[1]
+    assert resampling.rate(crowd, hours).low == 0.0 < exact[0]
+    mean = resampling.mean_rate(crowd, hours, [np.arange(50) < 25, np.arange(50) >= 25])
+    assert (mean.low, mean.value) == (0.0, pytest.approx(20 / 2.5 / 2))
+    assert mean.high > 1.3 * exact[1]
 
 
 def test_runs_without_a_mistake_have_the_bound_of_their_number():
