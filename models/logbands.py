@@ -105,10 +105,12 @@ class LogBands:
         """
         edges = self._edges(rate / 2)
         if len(edges) <= FEWEST:
+            least = self.lowest
+            for _ in range(FEWEST):
+                least = self._upper(least)
             raise ProfileError(
                 f"a rate of {rate:g} Hz leaves {len(edges) - 1} bands up to {rate / 2:g} Hz,"
-                f" expected {FEWEST} or more: take a rate of"
-                f" {2 * (self.lowest + FEWEST / self.window):g} Hz at least"
+                f" expected {FEWEST} or more: take a rate of {ceil(2 * least)} Hz at least"
             )
         quick = self._quick_edges(rate / 2)
         return Profile(
@@ -209,12 +211,14 @@ class LogBands:
 
     def _edges(self, nyquist: float) -> tuple[float, ...]:
         """Edges up to the Nyquist frequency, each band as wide as the window resolves or wider."""
-        edges, ratio, resolution = [self.lowest], 2.0 ** (1.0 / self.per_octave), 1.0 / self.window
-        while (upper := max(edges[-1] + resolution, edges[-1] * ratio)) <= min(
-            self.highest, nyquist
-        ):
+        edges = [self.lowest]
+        while (upper := self._upper(edges[-1])) <= min(self.highest, nyquist):
             edges.append(upper)
         return tuple(edges)
+
+    def _upper(self, edge: float) -> float:
+        """Upper edge of the band from an edge on."""
+        return max(edge + 1.0 / self.window, edge * 2.0 ** (1.0 / self.per_octave))
 
     def _quick_edges(self, nyquist: float) -> tuple[float, ...]:
         """Edges of the bands of the quick window, none if not even the first one fits."""

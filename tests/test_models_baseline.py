@@ -9,6 +9,7 @@ import models
 from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, distance, k_centers
 from models.novelty.frames import GUARD, parts
 from models.novelty.limit import HOUR, PEAKS, Limit, alarm_peaks, counted, limit
+from models.novelty.training import Learnt, check
 
 RATE = 1000.0
 PROFILE = MOTION.at(RATE)
@@ -78,6 +79,60 @@ def test_a_k_center_subset_of_all_frames_has_no_distance_from_any():
     assert far == sorted(far, reverse=True)
     assert far[-1] < 1e-6
     assert len(k_centers(np.repeat(features[:3], 9, axis=0), 20)) == 1 + 3
+
+
+def test_each_next_centre_is_the_frame_farthest_from_those_before():
+    features = np.random.default_rng(2).normal(0.3, 1.0, size=(150, 4))
+    silence, *centres = k_centers(features)
+    assert silence.tolist() == features.min(axis=0).tolist()
+    assert len(centres) == 100
+    lengths = np.linalg.norm(features, axis=1)
+    assert np.linalg.norm(centres[0]) == lengths.min()
+    for count in range(1, 100):
+        apart = np.linalg.norm(features[:, None] - np.array(centres[:count]), axis=2).min(axis=1)
+        assert (centres[count] == features[apart.argmax()]).all()
+    same = k_centers(np.repeat(features[:1], 3, axis=0))
+    assert same.tolist() == [features[0].tolist()] * 2
+
+
+def test_an_anomaly_lies_beyond_the_limit_and_not_at_it():
+    model = Baseline(np.array([[-1.0, -1.0], [0.0, 0.0]]), np.array([2.0]))
+    frames = np.array([[2.0, 2.0], [2.0, 2.1], [-9.0, -9.0], [1.0, -1.0]])
+    apart = model.decision(frames)
+    raised = np.array([[2.0, 2.0], [2.0, 2.1], [0.0, 0.0], [1.0, -1.0]])
+    expected = np.sqrt((raised**2).mean(axis=1)) / 2.0
+    np.testing.assert_allclose(apart[:, 0], expected, atol=1e-9)
+    assert model.choose(apart).tolist() == [0, 1, 0, 0]
+    np.testing.assert_allclose(model.score(apart), np.stack((np.ones(4), expected), axis=1))
+    assert model.width == 1
+    still = replace(model, limit=np.zeros(1))  # any distance at all is one then
+    assert still.choose(still.decision(frames)).tolist() == [1, 1, 0, 1]
+
+
+def test_so_much_good_motion_is_enough_and_no_less():
+    good = motion(np.zeros(75))
+    assert good.seconds == pytest.approx(30.0)
+    check(good, 0.1, good.seconds)
+    with pytest.raises(models.DatasetError, match=r"^30 s of good motion are too short to learn"):
+        check(good, 0.1, good.seconds + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("runs", "groups", "annotated", "head"),
+    [
+        (1, 1, 1, ["in 1 run", "of 1 run with annotations,", "its parts were left out in turn,"]),
+        (2, 2, 0, ["in 2 runs"]),
+        (3, 2, 2, ["in 3 runs", "of 2 runs with annotations,"]),
+    ],
+)
+def test_what_was_learnt_from_is_said_in_lines(learnt, runs, groups, annotated, head):
+    limit_ = Limit(1.0, 90.0, 1.0, 2, 0.5, 30)
+    lines = str(Learnt(learnt.classifier, limit_, runs, groups, annotated)).splitlines()
+    assert lines[0] == f"learnt from 1 h of good motion {head[0]}"
+    assert len(lines) == len(head) + 1
+    for line, start in zip(lines[1:], head[1:], strict=False):
+        assert line.startswith(start)
+    assert lines[-1] == str(limit_)
 
 
 def test_the_limit_of_an_exponential_tail_is_where_it_has_to_be():

@@ -217,6 +217,15 @@ def test_compressed_members_are_refused(path):
     refused(path, "is compressed, expected stored")
 
 
+@pytest.mark.parametrize(("place", "value"), [(10, 8), (20, 7), (24, 7)])
+def test_members_that_an_archive_says_are_packed_are_refused(path, place, value):
+    content = bytearray(path.read_bytes())
+    entry = content.index(b"PK\x01\x02")  # the first in the table of contents
+    content[entry + place] ^= value  # its method, or one of its sizes
+    path.write_bytes(content)
+    refused(path, "is compressed, expected stored")
+
+
 def test_a_header_that_states_more_than_there_is_is_refused(path):
     header = io.BytesIO()
     np.lib.format.write_array_header_1_0(
@@ -305,6 +314,7 @@ def test_wrong_arrays_are_refused(path, changes, reason):
         ({"rate": "fast"}, "manifest has rate = fast, expected a float"),
         ({"rate": 1000.0}, "rate is 1000.0 Hz, but 500.0 Hz in its profile"),
         ({"classes": ["ok"]}, "are not two or more of ok, rattle, squeal, in order"),
+        ({"classes": ["ok", "ok", "rattle"]}, "are not two or more of"),
         ({"classes": ["rattle", "ok", "squeal"]}, "are not two or more of"),
         ({"classes": ["ok", "rattle"]}, r"array 'coefficients' has shape .* asks for \(1, "),
         ({"profile": {}}, "manifest has a wrong profile: setting 'alarm' is missing"),

@@ -129,16 +129,22 @@ def test_features_that_rise_with_a_fault_never_fall_as_it_gets_louder():
 
 
 def test_a_rate_that_leaves_no_bands_is_refused():
-    for lowest, rate, bands in ((15.0, 50.0, 1), (15.0, 69.9, 1), (20.0, 79.0, 1)):
-        least = 2 * (lowest + 20.0)
+    for lowest, rate, bands, least in (
+        (15.0, 50.0, 1, 70),
+        (15.0, 69.9, 1, 70),
+        (20.0, 79.0, 1, 80),
+        (50.0, 80.0, 0, 143),  # bands of a quarter of an octave are wider than 10 Hz there
+    ):
         text = (
             f"a rate of {rate:g} Hz leaves {bands} bands up to {rate / 2:g} Hz, expected 2 or more:"
-            f" take a rate of {least:g} Hz at least"
+            f" take a rate of {least} Hz at least"
         )
+        recipe = replace(models.LogBands(), lowest=lowest)
         with pytest.raises(models.ProfileError, match=f"^{re.escape(text)}$"):
-            replace(models.LogBands(), lowest=lowest).at(rate)
-        edges = replace(models.LogBands(), lowest=lowest).at(least).edges
-        assert edges == (lowest, lowest + 10.0, lowest + 20.0)
+            recipe.at(rate)
+        assert len(recipe.at(float(least)).edges) == 3
+        with pytest.raises(models.ProfileError):
+            recipe.at(least - 1.0)
 
 
 @pytest.mark.parametrize(
