@@ -221,6 +221,7 @@ def test_frames_that_overlap_or_touch_are_one_alarm_and_runs_are_never_joined():
     np.testing.assert_array_equal(alarm_peaks(apart, apart_by_time, 0.5), [3.0, 5.0, 2.0])
     touching = motion(apart, hop=0.4)
     np.testing.assert_array_equal(alarm_peaks(apart, touching, 0.5), [3.0, 5.0, 2.0])
+    assert alarm_peaks(apart, touching, 5.0).tolist() == []
     two = motion(apart, ["a"] * 4 + ["b"] * 5, hop=0.1)
     np.testing.assert_array_equal(alarm_peaks(apart, two, 0.5), [5.0, 4.0])
 

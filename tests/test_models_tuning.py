@@ -93,9 +93,13 @@ def test_two_classes_are_predicted_as_a_classifier_does(name):
     assert_equal_to_training(some_points(profile), sets(("ok", "oscillations")))
 
 
-def test_points_of_trees_predict_what_a_classifier_predicts():
-    profile = replace(PROFILES["logbands"], estimator="trees", rounds=3)
-    points = Grid.of(["leaves=4,8"]).profiles(profile)
+@pytest.mark.parametrize(
+    ("estimator", "grid"),
+    [("trees", "leaves=4,8"), ("detector", "leaves=4,8"), ("networks", "epochs=1,2")],
+)
+def test_points_of_other_estimators_predict_what_a_classifier_predicts(estimator, grid):
+    profile = replace(PROFILES["logbands"], estimator=estimator, rounds=3, units=4, networks=2)
+    points = Grid.of([grid]).profiles(profile)
     assert_equal_to_training(points, sets(learn=range(12), check=range(12, 14)))
 
 

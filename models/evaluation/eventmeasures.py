@@ -81,7 +81,7 @@ def measure(score: EventScore, resampling: Resampling, only: Mask | None = None)
         return resampling.share(count(run[part & whole]), count(run[whole]))
 
     flagged = frames.flagged
-    failing = (frames.truth != OK) & (frames.truth != UNCLEAR)
+    failing = ~np.isin(frames.truth, (OK, UNCLEAR))
     every = np.ones(len(failures), dtype=bool)
     classes = [name for name in matched.classes if name != OK]
     others = sorted(set(failures.label.tolist()) - set(classes))

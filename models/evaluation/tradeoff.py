@@ -108,7 +108,7 @@ def trade_off(matched: Matched) -> TradeOff:
     """
     frames, failures = matched.frames, matched.failures
     risk = failure_score(frames.scores, matched.classes)
-    failing = (frames.truth != OK) & (frames.truth != UNCLEAR)
+    failing = ~np.isin(frames.truth, (OK, UNCLEAR))
     scores = np.unique(risk[frames.in_ok])[::-1]
     ranks = np.unique(np.geomspace(1, max(len(scores), 1), POINTS).round().astype(np.intp)) - 1
     thresholds = scores[ranks[: len(scores)]]
