@@ -92,12 +92,12 @@ def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
     return alike and len(count) == 1 and len(joints) == by_joint(names[-1]) and 0 not in joints
 
 
-def check(samples: Real, valid: Mask | None = None, *, first: int = 0) -> None:
+def check(samples: Real, valid: Mask | None, *, first: int) -> None:
     """Check the input of a classifier.
 
     Args:
         samples: Shape (samples,) or (rows, samples).
-        valid: False in gaps, of which there are none unless given.
+        valid: False in gaps; None if there are none.
         first: Number of the first sample.
 
     Raises:

@@ -24,6 +24,7 @@ from inspector.library import load_library
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.opening import Reading, Source, open_source
+from inspector.logs.options import ReadOptions
 from inspector.version import program_version
 from models import Event
 from noisemodel import OutputError, parallel
@@ -354,6 +355,22 @@ def test_a_state_of_the_largest_size_is_read(tmp_path, monkeypatch):
     monkeypatch.setattr(state, "MAX_BYTES", size - 1)
     with pytest.raises(state.StateError, match="is larger than"), state.opened(path, {"a": 1}):
         pass
+
+
+@pytest.mark.parametrize("beside", ["robot", "desired"])
+def test_a_file_that_logs_are_read_with_is_one_of_the_settings(tmp_path, beside):
+    path, other = tmp_path / "state", tmp_path / "other"
+    desired = other if beside == "desired" else None
+    options = ReadOptions(robot=str(other)) if beside == "robot" else ReadOptions()
+    for content, refused in ((b"one", False), (b"one", False), (b"other", True)):
+        other.write_bytes(content)
+        reading = Reading(options, desired)
+        done = classify_resumed([], LIBRARY, path, reading=reading)
+        if refused:
+            with pytest.raises(state.StateError, match="is of other settings"):
+                list(done)
+        else:
+            assert list(done) == []
 
 
 def test_a_digest_is_of_a_file_or_of_all_names_and_files_in_a_folder(tmp_path):

@@ -137,7 +137,11 @@ def test_labels_do_not_depend_on_chunks(ours, monkeypatch):
 def test_labels_are_those_of_the_frames_alone(ours):
     signal = np.concatenate([knocks(2.0), noise(2.0)])
     frames = models.frame(signal, length=400, hop=100)
-    assert np.array_equal(ours.classify(signal, RATE).label, ours.predict(frames))
+    labels = ours.classify(signal, RATE)
+    assert np.array_equal(labels.label, ours.predict(frames))
+    pieces = ours.classify_pieces([(signal[:1500], None), (signal[1500:], None)], RATE)
+    assert np.array_equal(pieces.label, labels.label)
+    assert pieces.start[0] == labels.start[0] == 0.0
 
 
 def test_frames_that_touch_a_gap_are_not_classified(ours):

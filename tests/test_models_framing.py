@@ -14,7 +14,9 @@ def test_as_many_frames_as_hops_fit(samples, frames):
 
 
 def test_frames_are_of_the_paper_by_default():
-    assert models.frame(np.zeros(10_000)).shape == (7, 4000)
+    cut = models.frame(np.arange(10_000.0))
+    assert cut.shape == (7, 4000)
+    assert cut[:, 0].tolist() == [1000.0 * number for number in range(7)]
 
 
 def test_frames_are_a_view_that_cannot_be_written():

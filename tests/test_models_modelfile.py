@@ -67,6 +67,8 @@ def refused(path, reason):
         {"multiclass": "one-vs-rest"},
         {"least_deviation": 0.0},
         {"estimator": "trees", "rounds": 3, "leaves": 4},
+        {"estimator": "detector", "rounds": 3, "leaves": 4},
+        {"estimator": "networks", "networks": 2, "units": 4, "epochs": 2},
     ],
 )
 def test_a_model_that_was_saved_decides_as_before(tmp_path, changes):

@@ -96,6 +96,7 @@ def test_the_model_that_ships_has_the_settings_of_the_code():
 def test_quick_bands_are_those_above_the_speed_where_that_is_none():
     plain, fast = replace(models.GENERAL, speed=False), models.GENERAL
     assert plain.at(1000.0).quick_edges == fast.at(1000.0).quick_edges[1:]
+    assert models.LogBands(quick=0.02).at(1000.0).quick_edges == plain.at(1000.0).quick_edges
     assert fast.at(150.0).quick_edges == (0.0, 75.0)  # a band and a half fit, and no less
     assert fast.at(149.9).quick_edges == plain.at(150.0).quick_edges == ()
 
