@@ -218,7 +218,8 @@ class LogBands:
 
     def _upper(self, edge: float) -> float:
         """Upper edge of the band from an edge on."""
-        return max(edge + 1.0 / self.window, edge * 2.0 ** (1.0 / self.per_octave))
+        ratio: float = 2.0 ** (1.0 / self.per_octave)
+        return max(edge + 1.0 / self.window, edge * ratio)
 
     def _quick_edges(self, nyquist: float) -> tuple[float, ...]:
         """Edges of the bands of the quick window, none if not even the first one fits."""

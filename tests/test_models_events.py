@@ -52,6 +52,8 @@ def test_a_model_that_predicts_ok_everywhere_finds_nothing_and_has_no_false_alar
     assert events.false_alarms_per_hour.low == 0.0
     assert events.false_alarms_per_hour.high == pytest.approx(3.6889 / events.ok_hours, abs=1e-3)
     assert np.isnan(events.delay.value)
+    none = scored(predicted("a", IMPACT, labelled())).alarms
+    assert len(none) == len(none.start) == len(none.stop) == len(none.false) == 0
 
 
 def test_a_model_that_flags_every_frame_finds_everything_with_false_alarms():
