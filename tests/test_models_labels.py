@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models import UNKNOWN, Labels
+from models import UNKNOWN, Event, Labels
 from models.labels import confirmed
 
 CLASSES = ("ok", "impact", "oscillations")
@@ -140,6 +140,12 @@ def test_two_frames_out_of_distribution_in_a_row_are_a_finding(text, events):
 def test_unknown_frames_that_are_ignored_are_no_evidence():
     assert replace(labels("..Iu...."), unknown_is_finding=False).events() == ()
     assert len(replace(labels("..IIu..."), unknown_is_finding=False).events()) == 1
+
+
+def test_an_event_is_in_distribution_unless_told():
+    plain = Event("impact", 1.0, 1.5, 0.9)
+    assert plain == Event("impact", 1.0, 1.5, 0.9, novel=False)
+    assert str(plain) == "impact from 1.00 s to 1.50 s (score 0.90)"
 
 
 def test_an_event_states_whether_it_is_out_of_distribution():
