@@ -163,7 +163,7 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
                 if not found:
                     raise RobotError(f"{part}: includes {file!r}, which is missing")
                 _inside(path, file, found[0], roots)
-                own.files[element.get("name") or file] = found[0].resolve()
+                own.files[element] = found[0].resolve()
                 if found[0].resolve() not in known:
                     known.add(found[0].resolve())
                     waiting.append(found[0])
@@ -198,10 +198,10 @@ def _parsed(path: Path) -> ET.Element:
 
 @dataclass
 class _Part:
-    """One of the files of an MJCF; ``files`` are those that it includes, or names as models."""
+    """One of the files of an MJCF; ``files`` are those that its includes and models name."""
 
     root: ET.Element
-    files: dict[str, Path] = field(default_factory=dict)
+    files: dict[ET.Element, Path] = field(default_factory=dict)
 
 
 def _copies(root: ET.Element) -> int:
@@ -239,14 +239,18 @@ def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
     @cache
     def counts(part: Path) -> tuple[int, int]:
         bodies = joints = 0
+        files = parts[part].files
+        # All models, attached or not: those that contain themselves make MuJoCo crash.
+        found = {_model_name(each, parts[file]): counts(file) for each, file in files.items()}
         for element, copies in _elements(parts[part].root):
             bodies += copies * (element.tag in ("body", "geom", "composite", "flexcomp"))
             joints += copies * (element.tag in ("joint", "freejoint") and not element.get("joint"))
-            name = {"include": "file", "attach": "model"}.get(element.tag, "")
-            other = parts[part].files.get(element.get(name, "")) if name else None
-            if other is not None and other != part:
-                more = counts(other)
-                bodies, joints = bodies + copies * more[0], joints + copies * more[1]
+            more = (0, 0)
+            if element.tag == "include":
+                more = counts(files[element])
+            elif element.tag == "attach":
+                more = found.get(element.get("model", ""), more)
+            bodies, joints = bodies + copies * more[0], joints + copies * more[1]
             if bodies > limit("bodies"):
                 raise RobotError(
                     f"{path}: more than {limit('bodies')} bodies and geoms; {beyond('bodies')}"
@@ -259,6 +263,10 @@ def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
         raise RobotError(f"{path}: its models attach each other") from error
     if joints > 10 * limit("joints"):  # those of defaults, sensors and equalities are counted too
         raise RobotError(f"{path}: more than {limit('joints')} joints; {beyond('joints')}")
+
+
+def _model_name(element: ET.Element, part: _Part) -> str:
+    return element.get("name") or part.root.get("model", "")
 
 
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:

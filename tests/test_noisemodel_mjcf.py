@@ -107,6 +107,27 @@ def test_joints_are_those_that_pinocchio_reads_itself(tmp_path):
     np.testing.assert_allclose(*found, atol=1e-12)
 
 
+def test_joints_are_of_the_kinds_that_pinocchio_makes_of_them(tmp_path):
+    text, kinds = "", []
+    for slide, name in (("", "R"), ('type="slide"', "P")):
+        long = "Revolute" if name == "R" else "Prismatic"
+        for axis, kind in (
+            *(("1 0 0", f"{name}X"), ("0 2 0", f"{name}Y"), ("0 0 3", f"{name}Z")),
+            *(("0 0 -1", f"{long}Unaligned"), ("1 2 0", f"{long}Unaligned")),
+        ):
+            text += f'<body><joint {slide} axis="{axis}"/>{BALL}</body>'
+            kinds.append(f"JointModel{kind}")
+    path = written(tmp_path, f"<mujoco><worldbody>{text}</worldbody></mujoco>")
+    assert [joint.shortname() for joint in Robot.load(path).model.joints][1:] == kinds
+
+
+def test_two_joints_of_a_body_without_names_are_numbered(tmp_path):
+    joints = '<joint axis="0 0 1"/><joint axis="1 0 0"/>'
+    text = LEGS.replace('<joint name="hip"', f'{joints}<joint name="hip"')
+    robot = Robot.load(written(tmp_path, text))
+    assert robot.joint_names == ("leftJoint_0", "leftJoint_1", "hip", "knee")
+
+
 def test_joints_without_a_name_are_named_after_their_body(tmp_path):
     robot = Robot.load(written(tmp_path, ARM))
     assert robot.joint_names == ("lift", "turn", "body3Joint_0", "wrist")
@@ -135,6 +156,26 @@ def test_objects_that_move_freely_stay_where_the_file_puts_them(tmp_path):
     robot = Robot.load(written(tmp_path, text))
     assert not robot.floating_base
     assert robot.nv == 4
+
+
+def test_of_two_free_joints_the_second_is_an_objects(tmp_path):
+    text = LEGS.replace(
+        "</worldbody>", f'<body name="cup" pos="1 2 3"><freejoint/>{BALL}</body></worldbody>'
+    )
+    robot = Robot.load(written(tmp_path, text))
+    assert (robot.floating_base, robot.nv, len(robot.joints)) == (True, 8, 3)
+    frame = robot.model.frames[robot.model.getFrameId("cup")]
+    assert frame.parentJoint == 0
+    np.testing.assert_array_equal(frame.placement.translation, [1.0, 2.0, 3.0])
+
+
+def test_bodies_without_joints_are_not_merged_and_what_is_only_drawn_is_kept(tmp_path):
+    fixed = (
+        '<body name="shell" pos="0 0 1"><geom size="0.2" group="1" contype="0" conaffinity="0"/>'
+        "</body>"
+    )
+    text = one_body(BALL + fixed, head='<compiler fusestatic="true" discardvisual="true"/>')
+    assert [each.link for each in Robot.load(written(tmp_path, text)).mjcf.visual] == ["shell"]
 
 
 def test_included_files_belong_to_the_robot(tmp_path):
@@ -169,10 +210,27 @@ def test_joints_that_an_equality_ties_together_are_coupled_if_asked(tmp_path):
     assert coupled.mimics["knee"] == Mimic("hip", -2.0, 0.1)
 
 
+def test_a_coupled_joint_is_where_mujocos_equality_has_it(tmp_path):
+    text = LEGS.replace('name="hip"', 'name="hip" ref="20"').replace(
+        'name="knee"', 'name="knee" type="slide" ref="0.3"'
+    )
+    equality = '<equality><joint joint1="knee" joint2="hip" polycoef="0.1 -2 0 0 0"/></equality>'
+    path = written(tmp_path, text.replace("</mujoco>", f"{equality}</mujoco>"))
+    mimic = Robot.load(path, mimic=True).mimics["knee"]
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    for hip in (-0.7, 0.4):
+        data.qpos[7:] = hip, mimic.multiplier * hip + mimic.offset
+        mujoco.mj_fwdPosition(model, data)
+        assert data.efc_pos[data.efc_id == 0][0] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_an_equality_that_couples_no_joints_hides_none_that_follows(tmp_path):
     pairs = (
         '<connect body1="left" body2="shin" anchor="0 0 0"/>',
         '<joint joint1="knee" joint2="hip" polycoef="0 1 2 0 0"/>',  # not linear
+        '<joint joint1="knee" joint2="hip" polycoef="0 1 0 0 2"/>',
+        '<joint joint1="knee" polycoef="0 1 0 0 0"/>',  # held
         '<joint joint1="knee" joint2="hip" polycoef="0 1 0 0 0" active="false"/>',
         '<joint joint1="knee" joint2="hip" polycoef="0.1 -2 0 0 0"/>',
     )
@@ -185,6 +243,14 @@ def test_a_file_that_only_an_included_one_is_beside_is_included(tmp_path):
     written(tmp_path, '<mujoco><include file="arm.xml"/></mujoco>', "parts/both.xml")
     scene = written(tmp_path, '<mujoco><include file="parts/both.xml"/></mujoco>', "scene.xml")
     assert "wrist" in Robot.load(scene).joint_names
+
+
+def test_of_two_files_of_a_name_the_one_beside_the_model_is_included(tmp_path):
+    scene = written(tmp_path, '<mujoco><include file="parts/both.xml"/></mujoco>')
+    written(tmp_path, LEGS, "legs.xml")
+    written(tmp_path, '<mujoco><include file="legs.xml"/></mujoco>', "parts/both.xml")
+    written(tmp_path, "no XML", "parts/legs.xml")
+    assert Robot.load(scene).joint_names == ("hip", "knee")
 
 
 def test_a_urdf_is_known_by_its_root_after_a_long_beginning(tmp_path):
@@ -282,6 +348,75 @@ def test_a_mesh_that_the_file_itself_holds_is_read(tmp_path):
     assert nm.Surface.of(Robot.load(path)).area[0] == pytest.approx(1.5 + np.sqrt(3) / 2)
 
 
+def test_a_mesh_that_only_gives_a_box_its_size_hides_no_missing_mesh(tmp_path):
+    write_stl(tmp_path / "part.stl")
+    head = '<asset><mesh file="part.stl"/><mesh name="gone" file="gone.stl"/></asset>'
+    geoms = '<geom type="box" mesh="part"/><geom type="mesh" mesh="gone"/>'
+    robot = Robot.load(written(tmp_path, one_body(geoms, head=head)))
+    assert triangles(robot, missing="skip").missing == ("gone.stl",)
+    assert len(triangles(robot, missing="skip").triangles[0]) == 12
+
+
+@pytest.mark.parametrize(
+    ("compiler", "file", "place"),
+    [
+        ('meshdir="meshes"', "a/part.stl", "meshes/a/part.stl"),
+        ('meshdir="meshes" strippath="true"', "a/b/part.stl", "meshes/part.stl"),
+        ('assetdir="parts"', "part.stl", "parts/part.stl"),
+    ],
+)
+def test_a_mesh_is_where_the_compiler_says(tmp_path, compiler, file, place):
+    head = f'<compiler {compiler}/><asset><mesh file="{file}"/></asset>'
+    path = written(tmp_path, one_body('<geom type="mesh" mesh="part"/>', head=head))
+    assert triangles(Robot.load(path), missing="skip").missing == (place,)
+    write_stl(tmp_path / place)
+    assert len(triangles(Robot.load(path)).triangles[0]) == len(STL)
+
+
+def depths(shape, points):
+    """How far a primitive's surface lies beneath points, by its size as MuJoCo has it."""
+    kind, (x, y, z) = shape
+    radius = np.linalg.norm(points[:, :2], axis=1)
+    if kind == mujoco.mjtGeom.mjGEOM_BOX:
+        return (np.abs(points) / (x, y, z)).max(axis=1) - 1.0
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return np.maximum(radius / x, np.abs(points[:, 2]) / y) - 1.0
+    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+        return np.hypot(radius, np.maximum(np.abs(points[:, 2]) - y, 0.0)) / x - 1.0
+    size = (x, x, x) if kind == mujoco.mjtGeom.mjGEOM_SPHERE else (x, y, z)
+    return np.linalg.norm(points / size, axis=1) - 1.0
+
+
+def test_the_corners_of_primitives_lie_on_them_where_mujoco_puts_them(tmp_path):
+    sizes = {
+        "box": "0.3 0.5 0.7",
+        "cylinder": "0.3 0.45",
+        "capsule": "0.3 0.35",
+        "sphere": "0.4",
+        "ellipsoid": "0.3 0.5 0.8",
+    }
+    geoms = "".join(
+        f'<geom type="{kind}" size="{size}" pos="0.1 0.2 {place}" quat="0.8 0.3 {place} 0.2"/>'
+        for place, (kind, size) in enumerate(sizes.items())
+    )
+    path = written(tmp_path, ARM.replace('name="wrist" axis="1 0 0"/>', f'name="wrist"/>{geoms}'))
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    shapes = [each for each in Robot.load(path).mjcf.collision if each.link == "tip"][:5]
+    tip = model.body("tip").id
+    first = int(model.body_geomadr[tip])
+    for geom, shape in enumerate(shapes, start=first):
+        corners = shape.body.reshape(-1, 3) @ shape.matrix.T + shape.translation
+        world = corners @ data.xmat[tip].reshape(3, 3).T + data.xpos[tip]
+        own = (world - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+        kind = (model.geom_type[geom], model.geom_size[geom])
+        on = np.abs(depths(kind, own)) < 1e-9
+        middle = np.linalg.norm(own[:, :2], axis=1) < 1e-9  # of a cylinder's end, in its cap
+        assert (on | middle).all()
+        assert np.linalg.matrix_rank(own[on] - own[on].mean(axis=0)) == 3
+
+
 URDF = """<robot name="r"><link name="base"/>
   <link name="a">
     <visual><origin xyz="0.1 0.2 0.3" rpy="0.3 -0.2 0.5"/>
@@ -333,6 +468,9 @@ def test_the_same_robot_as_urdf_and_as_mjcf_is_equally_loud(tmp_path, kind):
         ([("capsule", 0, 1), ("box", 1, 0)], ["box"], ["capsule"]),
         # Gymnasium, dm_control: one set for both
         ([("box", 0, 1), ("capsule", 0, 1)], ["box", "capsule"], ["box", "capsule"]),
+        # group 3 is not drawn, whatever collides
+        ([("box", 2, 1), ("capsule", 3, 1)], ["box"], ["box", "capsule"]),
+        ([("box", 2, 0), ("capsule", 3, 0)], ["box"], []),
         # a decoration beside it
         ([("box", 0, 1), ("capsule", 0, 0)], ["box", "capsule"], ["box"]),
     ],
@@ -347,6 +485,21 @@ def test_visual_geoms_are_those_that_are_drawn(tmp_path, geoms, visual, collisio
     count = {"box": 12, "capsule": len(capsule(1.0, 2.0))}
     for shapes, expected in ((mjcf.visual, visual), (mjcf.collision, collision)):
         assert [len(shape.body) for shape in shapes] == [count[kind] for kind in expected]
+
+
+def test_a_geom_that_collides_in_one_of_the_two_ways_collides(tmp_path):
+    text = '<geom size="1" contype="{}" conaffinity="{}"/>'
+    for ways in ((1, 0), (0, 1), (2, 2)):
+        robot = Robot.load(written(tmp_path, one_body(text.format(*ways))))
+        assert len(robot.mjcf.collision) == 1
+
+
+def test_a_black_geom_and_one_that_is_half_transparent_are_drawn(tmp_path):
+    geoms = "".join(
+        f'<geom size="1" rgba="{rgba}"/>' for rgba in ("0 0 0 1", "1 1 1 0", "0 0 1 .5")
+    )
+    drawn = Robot.load(written(tmp_path, one_body(geoms))).mjcf.visual
+    assert [shape.colour for shape in drawn] == [(0, 0, 0, 1), (0, 0, 1, 0.5)]
 
 
 def test_invisible_geoms_are_not_drawn(tmp_path):
@@ -394,6 +547,124 @@ def test_a_file_that_is_no_robot_is_refused_in_one_line(tmp_path, text, problem)
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("allowed", "refused", "problem"),
+    [
+        (
+            '<worldbody><replicate count="1"><replicate count="10000" offset="1 0 0"/></replicate>'
+            "</worldbody>",
+            '<worldbody><replicate count="73"><replicate count="137" offset="1 0 0"/></replicate>'
+            "</worldbody>",
+            "replicates an element more than 10000 times",
+        ),
+        (
+            '<size nuser_body=" 99999 "/>',
+            '<size nuser_body="100000"/>',
+            "<size nuser_body='100000'> is too large",
+        ),
+        (
+            '<asset><hfield name="h" nrow="2000" ncol="2000" size="1 1 1 1"/></asset>',
+            '<asset><hfield name="h" nrow="11" ncol="909091" size="1 1 1 1"/></asset>',
+            "a height field of more than 10000000 cells",
+        ),
+        (
+            '<include file="part0.xml"/>',
+            "".join(f'<include file="part{n}.xml"/>' for n in range(200)),
+            "includes more than 200 files",
+        ),
+    ],
+)
+def test_sizes_that_mujoco_would_take_gigabytes_for_are_refused(
+    tmp_path, allowed, refused, problem
+):
+    for n in range(200):
+        written(tmp_path, "<mujoco><asset/></mujoco>", f"part{n}.xml")
+    assert Robot.load(written(tmp_path, f"<mujoco>{allowed}</mujoco>")).joints == ()
+    with pytest.raises(RobotError, match=problem):
+        Robot.load(written(tmp_path, f"<mujoco>{refused}</mujoco>"))
+
+
+def test_an_mjcf_may_consist_of_two_hundred_files(tmp_path):
+    for n in range(200):
+        written(tmp_path, "<mujoco><asset/></mujoco>", f"part{n}.xml")
+    parts = [f'<include file="part{n}.xml"/>' for n in range(200)]
+    assert Robot.load(written(tmp_path, f"<mujoco>{''.join(parts[:199])}</mujoco>")).joints == ()
+
+
+def test_a_height_field_of_ten_million_cells_is_left_to_mujoco(tmp_path):
+    field = '<asset><hfield name="h" nrow="10000000" size="1 1 1 1"/></asset>'
+    for text, problem in (
+        (field, "MuJoCo cannot read the MJCF .hfield not specified"),  # of one column
+        (field.replace("10000000", "10000001"), "more than 10000000 cells"),
+        (field.replace('nrow="10000000"', 'ncol="1000000000"'), "more than 10000000 cells"),
+    ):
+        with pytest.raises(RobotError, match=problem):
+            Robot.load(written(tmp_path, f"<mujoco>{text}</mujoco>"))
+
+
+def test_bodies_and_geoms_are_counted_with_all_their_copies(tmp_path, monkeypatch):
+    written(tmp_path, one_body(BALL * 2), "arm.xml")  # a body, two geoms and a joint
+    written(tmp_path, f"<mujoco><worldbody>{BALL}</worldbody></mujoco>", "floor.xml")
+    text = (
+        '<mujoco><include file="floor.xml"/><asset><model name="arm" file="arm.xml"/></asset>'
+        '<worldbody><body name="b"><replicate count="2"><replicate count="5" offset="1 0 0">'
+        '<attach model="arm" body="b" prefix="c"/></replicate></replicate></body></worldbody>'
+        "</mujoco>"
+    )
+    path = written(tmp_path, text)
+    monkeypatch.setenv("NOISE_LIMIT_BODIES", "32")
+    assert len(Robot.load(path).joints) == 10
+    monkeypatch.setenv("NOISE_LIMIT_BODIES", "31")
+    with pytest.raises(RobotError, match="more than 31 bodies and geoms; the limit is 31"):
+        Robot.load(path)
+    monkeypatch.setenv("NOISE_LIMIT_BODIES", "32")
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "10")
+    assert len(Robot.load(path).joints) == 10
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "9")
+    with pytest.raises(RobotError, match="10 joints; the limit is 9"):
+        Robot.load(path)
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "1")
+    with pytest.raises(RobotError, match="10 joints; the limit is 1"):
+        Robot.load(path)
+    monkeypatch.setenv("NOISE_LIMIT_BODIES", "33")
+    path.write_text(text.replace("<body ", "<body><joint/></body><body "))
+    with pytest.raises(RobotError, match="more than 1 joints; the limit is 1"):
+        Robot.load(path)
+
+
+@pytest.mark.parametrize("reference", ["model", "include"])
+@pytest.mark.parametrize("back", ["robot.xml", "other.xml"])
+def test_models_that_contain_themselves_are_refused_though_nothing_attaches_them(
+    tmp_path, reference, back
+):
+    model = '<mujoco><asset><model name="other.xml" file="{}"/></asset></mujoco>'
+    written(tmp_path, model.format(back), "other.xml")
+    first = '<include file="other.xml"/>' if reference == "include" else ""
+    path = written(tmp_path, model.format("other.xml").replace("<asset>", f"{first}<asset>"))
+    with pytest.raises(RobotError, match=r"robot\.xml: its models attach each other"):
+        Robot.load(path)
+
+
+def test_an_attached_model_that_has_only_its_own_name_is_counted(tmp_path, monkeypatch):
+    written(tmp_path, one_body(BALL).replace("<mujoco", '<mujoco model="arm"'), "a.xml")
+    attach = '<body><attach model="arm" body="b" prefix="{}"/></body>'
+    path = written(
+        tmp_path,
+        f'<mujoco><asset><model file="a.xml"/></asset><worldbody>{attach.format("l")}'
+        f"{attach.format('r')}</worldbody></mujoco>",
+    )
+    assert Robot.load(path).joint_names == ("lturn", "rturn")
+    monkeypatch.setenv("NOISE_LIMIT_BODIES", "5")
+    with pytest.raises(RobotError, match="more than 5 bodies"):
+        Robot.load(path)
+
+
+def test_a_path_that_is_not_utf_8_is_named(tmp_path):
+    path = written(tmp_path, ARM, os.fsdecode(b"\xff.xml"))
+    with pytest.raises(RobotError, match="its path is not UTF-8, as MuJoCo needs it"):
+        mjcf.read(path, [tmp_path])
+
+
 def test_a_file_that_does_not_exist_is_named(tmp_path):
     with pytest.raises(RobotError, match=r"gone\.xml: there is no such MJCF file"):
         Robot.load(tmp_path / "gone.xml")
@@ -416,10 +687,10 @@ def test_no_file_is_opened_outside_of_the_robots_folders(tmp_path, text):
         Robot.load(path)
 
 
-def test_textures_are_not_opened(tmp_path):
+def test_textures_and_skins_are_not_opened(tmp_path):
     head = (
-        '<asset><texture name="t" type="2d" file="gone.png"/><material name="m" texture="t"'
-        ' rgba="1 0 0 1"/></asset>'
+        '<asset><skin file="gone.skn"/><texture name="t" type="2d" file="gone.png"/>'
+        '<material name="m" texture="t" rgba="1 0 0 1"/></asset>'
     )
     robot = Robot.load(written(tmp_path, one_body('<geom size="1" material="m"/>', head=head)))
     assert robot.mjcf.visual[0].colour == (1.0, 0.0, 0.0, 1.0)
