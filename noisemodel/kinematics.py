@@ -30,7 +30,7 @@ def link_twists(robot: Robot, q: Real, v: Real) -> Array:
         NoiseModelError: If ``q`` is not (samples, nq) or ``v`` not (samples, nv).
     """
     for name, array, width in (("q", q, robot.nq), ("v", v, robot.nv)):
-        if array.ndim != 2 or array.shape != (len(q), width):
+        if array.shape != (len(q), width):
             raise NoiseModelError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
     twists = np.empty((len(robot.joints) + 1, 6, len(q)))
     for start in range(0, len(q), CHUNK):

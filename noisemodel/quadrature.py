@@ -50,7 +50,8 @@ def fine(triangles: Array) -> Cloud:
         Thousands of points; means of polynomials of degree 2 are exact.
     """
     triangles, areas, _ = faces(triangles)
-    spread = np.linalg.eigvalsh(_statistics(*edge_points(triangles, areas), ALL)[1][0])
+    _, (covariance,) = _statistics(*edge_points(triangles, areas), ALL)
+    spread = np.linalg.eigvalsh(covariance)
     # A slender link that spins about itself is resolved only by steps smaller than it is thick.
     thickness, length = np.sqrt(np.maximum([spread[:2].sum(), spread[2]], 0.0))
     step = max(thickness / FINENESS, SLENDEREST * length)
@@ -59,7 +60,7 @@ def fine(triangles: Array) -> Cloud:
     sides = np.stack((edges.max(axis=1), edges.min(axis=1)), axis=1)
     while 4 * (panels := np.ceil(sides / step)).prod(axis=1).sum() > max(MOST, 8 * len(triangles)):
         step *= 2.0  # fans of a thousand slender triangles, such as no link has
-    tip = (edges.argmin(axis=1) + 2) % 3  # the corner opposite to the shortest edge
+    tip = edges.argmin(axis=1) + 2  # the corner opposite to the shortest edge
     order = (tip[:, None] + np.arange(3)) % 3
     triangles = np.take_along_axis(triangles, order[:, :, None], axis=1)
     small = (panels == 1).all(axis=1)
@@ -160,7 +161,8 @@ def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Rows]:
 
 def _plumper(cloud: Cloud) -> Array:
     """Find axes in which the cloud's lengths are to each other as their square roots are."""
-    spread, axes = np.linalg.eigh(_statistics(cloud.points, cloud.weights, ALL)[1][0])
+    _, (covariance,) = _statistics(cloud.points, cloud.weights, ALL)
+    spread, axes = np.linalg.eigh(covariance)
     plumper: Array = axes / np.maximum(spread, SLENDEREST**2 * spread[2]) ** 0.25
     return plumper
 

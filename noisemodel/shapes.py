@@ -106,7 +106,7 @@ def _unit_sphere() -> Array:
     triangles = np.array(
         [
             corners[[i, j, k]]
-            for i in range(12)
+            for i in range(len(corners))
             for j in range(i)
             for k in range(j)
             if near[i, j] and near[j, k] and near[i, k]

@@ -183,7 +183,7 @@ def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q
         MotionError: If an array is of another shape, or holds nan or inf.
     """
     for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
-        if array.ndim != 2 or array.shape != (len(q), width):
+        if array.shape != (len(q), width):
             raise MotionError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
         finite = np.isfinite(array)
         if not finite.all():

@@ -2,6 +2,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pinocchio
 import pytest
 import trimesh
 
@@ -197,6 +198,76 @@ def test_shapes_are_those_of_trimesh():
         assert np.isclose(area(ours), theirs.area, rtol=1e-12)
         assert np.allclose(ours.min(axis=(0, 1)), theirs.bounds[0], rtol=0, atol=1e-12)
         assert np.allclose(ours.max(axis=(0, 1)), theirs.bounds[1], rtol=0, atol=1e-12)
+
+
+def test_shapes_lie_around_the_origin_with_the_documented_number_of_triangles():
+    for drawn, half, count in (
+        (shapes.box(1, 2, 3), (0.5, 1, 1.5), 12),
+        (shapes.cylinder(0.3, 0.7), (0.3, 0.3, 0.35), 4 * 64),
+        (shapes.capsule(0.3, 0.7), (0.3, 0.3, 0.65), 64 * 64),
+        (shapes.sphere(0.3), (0.3, 0.3, 0.3), 5120),
+    ):
+        assert drawn.shape == (count, 3, 3)
+        np.testing.assert_allclose(drawn.max(axis=(0, 1)), half, rtol=1e-12)
+        np.testing.assert_allclose(drawn.min(axis=(0, 1)), np.negative(half), rtol=1e-12)
+        assert (np.linalg.norm(np.cross(*np.diff(drawn, axis=1).swapaxes(0, 1)), axis=1) > 0).all()
+
+
+def test_a_capsule_of_a_urdf_is_drawn(tmp_path):
+    capsule = visual('<geometry><capsule radius="0.3" length="0.7"/></geometry>')
+    drawn = triangles(robot(tmp_path, arm=capsule)).triangles[0]
+    np.testing.assert_array_equal(drawn, shapes.capsule(0.3, 0.7))
+
+
+@pytest.mark.parametrize(
+    ("geometry", "message"),
+    [
+        ('<sphere radius="1 2"/>', "radius of <sphere> is '1 2', expected 1 finite number$"),
+        ("<sphere/>", "radius of <sphere> is '', expected 1 finite number$"),
+        ('<capsule radius="1"/>', "and length of <capsule> is '1 ', expected 2 finite numbers$"),
+        ('<box size="a b c"/>', "size of <box> is 'a b c', expected 3 finite numbers$"),
+        ('<mesh scale="1 1"/>', "scale of <mesh> is '1 1', expected 3 finite numbers$"),
+        (
+            "<cone/>",
+            "<cone> is not known, expected one of box, capsule, cylinder, sphere, mesh$",
+        ),
+        ("", "has no geometry, expected one of box, capsule, cylinder, sphere, mesh$"),
+    ],
+)
+def test_a_shape_that_is_not_one_says_what_was_expected(tmp_path, geometry, message):
+    with pytest.raises(GeometryError, match=message):
+        triangles(robot(tmp_path, arm=visual(f"<geometry>{geometry}</geometry>")))
+
+
+def test_collision_geometry_is_not_read_if_every_link_has_a_visual(tmp_path):
+    broken = collision("<geometry><cone/></geometry>")
+    built = robot(tmp_path, arm=visual(BOX) + broken, slide=visual(BOX))
+    assert triangles(built, "auto").kind == ("visual", "visual")
+    with pytest.raises(GeometryError, match="collision of link 'arm': <cone> is not known"):
+        triangles(built, "collision")
+    with pytest.raises(GeometryError, match="<cone> is not known"):
+        triangles(robot(tmp_path, arm=visual(BOX) + broken), "auto")
+
+
+def test_angles_of_all_three_axes_turn_as_pinocchio_turns_them(tmp_path):
+    point = mesh_of(np.array([[[1, 0, 0], [0, 2, 0], [0, 0, 3]]]), tmp_path)
+    origin = '<origin rpy="0.4 -0.7 1.1" xyz="1 2 3"/>'
+    links = triangles(robot(tmp_path, arm=visual(MESH.format(point, 'scale="2 3 -4"'), origin)))
+    turn = pinocchio.rpy.rpyToMatrix(0.4, -0.7, 1.1)
+    expected = np.diag([2.0, 6.0, -12.0]) @ turn.T + [1, 2, 3]
+    np.testing.assert_allclose(links.triangles[0][0], expected, rtol=1e-12)
+
+
+def test_what_is_fixed_to_the_world_is_a_piece_and_collision_fills_in(tmp_path):
+    small = BOX.replace("1 2 3", "1 1 1")
+    built = robot(
+        tmp_path, fixed=visual(small), arm=visual(BOX) + collision(small), slide=collision(small)
+    )
+    assert [(joint, shape.link, area(drawn)) for joint, shape, drawn in pieces(built)] == [
+        (0, "world", pytest.approx(6.0)),
+        (1, "arm", pytest.approx(22.0)),
+        (2, "slide", pytest.approx(6.0)),
+    ]
 
 
 def test_round_shapes_are_too_small_by_the_documented_error():

@@ -3,8 +3,9 @@ import struct
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
-from noisemodel import MeshError, catalog, meshfile, shapes
+from noisemodel import MeshError, catalog, collada, meshfile, shapes
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
 BRICK = shapes.box(1, 2, 3)
@@ -287,6 +288,114 @@ def test_a_flat_mesh_has_no_hull(tmp_path):
     (tmp_path / "flat.stl").write_bytes(stl(BRICK[:2]))
     with pytest.raises(MeshError, match="flat.stl: is flat, it has no convex hull"):
         meshfile.hull(tmp_path / "flat.stl")
+
+
+def test_a_dae_is_turned_as_scipy_turns_it(tmp_path):
+    node = """<node><translate>1 2 3</translate><rotate>1 2 3 50</rotate><scale>2 3 -4</scale>
+      <matrix>1 2 0 4  0 1 3 5  5 0 1 6  0 0 0 1</matrix><instance_geometry url="#g"/></node>"""
+    turn = Rotation.from_rotvec(np.radians(50) * np.array([1, 2, 3]) / np.sqrt(14)).as_matrix()
+    matrix = np.array([[1, 2, 0], [0, 1, 3], [5, 0, 1]])
+    points = BRICK @ matrix.T + [4, 5, 6]
+    expected = (points * [2, 3, -4]) @ turn.T + [1, 2, 3]
+    found = read(tmp_path, "a.dae", dae(geometry(BRICK), node))
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
+
+
+def test_the_points_of_a_dae_may_stand_anywhere_in_its_numbers(tmp_path):
+    rows = np.column_stack((TRIANGLE[0], [7, 8, 9]))
+    plain = dae(geometry(TRIANGLE), NODE).decode()
+    moved = plain.replace(f">{numbers(TRIANGLE)}<", f">5 6 {numbers(rows)} 1 2<")
+    moved = moved.replace('count="3" stride="3"', 'offset="2" count="3" stride="4"')
+    assert np.array_equal(read(tmp_path, "a.dae", moved.encode()), TRIANGLE)
+    none = plain.replace(' count="3"', "")
+    with pytest.raises(MeshError, match="a <triangles> names a point that is not there"):
+        read(tmp_path, "b.dae", none.encode())
+
+
+def test_an_input_of_a_dae_without_an_offset_is_the_first(tmp_path):
+    part = (
+        '<triangles><input semantic="VERTEX" source="#g-v"/>'
+        '<input semantic="NORMAL" source="#n" offset="2"/><p>0 9 9 1 9 9 2 9 9</p></triangles>'
+    )
+    found = read(tmp_path, "a.dae", dae(geometry(TRIANGLE, part=part), NODE))
+    assert np.array_equal(found, TRIANGLE)
+    alone = '<triangles><input semantic="VERTEX" source="#g-v"/><p>0 2 1</p></triangles>'
+    found = read(tmp_path, "b.dae", dae(geometry(TRIANGLE, part=alone), NODE))
+    assert np.array_equal(found, TRIANGLE[:, [0, 2, 1]])
+
+
+def test_a_strip_of_a_dae_is_cut_into_triangles_of_three_neighbours(tmp_path):
+    part = f"<tristrips>{INPUTS}<p>9 1 9 2 9 0 9 3</p><p>9 4 9 0 9 2</p></tristrips>"
+    found = read(tmp_path, "a.dae", dae(geometry(PENTAGON, part=part), NODE))
+    assert np.array_equal(found, PENTAGON[[[1, 2, 0], [2, 0, 3], [4, 0, 2]]])
+
+
+def test_parts_of_a_dae_without_polygons_add_nothing(tmp_path):
+    parts = "".join(
+        f"<{kind}>{INPUTS}{'<vcount/>' if kind == 'polylist' else ''}<p/></{kind}>"
+        for kind in ("polylist", "triangles", "polygons")
+    )
+    parts += f"<polylist>{INPUTS}<vcount>0 3</vcount><p>9 0 9 1 9 2</p></polylist>"
+    assert np.array_equal(
+        read(tmp_path, "a.dae", dae(geometry(TRIANGLE, part=parts), NODE)), TRIANGLE
+    )
+
+
+def test_the_limit_of_a_scene_counts_its_nodes(tmp_path, monkeypatch):
+    monkeypatch.setattr(collada, "MAX_NODES", 5)
+    assert len(read(tmp_path, "a.dae", dae(geometry(TRIANGLE), NODE + "<node/>" * 3))) == 1
+    with pytest.raises(MeshError, match="more than 5 nodes with their instances"):
+        read(tmp_path, "b.dae", dae(geometry(TRIANGLE), NODE + "<node/>" * 4))
+
+
+def test_the_limit_of_triangles_counts_points_and_instances(monkeypatch):
+    part = '<triangles><input semantic="VERTEX" source="#g-v"/><p>0 1 2 0 1 2 0 1 2 0 1 2</p>'
+    few = dae(geometry(TRIANGLE), NODE * 2)  # 6 points and 2 triangles
+    lots = dae(geometry(TRIANGLE, part=f"{part}</triangles>"), NODE * 2)  # 6 and 8
+    for content, count, most in ((few, 2, 6), (lots, 8, 8)):
+        monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most))
+        assert len(collada.read(content)[1]) == count
+        monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most - 1))
+        with pytest.raises(ValueError, match=f"triangles or points, the limit is {most - 1}"):
+            collada.read(content)
+
+
+def test_faces_of_an_obj_that_name_nothing_are_passed_over(tmp_path):
+    content = b"f\n\nvn 1 0 0\n" + obj(TRIANGLE) + b"f 1 2\nf 1\n#\n"
+    assert np.array_equal(read(tmp_path, "a.obj", content), TRIANGLE)
+    quad = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+    (one, other) = read(tmp_path, "b.obj", quad)
+    assert np.array_equal(one, [[0, 0, 0], [1, 0, 0], [1, 1, 0]])
+    assert np.array_equal(other, [[0, 0, 0], [1, 1, 0], [0, 1, 0]])
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "problem"),
+    [
+        ("a.obj", b"# nothing\n", "has no triangles"),
+        ("a.obj", b"f 1 1 1\n", "a face names point 1 of 0"),
+        ("a.obj", b"v 0 0\n", "'v 0 0' is no point"),
+        ("a.obj", b"v 1 " + b"0" * 80, f"'v 1 {'0' * 56}' is no point"),
+        ("a.obj", b"f 0 " + b"1" * 80, f"'f 0 {'1' * 56}' names a point"),
+        ("a.stl", ascii_stl(BRICK).replace(b"endfacet", b"vertex 1 2 3\nendfacet", 1), "not three"),
+        ("a.stl", ascii_stl(BRICK).replace(b"endfacet\n", b"", 1), "not three corners"),
+        ("a.dae", dae("", "<node><lookat>1 2 3</lookat></node>"), "it has a <lookat>"),
+        (
+            "a.dae",
+            dae(
+                geometry(
+                    BRICK,
+                    part=f"<polylist>{INPUTS}<vcount>4 -1</vcount><p>9 0 9 1 9 2</p></polylist>",
+                ),
+                NODE,
+            ),
+            "a <polylist> of 3 corners has 3",
+        ),
+    ],
+)
+def test_what_is_wrong_with_a_mesh_is_said(tmp_path, name, content, problem):
+    with pytest.raises(MeshError, match=problem):
+        read(tmp_path, name, content)
 
 
 @pytest.mark.parametrize("damage", ["cut", "changed"])

@@ -225,6 +225,13 @@ def test_a_coupled_joint_is_where_mujocos_equality_has_it(tmp_path):
         assert data.efc_pos[data.efc_id == 0][0] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("polycoef", ["0 1 2 0 0", "0 1 0 2 0", "0 1 0 0 2"])
+def test_joints_that_an_equality_ties_by_a_curve_are_not_coupled(tmp_path, polycoef):
+    curve = f'<equality><joint joint1="knee" joint2="hip" polycoef="{polycoef}"/></equality>'
+    path = written(tmp_path, LEGS.replace("</mujoco>", f"{curve}</mujoco>"))
+    assert Robot.load(path, mimic=True).joint_names == ("hip", "knee")
+
+
 def test_an_equality_that_couples_no_joints_hides_none_that_follows(tmp_path):
     pairs = (
         '<connect body1="left" body2="shin" anchor="0 0 0"/>',

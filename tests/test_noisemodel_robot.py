@@ -134,6 +134,37 @@ def test_mimic_joints_follow_and_take_no_place(tmp_path):
     assert np.allclose(link_twists(robot, q[:1], v[:1]), explicit, rtol=0, atol=1e-15)
 
 
+def test_a_joint_that_only_keeps_a_distance_to_another_follows_it(tmp_path):
+    follows = '<mimic joint="elbow" offset="0.2"/>'
+    robot, independent = arm(tmp_path, follows, mimic=True), arm(tmp_path, follows)
+    found = link_twists(robot, np.array([[0.6, 0.8, 1.0]]), np.array([[3.0, 2.0]]))
+    explicit = np.array([[0.6, 0.8, 1.0, 1.2]]), np.array([[3.0, 2.0, 2.0]])
+    np.testing.assert_allclose(found, link_twists(independent, *explicit), rtol=0, atol=1e-15)
+
+
+def test_a_chain_of_followers_ends_at_the_joint_that_moves_by_itself(tmp_path):
+    text = "".join(f'<link name="l{n}"/>' for n in range(4))
+    for n, mimic in enumerate(
+        (
+            '<mimic joint="j1" multiplier="2" offset="0.3"/>',
+            '<mimic joint="j2" multiplier="-3" offset="0.5"/>',
+            "",
+        )
+    ):
+        text += (
+            f'<joint name="j{n}" type="revolute"><parent link="l{n}"/><child link="l{n + 1}"/>'
+            f'<axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="1" velocity="1"/>{mimic}'
+            "</joint>"
+        )
+    path = tmp_path / "chain.urdf"
+    path.write_text(f'<robot name="r">{text}</robot>')
+    first, second, leader = Robot.load(path, mimic=True).joints
+    assert [(each.first_q, each.first_v) for each in (first, second, leader)] == [(0, 0)] * 3
+    assert (second.multiplier, second.offset) == (-3.0, 0.5)
+    assert (first.multiplier, first.offset) == (-6.0, 2 * 0.5 + 0.3)
+    assert (leader.multiplier, leader.offset) == (1.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("follows", "message"),
     [

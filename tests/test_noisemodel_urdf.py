@@ -77,7 +77,65 @@ def test_a_bad_urdf_is_one_line_that_names_the_file_and_the_problem(tmp_path, ca
     assert capfd.readouterr().err == ""  # Pinocchio's parser writes there by itself
 
 
+def test_the_limit_of_joints_is_how_many_there_may_be(tmp_path, monkeypatch):
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "3")
+    path = tmp_path / "arm.urdf"
+    path.write_text(chain(3))
+    assert read(path).name == "chain"
+    path.write_text(chain(4))
+    with pytest.raises(RobotError, match="4 joints; the limit is 3 .--limit joints=N raises it"):
+        read(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (chain(3).replace("</robot>", "<a ixx='1 2'/></robot>"), "ixx='1 2'> has 2 numbers, exp"),
+        (chain(3).replace("</robot>", "<mass value='1 2'/></robot>"), "<mass value='1 2'> is not"),
+        (chain(3).replace("</robot>", "<mass/></robot>"), "<mass value=None> is not one number"),
+        (chain(3).replace('<child link="l3"', '<child link="l1"'), "'l1' go round in a circle"),
+    ],
+)
+def test_numbers_and_trees_that_pinocchio_takes_though_they_are_wrong(tmp_path, text, message):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    with pytest.raises(RobotError, match=message):
+        read(path)
+
+
+def test_joints_that_mimic_each_other_are_named(tmp_path):
+    path = tmp_path / "arm.urdf"
+    text = chain(3)
+    for n in range(3):
+        leader = (n + 1) % 3
+        text = text.replace(
+            f'<child link="l{n + 1}"/>', f'<child link="l{n + 1}"/><mimic joint="j{leader}"/>'
+        )
+    path.write_text(text)
+    with pytest.raises(RobotError, match="joint 'j0' mimics itself"):
+        read(path)
+    path.write_text(text.replace('<mimic joint="j0"/>', ""))
+    assert {name: each.joint for name, each in read(path).mimics.items()} == {
+        "j0": "j1",
+        "j1": "j2",
+    }
+
+
 def test_a_huge_urdf_is_not_read(tmp_path):
+    path = tmp_path / "arm.urdf"
+    with path.open("wb") as stream:
+        stream.truncate(65 * 2**20)
+    with path.open("wb") as stream:
+        stream.truncate(64 * 2**20 + 1)
+    with pytest.raises(RobotError, match="larger than 67108864 bytes"):
+        Robot.load(path)
+    with path.open("wb") as stream:
+        stream.truncate(64 * 2**20)
+    with pytest.raises(RobotError, match="not XML"):
+        Robot.load(path)
+
+
+def test_a_urdf_of_65_megabytes_is_larger_than_any(tmp_path):
     path = tmp_path / "arm.urdf"
     with path.open("wb") as stream:
         stream.truncate(65 * 2**20)
