@@ -27,8 +27,8 @@ class Mimic:
     """
 
     joint: str
-    multiplier: float = 1.0
-    offset: float = 0.0
+    multiplier: float
+    offset: float
 
 
 @dataclass(frozen=True)

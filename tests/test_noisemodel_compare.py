@@ -11,6 +11,13 @@ from noisemodel import (
     compare,
     extended,
 )
+from noisemodel.similarity import (
+    contrasts,
+    correlation,
+    envelopes,
+    log_spectra,
+    spectral_distances,
+)
 
 RATE = 1000.0
 
@@ -101,6 +108,51 @@ def test_an_event_stands_out_by_its_level(tmp_path):
     v[400:500] = 10.0
     found = compare(robot, np.zeros((1000, 1)), v, rate=RATE, events=[(400, 500)])
     assert np.allclose(found.contrast, 20.0, rtol=1e-9)
+
+
+def test_a_contrast_is_the_ratio_of_mean_powers():
+    powers = np.array([[1.0, 1, 40, 60, 30, 1], [2, 2, 2, 2, 2, 2]])
+    np.testing.assert_allclose(contrasts(powers, [(2, 4), (3, 5)]), [10 * np.log10(130 / 3), 0.0])
+    for events in ([], [(0, 6)], [(0, 3), (3, 6)]):
+        assert np.isnan(contrasts(powers, events)).all()
+    silent = np.array([[0.0, 0, 5, 5]])
+    assert contrasts(silent, [(2, 4)]) == [np.inf]
+
+
+def test_envelopes_are_root_mean_squares_of_whole_stretches():
+    powers = np.array([[1.0, 7, 9, 9, 5], [0, 2, 8, 0, 99]])
+    np.testing.assert_allclose(envelopes(powers, 2), [[2.0, 3.0], [1.0, 2.0]])
+
+
+def test_signals_are_correlated_as_numpy_does():
+    signals = np.random.default_rng(6).normal([[1.0], [2.0], [3.0]], size=(3, 50))
+    np.testing.assert_allclose(correlation(signals), np.corrcoef(signals), rtol=1e-12)
+    assert np.isnan(correlation(np.array([[1.0, 1, 1], [1, 2, 3]]))[0]).all()
+
+
+def test_spectra_are_of_windows_that_overlap_by_half():
+    time = np.arange(64)
+    signal = np.sin(2 * np.pi * time / 4) * (time >= 32)
+    spectra = log_spectra(signal, 16)
+    assert spectra.shape == (7, 9)  # 64 / 8 - 1 windows, lines up to half the rate
+    assert spectra.max() == spectra[4:, 4].max() == 0.0
+    np.testing.assert_array_equal(spectra[:3], -100.0)
+    window = np.abs(np.fft.rfft(signal[40:56] * np.hanning(16))) ** 2
+    np.testing.assert_allclose(
+        spectra[5, 3:6], 10 * np.log10(window / window.max())[3:6] + spectra[5, 4], atol=1e-9
+    )
+    np.testing.assert_array_equal(log_spectra(0 * signal, 16), np.full((7, 9), -100.0))
+
+
+def test_spectra_differ_by_the_mean_square_after_the_mean():
+    one, other = np.array([[0.0, -4], [0, -8]]), np.array([[-3.0, -3], [-9, -5]])
+    found = spectral_distances([one, other, one - 7.0])
+    difference = (one - other) - (one - other).mean()
+    np.testing.assert_allclose(found[0, 1], (difference**2).mean(axis=0))
+    np.testing.assert_array_equal(found[1, 0], found[0, 1])
+    np.testing.assert_allclose(found[1, 2], found[1, 0])
+    np.testing.assert_array_equal(found[0, 2], 0.0)
+    np.testing.assert_array_equal(found[[0, 1, 2], [0, 1, 2]], 0.0)
 
 
 def test_without_events_there_is_no_contrast(panda):

@@ -218,6 +218,12 @@ def test_a_rate_or_a_seed_that_cannot_be_is_refused(tmp_path, options, message):
         excitation(chain(tmp_path, "revolute"), **options)
 
 
+def test_a_run_names_a_listed_robot_and_the_file_of_another(tmp_path):
+    assert excitation(Robot.load("ur5"), rate=500.0).robot == "ur5"
+    robot = chain(tmp_path, "revolute")
+    assert excitation(robot, rate=500.0).robot == str(robot.path)
+
+
 def test_the_lowest_rate_is_above_twice_that_of_the_shakes(tmp_path):
     robot = chain(tmp_path, "revolute", floating_base=True)
     run = excitation(robot, rate=401.0)

@@ -1,5 +1,8 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from chains import BAR, chain
 
 from noisemodel import Robot, Run, Surface, extended
 from noisemodel.links import link_noise, vibrating
@@ -34,6 +37,69 @@ def test_bins_hold_the_mean_power_of_the_extended_noise():
     np.testing.assert_allclose(found.total[7], noise.total[70:80].mean(), rtol=1e-3)
     assert found.time[7] == pytest.approx(0.075)
     assert found.links == noise.names
+
+
+def test_the_terms_are_added_up_if_asked_and_are_those_of_the_extended_noise():
+    run, robot = arm_run(seconds=0.3), Robot.load("ur5")
+    assert link_noise(run).terms == {}
+    assert link_noise(run).kind == "normal"
+    terms = link_noise(run, "paper", terms=True).terms
+    motion = (robot, Surface.of(robot, "auto"), *robot.configuration(run))
+    for term in "ABC":
+        power = extended(*motion, term).power.sum(axis=1)
+        np.testing.assert_allclose(terms[term], power.reshape(-1, 10).mean(axis=1), rtol=1e-9)
+    assert tuple(terms) == ("A", "B", "C")
+
+
+def test_desired_velocities_without_positions_are_taken_where_the_robot_is():
+    run = arm_run(seconds=0.2)
+    once = link_noise(run)
+    both = link_noise(arm_run(seconds=0.2, velocity_desired=2 * run.velocity))
+    np.testing.assert_allclose(both.power, 5 * once.power, rtol=1e-9)
+    np.testing.assert_allclose(both.vibration, once.vibration, rtol=1e-12)
+
+
+def test_the_loudest_link_is_the_one_with_the_largest_peak():
+    found = link_noise(arm_run(rattling=3))
+    peaks = found.vibration.max(axis=0)
+    assert [peaks[link] for link in found.loudest] == sorted(peaks, reverse=True)
+    assert "wrist_1_joint" in found.movers[found.loudest[0]]
+    assert 200 <= found.vibration[:, found.loudest[0]].argmax() < 250
+
+
+def test_vibration_has_no_running_mean_of_a_tenth_of_a_second():
+    velocity = np.random.default_rng(5).normal([1.0, -2.0], size=(300, 2))
+    valid = np.ones(300, dtype=bool)
+    valid[120] = False
+    found = vibrating(velocity, valid, 1000.0)
+    for start, stop in ((0, 120), (121, 300)):
+        for sample in range(start, stop):
+            reach = min(50, sample - start, stop - 1 - sample)
+            mean = velocity[sample - reach : sample + reach + 1].mean(axis=0)
+            np.testing.assert_allclose(found[sample], velocity[sample] - mean, atol=1e-12)
+    assert not found[120].any()
+
+
+def test_what_is_missing_is_said_in_a_sentence_each(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", shapes=[BAR, ""], floating_base=True)
+    time = np.arange(200) / 1000
+    pose = np.zeros((200, 7))
+    pose[:, 6] = 1.0
+    run = Run(
+        time=time,
+        velocity=np.ones((200, 1)),
+        position=time[:, None],
+        joint_names=("joint2",),
+        robot=str(robot.path),
+        base_pose=pose,
+    )
+    assert link_noise(run).remarks == (
+        "Not in the log, assumed stationary: joint1.",
+        "Links without geometry make no noise: link0, link2.",
+        "The run has no base velocity: its base is assumed stationary.",
+    )
+    moving = replace(run, base_velocity=np.zeros((200, 6)))
+    assert len(link_noise(moving).remarks) == 2
 
 
 def test_a_robot_that_is_fixed_is_not_said_to_lack_the_motion_of_its_base():

@@ -129,6 +129,30 @@ def test_the_table_gives_the_mean_speed_about_any_axis(name):
     assert np.allclose(turning_speed(table, rounded, turns), back, rtol=1e-9)
 
 
+@pytest.mark.parametrize("size", [(0.3, 0.2, 0.5), (1.0, 4e-3, 2e-3), (1.0, 1.0, 1e-9)])
+def test_points_grow_with_the_surface(size):
+    surface = shapes.box(*size) + np.array([0.1, 0.2, 0.3])
+    once = fine(surface)
+    for factor in (64.0, 2.0**-10):
+        larger = fine(factor * surface)
+        near = {"rtol": 1e-9, "atol": 1e-12 * factor}
+        np.testing.assert_allclose(larger.points, factor * once.points, **near)
+        np.testing.assert_allclose(larger.weights, once.weights, rtol=1e-9)
+
+
+def test_mean_distances_of_a_square_sheet_are_the_known_ones():
+    """From its centre (sqrt 2 + asinh 1) / 6 sides, from its corner twice that."""
+    sheet = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], float)
+    known = (np.sqrt(2) + np.arcsinh(1)) / 6
+    spin = np.array([[0.0, 0, 0, 0, 0, 3]]).T
+    for shift, distance in ((-0.5, known), (0.0, 2 * known)):
+        cloud = fine(sheet + np.array([shift, shift, 0]))
+        assert cloud.weights @ point_speeds(cloud.points, spin) == pytest.approx(
+            3 * distance, rel=1e-4
+        )
+        assert 1000 < len(cloud.points) < 10_000
+
+
 def test_mean_distance_of_a_sphere_from_its_axis():
     """The mean of a sin(theta) over the sphere is pi a / 4."""
     dense = fine(SHAPES["sphere"])
