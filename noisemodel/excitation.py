@@ -92,8 +92,8 @@ def excitation(robot: Robot, *, seed: int = 0, rate: float = RATE) -> Run:
     bounds = limits(robot)
     position = np.cumsum(velocity, axis=0) / rate
     low, high = _extent(position)
-    scale = np.minimum(1.0, USABLE * bounds.range / np.maximum(high - low, 1e-9))
-    scale = np.minimum(scale, USABLE * bounds.speed / np.maximum(abs(velocity).max(axis=0), 1e-9))
+    scale = np.minimum(1.0, USABLE * bounds.range / (high - low))
+    scale = np.minimum(scale, USABLE * bounds.speed / abs(velocity).max(axis=0))
     velocity = velocity * scale
     hertz = random.uniform(*SHAKE_HZ)
     blocks = [Block(*JERK, "jerk")]

@@ -349,7 +349,7 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
     base = 0
     if floating and not free:
         base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root_joint")
-        model.addFrame(pin.Frame("world", base, pin.SE3.Identity(), pin.FrameType.BODY), False)
+        model.addFrame(pin.Frame("world", base, pin.SE3.Identity(), pin.FrameType.BODY))
     carrier = {0: (base, pin.SE3.Identity())}  # of each body: the joint, and its pose there
     for body in range(1, compiled.nbody):
         name = _body_name(compiled, body)
@@ -387,9 +387,9 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
             place = pin.SE3(np.eye(3), -origin)
             if index < first + count - 1:  # the next joint of the body moves against this one
                 frame = pin.Frame(f"{name}:{title}", joint, place, pin.FrameType.BODY)
-                model.addFrame(frame, False)
+                model.addFrame(frame)
         carrier[body] = (joint, place)
-        model.addFrame(pin.Frame(name, joint, place, pin.FrameType.BODY), False)
+        model.addFrame(pin.Frame(name, joint, place, pin.FrameType.BODY))
     return model, floating
 
 

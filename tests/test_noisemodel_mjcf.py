@@ -355,13 +355,14 @@ def test_a_mesh_that_the_file_itself_holds_is_read(tmp_path):
     assert nm.Surface.of(Robot.load(path)).area[0] == pytest.approx(1.5 + np.sqrt(3) / 2)
 
 
-def test_a_mesh_that_only_gives_a_box_its_size_hides_no_missing_mesh(tmp_path):
+def test_other_geoms_hide_no_missing_mesh(tmp_path):
     write_stl(tmp_path / "part.stl")
     head = '<asset><mesh file="part.stl"/><mesh name="gone" file="gone.stl"/></asset>'
     geoms = '<geom type="box" mesh="part"/><geom type="mesh" mesh="gone"/>'
-    robot = Robot.load(written(tmp_path, one_body(geoms, head=head)))
-    assert triangles(robot, missing="skip").missing == ("gone.stl",)
-    assert len(triangles(robot, missing="skip").triangles[0]) == 12
+    for first, count in (("", 12), ('<geom type="box" size="1 1 1"/>', 24)):
+        robot = Robot.load(written(tmp_path, one_body(first + geoms, head=head)))
+        assert triangles(robot, missing="skip").missing == ("gone.stl",)
+        assert len(triangles(robot, missing="skip").triangles[0]) == count
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import os
 import numpy as np
 import pinocchio as pin
 import pytest
+from chains import chain
 
 from noisemodel import (
     ROBOTS,
@@ -16,6 +17,7 @@ from noisemodel import (
     catalog,
     link_twists,
 )
+from noisemodel.robot import package_roots
 
 ARM = """
 <robot name="arm">
@@ -79,6 +81,24 @@ def test_a_urdf_of_ones_own_has_a_fixed_base_unless_requested(tmp_path):
 def test_neutral_is_pinocchios(name):
     robot = Robot.load(name)
     assert np.array_equal(robot.neutral, pin.neutral(robot.model))
+
+
+def test_neutral_is_pinocchios_for_every_kind_of_joint(tmp_path):
+    kinds = ("revolute", "planar", "continuous", "floating", "prismatic", "planar", "revolute")
+    robot = chain(tmp_path, *kinds, floating_base=True)
+    assert np.array_equal(robot.neutral, pin.neutral(robot.model))
+
+
+def test_of_a_file_that_is_too_large_no_package_is_looked_up(tmp_path, monkeypatch):
+    path = tmp_path / "parts" / "urdf" / "arm.urdf"
+    path.parent.mkdir(parents=True)
+    path.write_text('<robot><mesh filename="package://parts/a.stl"/></robot>')
+    size = path.stat().st_size
+    for most, root in ((size - 1, path.parent), (size + 1, path.parent.parent)):
+        monkeypatch.setattr("noisemodel.urdf.MAX_BYTES", most)
+        assert package_roots(path) == (root,)
+    monkeypatch.setattr("noisemodel.urdf.MAX_BYTES", size)
+    assert package_roots(path) == (path.parent.parent,)
 
 
 def test_a_configuration_is_ordered_by_joint_name(tmp_path):
