@@ -162,6 +162,16 @@ def test_mean_distance_of_a_sphere_from_its_axis():
     )
 
 
+def test_a_point_on_the_axis_of_a_motion_rests():
+    random = np.random.default_rng(7)
+    points, turns = random.standard_normal((2, 100, 3))
+    moving = np.concatenate((-np.cross(turns, points), turns), axis=1).T
+    speeds = point_speeds(points, moving)
+    assert 0.0 <= np.diag(speeds).max() < 1e-6
+    expected = np.linalg.norm(moving[:3].T + np.cross(turns, points[3]), axis=1)
+    np.testing.assert_allclose(speeds[3], expected, atol=1e-6)
+
+
 def test_no_rotation_has_no_speed():
     form = moments(SHAPES["box"]).mean_square[3:, 3:]
     rounded = rounding(form)
