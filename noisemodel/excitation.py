@@ -167,8 +167,7 @@ def _motion(time: Array, axes: int, random: "np.random.Generator", rate: float) 
     """Slow sines, ripple and jerk of each axis at a nominal speed of 1, shape (samples, axes)."""
     slow = _sines(time, axes, random)
     ripple = RIPPLE * _ripple(len(time), axes, random, rate)
-    after = np.maximum(time - JERK[0], 0.0)
-    jump = 0.5 * (time >= JERK[0]) * np.exp(-after / JERK_DECAY)
+    jump = 0.5 * (time >= JERK[0]) * np.exp((JERK[0] - time) / JERK_DECAY)
     velocity: Array = slow + ripple + jump[:, None] * random.choice([-1.0, 1.0], axes)
     return velocity
 

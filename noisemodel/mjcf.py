@@ -12,7 +12,6 @@ import re
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -36,7 +35,7 @@ UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's colour of a geom that names none: its material's is taken then."""
 
 MAX_INCLUDED = 200
-"""Most files that one MJCF may consist of."""
+"""Most files that one MJCF may consist of, each counted as often as it is named."""
 
 MAX_COPIES = 10_000
 """Most copies that ``<replicate>`` and the like may make of an element."""
@@ -236,29 +235,35 @@ def _check_sizes(part: Path, root: ET.Element) -> None:
 def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
     """Refuse what is copied or attached to more bodies or joints than a robot has."""
 
-    @cache
-    def counts(part: Path) -> tuple[int, int]:
-        bodies = joints = 0
-        files = parts[part].files
-        # All models, attached or not: those that contain themselves make MuJoCo crash.
-        found = {_model_name(each, parts[file]): counts(file) for each, file in files.items()}
+    def counts(part: Path) -> tuple[int, int, int]:
+        bodies, joints, files = 0, 0, 1
+        included, models = {}, {}
+        # MuJoCo reads all models, attached or not, and crashes on those that contain themselves.
+        for element, file in parts[part].files.items():
+            found = counts(file)
+            files += found[2]
+            if files > MAX_INCLUDED:
+                raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
+            if element.tag == "include":
+                included[element] = found
+            else:
+                models[_model_name(element, parts[file])] = found
         for element, copies in _elements(parts[part].root):
             bodies += copies * (element.tag in ("body", "geom", "composite", "flexcomp"))
             joints += copies * (element.tag in ("joint", "freejoint") and not element.get("joint"))
-            more = (0, 0)
-            if element.tag == "include":
-                more = counts(files[element])
-            elif element.tag == "attach":
-                more = found.get(element.get("model", ""), more)
-            bodies, joints = bodies + copies * more[0], joints + copies * more[1]
+            more = included.get(element)
+            if element.tag == "attach":
+                more = models.get(element.get("model", ""))
+            if more is not None:
+                bodies, joints = bodies + copies * more[0], joints + copies * more[1]
             if bodies > limit("bodies"):
                 raise RobotError(
                     f"{path}: more than {limit('bodies')} bodies and geoms; {beyond('bodies')}"
                 )
-        return bodies, joints
+        return bodies, joints, files
 
     try:
-        _, joints = counts(path.resolve())
+        _, joints, _ = counts(path.resolve())
     except RecursionError as error:
         raise RobotError(f"{path}: its models attach each other") from error
     if joints > 10 * limit("joints"):  # those of defaults, sensors and equalities are counted too

@@ -137,7 +137,8 @@ def test_joints_without_a_name_are_named_after_their_body(tmp_path):
 def test_limits_are_those_of_the_file(tmp_path):
     found = limits(Robot.load(written(tmp_path, ARM)))
     np.testing.assert_allclose(found.range, [np.inf, np.radians(190), np.inf, np.inf])
-    assert found.centre[1] == pytest.approx(np.radians(5))
+    np.testing.assert_allclose(found.centre, [0.0, np.radians(5), 0.0, 0.0])
+    assert np.isinf(found.speed).all()
 
 
 def test_a_free_joint_that_comes_first_makes_the_base_float(tmp_path):
@@ -638,6 +639,23 @@ def test_bodies_and_geoms_are_counted_with_all_their_copies(tmp_path, monkeypatc
     path.write_text(text.replace("<body ", "<body><joint/></body><body "))
     with pytest.raises(RobotError, match="more than 1 joints; the limit is 1"):
         Robot.load(path)
+
+
+def test_models_that_double_with_each_level_are_refused_before_they_are_read(tmp_path, monkeypatch):
+    levels = 30
+    for level in range(levels):
+        models = "".join(
+            f'<model name="{name}" file="a{level + 1}.xml"/>' for name in "lr" if level < levels - 1
+        )
+        written(tmp_path, f"<mujoco><asset>{models}</asset></mujoco>", f"a{level}.xml")
+    with pytest.raises(RobotError, match="a0.xml: includes more than 200 files"):
+        Robot.load(tmp_path / "a0.xml")
+    last = tmp_path / f"a{levels - 3}.xml"  # two models of two models each
+    monkeypatch.setattr(mjcf, "MAX_INCLUDED", 7)
+    assert Robot.load(last).joints == ()
+    monkeypatch.setattr(mjcf, "MAX_INCLUDED", 6)
+    with pytest.raises(RobotError, match="includes more than 6 files"):
+        Robot.load(last)
 
 
 @pytest.mark.parametrize("reference", ["model", "include"])

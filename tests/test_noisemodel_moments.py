@@ -140,6 +140,14 @@ def test_points_grow_with_the_surface(size):
         np.testing.assert_allclose(larger.weights, once.weights, rtol=1e-9)
 
 
+def test_no_more_points_are_placed_than_the_most(monkeypatch):
+    box, sheet = shapes.box(0.3, 0.2, 0.5), shapes.box(1.0, 0.3, 1e-3)
+    for most in range(200, 3000, 50):
+        monkeypatch.setattr("noisemodel.quadrature.MOST", most)
+        assert len(fine(box).points) <= most
+        assert len(fine(sheet).points) <= most
+
+
 def test_mean_distances_of_a_square_sheet_are_the_known_ones():
     """From its centre (sqrt 2 + asinh 1) / 6 sides, from its corner twice that."""
     sheet = np.array([[[0, 0, 0], [1, 0, 0], [1, 1, 0]], [[0, 0, 0], [1, 1, 0], [0, 1, 0]]], float)
