@@ -271,7 +271,7 @@ def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
 
 
 def _model_name(element: ET.Element, part: _Part) -> str:
-    return element.get("name") or part.root.get("model", "")
+    return element.get("name") or part.root.get("model") or ""
 
 
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:
@@ -414,18 +414,18 @@ def _body_name(compiled: Any, body: int) -> str:
 
 
 def _mimics(compiled: Any) -> Iterator[tuple[str, Mimic]]:
-    """Joints that an equality constraint ties to another one: q1 = ref1 + c0 + c1 (q2 - ref2)."""
-    from mujoco import mjtEq, mjtJoint
+    """Joints that an equality constraint ties to another one: q1 = ref1 + c0 + c1 (q2 - ref2).
 
-    single = (int(mjtJoint.mjJNT_HINGE), int(mjtJoint.mjJNT_SLIDE))
+    MuJoCo refuses equalities of joints that neither turn nor slide.
+    """
+    from mujoco import mjtEq
+
     for index in range(compiled.neq):
         first, second = int(compiled.eq_obj1id[index]), int(compiled.eq_obj2id[index])
         if int(compiled.eq_type[index]) != int(mjtEq.mjEQ_JOINT) or second < 0:
             continue
         constant, linear, *higher = compiled.eq_data[index][:5].tolist()
         if any(higher) or not compiled.eq_active0[index]:
-            continue
-        if any(int(compiled.jnt_type[joint]) not in single for joint in (first, second)):
             continue
         zeros = compiled.qpos0[compiled.jnt_qposadr[[first, second]]]
         offset = float(zeros[0] + constant - linear * zeros[1])

@@ -226,6 +226,17 @@ def test_a_coupled_joint_is_where_mujocos_equality_has_it(tmp_path):
         assert data.efc_pos[data.efc_id == 0][0] == pytest.approx(0.0, abs=1e-12)
 
 
+@pytest.mark.parametrize("kind", ["ball", "free"])
+def test_an_equality_of_a_joint_of_many_axes_is_refused(tmp_path, kind):
+    joint = f'<joint name="turn" type="{kind}"/>'
+    inner = f'<body><joint name="inner"/>{BALL}</body>'
+    for pair in ('joint1="turn" joint2="inner"', 'joint1="inner" joint2="turn"'):
+        equality = f"<equality><joint {pair}/></equality></mujoco>"
+        text = one_body(BALL + inner, joint=joint).replace("</mujoco>", equality)
+        with pytest.raises(RobotError, match="only HINGE and SLIDE joint allowed"):
+            Robot.load(written(tmp_path, text))
+
+
 @pytest.mark.parametrize("polycoef", ["0 1 2 0 0", "0 1 0 2 0", "0 1 0 0 2"])
 def test_joints_that_an_equality_ties_by_a_curve_are_not_coupled(tmp_path, polycoef):
     curve = f'<equality><joint joint1="knee" joint2="hip" polycoef="{polycoef}"/></equality>'
