@@ -84,7 +84,7 @@ def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
     if signal.dtype.kind != "f":
         raise RunError(f"{name}: holds {signal.dtype}, expected floating-point numbers")
     if signal.shape != shape:
-        turned = signal.ndim == 2 and signal.shape[::-1][0] == shape[0] != signal.shape[0]
+        turned = signal.ndim == 2 and signal.shape[1] == shape[0] != signal.shape[0]
         hint = "; samples come first, is it transposed?" if turned else ""
         raise RunError(f"{name}: shape {signal.shape}, expected {shape}{hint}")
     if isinstance(signal, OnDemand):

@@ -217,10 +217,10 @@ class Recorder:
 
     def _row(self, name: str, values: Values) -> Array:
         """Values of a sample, checked."""
-        names = () if name in (*WIDTHS, "time") else self._joints
-        names = self._desired if name.endswith("_desired") else names
+        known = () if name in (*WIDTHS, "time") else self._joints
+        names = known = self._desired if name.endswith("_desired") else known
         if isinstance(values, Mapping):
-            names = names or tuple(values)
+            names = known or tuple(values)
             _check_names(name, values, names)
             row = np.array([values[joint] for joint in names], dtype=np.float64)
         else:
@@ -237,11 +237,8 @@ class Recorder:
             )
         if name == "time" and not np.isfinite(row[0]):
             raise RunError(f"time: {row[0]} in sample {self._count + 1}")
-        if not names and name not in (*WIDTHS, "time"):
-            numbered = [
-                *(values if isinstance(values, Mapping) else map(_number, range(1, len(row) + 1)))
-            ]
-            self._joints = tuple(numbered)
+        if not known and name not in (*WIDTHS, "time"):
+            self._joints = names or tuple(f"joint{number + 1}" for number in range(len(row)))
             self._desired = self._desired or self._joints
         return row
 
@@ -292,10 +289,6 @@ class Recorder:
         return time, reached, found
 
 
-def _number(number: int) -> str:
-    return f"joint{number}"
-
-
 def _check_names(name: str, values: Iterable[str], names: Sequence[str]) -> None:
     given = tuple(values)
     for joint in given:
@@ -324,6 +317,6 @@ def _interpolated(name: str, stamps: Array, values: Array, time: Array) -> Array
     from scipy.interpolate import PchipInterpolator
 
     found = np.asarray(PchipInterpolator(stamps, values, axis=0)(time))
-    if name == "base_pose" and len(found):
+    if name == "base_pose":
         found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
     return found

@@ -36,9 +36,9 @@ def test_a_time_has_one_axis_and_two_samples_at_least(shape):
     [
         ([0.0, 0.5, np.nan, np.inf, 2.0], "time: nan in row 2"),
         ([0.0, np.inf, np.nan], "time: inf in row 1"),
-        ([0.0, 0.5, 1.0, 1.0, 1.0], "time: stands still in row 3 (1 s, then 1 s)"),
+        ([0.0, 0.5, 1.0, 1.0, 1.5], "time: stands still in row 3 (1 s, then 1 s)"),
         (
-            [0.0, 0.5, 1.0, 0.987654321, 0.5],
+            [0.0, 0.5, 1.0, 0.987654321, 0.987654321],
             "time: runs backwards in row 3 (1 s, then 0.987654321 s)",
         ),
     ],

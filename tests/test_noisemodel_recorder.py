@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 
@@ -227,3 +229,186 @@ def test_a_loaded_robot_is_named_as_it_was_loaded(tmp_path):
         recorder.push(velocity={"j": 1.0})
     recorder.save(tmp_path / "run.npz")
     assert nm.Run.load(tmp_path / "run.npz").robot == str(own)
+
+
+STEP = 1 / 128
+"""A step whose multiples are exact, in [s]."""
+
+
+def stamped(stamps, rate=128, **signals):
+    """What is pushed at these stamps, in steps: signals are functions of the time in [s]."""
+    recorder = nm.Recorder(None, rate)
+    for stamp in stamps:
+        time = stamp * STEP
+        recorder.push(time=5.0 + time, **{name: make(time) for name, make in signals.items()})
+    return recorder.run()
+
+
+SHIFT = np.array([0.0, 0.0, 0.0, 0.0, 9.0])
+
+
+def ramp(time):
+    return np.arange(1.0, 6.0) + np.arange(2.0, 7.0) * time
+
+
+def test_samples_are_interpolated_between_stamps_and_not_in_gaps_or_at_single_samples():
+    """A ramp is interpolated exactly; steps above five medians are gaps."""
+    stamps = [0, 1, 2, 3, 4.5, 5, 6, 12, 13, 14, 20, 30, 31, 40, 41, 42, 43.5]
+    sign = dict(zip(stamps, (1, 1, -1, 1, -1, 1, 1, -1, 1, 1, 1, 1, -1, 1, -1, -1, 1), strict=True))
+
+    def turn(time):
+        return np.array([0.6 * np.sin(40 * time), 0.8 * np.sin(40 * time), 0, np.cos(40 * time)])
+
+    run = stamped(
+        stamps,
+        velocity=lambda time: ramp(time) if time != 13 * STEP else np.full(5, np.nan),
+        position=lambda time: np.angle(np.exp(1j * 25.0 * ramp(time))) + SHIFT,
+        base_pose=lambda time: [*ramp(time)[:3], *sign[time / STEP] * turn(time)],
+    )
+    assert run.joint_names == ("joint1", "joint2", "joint3", "joint4", "joint5")
+    np.testing.assert_array_equal(run.time, np.arange(44) * STEP)
+    known = [*range(7), *range(12, 15), 30, 31, *range(40, 44)]
+    assert np.flatnonzero(run.mask).tolist() == known
+    assert run.meta["start"] == "5"
+    assert run.meta["jitter"] == pytest.approx({"rms": STEP * np.sqrt(0.75 / 12), "max": STEP / 2})
+    there, gap = run.time[known], ~run.mask
+    np.testing.assert_allclose(run.velocity[known], [*map(ramp, there)], rtol=1e-12)
+    np.testing.assert_allclose(run.base_pose[known, :3], [ramp(t)[:3] for t in there], rtol=1e-12)
+    np.testing.assert_array_equal(run.velocity[gap], 0.0)
+    np.testing.assert_array_equal(run.position[gap], 0.0)
+    np.testing.assert_array_equal(run.base_pose[gap], np.tile([0, 0, 0, 0, 0, 0, 1.0], (28, 1)))
+    np.testing.assert_allclose(np.linalg.norm(run.base_pose[:, 3:], axis=1), 1.0, rtol=1e-12)
+    for first, stop in ((0, 7), (12, 15), (30, 32), (40, 44)):
+        stretch, time = slice(first, stop), run.time[first:stop]
+        slopes = np.diff(run.position[stretch], axis=0) / STEP
+        np.testing.assert_allclose(
+            slopes, np.tile(25.0 * np.arange(2.0, 7.0), (stop - first - 1, 1))
+        )
+        start = np.angle(np.exp(1j * 25.0 * ramp(time[0]))) + SHIFT
+        np.testing.assert_allclose(run.position[first], start, rtol=1e-12)
+        expected = sign[first] * np.array([turn(each) for each in time])
+        np.testing.assert_allclose(run.base_pose[stretch, 3:], expected, atol=0.03)
+        stamped_there = np.isin(np.arange(first, stop), [each for each in stamps if each != 13])
+        np.testing.assert_allclose(
+            run.base_pose[stretch, 3:][stamped_there], expected[stamped_there], atol=1e-12
+        )
+
+
+@pytest.mark.parametrize(("step", "missing", "most"), [(5, 0, 4), (5.25, 5, 0.25)])
+def test_a_step_of_five_medians_is_no_gap_yet(step, missing, most):
+    """Where it is a gap, only the other step, of 0.75 medians, deviates."""
+    stamps = [*range(10), 9 + step, *range(15, 20)]
+    run = stamped(stamps, velocity=ramp)
+    assert (~run.mask).sum() == missing
+    assert run.meta["jitter"]["max"] == most * STEP
+    np.testing.assert_allclose(run.velocity[run.mask], [*map(ramp, run.time[run.mask])])
+
+
+@pytest.mark.parametrize(("share", "kept"), [(0.9e-3, True), (1.1e-3, False)])
+def test_stamps_are_kept_that_lie_a_thousandth_of_a_step_apart(share, kept):
+    stamps = np.arange(20.0)
+    stamps[7] += share
+    run = stamped(stamps, velocity=ramp)
+    assert ("jitter" in run.meta) != kept
+    np.testing.assert_array_equal(
+        run.time == np.arange(20) * STEP, (np.arange(20) != 7) | (not kept)
+    )
+    np.testing.assert_allclose(run.velocity, [*map(ramp, run.time)], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("share", "own"), [(-0.051, True), (-0.049, False), (0.049, False), (0.051, True)]
+)
+def test_stamps_that_jitter_have_the_recorders_rate_unless_theirs_is_another_by_5_percent(
+    share, own
+):
+    stamps = [*range(10), *range(11, 30)]
+    rate = 128 * (1 + share)
+    run = stamped(stamps, rate=rate, velocity=ramp)
+    assert run.rate == pytest.approx(128 if own else rate, rel=1e-8)
+    assert len(run.time) == (30 if own else int(29 * (1 + share) + 0.001) + 1)
+    np.testing.assert_allclose(run.velocity[run.mask], [*map(ramp, run.time[run.mask])])
+
+
+def test_a_rate_of_stamps_has_six_digits():
+    recorder = nm.Recorder(None, 100)
+    for step in (0, 1, 2, 3, 5, 6, 7):
+        recorder.push(velocity=[1.0], time=step / 300.1234567)
+    assert recorder.run().rate == 300.123
+
+
+def test_a_sample_that_is_not_finite_is_a_gap_in_all_signals_and_the_base_does_not_turn_there():
+    recorder = nm.Recorder(None, 0.5)
+    for step in range(4):
+        velocity, effort = [1.0, 2.0], [np.inf if step == 2 else 3.0, 4.0]
+        recorder.push(velocity=velocity, effort=effort, base_pose=[1, 2, 3, 1, 0, 0, 0])
+    run = recorder.run()
+    assert run.time.tolist() == [0.0, 2.0, 4.0, 6.0]
+    assert run.mask.tolist() == [True, True, False, True]
+    assert run.velocity.tolist() == [[1, 2], [1, 2], [0, 0], [1, 2]]
+    assert run.effort.tolist() == [[3, 4], [3, 4], [0, 0], [3, 4]]
+    assert run.base_pose[1:3].tolist() == [[1, 2, 3, 1, 0, 0, 0], [0, 0, 0, 0, 0, 0, 1]]
+
+
+def whole(text):
+    return pytest.raises(RunError, match=f"^{re.escape(text)}$")
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, np.nan, np.inf])
+def test_a_rate_is_a_number_above_zero(rate):
+    with whole(f"rate: {rate:g} Hz, expected a number above 0"):
+        nm.Recorder(None, rate)
+
+
+@pytest.mark.parametrize(("joints", "named"), [(10, 10), (11, 10)])
+def test_a_sample_of_another_width_names_ten_joints(joints, named):
+    names = [f"j{number}" for number in range(joints)]
+    recorder = nm.Recorder(None, 100, joint_names=names, desired_joint_names=names[:3])
+    known = ", ".join(names[:named]) + (", …" if joints > named else "")
+    with whole(f"effort: shape (2,), expected ({joints},) ({known}); joint_names=… names others"):
+        recorder.push(velocity=np.zeros(joints), effort=[1, 2])
+    with whole("velocity_desired: shape (), expected (3,) (j0, j1, j2)"):
+        recorder.push(velocity=np.zeros(joints), velocity_desired=1.0)
+    with whole("base_pose: shape (6,), expected (7,)"):
+        recorder.push(velocity=np.zeros(joints), base_pose=np.zeros(6))
+    with whole("base_velocity: shape (2, 6), expected (6,)"):
+        recorder.push(velocity=np.zeros(joints), base_velocity=np.zeros((2, 6)))
+    with whole("velocity: missing, and position too; the sample has effort, time"):
+        recorder.push(effort=np.zeros(joints), time=0.0)
+    with whole("position_desired: missing for j0, j2; joint_names=… names fewer"):
+        recorder.push(velocity=np.zeros(joints), position_desired={"j1": 0.0})
+
+
+def test_without_names_the_first_sample_names_the_joints():
+    recorder = nm.Recorder(None, 100)
+    with whole("velocity: shape (), expected (joints,)"):
+        recorder.push(velocity=1.0)
+    for _ in range(2):
+        recorder.push(time=len(recorder) / 100, velocity={"b": 1.0, "a": 2.0}, effort=[3.0, 4.0])
+    with whole("velocity: shape (3,), expected (2,) (b, a); joint_names=… names others"):
+        recorder.push(time=0.5, velocity=[1, 2, 3], effort=[3.0, 4.0])
+    with whole("time: inf in sample 3"):
+        recorder.push(time=np.inf, velocity=[1, 2], effort=[3.0, 4.0])
+    with whole("time: stands still in sample 3 (0.01 s, then 0.01 s)"):
+        recorder.push(time=0.01, velocity=[1, 2], effort=[3.0, 4.0])
+    run = recorder.run()
+    assert run.joint_names == run.desired_joint_names == ("b", "a")
+    assert run.velocity.tolist() == [[1.0, 2.0]] * 2
+
+
+def test_the_desired_joints_are_the_robots_too():
+    with pytest.raises(UnknownJointError, match="no joint 'elbow' in robot 'panda'"):
+        nm.Recorder("panda", 100, joint_names=PANDA, desired_joint_names=[PANDA[0], "elbow"])
+    recorder = nm.Recorder("panda", 100, joint_names=PANDA[:2], desired_joint_names=PANDA[4:5])
+    for _ in range(2):
+        recorder.push(velocity=[0, 0], velocity_desired=[0])
+    run = recorder.run()
+    assert (run.joint_names, run.desired_joint_names) == (tuple(PANDA[:2]), (PANDA[4],))
+
+
+def test_a_loop_that_ends_replaces_what_an_earlier_one_has_saved(tmp_path):
+    for samples in (10, 20):
+        with nm.Recorder(None, 100, path=tmp_path / "a.npz") as recorder:
+            pushed(recorder, samples)
+    assert len(nm.Run.load(tmp_path / "a.npz").time) == 20
+    assert nm.Run.load(tmp_path / "a.npz").meta == {}
