@@ -3,6 +3,7 @@ import os
 import pickle
 import sys
 from collections import Counter
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ from noisemodel import (
     estimates,
     parallel,
 )
-from noisemodel.comparison import BANDS
+from noisemodel.comparison import BANDS, Comparison, RobotComparison
 from noisemodel.comparisons import medians
 from noisemodel.excitation import excitation
 from noisemodel.similarity import log_spectra
@@ -521,3 +522,169 @@ def test_one_robot_prints_its_name_over_its_comparison(thrice):
     head, *rest = str(thrice[0]).splitlines()
     assert head == f"{thrice[0].name}, 24000 samples at 4000 Hz"
     assert "\n".join(rest) == str(thrice[0].comparison)
+
+
+KINDS = ("paper", "normal", "C")
+LABELS = ("jerk", "oscillations", "fall")
+
+
+def made(name, *, seed, floating_base=False, labels=LABELS, remarks=()):
+    """A comparison with numbers that are all different, and some that do not exist."""
+    golden = (0.3 * seed + number * (np.sqrt(5.0) - 1.0) / 2.0 for number in count())
+
+    def spread(low, high, shape):
+        """Numbers between two limits."""
+        parts = np.fromiter(golden, float, int(np.prod(shape))) % 1.0
+        return low + (high - low) * parts.reshape(shape)
+
+    frequency = np.arange(0.0, 500.0 + 1000.0 * floating_base, 10.0)
+    by_frequency = spread(1.0, 30.0, (3, 3, len(frequency)))
+    terms = spread(0.0, 1.0, (6, 3))
+    correlation = spread(-1.0, 1.0, (3, 3))
+    correlation[1, 2] = np.nan if seed in (1, 2, 3) else correlation[1, 2]
+    shares = spread(0.0, 1.0, (3, 6))
+    compared = Comparison(
+        kinds=KINDS,
+        names=("base", "hip", "knee", "foot", "wheel", "hand"),
+        correlation=correlation,
+        distance=spread(0.0, 20.0, (3, 3)),
+        frequency=frequency,
+        distance_by_frequency=by_frequency,
+        contrast=spread(-5.0, 40.0, 3) if labels else np.full(3, np.nan),
+        shares=shares / shares.sum(axis=1, keepdims=True),
+        terms=terms / terms.sum(),
+    )
+    return RobotComparison(
+        name=name,
+        floating_base=floating_base,
+        joints=5,
+        time=np.arange(300) / 1000.0,
+        rate=1000.0,
+        events=tuple(
+            Block(place / 10, place / 10 + 0.05, each) for place, each in enumerate(labels)
+        ),
+        comparison=compared,
+        pressure=np.ones((3, 300)),
+        contrast=spread(-5.0, 40.0, (3, len(labels))),
+        links_with_surface=4,
+        remarks=remarks,
+    )
+
+
+MANY = """\
+Reference 'normal'; F: floating base; last: the loudest link
+                             share in paper  correlation  distance [dB]
+                                 A    B    C  paper     C  paper    C
+arm                            37%  33%  30%  -0.21     -    1.6  6.3   29% hand
+…lder/with/a/long/arm.urdf     33%  30%  37%   0.39     -    7.6 12.3   33% foot
+exactly/26/letters/arm.urd     33%  30%  38%   0.99     -   13.6 18.3   32% wheel
+walker                     F   37%  33%  30%   0.05  0.52    4.2  9.0   32% base
+runner                     F   33%  30%  38%   0.65 -0.88   10.2 15.0   32% hip
+glider                     F   40%  26%  34%  -0.75 -0.28   16.2  1.0   31% knee
+swimmer                    F   29%  37%  34%  -0.15  0.32    2.2  7.0   28% hand
+median of 3 fixed              33%  30%  37%   0.39     -    7.6 12.3
+median of 4 floating           35%  31%  34%  -0.05  0.02    7.2  8.0
+
+Of all 7, medians
+                                   distance by frequency [dB]        contrast of events above 10 Hz [dB]
+                              0-20 Hz 20-100 Hz 100-500 Hz 500 Hz up  jerk oscillations fall
+paper                            18.3      17.0       17.8      17.6  24.6         10.4 21.8
+normal                           18.3      18.1       17.7      17.6  19.5          3.8 28.7
+C                                16.5      17.9       17.4      17.6  14.4          6.3 22.1
+walker: one finger is left out
+walker: it has no hand
+swimmer: wet
+tallos: left out: there is no such robot"""  # noqa: E501
+
+ONE = """\
+Reference 'normal'; F: floating base; last: the loudest link
+                             share in paper  correlation  distance [dB]
+                                 A    B    C  paper     C  paper    C
+arm                            37%  33%  30%  -0.21     -    1.6  6.3   29% hand
+
+By kind
+                                   distance by frequency [dB]
+                              0-20 Hz 20-100 Hz 100-500 Hz 500 Hz up
+paper                            18.2      16.9       17.2         -
+normal                           22.5      19.0       17.4         -
+C                                14.3      17.9       17.5         -"""
+
+ALONE = """\
+arm, 300 samples at 1000 Hz
+correlation of envelopes          paper     normal          C
+paper                             0.080     -0.684      0.552
+normal                           -0.212     -0.976        nan
+C                                -0.504      0.732     -0.032
+spectral distance [dB]            paper     normal          C
+paper                               4.5       16.9        9.3
+normal                              1.6       14.0        6.3
+C                                  18.7       11.1        3.4
+                                  paper     normal          C
+contrast of events [dB]            30.5       13.3       -3.9
+foot                              33.2%      21.2%      11.0%
+wheel                             19.9%       9.0%      29.3%
+hand                               6.7%      28.7%      18.0%
+base                               3.5%      25.9%      15.3%
+hip                               25.0%      13.7%       4.0%
+of the energy of paper: A 36.6%, B 33.3%, C 30.1%"""
+
+
+def test_many_robots_print_as_a_table_with_medians_of_three_or_more():
+    hands = ("one finger is left out", "it has no hand")
+    found = Comparisons(
+        (
+            made("arm", seed=1),
+            made("a/folder/with/a/long/arm.urdf", seed=2, labels=LABELS[:1]),
+            made("exactly/26/letters/arm.urd", seed=3, labels=(LABELS[0], LABELS[0])),
+            made("walker", seed=4, floating_base=True, remarks=hands),
+            made("runner", seed=5, floating_base=True),
+            made("glider", seed=6, floating_base=True, labels=()),
+            made("swimmer", seed=7, floating_base=True, remarks=("wet",)),
+        ),
+        (LeftOut("tallos", "there is no such robot"),),
+    )
+    assert str(found) == MANY
+    two = str(Comparisons(found.robots[1:3]))
+    assert "Of all 2, medians" in two
+    assert "median of" not in two
+
+
+def test_one_robot_without_events_prints_as_a_table_by_kind():
+    one = made("arm", seed=1, labels=())
+    assert str(Comparisons((one,))) == ONE
+    assert "contrast" not in str(one)
+    assert str(made("arm", seed=1)) == ALONE
+
+
+def test_a_row_of_an_arrow_table_has_the_numbers_of_its_kind():
+    one = made("walker", seed=4, floating_base=True, labels=("jerk", "fall", "jerk"))
+    table = Comparisons((made("arm", seed=1), one)).to_arrow().to_pylist()
+    found = one.comparison
+    for kind in range(3):
+        frequency, squares = found.frequency, found.distance_by_frequency[kind, 1] ** 2
+        bands = np.split(squares, np.searchsorted(frequency, [20.0, 100.0, 500.0]))
+        names = ("0_20", "20_100", "100_500", "500_up")
+        expected = {
+            "name": "walker",
+            "floating_base": True,
+            "joints": 5,
+            "links": 6,
+            "links_with_surface": 4,
+            "rate_hz": 1000.0,
+            **{f"share_{term}": found.terms[:, at].sum() for at, term in enumerate("ABC")},
+            "kind": KINDS[kind],
+            "reference": "normal",
+            "correlation": found.correlation[kind, 1],
+            "distance_db": found.distance[kind, 1],
+            **{f"distance_{n}_db": np.sqrt(b.mean()) for n, b in zip(names, bands, strict=True)},
+            "contrast_jerk_db": (one.contrast[kind, 0] + one.contrast[kind, 2]) / 2,
+            "contrast_oscillations_db": np.nan,
+            "contrast_fall_db": one.contrast[kind, 1],
+            "loudest_share": found.shares[kind].max(),
+            "loudest_link": found.names[found.shares[kind].argmax()],
+        }
+        assert list(table[3 + kind]) == list(expected)
+        for name, value in table[3 + kind].items():
+            text = isinstance(value, str)
+            wanted = expected[name]
+            assert value == (wanted if text else pytest.approx(wanted, rel=1e-12, nan_ok=True))
