@@ -1,6 +1,7 @@
 """Runs on the workers of a Dask scheduler: a real one, on this machine."""
 
 import json
+import logging
 import multiprocessing
 import os
 import shutil
@@ -8,10 +9,13 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 from contextlib import contextmanager
 from pathlib import Path
+from types import ModuleType
 
 import pytest
+import threadpoolctl  # which sets an environment variable
 from commandline import call
 from test_inspector_tune import OPTIONS, write_log
 
@@ -359,3 +363,244 @@ def test_a_worker_calls_a_function_where_and_as_its_client_would(tmp_path, monke
     with pytest.raises(ClusterError, match=rf"a worker has no folder {tmp_path}/gone; it must see"):
         cluster._called(seen, 7, gone)
     assert (dict(os.environ), Path.cwd()) == (before, folder)
+
+
+class CancelledError(Exception):
+    pass
+
+
+class KilledWorker(Exception):  # noqa: N818 - Dask's name
+    def __init__(self, task):
+        self.task = task
+
+
+class Task:
+    """A future of a scheduler."""
+
+    def __init__(self, key, function, arguments):
+        self.key, self._function, self._arguments = key, function, arguments
+        self.killed = None
+
+    def result(self):
+        if self.killed:
+            raise KilledWorker(self.killed)
+        own = [each.result() if isinstance(each, Task) else each for each in self._arguments]
+        return self._function(*own)
+
+    def add_done_callback(self, ready):
+        ready(self)
+
+
+class Scheduler(Fake):
+    """Stands in for `distributed` and its client: tasks are done here, where they are read."""
+
+    def __init__(self, monkeypatch, *, connects=None, staffed=None, **options):
+        super().__init__(**options)
+        self.connects, self.staffed, self.tasks, self.closed = connects, staffed, [], False
+        module = ModuleType("distributed")
+        module.Client = self.connect
+        module.CancelledError, module.KilledWorker = CancelledError, KilledWorker
+        monkeypatch.setitem(sys.modules, "distributed", module)
+        monkeypatch.setattr(cluster, "find_spec", lambda name: name)
+        self.levels = None
+
+    def connect(self, address, *, timeout, set_as_default):
+        self.levels = [logging.getLogger(f"distributed{name}").level for name in ("", ".client")]
+        assert (address, timeout, set_as_default) == ("tcp://here:1", cluster.REACHED, False)
+        if self.connects:
+            raise self.connects
+        return self
+
+    def wait_for_workers(self, count, timeout):
+        assert (count, timeout) == (1, cluster.STAFFED)
+        if self.staffed:
+            raise self.staffed
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.closed = True
+
+    def submit(self, function, *arguments, pure):
+        assert not pure  # else one call of two alike would do for both
+        if function is cluster._itself:
+            warnings.warn("Sending large graph of size 20 MiB", stacklevel=1)
+        task = Task(f"task{len(self.tasks)}", function, arguments)
+        self.tasks.append(task)
+        return task
+
+    def of(self, item):
+        """The tasks of an item, in the order in which they were submitted."""
+        return [t for t in self.tasks if t._function is cluster._called and t._arguments[1] == item]
+
+    def kills(self, item, *, times, of_function=False):
+        """Let an item, or the function that it waits for, kill its workers so many times."""
+        submit = self.submit
+
+        def killing(function, *arguments, pure):
+            task = submit(function, *arguments, pure=pure)
+            if task in self.of(item)[:times]:
+                task.killed = arguments[0].key if of_function else task.key
+            return task
+
+        self.submit = killing
+
+
+def square(number):
+    return number**2
+
+
+def named(number):
+    return f"{number} died"
+
+
+def found_by(scheduler, items, function=square):
+    """What a cluster finds, by item; each item once."""
+    found = list(cluster.on_cluster(function, items, address="tcp://here:1", died=named, poll=0.01))
+    assert sorted(index for index, _ in found) == list(range(len(items)))
+    assert scheduler.closed
+    return {items[index]: result for index, result in found}
+
+
+def test_items_are_done_on_a_cluster_with_the_settings_of_the_client(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "7")
+    monkeypatch.setenv("OTHER", "here")
+    limits = []
+
+    @contextmanager
+    def limited(threads):
+        limits.append(threads)
+        yield
+
+    monkeypatch.setattr(threadpoolctl, "threadpool_limits", limited)
+    scheduler = Scheduler(monkeypatch)
+    assert found_by(scheduler, [3, 5, 7]) == {3: 9, 5: 25, 7: 49}
+    client = scheduler.of(5)[0]._arguments[2]
+    assert client.folder == str(tmp_path)
+    assert client.variables["NOISE_LIMIT_JOINTS"] == "7"
+    assert "OTHER" not in client.variables
+    assert client.software == cluster._software()
+    assert limits == [1, 1, 1]
+    assert len(scheduler.tasks) == 4  # the function is sent once
+    assert list(in_order(square, [4, 2], jobs="tcp://here:1", died=named)) == [16, 4]
+
+
+def test_without_items_no_scheduler_is_asked(monkeypatch):
+    assert list(cluster.on_cluster(square, [], address="", died=named, poll=0.01)) == []
+
+
+@pytest.mark.parametrize(("times", "result"), [(0, 25), (1, 25), (2, "5 died")])
+def test_an_item_that_kills_its_workers_is_tried_once_more_alone(monkeypatch, times, result):
+    scheduler = Scheduler(monkeypatch)
+    scheduler.kills(5, times=times)
+    assert found_by(scheduler, [3, 5, 7, 9]) == {3: 9, 5: result, 7: 49, 9: 81}
+    assert len(scheduler.of(5)) == 1 + (times > 0)
+    assert len(scheduler.of(3)) == len(scheduler.of(9)) == 1
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_items_whose_function_kills_workers_wait_for_it_again_and_are_suspected_last(
+    monkeypatch, times
+):
+    """Where it is lost for all that wait, they are tried one by one, and then named."""
+    scheduler = Scheduler(monkeypatch)
+    for item in (5, 9):
+        scheduler.kills(item, times=times, of_function=True)
+    assert found_by(scheduler, [3, 5, 7, 9]) == {3: 9, 5: 25, 7: 49, 9: 81}
+    assert [len(scheduler.of(item)) for item in (3, 5, 7, 9)] == [1, 1 + times, 1, 1 + times]
+    lost = Scheduler(monkeypatch)
+    lost.kills(5, times=3, of_function=True)
+    assert found_by(lost, [3, 5, 7]) == {3: 9, 5: "5 died", 7: 49}
+    assert len(lost.of(5)) == 3
+
+
+def test_while_no_result_comes_none_is_found_and_the_scheduler_is_asked(monkeypatch):
+    """A scheduler may be without workers for a minute, counted from when it last had one."""
+    scheduler, now, callbacks = Scheduler(monkeypatch), [1000.0], []
+    monkeypatch.setattr(cluster, "monotonic", lambda: now[0])
+    monkeypatch.setattr(Task, "add_done_callback", lambda task, ready: callbacks.append(ready))
+    found = cluster.on_cluster(square, [3, 5], address="tcp://here:1", died=named, poll=0.001)
+    assert next(found) is None
+    callbacks[1](scheduler.of(5)[0])
+    assert next(found) == (1, 25)
+    now[0] += 100.0
+    assert next(found) is None
+    scheduler._workers = ()
+    now[0] += 60.0
+    assert next(found) is None
+    now[0] += 0.1
+    with pytest.raises(ClusterError, match=r"^tcp://here:1: the Dask scheduler has lost all its w"):
+        next(found)
+    assert scheduler.closed
+
+
+def test_an_error_of_an_item_is_raised_unless_its_worker_has_other_software(monkeypatch):
+    scheduler = Scheduler(monkeypatch)
+    with pytest.raises(ZeroDivisionError, match="division by zero"):
+        found_by(scheduler, [1, 0], invert)
+    other = Scheduler(monkeypatch)
+
+    def late(number):
+        other._versions = {("one", "numpy"): "0.0.1"}
+        return 1 / number
+
+    with pytest.raises(
+        ClusterError, match=r"worker one has numpy 0\.0\.1, here is .* same on all$"
+    ):
+        found_by(other, [0], late)
+
+    def closing(number):
+        late(1)
+        other.status = "closed"
+        return 1 / number
+
+    other._versions = {}
+    with pytest.raises(ZeroDivisionError, match="division by zero"):
+        found_by(other, [0], closing)
+
+    def cancelled(number):
+        raise CancelledError
+
+    other._versions = {}
+    with pytest.raises(ClusterError, match="the connection to the Dask scheduler is lost"):
+        found_by(other, [0], cancelled)
+
+
+def test_messages_of_dask_are_left_out_while_there_is_a_client_and_no_longer(monkeypatch):
+    loggers = [logging.getLogger(f"distributed{name}") for name in ("", ".client")]
+    for logger, level in zip(loggers, (logging.INFO, logging.ERROR), strict=True):
+        monkeypatch.setattr(logger, "level", level)
+    none = "tcp://here:1: the Dask scheduler has no worker after 60 s; start some with"
+    for options, said in (
+        ({}, ""),
+        ({"connects": OSError("refused")}, "tcp://here:1: no Dask scheduler answers there; start"),
+        ({"connects": ValueError("wrong")}, "tcp://here:1: no Dask scheduler answers there; start"),
+        ({"staffed": TimeoutError()}, f"{none} `dask worker tcp://here:1 --nthreads 1`"),
+    ):
+        scheduler = Scheduler(monkeypatch, **options)
+        if said:
+            with pytest.raises(ClusterError, match=f"^{said}"):
+                found_by(scheduler, [3])
+        else:
+            found_by(scheduler, [3])
+        assert min(scheduler.levels) > logging.CRITICAL
+        assert [logger.level for logger in loggers] == [logging.INFO, logging.ERROR]
+
+
+@pytest.mark.parametrize("address", ["here:1", "tcp://here", "tcp://here:", "tcp://:1", "://h:1"])
+def test_an_address_has_a_protocol_a_host_and_a_port(monkeypatch, address):
+    Scheduler(monkeypatch)
+    with pytest.raises(ClusterError, match=rf"^'{address}' is no address of a Dask scheduler, tcp"):
+        list(cluster.on_cluster(square, [3], address=address, died=named, poll=0.01))
+
+
+def test_software_that_is_run_from_its_folder_has_no_version(monkeypatch):
+    def version(name):
+        if name == "noise-inspector":
+            raise cluster.PackageNotFoundError(name)
+        return "9.9"
+
+    monkeypatch.setattr(cluster, "version", version)
+    assert cluster._software.__wrapped__() == {"noise-inspector": "none", "numpy": "9.9"}
