@@ -103,7 +103,7 @@ def polled(
     if min(jobs, len(items)) < 2 or work < (FORKED if _forks() else FRESH):
         yield from enumerate(map(function, items))
         return
-    jobs = max(1, min(jobs, len(items)))
+    jobs = min(jobs, len(items))
     waiting = list(range(len(items)))[::-1]
     suspects: list[int] = []
     while waiting or suspects:
