@@ -394,9 +394,10 @@ class Task:
 class Scheduler(Fake):
     """Stands in for `distributed` and its client: tasks are done here, where they are read."""
 
-    def __init__(self, monkeypatch, *, connects=None, staffed=None, **options):
+    def __init__(self, monkeypatch, *, connects=None, staffed=None, kind="item", **options):
         super().__init__(**options)
-        self.connects, self.staffed, self.tasks, self.closed = connects, staffed, [], False
+        self.connects, self.staffed, self.kind = connects, staffed, kind
+        self.tasks, self.closed = [], False
         module = ModuleType("distributed")
         module.Client = self.connect
         module.CancelledError, module.KilledWorker = CancelledError, KilledWorker
@@ -426,7 +427,8 @@ class Scheduler(Fake):
         assert not pure  # else one call of two alike would do for both
         if function is cluster._itself:
             warnings.warn("Sending large graph of size 20 MiB", stacklevel=1)
-        task = Task(f"task{len(self.tasks)}", function, arguments)
+        kind = "m" if function is cluster._itself else self.kind
+        task = Task(f"{kind}{len(self.tasks)}", function, arguments)
         self.tasks.append(task)
         return task
 
@@ -491,9 +493,10 @@ def test_without_items_no_scheduler_is_asked(monkeypatch):
     assert list(cluster.on_cluster(square, [], address="", died=named, poll=0.01)) == []
 
 
+@pytest.mark.parametrize("kind", ["a", "z"])
 @pytest.mark.parametrize(("times", "result"), [(0, 25), (1, 25), (2, "5 died")])
-def test_an_item_that_kills_its_workers_is_tried_once_more_alone(monkeypatch, times, result):
-    scheduler = Scheduler(monkeypatch)
+def test_an_item_that_kills_its_workers_is_tried_once_more_alone(monkeypatch, times, result, kind):
+    scheduler = Scheduler(monkeypatch, kind=kind)
     scheduler.kills(5, times=times)
     assert found_by(scheduler, [3, 5, 7, 9]) == {3: 9, 5: result, 7: 49, 9: 81}
     assert len(scheduler.of(5)) == 1 + (times > 0)
