@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from noisemodel import Block, Run, RunError, decimated
+from noisemodel import Block, Run, RunError, decimated, ondemand
+from noisemodel.ondemand import OnDemand
 
 
 def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
@@ -83,3 +86,43 @@ def test_a_rate_is_never_raised():
 def test_too_little_motion_is_refused():
     with pytest.raises(RunError, match="0.001 s of motion are too short for 1000 Hz"):
         decimated(run_of(20.0, seconds=0.001), 1000.0)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1000.0])
+def test_a_lower_rate_is_above_zero(rate):
+    with pytest.raises(RunError, match=f"^a run of 10000 Hz cannot be decimated to {rate:g} Hz$"):
+        decimated(run_of(20.0), rate)
+
+
+def test_two_samples_are_left_at_least():
+    assert len(decimated(run_of(20.0, seconds=0.002), 1000.0).time) == 2
+    with pytest.raises(RunError, match=r"^0.0019 s of motion are too short for 1000 Hz$"):
+        decimated(run_of(20.0, seconds=0.0019), 1000.0)
+
+
+@pytest.mark.parametrize("gap", [0, 7, 150, 2995, 2999])
+def test_ten_samples_to_either_side_of_a_gap_are_not_valid(gap):
+    valid = np.ones(30_000, dtype=bool)
+    valid[10 * gap + 3] = False
+    slow = decimated(run_of(20.0, valid=valid), 1000.0)
+    lost = np.flatnonzero(~slow.valid)
+    assert lost.tolist() == [*range(max(0, gap - 10), min(3000, gap + 11))]
+    assert (slow.velocity[lost] == 0.0).all()
+
+
+@pytest.mark.parametrize(("up", "down"), [(1, 3), (2, 5), (1, 25), (4, 5)])
+def test_rows_that_are_decimated_on_demand_are_those_of_the_whole(monkeypatch, up, down):
+    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 30)
+    run = run_of(90.0, rate=1000, seconds=0.503, valid=np.arange(503) != 300)
+    shifted = replace(run, velocity=run.velocity + 3.0 + np.linspace(0.0, 5.0, 503)[:, None])
+    there = OnDemand((503, 1), np.float64, lambda first, stop: shifted.velocity[first:stop])
+    whole = decimated(shifted, 1000.0 * up / down)
+    kept = decimated(replace(shifted, velocity=there), 1000.0 * up / down)
+    assert isinstance(kept.velocity, OnDemand)
+    samples = 503 * up // down
+    assert kept.velocity.shape == whole.velocity.shape == (samples, 1)
+    for first in (0, 1, 2, 3, 7, samples // 2, samples - 5, samples - 1):
+        for stop in (first, first + 1, first + 4, samples):
+            found = kept.velocity[first:stop]
+            np.testing.assert_allclose(found, whole.velocity[first:stop], atol=1e-12)
+    np.testing.assert_array_equal(kept.valid, whole.valid)

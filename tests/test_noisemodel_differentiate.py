@@ -3,7 +3,8 @@ import pinocchio as pin
 import pytest
 
 from noisemodel import Run, RunFileError
-from noisemodel.differentiate import METHOD, base_velocity, joint_velocity, stretches
+from noisemodel.differentiate import METHOD, base_velocity, fill_in, joint_velocity, stretches
+from noisemodel.ondemand import OnDemand
 
 RATE = 1000.0
 TIME = np.arange(2000) / RATE
@@ -132,3 +133,60 @@ def test_positions_that_cannot_be_differentiated_are_refused(tmp_path, arrays, m
     np.savez(tmp_path / "run.npz", time=TIME, **arrays)
     with pytest.raises(RunFileError, match=message):
         Run.load(tmp_path / "run.npz")
+
+
+@pytest.mark.parametrize("derivative", [joint_velocity, base_velocity])
+def test_rows_that_are_differentiated_on_demand_are_those_of_the_whole(derivative):
+    time, read = TIME[:60], []
+    pose, _ = tumble(time)
+    pose[30:, 3:] *= -1
+    valid = np.ones(60, dtype=bool)
+    valid[[7, 20, 23, 40, 41]] = False
+    whole = derivative(time, pose, valid)
+
+    def rows(first, stop):
+        assert 0 <= first <= stop <= 60
+        read.append((first, stop))
+        return pose[first:stop]
+
+    kept = derivative(time, OnDemand((60, 7), np.float64, rows), valid)
+    assert isinstance(kept, OnDemand)
+    assert (kept.shape, kept.dtype) == (whole.shape, np.float64)
+    for first in range(0, 60, 3):
+        for stop in (first + 1, first + 5, 60):
+            found = kept[first:stop]
+            np.testing.assert_allclose(found, whole[first:stop], atol=1e-9)
+    assert max(stop - first for first, stop in read[::3]) <= 1 + 2 * 7
+    without = derivative(time, OnDemand((60, 7), np.float64, rows))
+    np.testing.assert_allclose(without[10:20], derivative(time, pose)[10:20], atol=1e-9)
+
+
+def test_a_base_on_a_straight_and_level_way_has_the_velocity_along_its_own_axes():
+    """A quarter turn about z: what is x in the world is -y of the base."""
+    pose = np.tile([0, 0, 0, 0, 0, np.sqrt(0.5), np.sqrt(0.5)], (20, 1))
+    pose[:, :3] = np.outer(TIME[:20], [2.0, 3.0, 5.0])
+    expected = np.tile([3.0, -2.0, 5.0, 0, 0, 0], (20, 1))
+    np.testing.assert_allclose(base_velocity(TIME[:20], pose), expected, atol=1e-9)
+    np.testing.assert_allclose(base_velocity(TIME[:20], 1.005 * pose), 1.005 * expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 6, 7, 8])
+def test_a_parabola_is_differentiated_exactly_by_seven_samples_and_inside_by_fewer(samples):
+    time = np.arange(samples) / 4
+    found = joint_velocity(time, 0.1 * time[:, None] ** 2)[:, 0]
+    exact = slice(None) if samples >= 7 else slice(1, -1)
+    np.testing.assert_allclose(found[exact], 0.2 * time[exact], atol=1e-12)
+    assert (abs(found[0]) > 0.02) == (samples < 7)
+
+
+def test_what_is_missing_is_filled_in_and_its_method_told():
+    time, position = TIME[:20], np.outer(TIME[:20], [3.0])
+    signals = {"time": time, "velocity": position, "position_desired": 2 * position}
+    filled, how = fill_in(signals)
+    assert set(filled) == {*signals, "velocity_desired"}
+    np.testing.assert_allclose(filled["velocity_desired"], 6.0)
+    assert how == {"velocity_desired": "Savitzky-Golay, window 7, order 3"}
+    assert filled["velocity"] is position
+    filled, how = fill_in({"time": time, "position": position, "valid": time != time[2]})
+    assert filled["velocity"][:4, 0].round(9).tolist() == [3.0, 3.0, 0.0, 3.0]
+    assert set(how) == {"velocity"}
