@@ -1,3 +1,5 @@
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 from chains import BAR, chain, motion
@@ -10,7 +12,9 @@ from noisemodel import (
     UnknownKindError,
     compare,
     extended,
+    simplified,
 )
+from noisemodel.estimates import check_length
 from noisemodel.similarity import (
     contrasts,
     correlation,
@@ -214,3 +218,58 @@ def test_the_surface_of_another_robot_is_refused(panda, tmp_path):
     robot = chain(tmp_path, "revolute")
     with pytest.raises(GeometryError, match="which has 1"):
         compare(robot, *motion(robot, samples=200), rate=RATE, surface=panda[1])
+
+
+@pytest.mark.parametrize(
+    ("samples", "rate", "fits"),
+    [
+        (1024, 10_000.0, True),
+        (1023, 10_000.0, False),
+        (4, 40.0, True),
+        (3, 40.0, False),
+        (100, 34.0, False),
+    ],
+)
+def test_a_motion_has_one_spectrum_at_least_of_four_samples(samples, rate, fits):
+    text = rf"^{samples} samples at {rate:g} Hz, expected 0\.1024 s at least and 40 Hz$"
+    with nullcontext() if fits else pytest.raises(NoiseModelError, match=text):
+        check_length(samples, rate)
+
+
+def test_envelopes_are_root_mean_squares_of_20_milliseconds(tmp_path):
+    robot = chain(tmp_path, "revolute", "prismatic")
+    q, v = swinging(robot, samples=1990)
+    found = compare(robot, q, v, ["simplified", "mean", "rms"], rate=RATE)
+    surface = Surface.of(robot)
+    power = [simplified(v) ** 2]
+    power += [extended(robot, surface, q, v, kind).power.sum(axis=1) for kind in ("mean", "rms")]
+    rms = np.sqrt(np.array(power)[:, :1980].reshape(3, 99, 20).mean(axis=2))
+    np.testing.assert_allclose(found.correlation, np.corrcoef(rms), rtol=1e-9)
+    np.testing.assert_allclose(found.frequency, np.arange(52) * RATE / 102)
+
+
+def test_motions_are_estimated_in_chunks_as_whole(tmp_path, monkeypatch):
+    robot = chain(tmp_path, "revolute", "prismatic", floating_base=True)
+    q, v = motion(robot, samples=200)
+    whole = compare(robot, q, v, rate=RATE)
+    monkeypatch.setattr("noisemodel.estimates.CHUNK", 7)
+    chunks = compare(robot, q, v, rate=RATE)
+    for name in ("correlation", "distance", "shares", "terms"):
+        np.testing.assert_allclose(getattr(chunks, name), getattr(whole, name), rtol=1e-9)
+    squares = np.mean(v**2, axis=0)
+    shares = np.array([squares[:6].sum(), squares[6], squares[7]]) / squares.sum()
+    np.testing.assert_allclose(whole.shares[0], shares, rtol=1e-12)
+
+
+def test_q_v_and_their_rate_belong_together(tmp_path):
+    robot = chain(tmp_path, "revolute")
+    q, v = swinging(robot)
+    whole = {"q": q, "v": v, "rate": RATE}
+    assert compare(robot, **whole).kinds == ("simplified", "C", "paper", "mean", "rms", "normal")
+    for name in ("q", "v", "rate"):
+        with pytest.raises(NoiseModelError, match="^expected q, v and their rate, and no other mo"):
+            compare(robot, **{key: each for key, each in whole.items() if key != name})
+    with pytest.raises(NoiseModelError, match="^expected q, v and their rate, and no other mo"):
+        compare(robot, **whole, motion="excitation")
+    with pytest.raises(NoiseModelError, match=r"^q and v are given; expected one Robot, or motion"):
+        compare([robot], **whole)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chains import chain, motion
+from chains import BAR, chain, motion
 
 from noisemodel import (
     Block,
@@ -24,11 +24,13 @@ from noisemodel import (
     UnknownMotionError,
     compare,
     estimates,
+    motions,
     parallel,
 )
 from noisemodel.comparison import BANDS, Comparison, RobotComparison
 from noisemodel.comparisons import medians
 from noisemodel.excitation import excitation
+from noisemodel.links import vibrating
 from noisemodel.similarity import log_spectra
 
 FEW = ("simplified", "C", "paper", "normal")
@@ -688,3 +690,62 @@ def test_a_row_of_an_arrow_table_has_the_numbers_of_its_kind():
             text = isinstance(value, str)
             wanted = expected[name]
             assert value == (wanted if text else pytest.approx(wanted, rel=1e-12, nan_ok=True))
+
+
+def test_the_contrast_of_an_event_is_its_mean_power_over_that_outside_of_all(tmp_path):
+    """Events last from their start to before their stop; the slow motion is left out."""
+    robot = chain(tmp_path, "revolute", "prismatic")
+    events = (Block(1.0, 1.5, "jerk"), Block(1.5, 1.50025, "fall"), Block(3.0, 4.0, "jerk"))
+    found = alone(saved(tmp_path, robot, blocks=(Block(0.5, 0.9, "ok"), *events)))
+    assert found.events == events
+    power = vibrating(found.pressure.T, np.ones(len(found.time), dtype=bool), 4000.0).T ** 2
+    rest = np.ones(len(found.time), dtype=bool)
+    means = []
+    for first, stop in ((4000, 6000), (6000, 6001), (12_000, 16_000)):
+        rest[first:stop] = False
+        means.append(power[:, first:stop].mean(axis=1))
+    expected = 10 * np.log10(np.array(means).T / power[:, rest].mean(axis=1, keepdims=True))
+    np.testing.assert_allclose(found.contrast, expected, rtol=1e-9)
+    np.testing.assert_allclose(found.by_label(1, ["jerk"]), expected[1, [0, 2]].mean(), rtol=1e-9)
+
+
+def test_the_motion_is_the_excitation_of_seed_0_at_4000_hertz_unless_another_is_named(
+    urdfs, thrice
+):
+    found = alone(urdfs[1], THREE)
+    np.testing.assert_array_equal(found.pressure, thrice[0].pressure)
+    assert not np.array_equal(found.pressure, thrice[1].pressure)
+    slow = alone(urdfs[0], THREE, rate=1000.0)
+    assert (found.rate, slow.rate) == (4000.0, 1000.0)
+    assert len(slow.time) * 4 == len(found.time)
+
+
+def test_of_equal_stretches_the_first_is_compared_with_the_blocks_that_lie_in_it(tmp_path):
+    robot = chain(tmp_path, "revolute", shapes=[""])
+    run = excitation(robot)
+    valid = np.ones(len(run.time), dtype=bool)
+    valid[[0, *range(8001, 8011), *range(16_011, len(run.time))]] = False  # two of 8000 samples
+    edges = run.time[[1, 8000]]
+    blocks = (
+        Block(run.time[0], 0.1, "jerk"),
+        Block(edges[0] + 0.2, 0.3, "ok"),
+        Block(0.3, 0.4, "jerk"),
+        Block(1.5, edges[1], "fall"),
+        Block(edges[1], 2.2, "jerk"),
+    )
+    signals = {"velocity": run.velocity * valid[:, None], "position": run.position * valid[:, None]}
+    moving = motions._measured(run, dataclasses.replace(run, valid=valid, blocks=blocks, **signals))
+    assert (len(moving.time), moving.time[0], moving.time[-1]) == (8000, *edges)
+    assert [event.label for event in moving.events] == ["jerk", "fall"]
+    assert moving.remarks == ("The run has gaps: compared from 0.00 s on.",)
+    whole = motions._longest(dataclasses.replace(run, blocks=(Block(*edges, "fall"),)))
+    assert len(whole.blocks) == 1
+
+
+def test_a_robot_that_stands_still_and_has_a_link_without_a_surface_is_compared(tmp_path):
+    robot = chain(tmp_path, "revolute", "revolute", shapes=["", BAR])
+    q = np.zeros((500, 2))
+    found = alone(robot, motion=(q, q), rate=1000.0, surface="visual")
+    assert (found.links_with_surface, len(found.comparison.names)) == (1, 2)
+    assert not found.pressure.any()
+    assert found.time[[0, 1, -1]].tolist() == [0.0, 0.001, 0.499]
