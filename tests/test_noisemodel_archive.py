@@ -233,3 +233,20 @@ def test_a_text_is_a_regular_file_in_utf_8_of_some_length(tmp_path, monkeypatch)
 def test_the_words_of_an_error_are_one_line_and_its_name_if_it_has_none():
     assert archive.one_line(ValueError("a\n  b ")) == "a b"
     assert archive.one_line(EOFError()) == "EOFError"
+
+
+def test_a_text_has_64_mebibytes_at_most(tmp_path):
+    path = tmp_path / "a.urdf"
+    path.touch()
+    os.truncate(path, 64 * 2**20)
+    assert len(archive.read_text(path)) == 64 * 2**20
+    os.truncate(path, 64 * 2**20 + 1)
+    with refused("67108865 bytes, the limit is 67108864"):
+        archive.read_text(path)
+
+
+@pytest.mark.parametrize("columns", [2**62, 2**64, 10**30])
+def test_an_empty_array_of_more_columns_than_can_be_is_refused(tmp_path, columns):
+    path = packed(tmp_path / "a.npz", a=stated(f"(0, {columns})"))
+    with refused(f"damaged: a states shape (0, {columns})"):
+        archive.read(path)

@@ -1,4 +1,7 @@
+import fcntl
+import hashlib
 import os
+import platform
 import subprocess
 import sys
 import time
@@ -8,7 +11,7 @@ import pytest
 
 from models import modelfile
 from noisemodel import OutputError
-from noisemodel.atomic import _sweep, refuse_existing, replacing
+from noisemodel.atomic import _machine, _sweep, refuse_existing, replacing
 
 ROOT = Path(__file__).parents[1]
 
@@ -201,3 +204,62 @@ def test_the_temporary_file_of_a_process_that_waits_for_days_is_kept(tmp_path):
         write(tmp_path / "other.txt", "of today")
         assert temporary.exists()
     assert (tmp_path / "out.txt").read_text() == "of last week"
+
+
+@pytest.mark.parametrize(
+    ("machine", "age", "kept"),
+    [
+        ("", 86_000, True),
+        ("", 87_000, False),
+        ("0123abcd", 86_000, True),
+        ("0123abcd", 87_000, False),
+        ("own", 50, True),
+        ("own", 65, False),
+    ],
+)
+def test_a_file_is_abandoned_after_a_minute_here_and_after_a_day_elsewhere(
+    tmp_path, machine, age, kept
+):
+    machine = _machine() if machine == "own" else machine
+    temporary = tmp_path / f".noise-inspector-{machine}4567abcd"
+    temporary.touch()
+    os.utime(temporary, (time.time() - age,) * 2)
+    write(tmp_path / "out.txt", "")
+    assert temporary.exists() == kept
+
+
+def test_without_locks_age_alone_decides(tmp_path, monkeypatch):
+    def unsupported(*_):
+        raise OSError(37, "No locks available")
+
+    old, fresh = (tmp_path / f".noise-inspector-{each}4567abcd" for each in ("", "0123abcd"))
+    for temporary in (old, fresh):
+        temporary.touch()
+    os.utime(old, (time.time() - 90_000,) * 2)
+    monkeypatch.setattr(fcntl, "flock", unsupported)
+    write(tmp_path / "out.txt", "whole")
+    assert sorted(tmp_path.iterdir()) == sorted([fresh, tmp_path / "out.txt"])
+    assert (tmp_path / "out.txt").read_text() == "whole"
+
+
+def test_a_machine_is_known_by_its_start_or_by_its_name(monkeypatch):
+    def lacking(path):
+        raise FileNotFoundError(path)
+
+    started = Path("/proc/sys/kernel/random/boot_id")
+    if started.exists():
+        assert _machine() == hashlib.sha256(started.read_bytes()).hexdigest()[:8]
+    monkeypatch.setattr(Path, "read_text", lacking)
+    monkeypatch.setattr(platform, "node", lambda: "robot")
+    assert _machine.__wrapped__() == hashlib.sha256(b"robot").hexdigest()[:8]
+
+
+def test_without_hard_links_a_file_is_written_and_replaced_only_if_asked(tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "link", without_links)
+    write(tmp_path / "out.txt", "first")
+    with pytest.raises(OutputError, match=r"out\.txt: exists already"):
+        write(tmp_path / "out.txt", "second")
+    assert (tmp_path / "out.txt").read_text() == "first"
+    write(tmp_path / "out.txt", "second", overwrite=True)
+    assert (tmp_path / "out.txt").read_text() == "second"
+    assert os.listdir(tmp_path) == ["out.txt"]

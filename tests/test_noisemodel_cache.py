@@ -1,5 +1,7 @@
 import hashlib
 import io
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -115,3 +117,59 @@ def test_nothing_but_the_archive_is_left_behind(home):
     assert len(list(home.iterdir())) == 1
     with np.load(home / "a-1.npz", allow_pickle=False) as archive:
         assert_made(dict(archive))
+
+
+def test_the_secret_is_the_users_alone(home):
+    make, secret = Maker(), home.parent / "secret"
+    cached("a-1", make)
+    assert (secret.stat().st_mode & 0o777, len(secret.read_bytes())) == (0o600, 32)
+    for bit in (0o1, 0o2, 0o4, 0o10, 0o20, 0o40):
+        secret.chmod(0o600 | bit)
+        assert_made(cached("a-1", make))
+    assert make.calls == 7
+    for mode in (0o400, 0o600, 0o700):
+        secret.chmod(mode)
+        cached("a-1", make)
+    assert make.calls == 7
+
+
+@pytest.mark.parametrize("difference", [-1, 1])
+def test_the_secret_of_another_user_is_not_taken(monkeypatch, difference):
+    make, user = Maker(), os.getuid()
+    cached("a-1", make)
+    monkeypatch.setattr(os, "getuid", lambda: user + difference)
+    assert_made(cached("a-1", make))
+    assert make.calls == 2
+
+
+@pytest.mark.parametrize("length", [0, 31, 33])
+def test_a_secret_that_is_being_written_is_not_taken(home, length):
+    make = Maker()
+    cached("a-1", make)
+    (home.parent / "secret").write_bytes(bytes(length))
+    for calls in (2, 3):
+        assert_made(cached("a-1", make))
+        assert make.calls == calls
+
+
+def test_another_secret_or_another_name_is_of_somebody_else(home):
+    make = Maker()
+    cached("a-1", make)
+    (home / "a-2.npz").write_bytes((home / "a-1.npz").read_bytes())
+    cached("a-2", make)
+    assert make.calls == 2
+    (home.parent / "secret").write_bytes(bytes(32))
+    cached("a-1", make)
+    assert make.calls == 3
+
+
+def test_without_a_home_folder_nothing_is_kept(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", homeless)
+    make = Maker()
+    for _ in range(2):
+        assert_made(cached("a-1", make))
+    assert make.calls == 2

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from chains import BAR, chain, motion
 
 from noisemodel import Robot, Run, Surface, extended
-from noisemodel.linkpower import by_moments, second_moments
+from noisemodel.linkpower import by_moments, by_samples, second_moments
 from noisemodel.links import link_noise
 
 SIZE = 20
@@ -105,3 +106,48 @@ def test_a_bin_that_begins_in_a_gap_takes_the_pose_of_its_valid_part(solo, kind,
     holed = Run(valid=valid, **signals, **run)
     found, expected = link_noise(holed, kind).power, link_noise(whole, kind).power
     np.testing.assert_allclose(found[10], expected[10])
+
+
+@pytest.mark.parametrize("chunk", [4, 25, 1000])
+def test_power_of_samples_is_averaged_in_bins_whatever_the_chunks(tmp_path, monkeypatch, chunk):
+    monkeypatch.setattr("noisemodel.linkpower.CHUNK", chunk)
+    robot = chain(tmp_path, "revolute", "prismatic")
+    q, v = motion(robot, samples=95)
+    valid = np.ones(95, dtype=bool)
+    valid[[*range(20, 30), 33, 41, 42]] = False
+    run = Run(
+        time=np.arange(95) / 1000,
+        velocity=v * valid[:, None],
+        position=q * valid[:, None],
+        joint_names=robot.joint_names,
+        valid=valid,
+    )
+    surface = Surface.of(robot)
+    power = extended(robot, surface, *robot.configuration(run), "paper").power * valid[:, None]
+    parts = [slice(first, first + 10) for first in range(0, 95, 10)]
+    expected = [power[part].sum(axis=0) / max(valid[part].sum(), 1) for part in parts]
+    found = by_samples(robot, surface, run, "paper", np.array([*range(0, 95, 10), 95]))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert not found[2].any()
+
+
+def test_power_of_moments_is_that_of_each_link_with_a_surface_and_of_each_motion(tmp_path):
+    robot = chain(tmp_path, "revolute", "prismatic", "revolute", shapes=[BAR, "", BAR])
+    surface = Surface.of(robot)
+    q, v = motion(robot, samples=5)
+    motions = [("rms", v), ("normal", v), ("normal", -2 * v)]
+    moments = [(kind, each[:, :, None] * each[:, None]) for kind, each in motions]
+    for (kind, each), found in zip(motions, by_moments(robot, surface, q, moments), strict=True):
+        np.testing.assert_allclose(found, extended(robot, surface, q, each, kind).power, rtol=1e-9)
+        assert (found > 0).any(axis=0).tolist() == [True, False, True]
+
+
+def test_the_last_bin_of_moments_may_be_shorter_and_counts_its_own_samples():
+    random = np.random.default_rng(0)
+    velocity, valid = random.normal(size=(47, 3)), np.ones(47, dtype=bool)
+    valid[[3, 40, 44]] = False
+    parts = [slice(0, 20), slice(20, 40), slice(40, 47)]
+    expected = [np.cov(velocity[p][valid[p]].T, bias=True) for p in parts]
+    means = [velocity[p][valid[p]].mean(axis=0) for p in parts]
+    expected = [each + np.outer(mean, mean) for each, mean in zip(expected, means, strict=True)]
+    np.testing.assert_allclose(second_moments(velocity, valid, size=SIZE), expected, rtol=1e-12)
