@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from noisemodel import Block, Run, RunError
-from noisemodel.run import part
+from noisemodel import Block, Run, RunError, ondemand
+from noisemodel.ondemand import OnDemand
+from noisemodel.run import part, pieces_of
 
 TIME = np.arange(100) / 1000
 
@@ -250,3 +251,57 @@ def test_a_run_is_represented_in_one_line():
     line = "Run(panda, 2 joints, 100 samples at 1000 Hz, 0.1 s, 2 blocks)"
     assert repr(filled()) == line
     assert repr(run()) == "Run(no robot, 2 joints, 100 samples at 1000 Hz, 0.1 s, 0 blocks)"
+
+
+def test_a_cut_that_ends_before_it_begins_has_no_samples():
+    text = "0 samples from 0.05 s to 0.01 s, expected 2 at least; the run has 0 s to 0.099 s"
+    with pytest.raises(RunError, match=f"^{text}$"):
+        filled().cut(0.05, 0.01)
+    assert len(filled().cut(0.05, 0.0511).time) == 2
+
+
+def test_a_run_moves_by_joints_or_by_its_base():
+    base = run(velocity=np.zeros((100, 0)), joint_names=(), base_velocity=np.ones((100, 6)))
+    assert base.motion.shape == (100, 6)
+    text = "^joint_names: there are no joints, and the base does not move$"
+    with pytest.raises(RunError, match=text):
+        run(velocity=np.zeros((100, 0)), joint_names=())
+
+
+def test_the_motion_of_a_floating_base_comes_before_that_of_the_joints():
+    base, joints = np.random.default_rng(0).normal(size=(2, 100, 6))
+    whole = run(velocity=joints[:, :2], base_velocity=base)
+    np.testing.assert_array_equal(whole.motion, np.hstack((base, joints[:, :2])))
+
+    def on_demand(array):
+        return OnDemand(array.shape, array.dtype, lambda first, stop: array[first:stop])
+
+    for changes in (
+        {"velocity": on_demand(whole.velocity)},
+        {"base_velocity": on_demand(base.astype(np.float32))},
+        {"velocity": on_demand(whole.velocity), "base_velocity": on_demand(base)},
+    ):
+        kept = replace(whole, **changes).motion
+        assert isinstance(kept, OnDemand)
+        assert (kept.shape, kept.dtype) == ((100, 8), np.float64)
+        np.testing.assert_allclose(kept[7:13], whole.motion[7:13], rtol=1e-6)
+
+
+@pytest.mark.parametrize("samples", [1, 7, 99, 100, 101, None])
+def test_the_pieces_of_a_run_are_its_motion(monkeypatch, samples):
+    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 8 * 30 + 5)
+    whole = filled()
+    found = list(pieces_of(whole, samples=samples))
+    sizes = [len(piece.time) for piece in found]
+    assert set(sizes[:-1]) <= {samples or 30}
+    assert sizes[-1] == 100 - sum(sizes[:-1]) > 0
+    for name in ("time", "velocity", "velocity_desired", "effort", "base_velocity", "mask"):
+        joined = np.concatenate([getattr(piece, name) for piece in found])
+        np.testing.assert_array_equal(joined, getattr(whole, name))
+    for piece in found:
+        assert (piece.position, piece.position_desired, piece.base_pose) == (None, None, None)
+        assert (piece.rate, piece.robot, piece.meta) == (whole.rate, "panda", whole.meta)
+        assert (piece.joint_names, piece.desired_joint_names) == (("a", "b"), ("c", "d"))
+        assert (piece.blocks, piece.stages) == ((), {})
+    (alone,) = pieces_of(run())
+    assert (alone.effort, alone.base_velocity, alone.robot) == (None, None, None)

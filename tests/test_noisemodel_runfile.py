@@ -10,11 +10,13 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from noisemodel import Block, OutputError, Run, RunFileError, archive
+from noisemodel import Block, OutputError, Run, RunFileError, archive, runfile
+from noisemodel.ondemand import OnDemand
 
 TIME = np.arange(40) / 1000
 VELOCITY = np.ones((40, 2))
 BASE = {"time": TIME, "velocity": VELOCITY}
+TURNED = "expected (40, 2); samples come first, is it transposed?"
 NAMES = st.text(st.characters(categories=("L", "M", "N", "P", "S")), min_size=1, max_size=8)
 IN_PLACE = settings(
     deadline=None,
@@ -338,3 +340,110 @@ def test_the_same_run_is_the_same_file(tmp_path):
     one, other = saved(tmp_path), tmp_path / "other.npz"
     Run.load(one).save(other)
     assert other.read_bytes() == one.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("run.npz", ""),
+        ("run.txt", ""),
+        ("log.csv", "; `inspector import` makes a run of a CSV log"),
+        ("log.bag", ""),
+    ],
+)
+def test_a_csv_log_is_said_to_need_an_import(tmp_path, name, hint):
+    path = tmp_path / name
+    path.write_text("time,a\n")
+    with pytest.raises(RunFileError) as caught:
+        Run.load(path)
+    assert str(caught.value) == f"{path}: not a run file: File is not a zip file{hint}"
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        (BASE | {"velocity": VELOCITY.T}, f"velocity: shape (2, 40), {TURNED}"),
+        (BASE | {"velocity": VELOCITY[:9]}, "velocity: shape (9, 2), expected (40, 2)"),
+        (BASE | {"velocity": VELOCITY > 0}, "velocity holds bool, expected numbers"),
+        (BASE | {"robot": ["a"]}, "robot has shape (1,), expected (a single text)"),
+        (BASE | {"stage_x": TIME}, "stage_x has shape (40,), expected (samples, joints)"),
+        (
+            BASE | {"block_label": ["ok"]},
+            "block_start, block_stop and block_label have shapes (0,), (0,), (1,)",
+        ),
+        (BASE | {"format": "noise-run/2"}, "format 'noise-run/2', expected 'noise-run/1'"),
+        (BASE | {"meta": "3"}, "meta: expected a JSON object"),
+        (
+            BASE | {"meta": '{"differentiated": 3}'},
+            "meta: expected a JSON object as differentiated",
+        ),
+        (BASE | {"meta": '"\\ud800"'}, "meta: expected a JSON object"),
+        (BASE | {"meta": '{"a": "\\ud800"}'}, "meta: holds text that cannot be written as UTF-8"),
+        (BASE | {"meta": "[" * 10**5}, "meta: not JSON (nested too deeply)"),
+        (
+            {"robot": "a", "velocity": VELOCITY},
+            "array 'time' is missing; the file has robot, velocity",
+        ),
+        ({}, "array 'time' is missing; the file has nothing"),
+        (
+            {"time": TIME, "effort": VELOCITY},
+            "array 'velocity' is missing, and 'position' to differentiate too;"
+            " the file has time, effort",
+        ),
+    ],
+)
+def test_a_file_with_wrong_arrays_is_told_in_these_words(tmp_path, arrays, message):
+    np.savez(tmp_path / "run.npz", **arrays)
+    with pytest.raises(RunFileError) as caught:
+        Run.load(tmp_path / "run.npz")
+    assert str(caught.value) == f"{tmp_path / 'run.npz'}: {message}"
+
+
+@pytest.mark.parametrize(("name", "kind"), [("valid", "booleans"), ("stage_x", "numbers")])
+def test_an_array_that_is_none_should_hold_its_own_kind(tmp_path, name, kind):
+    np.savez(tmp_path / "run.npz", **BASE, **{name: None})
+    text = f"{name} holds a Python object, such as None; leave it out, or save {kind}$"
+    with pytest.raises(RunFileError, match=text):
+        Run.load(tmp_path / "run.npz")
+
+
+def test_lists_that_are_empty_are_no_names_and_no_blocks(tmp_path):
+    empty = {name: [] for name in ("desired_joint_names", "block_start", "block_label")}
+    counts = {"time": np.arange(40, dtype=np.uint16)}
+    np.savez(tmp_path / "run.npz", **(BASE | counts | empty), block_stop=np.zeros(0, dtype=int))
+    run = Run.load(tmp_path / "run.npz")
+    assert run.desired_joint_names == ("joint1", "joint2")
+    assert run.blocks == ()
+    assert run.rate == 1.0
+
+
+@pytest.mark.parametrize(
+    ("noise", "method"), [(0.7, zipfile.ZIP_DEFLATED), (0.9, zipfile.ZIP_STORED)]
+)
+def test_what_compression_makes_smaller_by_a_fifth_is_compressed(tmp_path, noise, method):
+    content = np.random.default_rng(0).integers(0, 256, (400, 1000), dtype=np.uint8)
+    content[:, int(1000 * noise) :] = 0
+    path = tmp_path / "run.npz"
+    runfile.write(path, {"a": content.view("<u8"), "b": np.zeros(10**5)}, overwrite=False)
+    with zipfile.ZipFile(path) as file:
+        noisy, zeros = file.infolist()
+    assert (noisy.compress_type, zeros.compress_type) == (method, zipfile.ZIP_DEFLATED)
+    assert zeros.compress_size < zeros.file_size / 100
+    share = noisy.compress_size / noisy.file_size
+    assert noise < share < 0.8 if method == zipfile.ZIP_DEFLATED else share == 1.0
+
+
+def test_signals_of_64_megabytes_stay_in_the_file_only_if_that_is_asked(tmp_path):
+    path = tmp_path / "run.npz"
+    np.savez(path, velocity=np.zeros((2**13, 2**10)), position=np.zeros((2**12, 2**10)))
+    found = runfile.read(path, on_demand=True)
+    assert isinstance(found["velocity"], OnDemand)
+    assert isinstance(found["position"], np.ndarray)
+
+
+def test_a_run_is_in_memory_unless_it_is_asked_otherwise(tmp_path, monkeypatch):
+    monkeypatch.setattr(runfile, "LARGE", 0)
+    path = saved(tmp_path)
+    assert isinstance(Run.load(path).velocity, np.ndarray)
+    assert isinstance(runfile.read(path)["velocity"], np.ndarray)
+    assert isinstance(Run.load(path, on_demand=True).velocity, OnDemand)
