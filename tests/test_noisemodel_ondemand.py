@@ -79,6 +79,8 @@ def test_another_type_is_made_of_the_rows_that_are_read(array, read):
     assert part.tolist() == [[12, 13, 14], [15, 16, 17]]
     assert read == [(4, 6)]
     assert not other.checked
+    assert np.asarray(other).dtype == np.int16
+    np.testing.assert_array_equal(np.asarray(other), VALUES)
 
 
 def test_an_array_on_demand_has_no_other_protocols_than_its_own(array, read):
@@ -122,3 +124,11 @@ def test_pieces_have_a_multiple_of_rows_and_end_where_the_array_does(monkeypatch
         assert [(each.start, each.stop) for each in pieces(array)] == parts
         assert list(pieces(array[:0])) == []
         assert list(pieces(array[:8])) == [slice(0, 8)]
+
+
+def test_a_piece_takes_megabytes():
+    """Neither a row nor the whole, so that what goes through a run takes the memory of a piece."""
+    hour = np.broadcast_to(np.float64(0.0), (3_600_000, 32))
+    sizes = [each.stop - each.start for each in pieces(hour)]
+    assert sum(sizes) == len(hour)
+    assert 10**6 < max(sizes) * 32 * 8 < 10**7
