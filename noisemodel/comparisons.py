@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
@@ -107,14 +107,12 @@ class _Columns:
     Attributes:
         title: What they hold.
         names: Their names.
-        values: Takes the numbers from a comparison, shape (columns,).
         form: Format of a number.
         least: Width of the narrowest column.
     """
 
     title: str
     names: Sequence[str]
-    values: Callable[[RobotComparison], Array]
     form: str
     least: int = 5
 
@@ -138,25 +136,24 @@ class _Columns:
         return [max(self.least, len(name) + 1) for name in self.names]
 
 
+_Valued: TypeAlias = tuple[_Columns, Callable[[RobotComparison], Array]]
+"""Columns, and what takes their numbers from a comparison, shape (columns,)."""
+
+
 def _table(found: Comparisons) -> Iterator[str]:
     """Print a row for each robot, then distance by frequency and contrast of each kind."""
     compared = found[0].comparison
     kinds, reference = compared.kinds, compared.reference
     others = [kind for kind in kinds if kind != kinds[reference]]
-    columns = (
-        _Columns("share in paper", TERMS, lambda one: one.comparison.terms.sum(axis=0), ".0%"),
-        _Columns(
-            "correlation",
-            others,
+    columns: tuple[_Valued, ...] = (
+        (_Columns("share in paper", TERMS, ".0%"), lambda one: one.comparison.terms.sum(axis=0)),
+        (
+            _Columns("correlation", others, ".2f", 6),
             lambda one: np.delete(one.comparison.correlation[reference], reference),
-            ".2f",
-            6,
         ),
-        _Columns(
-            "distance [dB]",
-            others,
+        (
+            _Columns("distance [dB]", others, ".1f"),
             lambda one: np.delete(one.comparison.distance[reference], reference),
-            ".1f",
         ),
     )
     yield f"Reference {kinds[reference]!r}; F: floating base; last: the loudest link"
@@ -180,26 +177,28 @@ def medians(rows: Sequence[Array]) -> Array:
     return np.array([np.median(column) if len(column) else np.nan for column in finite])
 
 
-def _robots(found: Comparisons, columns: Sequence[_Columns]) -> Iterator[str]:
-    for line in zip(*(part.head for part in columns), strict=True):
+def _robots(found: Comparisons, columns: Sequence[_Valued]) -> Iterator[str]:
+    for line in zip(*(part.head for part, _ in columns), strict=True):
         yield f"{'':{NAME + 2}}{''.join(line)}".rstrip()
     for one in found:
-        cells = "".join(part.row(part.values(one)) for part in columns)
+        cells = "".join(part.row(values(one)) for part, values in columns)
         link, share = one.comparison.loudest
         base = "F" if one.floating_base else " "
         yield f"{_short(one.name):{NAME}} {base}{cells}  {share:4.0%} {link}"
     for floating, word in ((False, "fixed"), (True, "floating")):
         group = [one for one in found if one.floating_base == floating]
         if len(group) >= GROUP:
-            cells = "".join(p.row(medians([p.values(one) for one in group])) for p in columns)
+            cells = "".join(
+                part.row(medians([values(one) for one in group])) for part, values in columns
+            )
             yield f"{f'median of {len(group)} {word}':{NAME}}  {cells}"
 
 
 def _kinds(found: Comparisons) -> Iterator[str]:
     """Print a row for each kind."""
-    labels, none = found.labels, lambda _: np.empty(0)
-    bands = _Columns("distance by frequency [dB]", [_band(*band) for band in BANDS], none, ".1f")
-    events = _Columns("contrast of events above 10 Hz [dB]", labels, none, ".1f")
+    labels = found.labels
+    bands = _Columns("distance by frequency [dB]", [_band(*band) for band in BANDS], ".1f")
+    events = _Columns("contrast of events above 10 Hz [dB]", labels, ".1f")
     for first, second in zip(bands.head, events.head, strict=True):
         yield f"{'':{NAME + 2}}{first}{second if labels else ''}".rstrip()
     reference = found[0].comparison.reference

@@ -340,8 +340,9 @@ def test_a_scheduler_may_be_without_workers_for_a_minute(monkeypatch):
     assert cluster._check_alive(Fake(workers=()), "a", 40.0) == 40.0
     with pytest.raises(ClusterError, match="a: the Dask scheduler has lost all its workers"):
         cluster._check_alive(Fake(workers=()), "a", 39.9)
-    with pytest.raises(ClusterError, match="a: the connection to the Dask scheduler is lost"):
-        cluster._check_alive(Fake(status="closed"), "a", 100.0)
+    for status in ("closed", "connecting", "stopped"):
+        with pytest.raises(ClusterError, match="a: the connection to the Dask scheduler is lost"):
+            cluster._check_alive(Fake(status=status), "a", 100.0)
 
 
 def test_a_worker_calls_a_function_where_and_as_its_client_would(tmp_path, monkeypatch):

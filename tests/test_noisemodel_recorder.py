@@ -412,3 +412,11 @@ def test_a_loop_that_ends_replaces_what_an_earlier_one_has_saved(tmp_path):
             pushed(recorder, samples)
     assert len(nm.Run.load(tmp_path / "a.npz").time) == 20
     assert nm.Run.load(tmp_path / "a.npz").meta == {}
+
+
+def test_desired_joints_keep_their_names_where_the_others_have_none():
+    recorder = nm.Recorder(None, 100, desired_joint_names=["b"])
+    for _ in range(2):
+        recorder.push(velocity=[1.0, 2.0], velocity_desired=[3.0])
+    run = recorder.run()
+    assert (run.joint_names, run.desired_joint_names) == (("joint1", "joint2"), ("b",))
