@@ -173,3 +173,16 @@ def test_without_a_home_folder_nothing_is_kept(monkeypatch):
     for _ in range(2):
         assert_made(cached("a-1", make))
     assert make.calls == 2
+
+
+def test_pickles_are_neither_opened_nor_kept(home):
+    """Not even those that the user has signed."""
+    make, file = Maker(), home / "a-1.npz"
+    cached("a-1", make)
+    archive = io.BytesIO()
+    np.savez(archive, points=np.array([{"a": 1}], dtype=object))
+    file.write_bytes(archive.getvalue() + cache._digest(file, archive.getvalue()))
+    assert_made(cached("a-1", make))
+    assert make.calls == 2
+    cached("a-2", lambda: {"points": np.array([{"a": 1}], dtype=object)})
+    assert [path.name for path in home.iterdir()] == ["a-1.npz"]

@@ -447,3 +447,12 @@ def test_a_run_is_in_memory_unless_it_is_asked_otherwise(tmp_path, monkeypatch):
     assert isinstance(Run.load(path).velocity, np.ndarray)
     assert isinstance(runfile.read(path)["velocity"], np.ndarray)
     assert isinstance(Run.load(path, on_demand=True).velocity, OnDemand)
+
+
+def test_a_file_that_is_gone_when_its_rows_are_read_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(runfile, "LARGE", 0)
+    path = saved(tmp_path)
+    velocity = Run.load(path, on_demand=True).velocity
+    path.unlink()
+    with pytest.raises(RunFileError, match=rf"^{path}: cannot be read \(No such file or directory"):
+        velocity[3:5]
