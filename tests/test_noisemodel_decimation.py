@@ -112,7 +112,7 @@ def test_ten_samples_to_either_side_of_a_gap_are_not_valid(gap):
 
 @pytest.mark.parametrize(("up", "down"), [(1, 3), (2, 5), (1, 25), (4, 5)])
 def test_rows_that_are_decimated_on_demand_are_those_of_the_whole(monkeypatch, up, down):
-    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 30)
+    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 20)
     run = run_of(90.0, rate=1000, seconds=0.503, valid=np.arange(503) != 300)
     shifted = replace(run, velocity=run.velocity + 3.0 + np.linspace(0.0, 5.0, 503)[:, None])
     there = OnDemand((503, 1), np.float64, lambda first, stop: shifted.velocity[first:stop])

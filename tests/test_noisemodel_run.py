@@ -218,6 +218,7 @@ def test_blocks_are_clipped_to_a_cut():
         Block(0.0205, 0.05, "impact"),
     )
     assert filled().cut(0.0301, 0.09).blocks == (Block(TIME[31], 0.08, "impact"),)
+    assert filled().cut(0.0205, 0.05).blocks == (Block(0.0205, 0.05, "impact"),)
     assert filled().cut(0.08, 0.09).blocks == ()
 
 
