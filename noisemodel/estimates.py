@@ -65,7 +65,7 @@ class Estimates:
         return Comparison(
             kinds=self.kinds,
             names=self.names,
-            correlation=correlation(envelopes(self.power, max(1, round(ENVELOPE * rate)))),
+            correlation=correlation(envelopes(self.power, round(ENVELOPE * rate))),
             distance=np.sqrt(squares.mean(axis=2)),
             frequency=np.arange(window // 2 + 1) * rate / window,
             distance_by_frequency=np.sqrt(squares),

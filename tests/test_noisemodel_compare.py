@@ -246,6 +246,9 @@ def test_envelopes_are_root_mean_squares_of_20_milliseconds(tmp_path):
     rms = np.sqrt(np.array(power)[:, :1980].reshape(3, 99, 20).mean(axis=2))
     np.testing.assert_allclose(found.correlation, np.corrcoef(rms), rtol=1e-9)
     np.testing.assert_allclose(found.frequency, np.arange(52) * RATE / 102)
+    odd = compare(robot, q, v, ["simplified", "mean"], rate=1010.0)
+    np.testing.assert_allclose(odd.frequency, np.arange(52) * 1010.0 / 103)
+    assert odd.distance_by_frequency.shape == (2, 2, 52)
 
 
 def test_motions_are_estimated_in_chunks_as_whole(tmp_path, monkeypatch):

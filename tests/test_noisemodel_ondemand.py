@@ -108,22 +108,23 @@ def test_rows_at_once_take_so_many_bytes_and_are_one_at_least(monkeypatch, shape
 @pytest.mark.parametrize(
     ("multiple", "parts"),
     [
-        (1, [(0, 8), (8, 16), (16, 20)]),
+        (1, [(0, 9), (9, 18), (18, 20)]),
         (2, [(0, 8), (8, 16), (16, 20)]),
-        (3, [(0, 6), (6, 12), (12, 18), (18, 20)]),
+        (3, [(0, 9), (9, 18), (18, 20)]),
         (5, [(0, 5), (5, 10), (10, 15), (15, 20)]),
         (9, [(0, 9), (9, 18), (18, 20)]),
+        (10, [(0, 10), (10, 20)]),
         (20, [(0, 20)]),
     ],
 )
 def test_pieces_have_a_multiple_of_rows_and_end_where_the_array_does(monkeypatch, multiple, parts):
-    monkeypatch.setattr(ondemand, "AT_ONCE", 100)
+    monkeypatch.setattr(ondemand, "AT_ONCE", 110)
     array = np.zeros((20, 3), dtype=np.float32)
     assert [(each.start, each.stop) for each in pieces(array, multiple)] == parts
     if multiple == 1:
         assert [(each.start, each.stop) for each in pieces(array)] == parts
         assert list(pieces(array[:0])) == []
-        assert list(pieces(array[:8])) == [slice(0, 8)]
+        assert list(pieces(array[:9])) == [slice(0, 9)]
 
 
 def test_a_piece_takes_megabytes():

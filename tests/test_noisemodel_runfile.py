@@ -456,3 +456,16 @@ def test_a_file_that_is_gone_when_its_rows_are_read_is_named(tmp_path, monkeypat
     path.unlink()
     with pytest.raises(RunFileError, match=rf"^{path}: cannot be read \(No such file or directory"):
         velocity[3:5]
+
+
+def test_the_order_of_meta_does_not_matter_and_a_robot_is_kept_as_it_is_named(tmp_path):
+    files = []
+    for name, robot in (("talos", "talos"), ("own", str(tmp_path / "own.urdf"))):
+        for meta in ({"seed": 1, "source": "a"}, {"source": "a", "seed": 1}):
+            run = Run(time=TIME, velocity=VELOCITY, joint_names=("a", "b"), robot=robot, meta=meta)
+            files.append(tmp_path / f"{name}{len(files)}.npz")
+            run.save(files[-1])
+        assert files[-1].read_bytes() == files[-2].read_bytes()
+        assert Run.load(files[-1]).robot == robot
+        with np.load(files[-1], allow_pickle=False) as plain:
+            assert str(plain["robot"]) == robot
