@@ -179,7 +179,8 @@ def test_a_fork_is_safe_on_linux_without_other_threads(monkeypatch, platform, th
 
 
 @pytest.mark.parametrize(
-    ("cores", "jobs", "threads"), [(8, 3, 2), (8, 8, 1), (8, 16, 1), (9, 2, 4), (None, 2, 1)]
+    ("cores", "jobs", "threads"),
+    [(8, 3, 2), (8, 8, 1), (8, 16, 1), (9, 2, 4), (None, 2, 1), (None, 1, 1)],
 )
 def test_processes_share_the_cores_and_end_with_their_parent(
     monkeypatch, start, cores, jobs, threads
