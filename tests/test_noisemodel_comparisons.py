@@ -403,6 +403,8 @@ def test_robots_that_cannot_be_read_or_have_no_surface_are_left_out(tmp_path):
             "no built-in motion 'dance'; there is excitation",
         ),
         ({"motion": ["excitation"] * 3}, NoiseModelError, "3 motions for 2 robots"),
+        ({"motion": [np.zeros((9, 9))]}, NoiseModelError, "1 motions for 2 robots"),
+        ({"motion": [np.zeros((9, 9))] * 3}, NoiseModelError, "3 motions for 2 robots"),
         ({"motion": {"panda": "excitation"}}, NoiseModelError, "for panda, expected .* panda, go2"),
         ({"motion": 7}, NoiseModelError, "a motion is of type int, expected a Run, a pair"),
         ({"motion": ["excitation", None]}, NoiseModelError, "a motion is of type NoneType"),
