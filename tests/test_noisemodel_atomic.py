@@ -11,7 +11,7 @@ import pytest
 
 from models import modelfile
 from noisemodel import OutputError
-from noisemodel.atomic import _machine, _sweep, refuse_existing, replacing
+from noisemodel.atomic import TEMPORARY, _machine, _sweep, refuse_existing, replacing
 
 ROOT = Path(__file__).parents[1]
 
@@ -263,3 +263,25 @@ def test_without_hard_links_a_file_is_written_and_replaced_only_if_asked(tmp_pat
     write(tmp_path / "out.txt", "second", overwrite=True)
     assert (tmp_path / "out.txt").read_text() == "second"
     assert os.listdir(tmp_path) == ["out.txt"]
+
+
+def test_a_temporary_file_is_known_by_its_name(tmp_path):
+    with replacing(tmp_path / "out.txt") as temporary:
+        assert TEMPORARY.fullmatch(temporary.name)[1] == _machine()
+
+
+def test_a_folder_that_refuses_files_is_one_error(tmp_path, monkeypatch):
+    def refusing(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "open", refusing)
+    with pytest.raises(OutputError, match=r"out\.txt: cannot be written \(Permission denied\)$"):
+        write(tmp_path / "out.txt", "")
+
+
+def test_an_output_that_exists_is_refused_unless_it_may_be_replaced(tmp_path):
+    (tmp_path / "out.txt").touch()
+    with pytest.raises(OutputError, match=r"out\.txt: exists already"):
+        refuse_existing(tmp_path / "out.txt")
+    refuse_existing(tmp_path / "out.txt", overwrite=True)
+    refuse_existing(tmp_path / "other.txt")
