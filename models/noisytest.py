@@ -149,9 +149,6 @@ def profile_from_config(path: str | Path) -> Profile:
         names = _SETTINGS[section]
         for key, value in _known(path, arguments, names, section).items():
             settings[names[key]] = _classes(path, value) if names[key] == "classes" else value
-    settings["rate"] = (
-        float(settings["rate"]) if type(settings["rate"]) is int else settings["rate"]
-    )
     try:
         profile = Profile.of(settings)
     except ProfileError as error:

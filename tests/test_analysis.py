@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from inspector.analysis.analyse import Analysis, analyse, analyse_noise, with_links
 from inspector.analysis.status import Status, Unknown
-from inspector.analysis.verdict import Verdict, exit_status
+from inspector.analysis.verdict import Verdict, classify_file, exit_status
 from inspector.assets import demo_run, model_files
 from inspector.audit import audit
 from inspector.audit.placeholder import without_placeholder
@@ -639,3 +639,15 @@ def test_the_papers_sum_is_given_where_a_robot_and_its_positions_are_known():
     assert default_kinds(whole) == ("simplified", "paper")
     assert default_kinds(replace(whole, position=None)) == ("simplified",)
     assert default_kinds(replace(whole, robot="no such robot")) == ("simplified",)
+
+
+def test_a_picture_that_cannot_be_drawn_is_lost_and_the_findings_are_not():
+    def draw(*_):
+        raise OSError("no space left")
+
+    verdict = classify_file(demo_run(), LIBRARY, draw=draw)
+    assert (verdict.status, verdict.lost, verdict.picture) == (
+        Status.FINDINGS,
+        ("no space left",),
+        None,
+    )

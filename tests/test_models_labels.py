@@ -113,6 +113,14 @@ def test_confirmed_frames_are_failure_frames_and_fewer_if_more_evidence_is_requi
         assert (kept[1] >= above_threshold).all()
 
 
+def test_a_frame_without_neighbours_counts_for_two_and_one_with_them_for_one():
+    alone, beside = np.ones(1, dtype=bool), np.array([False, True, False])
+    for suspect, most in ((alone, 2), (beside, 1)):
+        apart = np.zeros(len(suspect) - 1, dtype=bool)
+        assert (confirmed(suspect, suspect, apart, least=most) == suspect).all()
+        assert not confirmed(suspect, suspect, apart, least=most + 1).any()
+
+
 def test_no_frames_are_confirmed_of_none():
     none = np.zeros(0, dtype=bool)
     assert confirmed(none, none, none).shape == (0,)

@@ -105,6 +105,7 @@ def test_any_text_is_read_or_refused_with_a_reason(log, text):
         ),
         ("0 1\n1 1\n.5 1\n2 1\n3 1\n", "goes backward or stands still from row 2 to row 3"),
         ("0 1\n1 1\n2 1\n4 1\n", "not in even steps from row 3 to row 4: 2 s, then 4 s"),
+        ("0 1\n.1 1\n.2 1\n.4 1\n", "not in even steps from row 3 to row 4: 0.2 s, then 0.4 s"),
     ],
 )
 def test_what_is_wrong_with_a_log_is_named(log, text, reason):

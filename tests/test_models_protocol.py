@@ -534,6 +534,37 @@ def test_false_alarms_are_listed_where_they_are_most_frequent(seconds, rate, hou
     assert row.split() == words.split()
 
 
+def test_parts_with_more_alarms_per_hour_come_first_and_of_equals_the_longest():
+    false = {"often": (5.0, 2), "seldom": (50.0, 1), "long": (10.0, 4), "never": (5.0, 0)}
+    runs = [
+        reporting(
+            f"{robot}/good-001",
+            blocks((0.0, seconds, "ok")),
+            [("impact", 1.0 + place, 1.5 + place) for place in range(count)],
+            scenario="good",
+            seconds=seconds,
+        )
+        for robot, (seconds, count) in false.items()
+    ]
+    found = measured(runs)
+    worst = found.worst(found.cases, "false_alarms_per_hour")
+    assert [robot for robot, _ in worst] == ["long", "often", "seldom"]
+
+
+def test_five_names_are_told_and_how_many_are_left():
+    for count, rest in ((5, ""), (6, " and 1 more")):
+        slow = [Unanswered(f"{n}", {"robot": f"r{n}"}, "too slow") for n in range(count)]
+        text = [line for lines in lines_of(measured(perfect(1), slow)) for line in lines]
+        assert f"not answered: {count} runs (too slow) of r0, r1, r2, r3, r4{rest}" in text
+
+
+def test_a_table_of_twelve_is_told_whole():
+    runs = [exact("a/blow-001", IMPACT, domain=f"domain{number:02d}") for number in range(12)]
+    (table,) = (lines for lines in lines_of(measured(runs)) if lines[0].startswith("By domain"))
+    assert table[0].startswith("By domain  ")
+    assert len(table) == 1 + 12
+
+
 def test_long_tables_have_the_worst_and_long_names_keep_both_ends():
     names = [f"domain-with-a-name-that-is-far-too-long-{number:02d}" for number in range(20)]
     runs = [exact("a/blow-001", IMPACT, domain=name) for name in names]

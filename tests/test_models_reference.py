@@ -65,6 +65,14 @@ def test_a_running_reference_has_a_memory_of_a_minute():
     assert running._location[0] == pytest.approx(0.05 * (1.0 - np.exp(-1.0)), abs=2e-3)
 
 
+def test_a_running_reference_is_the_mean_of_frames_within_its_spread():
+    running = RunningReference()
+    for count, frame in enumerate((0.0, 0.03, -0.06, 0.05), start=1):
+        running.relative(np.array([[frame]]))
+        mean = np.mean((0.0, 0.03, -0.06, 0.05)[:count])
+        assert running._location[0] == pytest.approx(mean, abs=1e-12)
+
+
 def test_relative_features_are_bounded():
     reference = Reference.of(frames())
     found = reference.relative(np.array([np.full(5, 1e6), np.full(5, -1e6)]))
