@@ -419,6 +419,7 @@ def test_the_audit_names_a_placeholder_of_the_desired_velocity():
         ("0.0 1.5\n", False),
         ("# time noise\n\n 0.0, 1.5\n", False),
         ("-1;2\n", False),
+        ("1.5\n", False),
         ("time,noise\n", True),
         ("0.0 1.5 2.5\n", True),
         ("0.0 1.5 2.5 3.5\n", True),

@@ -121,6 +121,13 @@ def test_a_frame_without_neighbours_counts_for_two_and_one_with_them_for_one():
         assert not confirmed(suspect, suspect, apart, least=most + 1).any()
 
 
+def test_the_score_of_a_frame_is_that_of_its_label_and_none_of_unknown_ones():
+    found = labels(".iu")
+    found.scores[:] = np.arange(found.scores.size).reshape(found.scores.shape)
+    place = found.classes.index("impact")
+    assert [found.score(frame) for frame in range(3)] == [0.0, len(CLASSES) + place, 0.0]
+
+
 def test_no_frames_are_confirmed_of_none():
     none = np.zeros(0, dtype=bool)
     assert confirmed(none, none, none).shape == (0,)

@@ -235,9 +235,10 @@ def test_a_gap_of_a_year_is_passed_at_once_and_the_clock_goes_on():
 
 
 def test_after_its_end_another_signal_begins():
-    stream, signal = models.Stream(classifier("ours")), noise(1234)
-    once, again = (streamed(stream, signal, [17]) for _ in range(2))
+    stream, signal, other = models.Stream(classifier("ours")), noise(1234), 2.0 * noise(900, 1)
+    once, changed, again = (streamed(stream, each, [17]) for each in (signal, other, signal))
     assert_equal(once, again)
+    assert_equal(changed, streamed(models.Stream(classifier("ours")), other, [17]))
     assert stream.count == 0
 
 
