@@ -322,6 +322,15 @@ def test_an_onset_is_right_within_a_fifth_of_a_second(start, share):
     assert found.pooled["onset_within"].value == share
 
 
+def test_an_onset_is_right_once_however_many_findings_begin_there():
+    faults = (Fault(2.03, 2.2, "impact"), Fault(4.0, 4.2, "impact"))
+    both = [("impact", 2.0, 2.6), ("oscillations", 2.1, 2.6)]
+    for faults_there, findings, close in [(faults[:1], both, 1), (faults, [both[0]], 1)]:
+        run = reporting("a", IMPACT, findings, faults=faults_there)
+        assert Outcome.of(run).close.tolist() == [True, False][: len(faults_there)]
+        assert Outcome.of(run).counts["onset_close"] == close
+
+
 def probable(evidence, *, apart=()):
     """Labels of frames that are evidence of an impact by their numbers."""
     starts = frames() + np.searchsorted(apart, np.arange(COUNT), side="right") * 10.0
