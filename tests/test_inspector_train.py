@@ -126,7 +126,7 @@ def test_a_model_for_any_rate_is_trained_and_evaluated_on_logs_of_several_rates(
     log(logs / "missing.npz", rate=250.0, desired="missing", seed=9)
     status, _, err = call("train", logs, "-o", model, "--rate", 500)
     assert (status, err) == (
-        3,
+        2,
         "inspector: profile general is for any rate; leave out --rate 500\n",
     )
     status, out, _ = call("train", logs, "-o", model)
