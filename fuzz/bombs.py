@@ -703,6 +703,11 @@ def _mjcf(data: bytes) -> Iterator[Bomb]:
             '<asset><texture name="t" type="2d" builtin="flat" width="60000" height="60000"/></asset><default>',
         ),
         ("itself included", "<default>", '<include file="robot.xml"/><default>'),
+        (
+            "itself as a model",
+            "<default>",
+            '<asset><model name="m" file="robot.xml"/></asset><default>',
+        ),
         ("/dev/zero included", "<default>", '<include file="/dev/zero"/><default>'),
         ("a plugin", "<default>", '<extension><plugin plugin="a.b"/></extension><default>'),
         ("sizes of nan", 'size="0.05 0.4"', 'size="nan 0.4"'),

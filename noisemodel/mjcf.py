@@ -265,7 +265,7 @@ def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
     try:
         _, joints, _ = counts(path.resolve())
     except RecursionError as error:
-        raise RobotError(f"{path}: its models attach each other") from error
+        raise RobotError(f"{path}: its models contain each other") from error
     if joints > 10 * limit("joints"):  # those of defaults, sensors and equalities are counted too
         raise RobotError(f"{path}: more than {limit('joints')} joints; {beyond('joints')}")
 

@@ -678,7 +678,7 @@ def test_models_that_contain_themselves_are_refused_though_nothing_attaches_them
     written(tmp_path, model.format(back), "other.xml")
     first = '<include file="other.xml"/>' if reference == "include" else ""
     path = written(tmp_path, model.format("other.xml").replace("<asset>", f"{first}<asset>"))
-    with pytest.raises(RobotError, match=r"robot\.xml: its models attach each other"):
+    with pytest.raises(RobotError, match=r"robot\.xml: its models contain each other"):
         Robot.load(path)
 
 

@@ -128,7 +128,7 @@ def test_models_that_attach_each_other_twice_are_counted_before_they_are_built(t
     (tmp_path / "a39.xml").write_text((tmp_path / "a0.xml").read_text())
     (tmp_path / "a0.xml").write_text((tmp_path / "a0.xml").read_text().replace("a1.", "a39."))
     (tmp_path / "a39.xml").write_text((tmp_path / "a39.xml").read_text().replace("a1.", "a0."))
-    with pytest.raises(RobotError, match="its models attach each other"):
+    with pytest.raises(RobotError, match="its models contain each other"):
         Robot.load(tmp_path / "a0.xml")
 
 
