@@ -301,8 +301,10 @@ def test_the_command_refuses_wrong_settings_in_one_line(inspector, tmp_path):
     run_of(tone(440)).save(tmp_path / "run.npz")
     for wrong, code in (
         (["--joint", "knee"], 3),
-        (["--kind", "A"], 3),
-        (["--kind", "A", "--link", "hand"], 3),
+        (["--kind", "A"], 2),
+        (["--kind", "A", "--link", "hand"], 2),
+        (["--kind", "simplified", "--link", "hand"], 2),
+        (["--kind", "normal", "--joint", "knee"], 2),
         (["--link", "hand"], 3),
         (["--speed", "0"], 2),
     ):

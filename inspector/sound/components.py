@@ -18,7 +18,7 @@ import numpy as np
 
 import noisemodel as nm
 from inspector.analysis.analyse import robot_known
-from inspector.errors import InspectorError
+from inspector.errors import InspectorError, OptionError
 from noisemodel.noise import DENSITY, SOUND_SPEED
 from noisemodel.types import Array
 
@@ -59,17 +59,18 @@ def components(
         The signals.
 
     Raises:
-        InspectorError: If the kind cannot be played, or the run has no such joint or link.
+        OptionError: If the kind cannot be played, or not of a joint, or not of a link.
+        InspectorError: If the run has no such joint or link.
         RobotError: If the kind needs a robot and the run has no known one.
     """
     if kind not in PLAYABLE:
-        raise InspectorError(
+        raise OptionError(
             f"kind {kind!r} has no signed signals to play; there are {', '.join(PLAYABLE)}"
         )
     if link and (joint or kind == "simplified"):
-        raise InspectorError(f"link {link!r} is of the kinds normal and rms; name no joint with it")
+        raise OptionError(f"link {link!r} is of the kinds normal and rms; name no joint with it")
     if joint and kind != "simplified":
-        raise InspectorError(f"kind {kind!r} is of links, not of joints; name a link")
+        raise OptionError(f"kind {kind!r} is of links, not of joints; name a link")
     if kind == "simplified":
         what = f"simplified noise of {joint}" if joint else "simplified noise"
         return Components(what, "rad/s", _velocities(run, joint))
