@@ -27,7 +27,7 @@ bench: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks $(BENCH)
 
 models: $(VENV)/.installed-dev
-	$(BIN)/python assets/build.py
+	$(BIN)/python models/build.py
 
 mutation: $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --editable ".[dev,mutation]"

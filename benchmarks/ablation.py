@@ -18,21 +18,21 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 from benchmarks.paper import RATE, files, first_seeds
 from inspector.training.part import Part
 from inspector.training.recordings import recordings
-from models.evaluation.assessment import measure
-from models.evaluation.predictions import Predictions, predict
-from models.examples import Examples
-from models.splitting import folds
-from scenarios.sample import Sample
+from noiseclassifier.evaluation.assessment import measure
+from noiseclassifier.evaluation.predictions import Predictions, predict
+from noiseclassifier.examples import Examples
+from noiseclassifier.scenarios.sample import Sample
+from noiseclassifier.splitting import folds
 
-GENERAL, SCALAR = models.GENERAL, models.SCALAR
+GENERAL, SCALAR = nc.GENERAL, nc.SCALAR
 POWER = "power"
 VARIANTS = {
     "the whole": GENERAL,
-    "joint by joint": models.EACH,
+    "joint by joint": nc.EACH,
     "the noise alone": SCALAR,
     "the noise alone, levels as they are": replace(SCALAR, relative=False),
     "measured alone": replace(GENERAL, signals=("measured",)),
@@ -70,7 +70,7 @@ def main() -> None:
     power = any(POWER in variant.signals for variant in chosen.values())
     paths = first_seeds(files(options.data, Part.TRAINING), options.seeds)
     read = _recordings(paths, options.rate, power=power)
-    print(f"{len(read)} runs in {len({models.group_of(one.name) for one in read})} groups")
+    print(f"{len(read)} runs in {len({nc.group_of(one.name) for one in read})} groups")
     print("| " + " | ".join(HEAD) + " |\n" + "|---" * len(HEAD) + "|", flush=True)
     for name, variant in chosen.items():
         start = time.process_time()
@@ -79,7 +79,7 @@ def main() -> None:
         print(f"| {name} | {found} | {time.process_time() - start:.0f} |", flush=True)
 
 
-def _recordings(paths: Sequence[Path], rate: float, *, power: bool) -> list[models.Recording]:
+def _recordings(paths: Sequence[Path], rate: float, *, power: bool) -> list[nc.Recording]:
     found = list(recordings(paths, rate))
     if not power:
         return found
@@ -95,16 +95,16 @@ def _power(path: Path) -> np.ndarray:
     return np.sqrt(signals["power"] + signals["power_desired"])
 
 
-def _measure(read: Sequence[models.Recording], profile: models.Profile, count: int) -> str:
+def _measure(read: Sequence[nc.Recording], profile: nc.Profile, count: int) -> str:
     """Measures by cross-validation, as the cells of a row of the table."""
     examples = Examples.read(read, profile)
     predictions: list[Predictions] = []
-    for train, test in folds([models.group_of(one.name) for one in read], count):
+    for train, test in folds([nc.group_of(one.name) for one in read], count):
         names = {read[item].name for item in train}
         rows = np.array([run in names for run in examples.runs.tolist()])
         hashes = {name: examples.hashes[name] for name in names}
         part = Examples(examples.features[rows], examples.labels[rows], examples.runs[rows], hashes)
-        classifier = models.Classifier.train(part, profile)
+        classifier = nc.Classifier.train(part, profile)
         predictions += [predict(classifier, read[item]) for item in test]
     found = measure(predictions)
     shares = [

@@ -18,34 +18,32 @@ from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import models
+import noiseclassifier as nc
 from inspector.assets import model_files
 from inspector.training.recordings import classified
-from models.evaluation.outcomes import Outcome
-from models.evaluation.predictions import predict
+from noiseclassifier.evaluation.outcomes import Outcome
+from noiseclassifier.evaluation.predictions import predict
 
 PARTS = 5
 """Most parts that good runs are left out in."""
 COUNTS = ("ok_hours", "ok_hours_flagged", "false_alarms", "felt", "found_felt", "faults", "matched")
 
 
-def recordings(folder: Path, rate: float) -> list[models.Recording]:
+def recordings(folder: Path, rate: float) -> list[nc.Recording]:
     """Runs of a folder that have this rate or more."""
     found = (recording for recording, _ in classified([folder], rate))
-    return [each for each in found if isinstance(each, models.Recording)]
+    return [each for each in found if isinstance(each, nc.Recording)]
 
 
-def outcomes(model: models.Classifier, runs: Iterable[models.Recording]) -> list[Outcome]:
+def outcomes(model: nc.Classifier, runs: Iterable[nc.Recording]) -> list[Outcome]:
     """Outcomes of runs, as they are reported."""
     return [Outcome.of(predict(model, run)) for run in runs]
 
 
-def adapted(
-    general: models.Classifier, good: list[models.Recording], alarms: float
-) -> models.Classifier:
+def adapted(general: nc.Classifier, good: list[nc.Recording], alarms: float) -> nc.Classifier:
     """The model adapted to good runs."""
-    motion = models.GoodMotion.read(good, general.profile)
-    return models.adapt(general, motion, alarms=alarms).classifier
+    motion = nc.GoodMotion.read(good, general.profile)
+    return nc.adapt(general, motion, alarms=alarms).classifier
 
 
 def row(name: str, good: list[Outcome], faulty: list[Outcome]) -> str:
@@ -68,13 +66,13 @@ def main() -> None:
     arguments.add_argument("--alarms", type=float, nargs="+", default=[1.0, 5.0, 20.0])
     arguments.add_argument("--rate", type=float, default=1000.0)
     options = arguments.parse_args()
-    general = models.load(options.model)
-    assert isinstance(general, models.General)
+    general = nc.load(options.model)
+    assert isinstance(general, nc.General)
     print("| | good runs flagged | ok flagged | false/h | felt found | matched |")
     print("|---|---|---|---|---|---|")
     for folder in options.folders:
         runs = recordings(folder, options.rate)
-        common = set.intersection(*(set(models.signals.named(run.signal)) for run in runs))
+        common = set.intersection(*(set(nc.signals.named(run.signal)) for run in runs))
         model = general.at(options.rate, common)
         faulty = [run for run in runs if run.events or {b.label for b in run.blocks} - {"ok"}]
         good = [run for run in runs if run not in faulty]

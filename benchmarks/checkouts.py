@@ -95,19 +95,29 @@ class Checkout:
     @property
     def models(self) -> dict[str, Path]:
         """The model files that it ships, by name."""
-        return {path.stem: path for path in sorted(self.folder.glob("assets/models/*.npz"))}
+        places = ("assets/models/*.npz", "models/*.npz")
+        found = (path for place in places for path in self.folder.glob(place))
+        return {path.stem: path for path in sorted(found)}
 
     @property
     def renamed(self) -> dict[str, str]:
-        """Its names by those of this version; nothing where it knows them: it has the list."""
-        known = (self.folder / RENAMED.relative_to(ROOT)).exists()
-        return {} if known else {new: old for old, new in reversed(names()) if new}
+        """Its names by those of this version; nothing of a checkout with the new layout."""
+        return {} if self._nested else {new: old for old, new in reversed(names()) if new}
+
+    @property
+    def _nested(self) -> bool:
+        """Whether the classifier is a package of a name of its own, in `models/`."""
+        return (self.folder / "models" / "noiseclassifier").is_dir()
+
+    @property
+    def _paths(self) -> list[Path]:
+        return [self.folder, *([self.folder / "models"] if self._nested else [])]
 
     @property
     def environment(self) -> dict[str, str]:
         """Variables of its processes: its own code and caches, one thread."""
         return os.environ | {
-            "PYTHONPATH": str(self.folder),
+            "PYTHONPATH": os.pathsep.join(map(str, self._paths)),
             "PYTHONPYCACHEPREFIX": str(self.scratch / "bytecode"),
             "PYTHONDONTWRITEBYTECODE": "",
             "XDG_CACHE_HOME": str(self.scratch / "cache"),

@@ -101,9 +101,9 @@ class Probe:
         """Load the models, by the names of their files."""
         self.names, self.output = names, output
         try:
-            load = names("models.load")
+            load = names("noiseclassifier.load")
         except AttributeError:  # before 0.4, all models are of one rate
-            load = names("models.Classifier.load")
+            load = names("noiseclassifier.Classifier.load")
         self._models = {name: load(path) for name, path in models.items()}
 
     def keep(self, run: str, what: str, **arrays: Any) -> None:
@@ -115,7 +115,9 @@ class Probe:
     def simulate(self, name: str, case: list[Any]) -> None:
         """Simulate robot, scenario and seed for a duration in [s], and write the run file."""
         robot, scenario, seed, duration = case
-        run = self.names("scenarios.simulate")(robot, scenario, seed, duration=duration)
+        run = self.names("noiseclassifier.scenarios.simulate")(
+            robot, scenario, seed, duration=duration
+        )
         path = self.output / name / "simulated run.npz"
         path.parent.mkdir(parents=True, exist_ok=True)
         self.names("noisemodel.Run.save")(run, path)
@@ -135,39 +137,46 @@ class Probe:
 
     def look_at_log(self, name: str, path: str) -> None:
         """Read one of NoisyTest's logs, and classify it by all models of the noise alone."""
-        time, noise = self.names("models.read_log")(path)
-        rate = self.names("models.nominal_rate")(time)
+        time, noise = self.names("noiseclassifier.read_log")(path)
+        rate = self.names("noiseclassifier.nominal_rate")(time)
         self.keep(name, "log", time=time, noise=noise, rate=rate)
         for model in self._models:
-            classifier = self._bound(model, rate, (self.names("models.NOISE"),))
-            profile = self.names.field("models.Classifier.profile", classifier)
-            signals = self.names.field("models.Profile.signals", profile)
-            same_rate = abs(rate / self.names.field("models.Profile.rate", profile) - 1) < 1e-3
-            if same_rate and tuple(signals) == (self.names("models.NOISE"),):
+            classifier = self._bound(model, rate, (self.names("noiseclassifier.NOISE"),))
+            profile = self.names.field("noiseclassifier.Classifier.profile", classifier)
+            signals = self.names.field("noiseclassifier.Profile.signals", profile)
+            same_rate = (
+                abs(rate / self.names.field("noiseclassifier.Profile.rate", profile) - 1) < 1e-3
+            )
+            if same_rate and tuple(signals) == (self.names("noiseclassifier.NOISE"),):
                 self._classify(name, model, classifier, {"noise": noise}, valid=None)
 
     def train(self, name: str, folder: str) -> None:
         """Train each kind of model on NoisyTest's data set, and decide on the validation part."""
-        read, log_bands = self.names("models.Dataset.read"), self.names("models.LogBands")
-        original = self.names("models.Profile.noisytest")("rbf")
-        estimator = older("models.LogBands.estimator", self.names.renamed).rpartition(".")[2]
+        read, log_bands = (
+            self.names("noiseclassifier.Dataset.read"),
+            self.names("noiseclassifier.LogBands"),
+        )
+        original = self.names("noiseclassifier.Profile.noisytest")("rbf")
+        estimator = older("noiseclassifier.LogBands.estimator", self.names.renamed).rpartition(".")[
+            2
+        ]
         profiles = {kind: log_bands(**{estimator: kind}).at(RATE) for kind in ESTIMATORS}
         trained = {
-            what: self.names("models.Classifier.train")(
+            what: self.names("noiseclassifier.Classifier.train")(
                 read(Path(folder, "training"), profile), profile
             )
             for what, profile in {"noisytest-rbf": original, **profiles}.items()
         }
-        profile = self.names("models.estimators.baseline.NOISE_ALONE").at(RATE)
-        recordings = self.names("models.noisytest.read_folder")(Path(folder, "training"))
-        good = self.names("models.GoodMotion.read")(recordings, profile)
-        learnt = self.names("models.learn_baseline")(good, profile)
-        trained["baseline"] = self.names.field("models.Learnt.classifier", learnt)
+        profile = self.names("noiseclassifier.estimators.baseline.NOISE_ALONE").at(RATE)
+        recordings = self.names("noiseclassifier.noisytest.read_folder")(Path(folder, "training"))
+        good = self.names("noiseclassifier.GoodMotion.read")(recordings, profile)
+        learnt = self.names("noiseclassifier.learn_baseline")(good, profile)
+        trained["baseline"] = self.names.field("noiseclassifier.Learnt.classifier", learnt)
         validation = read(Path(folder, "validation"), original, training=False)
-        frames = self.names.field("models.Dataset.frames", validation)
+        frames = self.names.field("noiseclassifier.Dataset.frames", validation)
         for what, classifier in trained.items():
-            decisions = self.names("models.Classifier.decision")(classifier, frames)
-            scores = self.names("models.Classifier.scores")(classifier, frames)
+            decisions = self.names("noiseclassifier.Classifier.decision")(classifier, frames)
+            scores = self.names("noiseclassifier.Classifier.scores")(classifier, frames)
             self.keep(name, f"{what}, trained", decisions=decisions, scores=scores)
 
     def _link_noise(self, name: str, run: Any) -> None:
@@ -193,14 +202,14 @@ class Probe:
         """Classify a run, at the lower rate of the model if it has one."""
         own = self.names.field("noisemodel.Run.rate", run)
         classifier = self._bound(model, own, self._signals(run))
-        profile = self.names.field("models.Classifier.profile", classifier)
-        rate = self.names.field("models.Profile.rate", profile)
+        profile = self.names.field("noiseclassifier.Classifier.profile", classifier)
+        rate = self.names.field("noiseclassifier.Profile.rate", profile)
         if own < rate * (1 - 1e-3):
             return
         if own > rate * (1 + 1e-3):
             run = self.names("noisemodel.decimated")(run, rate)
         signals = self._signals(run)
-        if set(self.names.field("models.Profile.signals", profile)) <= set(signals):
+        if set(self.names.field("noiseclassifier.Profile.signals", profile)) <= set(signals):
             valid = self.names.field("noisemodel.Run.valid", run)
             self._classify(name, model, classifier, signals, valid=valid)
 
@@ -213,7 +222,7 @@ class Probe:
         found = self._models[model]
         if not hasattr(found, "recipe"):
             return found
-        return found.at(max(rate, self.names("models.logbands.LOWEST")), signals)
+        return found.at(max(rate, self.names("noiseclassifier.logbands.LOWEST")), signals)
 
     def _classify(
         self, name: str, model: str, classifier: Any, signals: Mapping[str, Any], *, valid: Any
@@ -222,20 +231,24 @@ class Probe:
 
         Of a model with a reference, features and decisions are those without it.
         """
-        profile = self.names.field("models.Classifier.profile", classifier)
-        rate = self.names.field("models.Profile.rate", profile)
-        wanted = self.names.field("models.Profile.signals", profile)
+        profile = self.names.field("noiseclassifier.Classifier.profile", classifier)
+        rate = self.names.field("noiseclassifier.Profile.rate", profile)
+        wanted = self.names.field("noiseclassifier.Profile.signals", profile)
         rows = np.vstack([signals[one] for one in wanted])
-        frames = self.names("models.frame")(
+        frames = self.names("noiseclassifier.frame")(
             rows if len(rows) > 1 else rows[0],
-            length=self.names.field("models.Profile.length", profile),
-            hop=self.names.field("models.Profile.hop", profile),
+            length=self.names.field("noiseclassifier.Profile.length", profile),
+            hop=self.names.field("noiseclassifier.Profile.hop", profile),
         )
         parts = np.split(frames, range(CHUNK, len(frames), CHUNK))
-        features = np.concatenate([self.names("models.features")(one, profile) for one in parts])
-        decisions = self.names("models.Classifier.decide")(classifier, features)
+        features = np.concatenate(
+            [self.names("noiseclassifier.features")(one, profile) for one in parts]
+        )
+        decisions = self.names("noiseclassifier.Classifier.decide")(classifier, features)
         given = {one: signals[one] for one in wanted}
-        labels = self.names("models.Classifier.classify")(classifier, given, rate, valid=valid)
+        labels = self.names("noiseclassifier.Classifier.classify")(
+            classifier, given, rate, valid=valid
+        )
         self.keep(
             name,
             model,
@@ -243,7 +256,7 @@ class Probe:
             features=features,
             decisions=decisions,
             **{
-                field: self.names.field(f"models.Labels.{field}", labels)
+                field: self.names.field(f"noiseclassifier.Labels.{field}", labels)
                 for field in ("start", "stop", "scores")
             },
         )
@@ -252,8 +265,9 @@ class Probe:
 def main() -> None:
     """Do the job that the only argument names."""
     job = json.loads(Path(sys.argv[1]).read_text())
-    for package in ("noisemodel", "models", "scenarios"):
-        found = Path(str(importlib.import_module(package).__file__)).resolve()
+    for package in ("noisemodel", "noiseclassifier", "noiseclassifier.scenarios"):
+        name = older(package, job["renamed"])
+        found = Path(str(importlib.import_module(name).__file__)).resolve()
         if not found.is_relative_to(Path(job["checkout"]).resolve()):
             raise SystemExit(f"{package} is imported from {found}, not from {job['checkout']}")
     probe = Probe(Names(job["renamed"]), Path(job["output"]), job["models"])

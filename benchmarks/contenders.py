@@ -16,9 +16,9 @@ from sklearn.linear_model import LogisticRegression, RidgeClassifierCV
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-import models
-from models.estimators.estimator import ESTIMATORS
-from models.features import feature_count, standard
+import noiseclassifier as nc
+from noiseclassifier.estimators.estimator import ESTIMATORS
+from noiseclassifier.features import feature_count, standard
 
 RATE = 1000.0
 """Rate of the frames, in [Hz]."""
@@ -26,7 +26,7 @@ RATE = 1000.0
 Prediction = tuple[np.ndarray, np.ndarray]
 """Predicted class, as an index, and failure score; shape (frames,) each."""
 Classify = Callable[[np.ndarray], Prediction]
-Train = Callable[[models.Dataset], Classify]
+Train = Callable[[nc.Dataset], Classify]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Contender:
 
     signals: str
     name: str
-    profile: models.Profile
+    profile: nc.Profile
     train: Train
     needs_aeon: bool = False
 
@@ -63,21 +63,21 @@ TRANSFORMS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 """Transforms of the samples for the classifiers of aeon."""
 
 
-def targets(dataset: models.Dataset) -> np.ndarray:
+def targets(dataset: nc.Dataset) -> np.ndarray:
     """Class of each frame as an index, shape (frames,)."""
-    return np.array([models.CLASSES.index(label) for label in dataset.labels.tolist()])
+    return np.array([nc.CLASSES.index(label) for label in dataset.labels.tolist()])
 
 
-def features_of(frames: np.ndarray, profile: models.Profile) -> np.ndarray:
+def features_of(frames: np.ndarray, profile: nc.Profile) -> np.ndarray:
     """Our features, computed 64 frames at a time, shape (frames, features)."""
     parts = np.split(frames, range(64, len(frames), 64))
-    return np.concatenate([models.features(part, profile) for part in parts])
+    return np.concatenate([nc.features(part, profile) for part in parts])
 
 
-def on_features(profile: models.Profile, learnt: Callable[..., Classify]) -> Train:
+def on_features(profile: nc.Profile, learnt: Callable[..., Classify]) -> Train:
     """Training of a classifier on our standardised features."""
 
-    def train(dataset: models.Dataset) -> Classify:
+    def train(dataset: nc.Dataset) -> Classify:
         plain = features_of(dataset.frames, profile)
         mean, scale = standard(plain, profile)
         decide = learnt((plain - mean) / scale, dataset)
@@ -86,9 +86,9 @@ def on_features(profile: models.Profile, learnt: Callable[..., Classify]) -> Tra
     return train
 
 
-def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -> Classify:
+def ours(profile: nc.Profile, scaled: np.ndarray, dataset: nc.Dataset) -> Classify:
     """Train an estimator of ours: networks, trees, or support vectors."""
-    groups = np.array([models.group_of(run) for run in dataset.runs.tolist()])
+    groups = np.array([nc.group_of(run) for run in dataset.runs.tolist()])
     estimator = ESTIMATORS[profile.estimator].fit(scaled, targets(dataset), groups, profile)
 
     def decide(scaled: np.ndarray) -> Prediction:
@@ -96,13 +96,13 @@ def ours(profile: models.Profile, scaled: np.ndarray, dataset: models.Dataset) -
         if profile.estimator != "svm":
             return estimator.choose(decisions), 1.0 - estimator.score(decisions)[:, 0]
         # The first pairs are `ok` against each failure; votes would rank too coarsely.
-        against = -decisions[:, : len(models.CLASSES) - 1]
+        against = -decisions[:, : len(nc.CLASSES) - 1]
         return estimator.choose(decisions), against.max(axis=1)
 
     return decide
 
 
-def theirs(make: Callable[[], Any], scaled: np.ndarray, dataset: models.Dataset) -> Classify:
+def theirs(make: Callable[[], Any], scaled: np.ndarray, dataset: nc.Dataset) -> Classify:
     """Train a classifier of scikit-learn."""
     return partial(predict, make().fit(scaled, targets(dataset)))
 
@@ -114,7 +114,7 @@ def on_samples(view: Callable[[np.ndarray], np.ndarray], make: Callable[[], Any]
         several = frames if frames.ndim == 3 else frames[:, None]
         return np.ascontiguousarray(view(several), dtype=np.float32)
 
-    def train(dataset: models.Dataset) -> Classify:
+    def train(dataset: nc.Dataset) -> Classify:
         estimator = make().fit(transformed(dataset.frames), targets(dataset))
         return lambda frames: predict(estimator, transformed(frames))
 
@@ -161,7 +161,7 @@ def contenders(*, views: bool) -> Iterator[Contender]:
     Args:
         views: Whether those of aeon take part with each transform, not only with the default one.
     """
-    for signals, settings in (("three", models.GENERAL), ("noise", models.SCALAR)):
+    for signals, settings in (("three", nc.GENERAL), ("noise", nc.SCALAR)):
         profile = settings.at(RATE)
         gamma = 0.5 / feature_count(profile)
         vectors = replace(profile, estimator="svm", regularization=100.0, gamma=gamma)

@@ -23,14 +23,14 @@ from scipy.signal import butter, sosfilt, welch
 from benchmarks.orders import ORDERS, order_spectra
 from inspector import read_log
 from inspector.sound.sonification import common_gain, save, sonify
+from noiseclassifier.scenarios.domains import GOOD
+from noiseclassifier.scenarios.domains.drives import ORDERS as GEAR_ORDERS
+from noiseclassifier.scenarios.domains.logs import HARMONICS
+from noiseclassifier.scenarios.domainset import logs
+from noiseclassifier.scenarios.folder import FALLEN, Folder
+from noiseclassifier.scenarios.robots import TARGETS, WIDE
 from noisemodel import Run
 from noisemodel.types import Array
-from scenarios.domains import GOOD
-from scenarios.domains.drives import ORDERS as GEAR_ORDERS
-from scenarios.domains.logs import HARMONICS
-from scenarios.domainset import logs
-from scenarios.folder import FALLEN, Folder
-from scenarios.robots import TARGETS, WIDE
 
 PANDA = Path(__file__).parents[2] / "shared" / "data" / "panda"
 HOME, REAL = "home-panda-straight-0", "real-panda-good"
@@ -183,7 +183,7 @@ def table(robots: Mapping[str, Robot], compared: Mapping[str, Run]) -> Iterable[
 
 def home() -> Run:
     """A Panda of the scenarios at home, which has no ripple."""
-    from scenarios import simulate
+    from noiseclassifier.scenarios import simulate
 
     return simulate("panda", "straight", 0)
 

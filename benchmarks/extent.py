@@ -22,8 +22,8 @@ import numpy as np
 import noisemodel as nm
 from inspector.analysis.analyse import extents
 from inspector.library import load_library
-from models.signals import JOINTS, MOTION, NOISE
-from scenarios.sample import DECIMATED, Sample
+from noiseclassifier.scenarios.sample import DECIMATED, Sample
+from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
 WITHIN = (0.05, 0.1, 0.2)
 """Errors that are counted, in [s]."""

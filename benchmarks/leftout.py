@@ -12,7 +12,7 @@ evenly. Each candidate is trained on all folds but one and predicts the runs of 
 points of the grid, and logistic regression on the same features, missing ones at their mean.
 
 The general profile takes logs of any rates, each once with each of the inputs that training takes
-of it (`models.general.LEARNT`): what is said of runs below holds for each pair of a run and an
+of it (`LEARNT`): what is said of runs below holds for each pair of a run and an
 input. Other profiles are of one rate. For ablations, features can be left out by name, and domains
 above a wildness are measured on but not learnt from. Logs to learn from only, say copies with
 added faults, are never measured on.
@@ -39,31 +39,31 @@ import numpy as np
 from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.recordings import classified
 from inspector.training.training import ANY_RATE, THIN, LeftOut, lacking, profile_at
-from models.estimators.calibration import identity, unthinned
-from models.estimators.estimator import ESTIMATORS
-from models.estimators.probabilistic import NOVELTY_LIMIT, Probable
-from models.estimators.trees import TAIL, Trees
-from models.evaluation.intervals import ratio
-from models.evaluation.matching import OK, UNCLEAR, Matched
-from models.evaluation.outcomes import Outcome
-from models.evaluation.predictions import Predictions, silent
-from models.evaluation.ranking import auc, harmonic_mean, partial_auc
-from models.features import standard
-from models.framefeatures import frame_features
-from models.general import LEARNT, UNBOUNDED, kept
-from models.logbands import ANY, HIGHEST, LOWEST
-from models.pooling import RELATIVE, columns
-from models.signals import EFFORT, JOINTS, NOISE, feeds, named
-from models.splitting import folds
-from models.tuning.grid import Grid
+from noiseclassifier.estimators.calibration import identity, unthinned
+from noiseclassifier.estimators.estimator import ESTIMATORS
+from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT, Probable
+from noiseclassifier.estimators.trees import TAIL, Trees
+from noiseclassifier.evaluation.intervals import ratio
+from noiseclassifier.evaluation.matching import OK, UNCLEAR, Matched
+from noiseclassifier.evaluation.outcomes import Outcome
+from noiseclassifier.evaluation.predictions import Predictions, silent
+from noiseclassifier.evaluation.ranking import auc, harmonic_mean, partial_auc
+from noiseclassifier.features import standard
+from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.general import LEARNT, UNBOUNDED, kept
+from noiseclassifier.logbands import ANY, HIGHEST, LOWEST
+from noiseclassifier.pooling import RELATIVE, columns
+from noiseclassifier.scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
+from noiseclassifier.scenarios.robots import ROBOTS, TARGETS, WIDE
+from noiseclassifier.signals import EFFORT, JOINTS, NOISE, feeds, named
+from noiseclassifier.splitting import folds
+from noiseclassifier.tuning.grid import Grid
 from noisemodel import NoiseModelError
-from scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
-from scenarios.robots import ROBOTS, TARGETS, WIDE
 
 ALARMS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)
 """Alarm thresholds."""
@@ -133,7 +133,7 @@ class Known:
         places: Which of all features they are, shape (there,).
     """
 
-    profile: models.Profile
+    profile: nc.Profile
     base: Predictions
     failing: np.ndarray
     starts: np.ndarray
@@ -359,7 +359,7 @@ def main() -> None:
                 thin=thin,
                 quick=given.quick,
             )
-    except (InspectorError, models.ModelsError) as error:
+    except (InspectorError, nc.ModelsError) as error:
         sys.exit(str(error))
     print(f"trained and measured in {perf_counter() - began:.0f} s\n")
     print("\n".join(report(measured, given.budget)))
@@ -379,7 +379,7 @@ def files(logs: Sequence[Path], limit: int | None = None) -> list[Path]:
 
 def wanted(
     name: str, rate: float | None = None, without: Sequence[str] = ()
-) -> tuple[models.Profile, tuple[str, ...]]:
+) -> tuple[nc.Profile, tuple[str, ...]]:
     """A profile by its name, and the names of its features if it is the general one.
 
     Args:
@@ -410,7 +410,7 @@ def wanted(
 
 def read(
     paths: Sequence[Path],
-    profile: models.Profile,
+    profile: nc.Profile,
     *,
     thin: int = 1,
     names: Sequence[str] = (),
@@ -445,19 +445,19 @@ def read(
 
 
 def known(
-    path: Path, profile: models.Profile, thin: int, names: Sequence[str], wildest: float = inf
+    path: Path, profile: nc.Profile, thin: int, names: Sequence[str], wildest: float = inf
 ) -> list[Known] | tuple[str, str]:
     """Features of a run, of each of its inputs; its name and a reason if it cannot be used."""
     try:
         return _known(path, profile, thin, names, wildest)
     except TargetError:
         raise
-    except (InspectorError, models.ModelsError, NoiseModelError) as error:
+    except (InspectorError, nc.ModelsError, NoiseModelError) as error:
         raise InspectorError(str(error)) from None  # not all errors can come from a process
 
 
 def _known(
-    path: Path, profile: models.Profile, thin: int, names: Sequence[str], wildest: float
+    path: Path, profile: nc.Profile, thin: int, names: Sequence[str], wildest: float
 ) -> list[Known] | tuple[str, str]:
     ((recording, run),) = classified([path], None if names else profile.rate, bare_too=True)
     robot = recording.facts.get("robot", "")
@@ -483,13 +483,13 @@ def _known(
             if wild
             else found
         )
-    except models.SignalError:  # too short
+    except nc.SignalError:  # too short
         return recording.name, f"shorter than {profile.duration:g} s"
 
 
 def of_recording(
-    recording: models.Recording,
-    profile: models.Profile,
+    recording: nc.Recording,
+    profile: nc.Profile,
     *,
     thin: int = 1,
     names: Sequence[str] = (),
@@ -512,9 +512,9 @@ def of_recording(
         cut, labels = whole, truth
     else:
         try:
-            examples = models.Examples.of(models.Dataset.of([recording], profile), profile)
+            examples = nc.Examples.of(nc.Dataset.of([recording], profile), profile)
             cut, labels = examples.features.astype(np.float32), examples.labels
-        except models.NoFrameError:
+        except nc.NoFrameError:
             cut, labels = whole[:0], truth[:0]
     learnt = kept(labels, thin, first=first)
     return Known(
@@ -569,7 +569,7 @@ def line_of(robot: str) -> str:
 
 
 def candidates(
-    profile: models.Profile, grid: Sequence[str], names: Sequence[str] = ()
+    profile: nc.Profile, grid: Sequence[str], names: Sequence[str] = ()
 ) -> Iterator[Candidates]:
     """Points of a grid; trees that differ in their number of rounds alone are trained together.
 
@@ -589,7 +589,7 @@ def candidates(
         points = [", ".join(f"{k} {v:g}" for k, v in point.items()) for point in axes.points()]
     known = dict(zip(ANY.columns, ANY.rising.tolist(), strict=True))
     rising = np.array([known[name] for name in names]) if names else None
-    together: dict[models.Profile, list[tuple[str, models.Profile]]] = {}
+    together: dict[nc.Profile, list[tuple[str, nc.Profile]]] = {}
     for name, one in zip(points, profiles, strict=True):
         key = replace(one, rounds=1) if issubclass(ESTIMATORS[one.estimator], Trees) else one
         together.setdefault(key, []).append((name, one))
@@ -598,7 +598,7 @@ def candidates(
         yield Candidates(labels, _trained(mine, rising))
 
 
-def _trained(profiles: Sequence[models.Profile], rising: Any) -> Fit:
+def _trained(profiles: Sequence[nc.Profile], rising: Any) -> Fit:
     def fit(scaled: np.ndarray, targets: np.ndarray, groups: np.ndarray) -> Sequence[Any]:
         most = max(profiles, key=lambda profile: profile.rounds)
         kind = ESTIMATORS[most.estimator]
@@ -610,7 +610,7 @@ def _trained(profiles: Sequence[models.Profile], rising: Any) -> Fit:
     return fit
 
 
-def logistic(profile: models.Profile) -> Candidates:
+def logistic(profile: nc.Profile) -> Candidates:
     """Logistic regression."""
 
     def fit(scaled: np.ndarray, targets: np.ndarray, _: np.ndarray) -> Sequence[Any]:
@@ -623,7 +623,7 @@ def measure(
     runs: Sequence[Known],
     split: Iterable[tuple[np.ndarray, np.ndarray]],
     several: Sequence[Candidates],
-    profile: models.Profile,
+    profile: nc.Profile,
     thresholds: Sequence[Threshold],
     *,
     measured: int | None = None,
@@ -664,7 +664,7 @@ def measure(
             groups = np.full(len(labels), "one")  # trees of one group are not calibrated
         classes = tuple(name for name in profile.classes if name in set(labels.tolist()))
         if len(classes) < 2:
-            raise models.DatasetError(f"training takes two classes or more, not {len(classes)}")
+            raise nc.DatasetError(f"training takes two classes or more, not {len(classes)}")
         targets = np.array([classes.index(label) for label in labels.tolist()])
         unknown = np.isnan(features).all(axis=0)  # as `General.train` takes them
         features[:, unknown] = 0.0
@@ -680,7 +680,7 @@ def measure(
                 own = corrected(estimator, thin, unbounded)
                 for index in test.tolist():
                     run = runs[index]
-                    classifier = models.Classifier(run.profile, classes, own, mean, scale)
+                    classifier = nc.Classifier(run.profile, classes, own, mean, scale)
                     decisions = classifier.decide(run.wide(run.whole, count))
                     found = counted(run, classifier, decisions, thresholds)
                     score[number, index], counts[number, :, :, index] = found
@@ -715,7 +715,7 @@ def corrected(estimator: Any, thin: int, unbounded: np.ndarray) -> Any:
 
 def counted(
     run: Known,
-    classifier: models.Classifier,
+    classifier: nc.Classifier,
     decisions: np.ndarray,
     thresholds: Sequence[Threshold],
 ) -> tuple[float, np.ndarray]:

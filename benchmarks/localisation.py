@@ -22,9 +22,9 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import noisemodel as nm
 from inspector.localisation.links import fault_links
 from inspector.localisation.localise import Localisation, localise
+from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
+from noiseclassifier.scenarios.limbs import limbs
 from noisemodel.links import LinkNoise, link_noise
-from scenarios import ROBOTS, ScenarioError, SimulationError, simulate
-from scenarios.limbs import limbs
 
 SCENARIOS = (
     "obstacle-full",

@@ -100,10 +100,10 @@ class Ours:
         """Import the modules that training and labelling import."""
         import sklearn.svm  # noqa: F401
 
-        import models
+        import noiseclassifier as nc
 
-        self._models, self._folder = models, folder
-        self._profile = models.noisytest.profile_from_config(folder / "noisytest-config.json")
+        self._models, self._folder = nc, folder
+        self._profile = nc.noisytest.profile_from_config(folder / "noisytest-config.json")
 
     def tasks(self) -> dict[str, Callable[[], Any]]:
         """The tasks, by name."""
@@ -129,14 +129,14 @@ class Ours:
         return self._point(1)
 
     def _prepare(self) -> None:
-        models, profile = self._models, self._profile
-        shipped = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
-        self._shipped = models.load(shipped)
+        nc, profile = self._models, self._profile
+        shipped = Path(__file__).parents[1] / "models" / "general.npz"
+        self._shipped = nc.load(shipped)
         self._general = self._shipped.at(profile.rate)
-        _, self._noise = models.read_log(self._folder / "validation" / FILE)
-        self._windows = models.frame(self._noise[1:], length=profile.length, hop=profile.hop)
+        _, self._noise = nc.read_log(self._folder / "validation" / FILE)
+        self._windows = nc.frame(self._noise[1:], length=profile.length, hop=profile.hop)
         self._recordings = [
-            list(models.noisytest.read_folder(self._folder / name, rate=profile.rate))
+            list(nc.noisytest.read_folder(self._folder / name, rate=profile.rate))
             for name in ("training", "validation")
         ]
         self._hop(1)
@@ -173,9 +173,9 @@ class Ours:
 
     def _points(self) -> int:
         """Measure all points of the paper's grid with one stride; their number."""
-        from models.tuning.grid import Grid
-        from models.tuning.search import measure
-        from models.tuning.trial import Trial
+        from noiseclassifier.tuning.grid import Grid
+        from noiseclassifier.tuning.search import measure
+        from noiseclassifier.tuning.trial import Trial
 
         grid = Grid.of(["paper"], self._profile.kernel).profiles(self._profile)
         points = [point for point in grid if point.stride == self._profile.stride]

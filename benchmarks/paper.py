@@ -30,16 +30,16 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 from inspector.training import recordings, training
 from inspector.training.part import Part
-from models.evaluation.assessment import measure, number, percent
-from models.evaluation.predictions import Predictions, predict
+from noiseclassifier.evaluation.assessment import measure, number, percent
+from noiseclassifier.evaluation.predictions import Predictions, predict
+from noiseclassifier.scenarios.sample import Sample
+from noiseclassifier.scenarios.signals import WHOLE
 from noisemodel.parallel import DIED, in_order
-from scenarios.sample import Sample
-from scenarios.signals import WHOLE
 
-SHIPPED = Path(__file__).parents[1] / "assets" / "models"
+SHIPPED = Path(__file__).parents[1] / "models"
 RATE = 10_000.0
 PROFILES = (
     *("noisytest-linear", "noisytest-rbf", "paper-linear", "paper-rbf"),
@@ -70,9 +70,9 @@ FRAMES = np.array([129, 11, 12, 39])
 class Score(NamedTuple):
     """The measures of a model on some runs."""
 
-    frames: models.Assessment
+    frames: nc.Assessment
     """On the test set, by frames of blocks."""
-    alarms: models.Assessment
+    alarms: nc.Assessment
     """On the test set and the good motion, by alarms."""
 
 
@@ -132,7 +132,7 @@ def files(folders: Sequence[Path], part: Part) -> list[Path]:
     if part is Part.ALL:
         return every
     test = part is Part.TEST
-    return [path for path in every if models.held_out(models.group_of(name_of(path))) == test]
+    return [path for path in every if nc.held_out(nc.group_of(name_of(path))) == test]
 
 
 def name_of(path: Path) -> str:
@@ -170,7 +170,7 @@ def measured(
 ) -> Measured:
     """Measures of a model; a profile is trained first."""
     path = job if isinstance(job, Path) else trained(job, known, folder)
-    classifier, reduced = models.Classifier.load(path), ()
+    classifier, reduced = nc.Classifier.load(path), ()
     every = [*test, *good]
     names = {name_of(one) for one in test}
     found = predictions(classifier, recordings.recordings(every, classifier.rate))
@@ -183,13 +183,11 @@ def measured(
     return Measured(name, len(classifier.runs), scored(found, names), reduced)
 
 
-def predictions(
-    classifier: models.Classifier, read: Iterable[models.Recording]
-) -> list[Predictions]:
+def predictions(classifier: nc.Classifier, read: Iterable[nc.Recording]) -> list[Predictions]:
     """Predictions for recordings that the model was not trained on; of equal ones, the first."""
     found: dict[str, Predictions] = {}
     for recording in read:
-        models.check_apart(classifier.runs, {recording.name: recording.sha256})
+        nc.check_apart(classifier.runs, {recording.name: recording.sha256})
         if recording.sha256 not in found:
             found[recording.sha256] = predict(classifier, recording)
     return list(found.values())
@@ -205,12 +203,12 @@ def trained(profile: str, paths: Sequence[Path], folder: Path) -> Path:
     path = folder / f"{profile}.npz"
     if not path.exists():
         training.train(paths, profile, RATE, path)
-    elif set(models.Classifier.load(path).runs) != set(map(name_of, paths)):
+    elif set(nc.Classifier.load(path).runs) != set(map(name_of, paths)):
         raise SystemExit(f"{path}: trained on other runs; remove it, or take another --output")
     return path
 
 
-def halved(paths: Sequence[Path], rate: float) -> Iterator[models.Recording]:
+def halved(paths: Sequence[Path], rate: float) -> Iterator[nc.Recording]:
     """Recordings of half of the limbs of samples."""
     for path in paths:
         sample = Sample.load(path).at(rate)
@@ -259,7 +257,7 @@ def row(name: str, score: Score) -> str:
     )
     return _row(
         name,
-        *(" / ".join(f"{100.0 * side[c].value:.1f}" for c in models.CLASSES) for side in errors),
+        *(" / ".join(f"{100.0 * side[c].value:.1f}" for c in nc.CLASSES) for side in errors),
         *map(percent, shares),
         number(score.alarms.events.false_alarms_per_hour),
     )
@@ -275,7 +273,7 @@ def _table(title: str, found: Sequence[tuple[str, Score]]) -> str:
     lines += [row(name, score) for name, score in found]
     for _, (frames, alarms) in found[:1]:
         counts = frames.frames.evaluation.confusion.sum(axis=1).tolist()
-        each_class = ", ".join(f"{n} {c}" for c, n in zip(models.CLASSES, counts, strict=False))
+        each_class = ", ".join(f"{n} {c}" for c, n in zip(nc.CLASSES, counts, strict=False))
         lines += [
             "",
             f"{sum(counts)} frames ({each_class}) of {frames.runs} runs in {frames.groups} groups;"

@@ -35,7 +35,6 @@ import numpy as np  # noqa: E402
 from scipy.stats import beta  # noqa: E402
 
 import noisemodel as nm  # noqa: E402
-import scenarios  # noqa: E402
 from inspector.analysis.analyse import analyse  # noqa: E402
 from inspector.library import Library, load_library  # noqa: E402
 from inspector.regression import difference as compares  # noqa: E402
@@ -44,6 +43,7 @@ from inspector.regression.difference import Verdict, difference  # noqa: E402
 from inspector.regression.measure import Measured, measure  # noqa: E402
 from inspector.regression.pairing import Pairing, Scenario  # noqa: E402
 from inspector.regression.statistic import FEWEST_PAIRS  # noqa: E402
+from noiseclassifier import scenarios  # noqa: E402
 
 compares.lag = findings.lag = cache(findings.lag)  # runs are drawn again and again
 

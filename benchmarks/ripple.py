@@ -25,12 +25,12 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from inspector.localisation.order import LEAST, MARGIN, best_lines
+from noiseclassifier.scenarios.domains import logged
+from noiseclassifier.scenarios.domains.distribution import DISTRIBUTION
+from noiseclassifier.scenarios.domains.logs import HARMONICS
+from noiseclassifier.scenarios.limits import Limits
 from noisemodel import Block, Run
 from noisemodel.types import Array
-from scenarios.domains import logged
-from scenarios.domains.distribution import DISTRIBUTION
-from scenarios.domains.logs import HARMONICS
-from scenarios.limits import Limits
 
 RATE, SECONDS = 2000.0, 6.0
 """Of the motions, in [Hz] and [s]; logs have up to this rate."""

@@ -29,11 +29,11 @@ os.environ["MKL_NUM_THREADS"] = os.environ["NUMBA_NUM_THREADS"] = "1"
 import numpy as np
 from sklearn.metrics import roc_auc_score
 
-import models
+import noiseclassifier as nc
 from benchmarks.contenders import RATE, Contender, contenders
 from inspector.training.recordings import of_sample
-from models.evaluation.assessment import percent
-from models.evaluation.intervals import Resampling
+from noiseclassifier.evaluation.assessment import percent
+from noiseclassifier.evaluation.intervals import Resampling
 
 SHARES = (0.001, 0.01)
 """False-positive rates of `ok` frames: 36 and 360 frames in an hour."""
@@ -47,7 +47,7 @@ ADVICE = (
 )
 
 HEAD = (
-    *("signals", "classifier", "balanced accuracy", f"recall of {' / '.join(models.CLASSES)}, %"),
+    *("signals", "classifier", "balanced accuracy", f"recall of {' / '.join(nc.CLASSES)}, %"),
     *("failure recall", "false alarms", *(f"found at {share:.1%}" for share in SHARES), "AUC"),
     *("training, s", "a frame of many, ms", "a frame alone, ms"),
 )
@@ -61,32 +61,32 @@ def files(folder: Path, seeds: int) -> tuple[list[Path], list[Path]]:
         seeds: Seeds of each robot, half of them for each side.
     """
     groups = {
-        path: models.group_of(f"{path.parent.name}/{path.stem}")
+        path: nc.group_of(f"{path.parent.name}/{path.stem}")
         for path in sorted(folder.rglob("*.npz"))
     }
     robots: dict[str, list[str]] = defaultdict(list)
     for group in sorted(set(groups.values())):
-        if not models.held_out(group):
+        if not nc.held_out(group):
             robots[group.rpartition("-")[0]].append(group)
     taken = {group for each in robots.values() for group in each[:seeds]}
     kept = [path for path, group in groups.items() if group in taken]
-    learnt, measured = models.folds([groups[path] for path in kept], 2)[0]
+    learnt, measured = nc.folds([groups[path] for path in kept], 2)[0]
     return [kept[item] for item in learnt], [kept[item] for item in measured]
 
 
-def framed(paths: Sequence[Path], profile: models.Profile, *, training: bool) -> models.Dataset:
+def framed(paths: Sequence[Path], profile: nc.Profile, *, training: bool) -> nc.Dataset:
     """Frames of samples; of equal samples, the first counts."""
     found = {one.sha256: one for one in (of_sample(path, RATE) for path in reversed(paths))}
-    return models.Dataset.of(reversed(found.values()), profile, training=training)
+    return nc.Dataset.of(reversed(found.values()), profile, training=training)
 
 
-def thinned(dataset: models.Dataset, every: int) -> models.Dataset:
+def thinned(dataset: nc.Dataset, every: int) -> nc.Dataset:
     """One of so many frames."""
     kept = {name: getattr(dataset, name)[::every] for name in ("frames", "labels", "runs")}
     return replace(dataset, **kept)
 
 
-def row(contender: Contender, known: models.Dataset, test: models.Dataset) -> str:
+def row(contender: Contender, known: nc.Dataset, test: nc.Dataset) -> str:
     """Row of the table of one classifier."""
     if contender.needs_aeon:
         contender.train(thinned(known, WARM))(known.frames[:1])
@@ -94,14 +94,14 @@ def row(contender: Contender, known: models.Dataset, test: models.Dataset) -> st
     (predicted, scores), deciding = timed(lambda: decide(test.frames))
     some = test.frames[:: max(len(test) // ALONE, 1), None]
     alone = median(timed(lambda frame=frame: decide(frame))[1] for frame in some)
-    names = np.array((*models.CLASSES, models.UNKNOWN))[predicted]
-    frames = models.Evaluation.of(test.labels, names, models.CLASSES)
-    failure = test.labels != models.CLASSES[0]
+    names = np.array((*nc.CLASSES, nc.UNKNOWN))[predicted]
+    frames = nc.Evaluation.of(test.labels, names, nc.CLASSES)
+    failure = test.labels != nc.CLASSES[0]
     cells = [
         contender.signals,
         contender.name,
         f"{frames.balanced_accuracy:.1%}",
-        " / ".join(f"{100 * recall:.1f}" for recall in frames.recall[: len(models.CLASSES)]),
+        " / ".join(f"{100 * recall:.1f}" for recall in frames.recall[: len(nc.CLASSES)]),
         f"{frames.failure_recall:.1%}",
         f"{frames.false_alarm_rate:.2%}",
         *(found(test, scores, share) for share in SHARES),
@@ -120,14 +120,14 @@ def timed(work: Callable[[], Any]) -> tuple[Any, float]:
     return result, time.process_time() - start
 
 
-def found(test: models.Dataset, scores: np.ndarray, share: float) -> str:
+def found(test: nc.Dataset, scores: np.ndarray, share: float) -> str:
     """Recall of failure frames at a threshold with at most this share of `ok` frames above."""
-    failure = test.labels != models.CLASSES[0]
+    failure = test.labels != nc.CLASSES[0]
     quiet = np.sort(scores[~failure])[::-1]
     above = failure & (scores > quiet[int(share * len(quiet))])
     runs, run = np.unique(test.runs, return_inverse=True)
     part, whole = (np.bincount(run[one], minlength=len(runs)) for one in (above, failure))
-    resampling = Resampling.of([models.group_of(name) for name in runs.tolist()])
+    resampling = Resampling.of([nc.group_of(name) for name in runs.tolist()])
     return percent(resampling.share(part, whole))
 
 
@@ -156,8 +156,8 @@ def main() -> None:
             if one.profile == profile:
                 print(row(one, *sides), flush=True)
     for side, name in zip(sides, ("training", "measured"), strict=True):
-        counts = ", ".join(f"{(side.labels == each).sum()} {each}" for each in models.CLASSES)
-        groups = sorted({models.group_of(run) for run in side.hashes})
+        counts = ", ".join(f"{(side.labels == each).sum()} {each}" for each in nc.CLASSES)
+        groups = sorted({nc.group_of(run) for run in side.hashes})
         print(f"\n{name}: {len(side.hashes)} runs, {', '.join(groups)}; frames: {counts}")
 
 

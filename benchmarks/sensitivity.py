@@ -16,10 +16,10 @@ from dataclasses import replace
 import numpy as np
 
 import noisemodel as nm
-import scenarios
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import EXIT
 from inspector.library import load_library, signals_of
+from noiseclassifier import scenarios
 
 JOINTS = {"panda": "panda_joint3", "talos": "leg_left_4_joint"}
 TONES, AMPLITUDES = (35.0, 90.0, 180.0), (0.1, 0.3, 1.0, 3.0, 10.0, 100.0)

@@ -23,15 +23,15 @@ import numpy as np
 from benchmarks.elsewhere.references import KINDS, Reference, draw
 from inspector.smoothness.measures import sparc, speed_of
 from inspector.smoothness.scores import SCORES, scored
-from models.evaluation.ranking import auc
+from noiseclassifier.evaluation.ranking import auc
+from noiseclassifier.scenarios.mujoco_model import build
+from noiseclassifier.scenarios.physics import Physics
+from noiseclassifier.scenarios.quadruped.standing import stand
+from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.robots import ROBOTS
+from noiseclassifier.scenarios.shapes import Box
 from noisemodel import Run
 from noisemodel.types import Array
-from scenarios.mujoco_model import build
-from scenarios.physics import Physics
-from scenarios.quadruped.standing import stand
-from scenarios.reduced import reduced_model
-from scenarios.robots import ROBOTS
-from scenarios.shapes import Box
 
 RATE, STEPS = 50.0, 20
 """Of the policy and of the log, in [Hz]; steps of the simulation in between."""

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 from benchmarks.table import ROOT, Given, Row, used
-from models.signals import JOINTS, MOTION, NOISE, by_joint
+from noiseclassifier.signals import JOINTS, MOTION, NOISE, by_joint
 
 RATES = (125.0, 1000.0, 10_000.0)
 """Rates of the signals, in [Hz]."""
@@ -27,8 +27,8 @@ MEDIAN, SLOW = 3e-4, 2e-3
 
 def rows(_: Given) -> Iterator[Row]:
     """Each input and rate in chunks; of 12 joints at 1 kHz sample by sample, too, and whole."""
-    general = models.load(ROOT / "assets" / "models" / "general.npz")
-    assert isinstance(general, models.General)
+    general = nc.load(ROOT / "models" / "general.npz")
+    assert isinstance(general, nc.General)
     cases = {
         f"labels by {name}, {rate:g} Hz": general.at(rate, signals)
         for name, signals in INPUTS.items()
@@ -58,14 +58,14 @@ def rows(_: Given) -> Iterator[Row]:
 
 
 def pushed(
-    classifier: models.Classifier, signals: dict[str, np.ndarray], chunk: int
+    classifier: nc.Classifier, signals: dict[str, np.ndarray], chunk: int
 ) -> tuple[float, ...]:
     """Push signals by name, shape (samples,) or (joints, samples).
 
     Returns:
         CPU times in [s]: in all, and of a chunk that completes a frame, median and 99th percentile.
     """
-    stream, labels = models.Stream(classifier, joints=MANY), []
+    stream, labels = nc.Stream(classifier, joints=MANY), []
     count = next(iter(signals.values())).shape[-1]
     start_cpu = time.process_time()
     for first in range(0, count, chunk):

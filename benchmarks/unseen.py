@@ -16,11 +16,11 @@ from pathlib import Path
 
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
-import models
+import noiseclassifier as nc
 from benchmarks.paper import files, first_seeds
 from inspector.training import recordings, training
 from inspector.training.part import Part
-from models.evaluation.assessment import number, percent
+from noiseclassifier.evaluation.assessment import number, percent
 
 BUDGET = 20.0
 """False-alarm budget, per hour."""
@@ -60,9 +60,9 @@ def measured(
     """Row of the table of a model, trained unless it exists, on an unseen robot."""
     if not path.exists():
         training.train(known, profile, rate, path)
-    classifier = models.Classifier.load(path)
+    classifier = nc.Classifier.load(path)
     test = files([folder / robot for folder in data], Part.TEST)
-    found = models.assess(classifier, recordings.recordings(test, classifier.rate))
+    found = nc.assess(classifier, recordings.recordings(test, classifier.rate))
     recall, events = found.at_budgets[BUDGET]
     cells = (
         *(profile, robot, str(len(classifier.runs)), f"{found.runs}, {found.groups}"),

@@ -15,12 +15,12 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.analyse import analyse
 from inspector.colors import of_classes
 from inspector.library import load_library
-from models.evaluation.spans import duration, spans_of
+from noiseclassifier.evaluation.spans import duration, spans_of
 
 
 def main() -> None:
@@ -62,7 +62,7 @@ def main() -> None:
         middle = (labels.start + labels.stop) / 2
         axes.plot(middle, 1.0 - labels.scores[:, labels.classes.index("ok")], "k", lw=0.8)
         (model,) = load_library([path]).values()
-        settings = model.recipe if isinstance(model, models.General) else model.profile
+        settings = model.recipe if isinstance(model, nc.General) else model.profile
         axes.axhline(settings.alarm, color="0.4", ls="--")
         axes.set(ylim=(0, 1), ylabel="P(failure)")
         axes.set_title(f"{name}: {flagged:.0%} of the time flagged", loc="left", fontsize="medium")

@@ -22,7 +22,7 @@ from sphinx.pycode import ModuleAnalyzer
 from sphinx.util.docutils import SphinxTranslator
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "models")]
 
 
 class _Shown:
@@ -57,7 +57,12 @@ NAVIGATION = {
         "robots",
     ],
     "Theory": ["theory", "classifier", "noise-models"],
-    "API": ["api/inspector", "api/noisemodel", "api/models", "api/scenarios"],
+    "API": [
+        "api/inspector",
+        "api/noisemodel",
+        "api/noiseclassifier",
+        "api/noiseclassifier.scenarios",
+    ],
     "Reference": [
         "formats",
         "limits",

@@ -184,18 +184,18 @@ def _run(output: _StandardOutput | None) -> int:
 def _failed(error: Exception) -> int:
     """Print an expected error as one line, or the traceback of a bug; the exit status."""
     if isinstance(error, ValueError):
-        import models
+        import noiseclassifier as nc
         import noisemodel
         from inspector.analysis.verdict import EXPECTED
         from inspector.errors import OptionError
         from inspector.recording.viewer import DisplayError
-        from scenarios import ScenarioError
+        from noiseclassifier.scenarios import ScenarioError
 
         if isinstance(error, (*EXPECTED, ScenarioError)):
             typer.echo(f"inspector: {printable(str(error))}", err=True)
             if isinstance(error, (OptionError, noisemodel.UnknownKindError)):
                 return 2
-            output = isinstance(error, (noisemodel.OutputError, models.OutputError))
+            output = isinstance(error, (noisemodel.OutputError, nc.OutputError))
             lost = output and isinstance(error.__cause__, OSError)
             return OUTPUT_LOST if lost or isinstance(error, DisplayError) else 3
     traceback.print_exception(error)

@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from models import ANOMALY, UNKNOWN
+from noiseclassifier import ANOMALY, UNKNOWN
 
 Color: TypeAlias = tuple[int, int, int]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from models.types import Index
+from noiseclassifier.types import Index
 from noisemodel import Run
 from noisemodel.ondemand import OnDemand, pieces
 from noisemodel.run import SAMPLED

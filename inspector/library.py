@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector import assets
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
-from models.profile import NOMINAL
+from noiseclassifier.profile import NOMINAL
 from noisemodel.run import pieces_of
 from noisemodel.types import Array, Real
 
-Library = Mapping[str, models.Model]
+Library = Mapping[str, nc.Model]
 """Models by name."""
 
 
@@ -34,7 +34,7 @@ class Labelled:
         alarm: Alarm threshold, a probability of any failure; None of a model without one.
     """
 
-    labels: models.Labels
+    labels: nc.Labels
     model: str
     remark: str = ""
     alarm: float | None = None
@@ -50,7 +50,7 @@ def load_library(paths: Sequence[str | Path] = ()) -> Library:
         ModelFileError: If a file is no model.
     """
     files = assets.model_files([Path(path) for path in paths])
-    return {path.stem: models.load(path) for path in files}
+    return {path.stem: nc.load(path) for path in files}
 
 
 def for_robot(library: Library, robot: str | None) -> Library:
@@ -67,14 +67,14 @@ def for_robot(library: Library, robot: str | None) -> Library:
     return kept or library
 
 
-def _fits(model: models.Model, robot: str | None) -> bool:
+def _fits(model: nc.Model, robot: str | None) -> bool:
     if (
-        isinstance(model, models.General)
+        isinstance(model, nc.General)
         or model.profile.reference
-        or not any(map(models.signals.by_joint, model.profile.signals))
+        or not any(map(nc.signals.by_joint, model.profile.signals))
     ):
         return True
-    robots = {models.splitting.robot_of(name) for name in model.runs} - {""}
+    robots = {nc.splitting.robot_of(name) for name in model.runs} - {""}
     return not robots or robot in robots
 
 
@@ -101,7 +101,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     try:
         own = for_robot(library, run.robot)
         name, classifier = nearest(own, slower.rate, signal_names(slower), logged=run.rate)
-    except models.ModelsError as error:
+    except nc.ModelsError as error:
         held = "" if slower is run else "measured values are held: "
         raise CannotTellError(f"{held}{error}") from error
     rate, remark = classifier.rate, ""
@@ -122,7 +122,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
 
 def nearest(
     library: Library, rate: float, signals: Collection[str], *, logged: float
-) -> tuple[str, models.Classifier]:
+) -> tuple[str, nc.Classifier]:
     """Model of the nearest rate at or below that of a log's values, bound to them.
 
     Args:
@@ -140,14 +140,12 @@ def nearest(
         RateError: If all others are of higher rates, or there are no models.
     """
     try:
-        return models.nearest(library, rate, signals)
-    except models.ModelsError:
-        single = {
-            name: each for name, each in library.items() if isinstance(each, models.Classifier)
-        }
+        return nc.nearest(library, rate, signals)
+    except nc.ModelsError:
+        single = {name: each for name, each in library.items() if isinstance(each, nc.Classifier)}
         if logged == rate or not single:
             raise
-        return models.nearest(single, logged, signals)
+        return nc.nearest(single, logged, signals)
 
 
 def signals_of(run: nm.Run) -> dict[str, Real]:
@@ -160,7 +158,7 @@ def signals_of(run: nm.Run) -> dict[str, Real]:
         Norms by name, each of shape (samples,), and velocities joint by joint, shape
         (joints, samples), in [rad/s].
     """
-    return models.signals.without_zero_error(_signals(run))
+    return nc.signals.without_zero_error(_signals(run))
 
 
 def signal_names(run: nm.Run) -> tuple[str, ...]:
@@ -189,7 +187,7 @@ def _differs(run: nm.Run) -> bool:
     return bool(np.any(desired[:, wanted] != run.velocity[:, measured]))
 
 
-def _alarm(classifier: models.Classifier, labels: models.Labels) -> float | None:
+def _alarm(classifier: nc.Classifier, labels: nc.Labels) -> float | None:
     return None if labels.above_threshold is None else classifier.profile.alarm
 
 
@@ -219,10 +217,10 @@ def label_noise(time: Array, noise: Array, library: Library) -> Labelled:
             joint velocities are not there.
         SignalError: If the noise is too short for a frame.
     """
-    rate = models.nominal_rate(time)
+    rate = nc.nominal_rate(time)
     try:
-        name, classifier = models.nearest(library, rate, (models.NOISE,))
-    except models.ModelsError as error:
+        name, classifier = nc.nearest(library, rate, (nc.NOISE,))
+    except nc.ModelsError as error:
         raise CannotTellError(str(error)) from error
     if not _close(rate, classifier.rate):
         raise CannotTellError(

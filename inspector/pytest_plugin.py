@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from inspector.analysis.analyse import Analysis
     from inspector.library import Library
     from inspector.regression.difference import Difference
-    from models import Event
+    from noiseclassifier import Event
     from noisemodel import Run
 
 Allowed: TypeAlias = "str | tuple[str, float, float]"
@@ -280,7 +280,7 @@ def _allows(allowed: Iterable[Allowed], event: "Event") -> bool:
 
 
 def _sentence(event: "Event") -> str:
-    from models.labels import interval
+    from noiseclassifier.labels import interval
 
     return f"{event.label} from {interval(event.start, event.stop)}{event.novelty}"
 

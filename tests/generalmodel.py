@@ -5,12 +5,12 @@ from functools import cache
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
-from models.signals import JOINTS, MOTION, NOISE
+from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
-RECIPE = replace(models.ANY, rounds=8, leaves=4)
-ONE_RATE = replace(models.EACH, rounds=8)
+RECIPE = replace(nc.ANY, rounds=8, leaves=4)
+ONE_RATE = replace(nc.EACH, rounds=8)
 RATES = (80.0, 125.0, 500.0, 1000.0)
 SECONDS = 5.0
 
@@ -43,9 +43,9 @@ def run_at(rate, label="ok", seed=3, seconds=5.0, **changes):
 
 
 def recording(rate, label, seed, names=(*MOTION, *JOINTS)):
-    blocks = (models.Block(0.0, SECONDS, label),)
+    blocks = (nc.Block(0.0, SECONDS, label),)
     found = signals(rate, label, seed, names)
-    return models.Recording(f"panda/{label}-{rate:g}-{seed:03d}", found, rate, blocks)
+    return nc.Recording(f"panda/{label}-{rate:g}-{seed:03d}", found, rate, blocks)
 
 
 @cache
@@ -56,12 +56,12 @@ def frames(recipe=RECIPE):
         for seed in range(2)
         for label in ("ok", "impact", "oscillations")
     ]
-    return models.Frames.joined(models.frames_of(recordings, recipe))
+    return nc.Frames.joined(nc.frames_of(recordings, recipe))
 
 
 @cache
 def trained():
-    return models.General.train(frames(), RECIPE)
+    return nc.General.train(frames(), RECIPE)
 
 
 @cache
@@ -75,4 +75,4 @@ def fixed(names=(NOISE,), rate=1000.0):
     ]
     still = {name: np.zeros_like(each) for name, each in recordings[0].signal.items()}
     recordings.append(replace(recordings[0], name="panda/still-009", signal=still))
-    return models.Classifier.train(models.Dataset.of(recordings, profile), profile)
+    return nc.Classifier.train(nc.Dataset.of(recordings, profile), profile)

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from models.evaluation.predictions import Predictions
-from models.labels import Labels
-from models.recording import Block
-from models.splitting import group_of
+from noiseclassifier.evaluation.predictions import Predictions
+from noiseclassifier.labels import Labels
+from noiseclassifier.recording import Block
+from noiseclassifier.splitting import group_of
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 RATE, LENGTH, HOP = 1000.0, 400, 100

@@ -23,7 +23,7 @@ from inspector.audit.placeholder import without_placeholder
 from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.formats import FORMATS
-from models import Event, Labels
+from noiseclassifier import Event, Labels
 from noisemodel import Robot, Run
 from noisemodel.differentiate import METHOD, joint_velocity
 

@@ -3,7 +3,7 @@ import numpy as np
 from inspector.analysis.analyse import Analysis, Status
 from inspector.analysis.loudest import SHOWN, chosen
 from inspector.levels import STEP
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Run
 
 TIME = np.arange(100) * 0.05

@@ -9,8 +9,8 @@ from inspector.assets import demo_run, model_files
 from inspector.audit import Observability, audit, shortcomings, summary
 from inspector.audit.observability import OSCILLATIONS, band_edges, has_frame
 from inspector.library import CannotTellError, label_run, load_library
-from models import Profile
-from models.signals import MOTION
+from noiseclassifier import Profile
+from noiseclassifier.signals import MOTION
 from noisemodel import Run, decimated
 
 LIBRARY = load_library(model_files())

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import models
+import noiseclassifier as nc
+from noiseclassifier.scenarios.limbs import limbs
+from noiseclassifier.scenarios.sample import Sample
 from noisemodel import Block
-from scenarios.limbs import limbs
-from scenarios.sample import Sample
 
 ROOT = Path(__file__).parents[1]
 RATE = 10_000.0
@@ -124,8 +124,8 @@ def test_the_robot_that_is_left_out_is_measured_and_not_trained_on(
     out = capsys.readouterr().out
     assert "| noisytest-rbf | go2 | 4 | 2, 2 | 96.4% | 100.0%" in out  # go2's seeds 2 and 7
     (model,) = tmp_path.glob("*.npz")
-    learnt = models.Classifier.load(model).runs
-    assert {models.group_of(run).rpartition("-")[0] for run in learnt} == {"panda", "talos"}
+    learnt = nc.Classifier.load(model).runs
+    assert {nc.group_of(run).rpartition("-")[0] for run in learnt} == {"panda", "talos"}
 
 
 def test_a_model_of_other_runs_is_refused(paper, data, tmp_path):

@@ -26,7 +26,7 @@ from inspector.localisation.stage import Localisation
 from inspector.logs.opening import Reading, Source, open_source
 from inspector.logs.options import ReadOptions
 from inspector.version import program_version
-from models import Event
+from noiseclassifier import Event
 from noisemodel import OutputError, parallel
 
 ROOT = Path(__file__).parents[1]

@@ -23,9 +23,9 @@ import numpy as np
 import pytest
 
 import inspector
-import models
+import noiseclassifier as nc
 import noisemodel
-import scenarios
+from noiseclassifier import scenarios
 from noisemodel import Run, decimated, runfile
 
 ROOT = Path(__file__).parents[1]
@@ -114,7 +114,7 @@ def files(tmp_path_factory):
         head = ["time", *(f"{joint}.{kind}" for kind in own for joint in run.joint_names)]
         file = folder / f"{name}.csv"
         np.savetxt(file, table, "%.7g", delimiter=",", header=",".join(head), comments="")
-    (folder / "my_model.npz").symlink_to(ROOT / "assets" / "models" / "general.npz")
+    (folder / "my_model.npz").symlink_to(ROOT / "models" / "general.npz")
     (folder / "assets").symlink_to(ROOT / "assets")
     call = folder / "bin" / "inspector"
     call.parent.mkdir()
@@ -259,7 +259,7 @@ def test_pictures_are_small_and_fetch_nothing():
 
 
 @pytest.mark.parametrize(
-    "package", [inspector, models, noisemodel, scenarios], ids=lambda p: p.__name__
+    "package", [inspector, nc, noisemodel, scenarios], ids=lambda p: p.__name__
 )
 def test_the_api_has_every_public_name(package):
     page = (DOCS / "api" / f"{package.__name__}.md").read_text(encoding="utf-8")

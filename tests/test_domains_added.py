@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from noiseclassifier.scenarios.domains.added import APART, KINDS, LEVELS, fault, with_faults
 from noisemodel import Block, Run
-from scenarios.domains.added import APART, KINDS, LEVELS, fault, with_faults
 
 
 def log(rate=500.0, seconds=7.0, noise=1e-4):

@@ -5,9 +5,9 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from scenarios.domains import DISTRIBUTION, Distribution
-from scenarios.domains.distribution import RATES, DistributionError
-from scenarios.limits import Limits
+from noiseclassifier.scenarios.domains import DISTRIBUTION, Distribution
+from noiseclassifier.scenarios.domains.distribution import RATES, DistributionError
+from noiseclassifier.scenarios.limits import Limits
 
 FREE = Limits()
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scenarios.domains import DISTRIBUTION, FIRST
-from scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
-from scenarios.domains.faults import FAULTS
-from scenarios.robots import TARGETS, WIDE
+from noiseclassifier.scenarios.domains import DISTRIBUTION, FIRST
+from noiseclassifier.scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
+from noiseclassifier.scenarios.domains.faults import FAULTS
+from noiseclassifier.scenarios.robots import TARGETS, WIDE
 
 PAGE = (Path(__file__).parents[1] / "docs" / "domains.md").read_text(encoding="utf-8")
 FAMILIES = ("arm", "quadruped", "humanoid")
@@ -56,7 +56,7 @@ def test_the_table_has_every_fault_of_drives_with_its_class():
 def test_the_table_has_every_fault_of_a_family(family):
     (row,) = [row for row in rows("Faults") if row[0] == family]
     named = {word for cell in row[1:] for word in cell.split("`")[1::2]}
-    assert named == set(import_module(f"scenarios.{family}.domains").DEFECTS)
+    assert named == set(import_module(f"noiseclassifier.scenarios.{family}.domains").DEFECTS)
 
 
 def test_the_page_says_what_is_never_learnt_from():

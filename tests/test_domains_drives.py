@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenarios.clock import RATE, STEP, STEPS, TICK
-from scenarios.domains.domain import Domain
-from scenarios.domains.drives import DomainDrives
-from scenarios.domains.faults import FAULTS, NONE, DriveFault, Held, Lost, Step
-from scenarios.drives import Drives
-from scenarios.drivetrain import Drivetrain
-from scenarios.events import Event
-from scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.clock import RATE, STEP, STEPS, TICK
+from noiseclassifier.scenarios.domains.domain import Domain
+from noiseclassifier.scenarios.domains.drives import DomainDrives
+from noiseclassifier.scenarios.domains.faults import FAULTS, NONE, DriveFault, Held, Lost, Step
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.drivetrain import Drivetrain
+from noiseclassifier.scenarios.events import Event
+from noiseclassifier.scenarios.imperfections import Imperfections
 
 NOMINAL = Domain(
     wildness=0.0, length=1.0, mass=1.0, payload=0.0, gear=100.0, ripple=0.0, flexibility=0.0,

@@ -7,19 +7,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from noiseclassifier.scenarios.arm.scene import bodies
+from noiseclassifier.scenarios.clock import RATE
+from noiseclassifier.scenarios.domains import GOOD, RECIPE, logged, simulate, simulation
+from noiseclassifier.scenarios.domains.domain import Logger
+from noiseclassifier.scenarios.domains.logs import visible
+from noiseclassifier.scenarios.errors import DatasetError
+from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.imperfections import real_model
+from noiseclassifier.scenarios.loads import PUSH
+from noiseclassifier.scenarios.reduced import configuration, reduced_model
+from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.tasks import Task
 from noisemodel import Run
-from scenarios.arm.scene import bodies
-from scenarios.clock import RATE
-from scenarios.domains import GOOD, RECIPE, logged, simulate, simulation
-from scenarios.domains.domain import Logger
-from scenarios.domains.logs import visible
-from scenarios.errors import DatasetError
-from scenarios.folder import Folder
-from scenarios.imperfections import real_model
-from scenarios.loads import PUSH
-from scenarios.reduced import configuration, reduced_model
-from scenarios.robots import WIDE
-from scenarios.tasks import Task
 
 SECONDS = 1.5
 STANDS = 10_004
@@ -88,8 +88,8 @@ def test_a_push_shows_in_the_efforts_as_the_torque_that_holds_its_force(twin, pu
 
 def pushes(run):
     drawn = simulation._draw(WIDE["panda"], STANDS)
-    from scenarios.arm.domains import DEFECTS
-    from scenarios.arm.scene import plan
+    from noiseclassifier.scenarios.arm.domains import DEFECTS
+    from noiseclassifier.scenarios.arm.scene import plan
 
     planned = plan(drawn.robot, drawn.motion, drawn.streams[0], SECONDS)
     return DEFECTS["push"].draw(drawn.streams[4], planned).loads

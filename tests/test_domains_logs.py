@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from noiseclassifier.scenarios.domains import Logger, logged
+from noiseclassifier.scenarios.domains.logs import visible
 from noisemodel import Block, Run
-from scenarios.domains import Logger, logged
-from scenarios.domains.logs import visible
 
 RATE = 2000.0
 PLAIN = Logger(

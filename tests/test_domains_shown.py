@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from noiseclassifier.scenarios.domains import DISTRIBUTION
+from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.limits import Limits
+from noiseclassifier.scenarios.tasks import Task
 from noisemodel import Block, Run
-from scenarios.domains import DISTRIBUTION
-from scenarios.folder import Folder
-from scenarios.limits import Limits
-from scenarios.tasks import Task
 
 RATE = 2000.0
 PNG = b"\x89PNG"

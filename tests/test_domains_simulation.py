@@ -9,19 +9,19 @@ import numpy as np
 import pinocchio
 import pytest
 
-import scenarios
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios.dataset import make
+from noiseclassifier.scenarios.domains import DISTRIBUTION, GOOD, faults_of, simulate, simulation
+from noiseclassifier.scenarios.domains.domain import Domain, Logger
+from noiseclassifier.scenarios.domainset import logs, side_of, tasks, write
+from noiseclassifier.scenarios.errors import DivergedError
+from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.limits import Limits
+from noiseclassifier.scenarios.quadruped.robots import GO2
+from noiseclassifier.scenarios.robots import TARGETS, WIDE
+from noiseclassifier.scenarios.statistics import Statistics
+from noiseclassifier.scenarios.tasks import Task
 from noisemodel import Block, Run
-from scenarios.dataset import make
-from scenarios.domains import DISTRIBUTION, GOOD, faults_of, simulate, simulation
-from scenarios.domains.domain import Domain, Logger
-from scenarios.domainset import logs, side_of, tasks, write
-from scenarios.errors import DivergedError
-from scenarios.folder import Folder
-from scenarios.limits import Limits
-from scenarios.quadruped.robots import GO2
-from scenarios.robots import TARGETS, WIDE
-from scenarios.statistics import Statistics
-from scenarios.tasks import Task
 
 SECONDS = 3.0
 
@@ -177,7 +177,7 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
             meta={"domain": drawn(control="pd").as_dict(), "events": []},
         )
 
-    monkeypatch.setattr("scenarios.domains.simulate", fall)
+    monkeypatch.setattr("noiseclassifier.scenarios.domains.simulate", fall)
     folder = Folder.opened(tmp_path / "data", format_name="domains")
     wanted = [Task("ur5", name, seed) for seed in (10_000, 10_001) for name in (GOOD, "tone")]
     assert sorted(make(folder, wanted)) == sorted(wanted)

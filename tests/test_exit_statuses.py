@@ -149,7 +149,7 @@ def test_a_command_ends_with_70_and_a_traceback_at_a_bug(place, name, monkeypatc
             monkeypatch.setattr(sys, "stdin", rows)
             status, out, err = call(name, *COMMANDS[name])
     elif name == "tune":
-        monkeypatch.setattr("models.noisytest.parse_annotations", broken)
+        monkeypatch.setattr("noiseclassifier.noisytest.parse_annotations", broken)
         status, out, err = call(name, *COMMANDS[name])
     else:
         monkeypatch.setattr(checks, "check_time", broken)

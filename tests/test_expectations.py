@@ -17,7 +17,7 @@ from inspector.expectations.first import first
 from inspector.expectations.judge import Gate, judge
 from inspector.library import load_library
 from inspector.localisation.localise import Localisation
-from models import Event
+from noiseclassifier import Event
 
 TODAY = date(2026, 6, 1)
 BLOW, RATTLE = Event("impact", 1.2, 1.4, 0.9), Event("oscillations", 2.0, 3.0, 0.7)

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzz import malformed
-from fuzz.bombs import Bomb
-from fuzz.damage import damaged
-from fuzz.readers import EXPECTED, READERS
+from benchmarks.fuzz import malformed
+from benchmarks.fuzz.bombs import Bomb
+from benchmarks.fuzz.damage import damaged
+from benchmarks.fuzz.readers import EXPECTED, READERS
 
 ROOT = Path(__file__).parents[1]
 LAWFUL = settings(
@@ -109,7 +109,7 @@ def test_commands_handle_malformed_files(tmp_path):
     names = ("run, stored noise", "labels, NoisyTest", "CSV", "HDF5", "URDF", "live rows, JSON")
     chosen = [each for name in names for each in ("--only", name)]
     done = subprocess.run(
-        [sys.executable, "-m", "fuzz.malformed", "--count", "5", *chosen],
+        [sys.executable, "-m", "benchmarks.fuzz.malformed", "--count", "5", *chosen],
         cwd=ROOT,
         capture_output=True,
         check=False,
@@ -126,7 +126,7 @@ GROUPS = ("labels", "settings", "rows", "tables", "arrays", "models", "bags", "r
 @pytest.mark.parametrize("group", GROUPS)
 def test_fuzzing_finds_nothing(tmp_path, group):
     done = subprocess.run(
-        [sys.executable, "-m", "fuzz.run", "--group", group, "--seconds", "15"],
+        [sys.executable, "-m", "benchmarks.fuzz.run", "--group", group, "--seconds", "15"],
         cwd=ROOT,
         capture_output=True,
         check=False,

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from scenarios.defects import Obstacles, Overhang
-from scenarios.humanoid.cases import HUMANOID
-from scenarios.humanoid.footsteps import footsteps
-from scenarios.humanoid.robots import G1, TALOS
-from scenarios.humanoid.walking import walk
-from scenarios.motions import Walk
-from scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.defects import Obstacles, Overhang
+from noiseclassifier.scenarios.humanoid.cases import HUMANOID
+from noiseclassifier.scenarios.humanoid.footsteps import footsteps
+from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
+from noiseclassifier.scenarios.humanoid.walking import walk
+from noiseclassifier.scenarios.motions import Walk
+from noiseclassifier.scenarios.table import SCENARIOS
 
 
 def plan_of(robot=TALOS, seed=1, **changes):

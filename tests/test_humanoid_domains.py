@@ -7,14 +7,14 @@ import pinocchio as pin
 import pytest
 
 import noisemodel
-from scenarios.clock import STEPS, TICK
-from scenarios.contacts import unplanned
-from scenarios.drives import Drives
-from scenarios.faults import Faults
-from scenarios.humanoid.domains import DEFECTS, GAITS, LIMITS, motion, scaled
-from scenarios.humanoid.footsteps import stopping
-from scenarios.humanoid.motions import Gesture, Stand, Stroll
-from scenarios.humanoid.robots import (
+from noiseclassifier.scenarios.clock import STEPS, TICK
+from noiseclassifier.scenarios.contacts import unplanned
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.faults import Faults
+from noiseclassifier.scenarios.humanoid.domains import DEFECTS, GAITS, LIMITS, motion, scaled
+from noiseclassifier.scenarios.humanoid.footsteps import stopping
+from noiseclassifier.scenarios.humanoid.motions import Gesture, Stand, Stroll
+from noiseclassifier.scenarios.humanoid.robots import (
     G1,
     G1_MOVING,
     HUMANOIDS,
@@ -24,10 +24,10 @@ from scenarios.humanoid.robots import (
     TALOS_MASS,
     similar,
 )
-from scenarios.humanoid.scene import bodies, plan, scene, standing
-from scenarios.imperfections import Imperfections
-from scenarios.loop import record
-from scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.humanoid.scene import bodies, plan, scene, standing
+from noiseclassifier.scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.loop import record
+from noiseclassifier.scenarios.reduced import reduced_model
 
 WAVE = Gesture(way="sines", size=(1.0, 1.0), period=(0.8, 2.0))
 SQUAT = Stand(sway=(0.5, 0.5), squat=(0.1, 0.1), period=(1.5, 2.5), upper=WAVE)

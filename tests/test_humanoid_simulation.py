@@ -5,18 +5,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import scenarios
-from scenarios.clock import STEPS, TICK
-from scenarios.drives import Drives
-from scenarios.faults import Faults
-from scenarios.humanoid.footsteps import footsteps
-from scenarios.humanoid.robots import G1, TALOS
-from scenarios.humanoid.scene import SETTLING, bodies, plan, scene, standing
-from scenarios.humanoid.walking import walk
-from scenarios.imperfections import Imperfections, real_model
-from scenarios.loop import record
-from scenarios.motions import Walk
-from scenarios.reduced import reduced_model
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios.clock import STEPS, TICK
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.faults import Faults
+from noiseclassifier.scenarios.humanoid.footsteps import footsteps
+from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
+from noiseclassifier.scenarios.humanoid.scene import SETTLING, bodies, plan, scene, standing
+from noiseclassifier.scenarios.humanoid.walking import walk
+from noiseclassifier.scenarios.imperfections import Imperfections, real_model
+from noiseclassifier.scenarios.loop import record
+from noiseclassifier.scenarios.motions import Walk
+from noiseclassifier.scenarios.reduced import reduced_model
 
 SEED, SHORT = 1, 4.0
 HUMANOIDS = pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from scenarios.clock import TICK
-from scenarios.humanoid.footsteps import footsteps
-from scenarios.humanoid.robots import G1, TALOS
-from scenarios.humanoid.walking import centre_of_mass, walk
-from scenarios.motions import Walk
+from noiseclassifier.scenarios.clock import TICK
+from noiseclassifier.scenarios.humanoid.footsteps import footsteps
+from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
+from noiseclassifier.scenarios.humanoid.walking import centre_of_mass, walk
+from noiseclassifier.scenarios.motions import Walk
 
 WAYS = ("straight", "curve", "directions", "spot")
 DURATION = 8.0

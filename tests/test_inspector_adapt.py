@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from commandline import call
 
-import models
+import noiseclassifier as nc
 from inspector.library import for_robot, load_library
 from inspector.training.recordings import of_run
-from models.novelty.faults import LEVELS, fault
+from noiseclassifier.novelty.faults import LEVELS, fault
 from noisemodel import Block, Run
 
 RATE = 250.0
@@ -46,9 +46,9 @@ def folder(tmp_path_factory):
         run = faulty(seed, LEVELS[seed % 3], noise=0.005 * 2 ** (seed % 4))
         run.save(folder / "run.npz", overwrite=True)
         recordings.append(replace(of_run(folder / "run.npz", run, RATE), name=f"run{seed}"))
-    recipe = replace(models.ANY, rounds=20)
-    frames = models.Frames.joined(models.frames_of(recordings, recipe))
-    small = models.General.train(frames, recipe)
+    recipe = replace(nc.ANY, rounds=20)
+    frames = nc.Frames.joined(nc.frames_of(recordings, recipe))
+    small = nc.General.train(frames, recipe)
     replace(small, versions={**small.versions, "mujoco": "4.0.0"}).save(folder / "small.npz")
     (folder / "good").mkdir()
     for seed in range(20, 26):
@@ -75,7 +75,7 @@ def test_it_says_what_it_learnt_from_what_that_can_show_and_what_it_finds(folder
 
 
 def test_an_adapted_model_names_the_simulators_of_the_general_one_and_its_own(folder):
-    assert models.load(folder / "robot.npz").versions["mujoco"] == "4.0.0, 4.1.0"
+    assert nc.load(folder / "robot.npz").versions["mujoco"] == "4.0.0, 4.1.0"
 
 
 def test_classify_finds_failures_of_the_robot_by_the_adapted_model_and_names_them(folder, tmp_path):

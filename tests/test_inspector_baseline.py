@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.library import label_run, load_library
 from inspector.training.baseline import train
@@ -63,7 +63,7 @@ def test_an_anomaly_against_good_runs_is_a_finding(folder):
 
 
 def test_a_baseline_names_the_simulators_of_its_runs(folder):
-    assert models.load(folder / "robot.npz").versions["mujoco"] == "4.0.0, 4.0.1, 4.0.2"
+    assert nc.load(folder / "robot.npz").versions["mujoco"] == "4.0.0, 4.0.1, 4.0.2"
 
 
 def test_findings_go_into_label_files(folder, tmp_path):
@@ -95,7 +95,7 @@ def test_runs_without_desired_motion_have_the_scalar_profile(tmp_path):
     for seed in range(2):
         run_of(seed, desired=False).save(tmp_path / f"run{seed}.npz")
     trained = train([tmp_path], tmp_path / "model.npz")
-    assert trained.classifier.profile.signals == (models.NOISE,)
+    assert trained.classifier.profile.signals == (nc.NOISE,)
 
 
 def test_a_placeholder_of_the_desired_motion_is_left_out_as_classify_does(tmp_path):
@@ -104,7 +104,7 @@ def test_a_placeholder_of_the_desired_motion_is_left_out_as_classify_does(tmp_pa
         placeholder = replace(run, velocity_desired=np.zeros_like(run.velocity))
         placeholder.save(tmp_path / f"run{seed}.npz")
     trained = train([tmp_path / "run0.npz", tmp_path / "run1.npz"], tmp_path / "model.npz")
-    assert trained.classifier.profile.signals == (models.NOISE,)
+    assert trained.classifier.profile.signals == (nc.NOISE,)
     status, _, _ = call("classify", tmp_path / "run2.npz", "--model", tmp_path / "model.npz")
     assert status in (0, 1)
 

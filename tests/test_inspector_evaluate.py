@@ -9,8 +9,8 @@ from commandline import call
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
 from inspector.training import evaluation
-from models.evaluation.assessment import measure
-from models.splitting import group_of
+from noiseclassifier.evaluation.assessment import measure
+from noiseclassifier.splitting import group_of
 
 
 def run(path, seed, *, label="oscillations"):

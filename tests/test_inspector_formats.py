@@ -19,7 +19,7 @@ from inspector.report.formats import (
     sarif,
     text,
 )
-from models import Event
+from noiseclassifier import Event
 
 BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
 QUIET = Verdict(Path("quiet.npz"), Status.OK, "general")

@@ -9,7 +9,7 @@ from commandline import call
 from generalmodel import RATES, fixed, run_at, trained
 from scipy.signal import butter, sosfilt
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status
@@ -221,5 +221,5 @@ def test_evaluation_takes_held_logs_as_classify_does(tmp_path):
     assert ours.rate == 1000.0
     replace(held(run_at(40.0), 25), blocks=(block,)).save(tmp_path / "slow.npz")
     ((slow, _),) = classified([tmp_path / "slow.npz"], None)
-    assert isinstance(slow, models.Unanswered)
+    assert isinstance(slow, nc.Unanswered)
     assert slow.reason == "rate 40 Hz < 80 Hz"

@@ -15,7 +15,7 @@ from inspector.cli import main
 from inspector.errors import InspectorError
 from inspector.library import load_library
 from inspector.report import html
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, OutputError, Run
 
 VOID = {"meta", "img", "br", "hr", "link", "input"}

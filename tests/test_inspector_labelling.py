@@ -13,7 +13,7 @@ from inspector.library import (
     label_run,
     load_library,
 )
-from models.signals import JOINTS, MOTION
+from noiseclassifier.signals import JOINTS, MOTION
 from noisemodel import Run
 
 LIBRARY = load_library(model_files())

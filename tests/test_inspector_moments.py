@@ -5,7 +5,7 @@ import pytest
 
 from inspector.analysis.analyse import analyse_file
 from inspector.analysis.moments import gaps, worst
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 
 

@@ -276,7 +276,7 @@ def test_the_plugin_is_registered_and_imports_nothing_slow():
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["entry-points"]["pytest11"] == {"noise": "inspector.pytest_plugin"}
-    slow = ["rerun", "numpy", "scipy", "typer", "noisemodel", "models"]
+    slow = ["rerun", "numpy", "scipy", "typer", "noisemodel", "noiseclassifier"]
     script = f"import sys, inspector.pytest_plugin; print([n for n in {slow} if n in sys.modules])"
     loaded = subprocess.run(
         [sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True

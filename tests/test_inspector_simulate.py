@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import scenarios
 from inspector.cli import main
 from inspector.training.recordings import recordings
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios import formats
+from noiseclassifier.scenarios.sample import Sample, is_sample
 from noisemodel import Block, Run
-from scenarios import formats
-from scenarios.sample import Sample, is_sample
 
 ROOT = Path(__file__).parents[1]
 JOINTS = scenarios.ROBOTS["panda"].drives.joints

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-import models
+import noiseclassifier as nc
 
 
 def log(path, *, rate=1000.0, desired="planned", seed=0):
@@ -51,7 +51,7 @@ def test_logs_that_a_profile_cannot_be_trained_on_are_left_out_and_counted(tmp_p
         " errors, 1 below 1000 Hz, e.g. bare"
     )
     assert f"\n{counts}\n" in out
-    assert set(models.Classifier.load(tmp_path / "m.npz").runs) == {"good0", "good1"}
+    assert set(nc.Classifier.load(tmp_path / "m.npz").runs) == {"good0", "good1"}
 
 
 MADE_BY = {"mujoco": "4.0.0", "pinocchio": "4.1.0", "numpy": "1.0"}
@@ -77,7 +77,7 @@ def test_a_model_names_all_versions_of_what_simulated_its_runs(tmp_path, profile
     runs = sorted(tmp_path.glob("*.npz"))
     status, _, err = call("train", *runs, "-o", output, "--profile", profile, *rate)
     assert (status, err) == (0, "")
-    versions = models.load(output).versions
+    versions = nc.load(output).versions
     assert versions["mujoco"] == "3, 4.0.0, 4.1.0"
     assert versions["pinocchio"] == "4.1.0"
     assert versions["numpy"] == np.__version__
@@ -85,7 +85,7 @@ def test_a_model_names_all_versions_of_what_simulated_its_runs(tmp_path, profile
 
 def test_a_model_of_logs_names_no_simulator(tmp_path):
     train(log(tmp_path / "log.npz"), output=tmp_path / "m.npz")
-    versions = models.load(tmp_path / "m.npz").versions
+    versions = nc.load(tmp_path / "m.npz").versions
     assert versions.keys() == {"noise-inspector", "numpy", "scikit-learn"}
 
 
@@ -131,7 +131,7 @@ def test_a_model_for_any_rate_is_trained_and_evaluated_on_logs_of_several_rates(
     )
     status, out, _ = call("train", logs, "-o", model)
     assert (status, "left out: 1 run below 80 Hz, e.g. log50" in out) == (0, True)
-    assert set(models.load(model).runs) == {"log100", "log125", "log500", "missing"}
+    assert set(nc.load(model).runs) == {"log100", "log125", "log500", "missing"}
     log(tmp_path / "new.npz", rate=200.0, seed=20)
     status, out, _ = call("evaluate", model, tmp_path / "new.npz", "--json")
     assert (status, json.loads(out)["runs"]) == (0, 1)

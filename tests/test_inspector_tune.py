@@ -10,7 +10,7 @@ import pytest
 from commandline import call
 
 import inspector.training.tuning
-import models
+import noiseclassifier as nc
 from noisemodel import parallel
 
 GRID = ("--grid", "stride=25,50", "--grid", "gamma=0.001,0.01", "--grid", "C=0.1,1,10")
@@ -74,7 +74,7 @@ def counted(monkeypatch):
 
     def measure(profiles, trial):
         points.extend(profiles)
-        return models.tuning.search.measure(profiles, trial)
+        return nc.tuning.search.measure(profiles, trial)
 
     monkeypatch.setattr(inspector.training.tuning, "measure", measure)
     return points
@@ -132,7 +132,7 @@ def test_the_best_point_is_the_one_that_is_trained(data, whole, tmp_path):
     assert out.endswith(f"{model}: written, the best point trained on all training runs\n")
     points = lines(whole[0])[1:]
     best = min(points, key=lambda point: (-point["balanced_accuracy"], point["log_loss"]))
-    classifier = models.Classifier.load(model)
+    classifier = nc.Classifier.load(model)
     for name in ("stride", "gamma", "regularization"):
         assert getattr(classifier.profile, name) == best[name]
     metrics = classifier.metrics["validation"]
@@ -227,7 +227,7 @@ def test_without_a_validation_set_recordings_are_folded(data, tmp_path):
 
 
 def test_a_part_of_the_recordings_can_be_selected(data, tmp_path):
-    held_out = [f"walk{n}" for n in range(4) if models.held_out(f"walk{n}")]
+    held_out = [f"walk{n}" for n in range(4) if nc.held_out(f"walk{n}")]
     options = (*OPTIONS, *GRID, "--folds", 2, "--part", "training", "-o", tmp_path / "a.jsonl")
     assert call("tune", data / "training", *options)[0] == 0
     kept = lines(tmp_path / "a.jsonl")[0]["training_set"]

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from inspector.labels import LabelFileError, read_labels, write_labels
 from inspector.labels.files import FORMATS
-from models import Event, noisytest
+from noiseclassifier import Event, noisytest
 from noisemodel import Block, Run, RunError
 
 SUFFIXES = [each.suffix for each in FORMATS.values()]

@@ -18,13 +18,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import noisemodel as nm
-import scenarios
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
-from models.novelty.faults import KINDS, fault
-from scenarios.domains.added import LEVELS
+from noiseclassifier import scenarios
+from noiseclassifier.novelty.faults import KINDS, fault
+from noiseclassifier.scenarios.domains.added import LEVELS
 
 FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling

@@ -7,26 +7,26 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.training.recordings import classified
-from models.estimators.calibration import identity
-from models.estimators.probabilistic import NOVELTY_LIMIT
-from models.estimators.trees import Trees
-from models.evaluation.outcomes import Outcome
-from models.evaluation.predictions import predict
-from models.logbands import ANY
-from models.pooling import columns
+from noiseclassifier.estimators.calibration import identity
+from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT
+from noiseclassifier.estimators.trees import Trees
+from noiseclassifier.evaluation.outcomes import Outcome
+from noiseclassifier.evaluation.predictions import predict
+from noiseclassifier.logbands import ANY
+from noiseclassifier.pooling import columns
+from noiseclassifier.scenarios.robots import TARGETS, WIDE
 from noisemodel import Block, Run
 from noisemodel.limits import joint_limits
-from scenarios.robots import TARGETS, WIDE
 
 with pytest.MonkeyPatch.context() as patch:
     patch.syspath_prepend(Path(__file__).parents[1])
     from benchmarks import leftout
     from benchmarks.leftout import Candidates, Linear, Measured, TargetError, Threshold
 
-PROFILE = models.EACH.at(1000.0)
+PROFILE = nc.EACH.at(1000.0)
 LOGGER = {
     **dict.fromkeys(("cutoff", "noise", "jitter", "lost", "repeated", "ripple", "gear"), 0.0),
     "rate": 1000.0,
@@ -43,16 +43,16 @@ def recording(robot, seed, *, faulty, rate=1000.0):
     time = np.arange(int(4 * rate)) / rate
     desired = np.stack([np.sin(np.pi * time + seed), np.cos(np.pi * time)])
     error = 1e-3 * np.random.default_rng([seed, faulty]).normal(size=desired.shape)
-    blocks, events = [models.Block(0.0, 4.0, "ok")], ()
+    blocks, events = [nc.Block(0.0, 4.0, "ok")], ()
     if faulty:
         vibrates = (time >= 2.0) & (time < 3.0)
         error[0, vibrates] += np.sin(2 * np.pi * 60 * time[: vibrates.sum()])
         ends = (0.0, 1.9, "ok"), (2.0, 3.0, "oscillations"), (3.2, 4.0, "ok")
-        blocks, events = [models.Block(*each) for each in ends], (models.Fault(*ends[1]),)
+        blocks, events = [nc.Block(*each) for each in ends], (nc.Fault(*ends[1]),)
     joints = {"desired": desired, "measured": desired - error, "error": error}
     signal = {name: np.linalg.norm(each, axis=0) for name, each in joints.items()}
     signal |= {f"{name}_joints": each for name, each in joints.items()}
-    return models.Recording(
+    return nc.Recording(
         f"{robot}/{'fault' if faulty else 'good'}-{seed}",
         signal,
         rate,
@@ -187,7 +187,7 @@ def test_a_model_predicts_robots_that_it_was_not_trained_on(runs):
 def test_counts_at_the_shipped_thresholds_are_those_of_the_protocol():
     profile = replace(PROFILE, rounds=5, leaves=4)
     every = [recording("ur5", seed, faulty=seed % 2 > 0) for seed in range(4)]
-    classifier = models.Classifier.train(models.Examples.read(every[:2], profile), profile)
+    classifier = nc.Classifier.train(nc.Examples.read(every[:2], profile), profile)
     for one in every:
         expected = Outcome.of(predict(classifier, one))
         run = leftout.of_recording(one, profile)
@@ -304,7 +304,7 @@ def test_frames_of_the_general_profile_are_those_that_training_takes(logs):
     runs, _, names = read_general(logs, thin=3)
     own = np.array([name in names for name in ANY.columns])
     read = [each for each, _ in classified(leftout.files(logs), None, bare_too=True)]
-    expected = models.Frames.joined(models.frames_of(read, ANY, thin=3))
+    expected = nc.Frames.joined(nc.frames_of(read, ANY, thin=3))
     found = np.concatenate([run.wide(run.cut, len(names)) for run in runs])
     np.testing.assert_array_equal(found, expected.features[:, own])
     assert np.isnan(expected.features[:, ~own]).all()
@@ -316,9 +316,7 @@ def test_a_general_candidate_decides_as_the_model_that_training_makes(logs, monk
     runs, profile, names = read_general(logs)
     small = replace(ANY, rounds=3, leaves=4)
     read = [each for each, _ in classified(leftout.files(logs), None, bare_too=True)]
-    model = models.General.train(
-        models.Frames.joined(models.frames_of(read, small, thin=8)), small, thin=8
-    )
+    model = nc.General.train(nc.Frames.joined(nc.frames_of(read, small, thin=8)), small, thin=8)
     decided = []
 
     def counted(run, classifier, decisions, thresholds):

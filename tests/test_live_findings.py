@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from inspector.live.findings import Findings, News, lasting
-from models import Labels
+from noiseclassifier import Labels
 
 NAMES = {".": "ok", "i": "impact", "o": "oscillations", "u": "unknown"}
 

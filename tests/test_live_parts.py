@@ -5,7 +5,7 @@ from generalmodel import fixed
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.levels import SPECTRUM
 from inspector.live.clock import Clock
@@ -124,7 +124,7 @@ def labelled(labeller, motion, valid=None, size=77):
     ]
     fields = ("start", "stop", "label", "scores")
     joined = (np.concatenate([getattr(part, name) for part in parts]) for name in fields)
-    return models.Labels(*joined, parts[0].classes)
+    return nc.Labels(*joined, parts[0].classes)
 
 
 @pytest.fixture(scope="module")
@@ -184,7 +184,7 @@ def test_rates_that_no_model_fits_have_no_labels_and_a_remark(library, rate, rem
 def labels_at(*frames):
     start = np.array([start for start, _ in frames])
     label = np.array([label for _, label in frames])
-    return models.Labels(start, start + 0.4, label, np.ones((len(frames), 2)), CLASSES)
+    return nc.Labels(start, start + 0.4, label, np.ones((len(frames), 2)), CLASSES)
 
 
 def test_a_lane_changes_halfway_between_frames_and_only_where_the_class_does():

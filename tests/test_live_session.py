@@ -20,7 +20,7 @@ from inspector.live.session import BATCH
 from inspector.live.sink import Sink
 from inspector.recording import unstable
 from inspector.report.markdown import spoken
-from models.signals import JOINTS, MOTION, NOISE
+from noiseclassifier.signals import JOINTS, MOTION, NOISE
 from noisemodel import OutputError, UnknownJointError
 
 RATE = 1000.0

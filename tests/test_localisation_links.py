@@ -5,7 +5,7 @@ import pytest
 
 from inspector.localisation.links import fault_links
 from inspector.localisation.stage import Localisation
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Robot, Run
 from noisemodel.links import LinkNoise, link_noise
 

@@ -16,7 +16,7 @@ from inspector.report.formats import as_json, github, junit, text
 from inspector.report.html import found
 from inspector.report.markdown import report, sentence
 from inspector.report.picture import picture
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Run
 
 RATE, SECONDS = 1000.0, 4.0

@@ -4,7 +4,7 @@ import pytest
 from inspector.localisation.flow import flow
 from inspector.localisation.innovation import changes, quiet_statistics
 from inspector.localisation.stage import Localisation, first_stage, onset, rise
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 
 RATE, SECONDS = 2000.0, 4.0

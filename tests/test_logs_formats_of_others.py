@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-import models
+import noiseclassifier as nc
 from inspector import read_log
 from inspector.errors import LogError
 from inspector.logs.angles import FARTHEST, NORMALISED
@@ -558,7 +558,7 @@ def test_the_page_states_the_limits_of_the_rules():
         f"up to {SLOWEST_SECONDS:g} s",
         f"goes beyond {FARTHEST:g}°",
         f"beyond {NORMALISED:g}",
-        f"within {100 * models.profile.NOMINAL:g} %",
+        f"within {100 * nc.profile.NOMINAL:g} %",
     ):
         assert words in page, words
     for words in (*QUANTITIES.values(), DESIRED, MEASURED):

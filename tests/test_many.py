@@ -10,7 +10,7 @@ from inspector.logs.opening import open_run
 from inspector.many.many import Several, lay
 from inspector.many.recording import report, shortened, write
 from inspector.recording.axes import TOP
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import poisson
 
-import models
-from models.novelty.adaptation import FITTED, _confirmed
-from models.novelty.faults import CASES, KINDS, LEVELS, Recall, fault, recall, with_fault
+import noiseclassifier as nc
+from noiseclassifier.novelty.adaptation import FITTED, _confirmed
+from noiseclassifier.novelty.faults import CASES, KINDS, LEVELS, Recall, fault, recall, with_fault
 
 RATE = 250.0
-RECIPE = replace(models.ANY, rounds=20)
-SIGNALS = models.logbands.INPUTS[models.logbands.INPUTS.index(models.signals.MOTION) - 1]
+RECIPE = replace(nc.ANY, rounds=20)
+SIGNALS = nc.logbands.INPUTS[nc.logbands.INPUTS.index(nc.signals.MOTION) - 1]
 
 
 def signals(seed, *, noise=0.01, scale=1.0, seconds=20.0):
@@ -30,7 +30,7 @@ def signals(seed, *, noise=0.01, scale=1.0, seconds=20.0):
 
 
 def good(seed, **how):
-    return models.Recording(f"good{seed}", signals(seed, **how), RATE)
+    return nc.Recording(f"good{seed}", signals(seed, **how), RATE)
 
 
 def faulty(seed, kind, level, **how):
@@ -40,11 +40,11 @@ def faulty(seed, kind, level, **how):
     added = level * fault(time, kind, 60.0, seed, start=5.0)
     label, stop = ("impact", 5.1) if kind == "blow" else ("oscillations", 6.0)
     blocks = ((0.0, 4.5, "ok"), (5.0, stop, label), (7.0, 20.0, "ok"))
-    return models.Recording(
+    return nc.Recording(
         f"{kind}{seed}",
         with_fault(motion, seed % 3, added),
         RATE,
-        tuple(models.Block(*block) for block in blocks),
+        tuple(nc.Block(*block) for block in blocks),
     )
 
 
@@ -55,8 +55,8 @@ def general():
         faulty(seed, KINDS[seed % 3], LEVELS[seed // 3 % 3], noise=0.005 * 2 ** (seed % 4))
         for seed in range(18)
     ]
-    frames = models.Frames.joined(models.frames_of(recordings, RECIPE))
-    return models.General.train(frames, RECIPE).at(RATE, SIGNALS)
+    frames = nc.Frames.joined(nc.frames_of(recordings, RECIPE))
+    return nc.General.train(frames, RECIPE).at(RATE, SIGNALS)
 
 
 ROBOT = {"noise": 0.15}
@@ -66,12 +66,12 @@ ROBOT = {"noise": 0.15}
 @pytest.fixture(scope="module")
 def motion(general):
     recordings = [good(seed, **ROBOT) for seed in range(100, 106)]
-    return models.GoodMotion.read(recordings, general.profile)
+    return nc.GoodMotion.read(recordings, general.profile)
 
 
 @pytest.fixture(scope="module")
 def adapted(general, motion):
-    return models.adapt(general, motion, alarms=20.0).classifier
+    return nc.adapt(general, motion, alarms=20.0).classifier
 
 
 def alarms(model, recordings):
@@ -87,7 +87,7 @@ def test_good_motion_of_the_robot_raises_no_more_alarms_than_the_budget(general,
     fresh = [good(seed, **ROBOT) for seed in range(200, 215)]
     hours = 20.0 * len(fresh) / 3600
     for budget in (100.0, 400.0):
-        model = models.adapt(general, motion, alarms=budget).classifier
+        model = nc.adapt(general, motion, alarms=budget).classifier
         assert alarms(model, fresh) <= poisson.ppf(0.999, budget * hours)
     assert alarms(general, fresh) >= 10
 
@@ -103,7 +103,7 @@ def test_a_fault_is_found_and_keeps_its_class(adapted):
 
 @pytest.mark.parametrize("budget", [20.0, 100.0, 500.0])
 def test_alarms_counted_in_the_good_motion_keep_to_the_budget(general, motion, budget):
-    found = models.adapt(general, motion, alarms=budget).limit
+    found = nc.adapt(general, motion, alarms=budget).limit
     assert found.alarms <= budget * found.hours
 
 
@@ -113,7 +113,7 @@ def test_scores_that_all_equal_the_highest_one_are_no_alarms(general):
     flat = replace(trees, leaf=np.zeros_like(trees.leaf), calibration=calibration)
     flat = replace(general, estimator=flat)
     recordings = [good(seed, **ROBOT) for seed in range(6)]
-    model = models.adapt(flat, models.GoodMotion.read(recordings, flat.profile)).classifier
+    model = nc.adapt(flat, nc.GoodMotion.read(recordings, flat.profile)).classifier
     probability = 1.0 - model.classify(recordings[0].signal, RATE).scores[:, 0]
     alarm = general.profile.alarm
     assert alarm - 1e-3 < probability.max() < alarm - 1e-4
@@ -124,7 +124,7 @@ def test_scores_that_all_equal_the_highest_one_are_no_alarms(general):
 def test_a_larger_budget_never_finds_less(general, motion):
     recordings = [good(seed, **ROBOT) for seed in range(100, 106)]
     budgets = (1.0, 2.0, 50.0)
-    learnt = {str(each): models.adapt(general, motion, alarms=each) for each in budgets}
+    learnt = {str(each): nc.adapt(general, motion, alarms=each) for each in budgets}
     limits = [each.limit.distance for each in learnt.values()]
     assert limits == sorted(limits, reverse=True)
     models_of = {name: each.classifier for name, each in learnt.items()}
@@ -137,8 +137,8 @@ def test_a_larger_budget_never_finds_less(general, motion):
 
 def test_a_robot_that_is_louder_as_a_whole_is_adapted_to_alike(general):
     louder = [good(seed, scale=5.0) for seed in range(100, 106)]
-    motion = models.GoodMotion.read(louder, general.profile)
-    model = models.adapt(general, motion, alarms=100.0).classifier
+    motion = nc.GoodMotion.read(louder, general.profile)
+    model = nc.adapt(general, motion, alarms=100.0).classifier
     fresh = [good(seed, scale=5.0) for seed in range(200, 215)]
     assert alarms(model, fresh) <= poisson.ppf(0.999, 100.0 * 20.0 * len(fresh) / 3600)
     assert alarms(general, fresh) == len(fresh)
@@ -149,8 +149,8 @@ def test_runs_that_differ_widely_are_no_reference_for_each_other(general, adapte
     assert adapted.reference is not None
     noises = (0.003, 0.003, 0.3, 0.003, 0.003, 0.003)
     recordings = [good(seed, noise=noise) for seed, noise in enumerate(noises)]
-    motion = models.GoodMotion.read(recordings, general.profile)
-    found = models.adapt(general, motion, alarms=20.0).classifier
+    motion = nc.GoodMotion.read(recordings, general.profile)
+    found = nc.adapt(general, motion, alarms=20.0).classifier
     assert found.reference is None
     assert found.metrics["adapted"]["reference"] == "the signal itself"
 
@@ -194,8 +194,8 @@ def test_bounds_and_odds_of_an_adapted_model_are_those_of_its_limits(general, ad
 
 def test_runs_that_one_another_exceed_raise_the_bounds_further(general):
     recordings = [good(seed, noise=noise) for seed, noise in enumerate((0.1, 0.1, 0.1, 2.5))]
-    motion = models.GoodMotion.read(recordings, general.profile)
-    found = models.adapt(general, motion).classifier
+    motion = nc.GoodMotion.read(recordings, general.profile)
+    found = nc.adapt(general, motion).classifier
     assert found.metrics["adapted"]["novelty"] > 2.0
     expected = raised_bounds(general, motion, found)
     np.testing.assert_allclose(found.estimator.known, expected)
@@ -209,7 +209,7 @@ def test_what_counts_of_a_frame_is_what_a_neighbour_reaches_too():
         gaps[random.integers(12)] = 0.5  # beside a change of runs, or not
         start = np.cumsum(gaps)
         runs = np.where(np.arange(12) < random.integers(1, 12), "a", "b")
-        good = models.GoodMotion(score[:, None], runs, start, start + 0.4, {})
+        good = nc.GoodMotion(score[:, None], runs, start, start + 0.4, {})
         expected = []
         for frame in range(12):
             sides = []
@@ -224,8 +224,8 @@ def test_what_counts_of_a_frame_is_what_a_neighbour_reaches_too():
 
 def test_a_robot_that_stands_does_not_alarm_whenever_it_moves_a_little(general):
     still = [good(seed, noise=1e-4, scale=0.0) for seed in range(6)]
-    motion = models.GoodMotion.read(still, general.profile)
-    learnt = models.adapt(general, motion, alarms=100.0)
+    motion = nc.GoodMotion.read(still, general.profile)
+    learnt = nc.adapt(general, motion, alarms=100.0)
     assert learnt.limit.distance >= np.log(0.05 / 0.95)
     assert alarms(learnt.classifier, still) == 0
 
@@ -234,10 +234,10 @@ def test_an_adapted_model_is_a_model_file_and_the_same_runs_give_the_same_bytes(
     general, motion, adapted, tmp_path
 ):
     adapted.save(tmp_path / "one.npz")
-    models.adapt(general, motion, alarms=20.0).classifier.save(tmp_path / "two.npz")
+    nc.adapt(general, motion, alarms=20.0).classifier.save(tmp_path / "two.npz")
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
-    loaded = models.load(tmp_path / "one.npz")
-    assert isinstance(loaded, models.Classifier)
+    loaded = nc.load(tmp_path / "one.npz")
+    assert isinstance(loaded, nc.Classifier)
     assert loaded.metrics["adapted"]["budget"] == 20.0
     assert {f"good{seed}" for seed in range(100, 106)} <= loaded.runs.keys()
     bad = faulty(300, "blow", 1.0, **ROBOT).signal
@@ -248,12 +248,12 @@ def test_an_adapted_model_is_a_model_file_and_the_same_runs_give_the_same_bytes(
 
 def test_a_stream_has_the_labels_of_the_whole_signal(adapted):
     whole = faulty(300, "noise", 1.0, **ROBOT).signal
-    stream = models.Stream(adapted, joints=3)
+    stream = nc.Stream(adapted, joints=3)
     parts = [
         stream.push({name: each[..., first : first + 37] for name, each in whole.items()})
         for first in range(0, round(20 * RATE), 37)
     ]
-    found = models.Labels.concatenated([*parts, stream.finish()])
+    found = nc.Labels.concatenated([*parts, stream.finish()])
     batch = adapted.classify(whole, RATE)
     np.testing.assert_array_equal(found.scores, batch.scores)
     np.testing.assert_array_equal(found.label, batch.label)
@@ -261,52 +261,52 @@ def test_a_stream_has_the_labels_of_the_whole_signal(adapted):
 
 
 def test_what_it_learnt_from_is_said_with_the_least_rate_that_it_can_show(general, motion):
-    learnt = models.adapt(general, motion, alarms=1.0)
+    learnt = nc.adapt(general, motion, alarms=1.0)
     text = str(learnt)
     assert "learnt from 0.0333 h of good motion in 6 runs" in text
     assert "log odds of a failure, for 1 false alarms per hour" in text
     assert "can show no fewer than 90 alarms per hour: the limit is extrapolated" in text
-    alone = models.Recording("long", signals(0, **ROBOT, seconds=60), RATE)
-    single = models.adapt(general, models.GoodMotion.read([alone], general.profile))
+    alone = nc.Recording("long", signals(0, **ROBOT, seconds=60), RATE)
+    single = nc.adapt(general, nc.GoodMotion.read([alone], general.profile))
     assert "which does not show how much another run differs" in str(single)
 
 
 def test_only_what_is_annotated_ok_is_learnt_from(general):
     recordings = [faulty(seed, "tone", 1.0, **ROBOT) for seed in range(4)]
-    motion = models.GoodMotion.read(recordings, general.profile)
+    motion = nc.GoodMotion.read(recordings, general.profile)
     assert not ((motion.stop > 4.51) & (motion.start < 6.99)).any()
-    learnt = models.adapt(general, motion)
+    learnt = nc.adapt(general, motion)
     assert "of 4 runs with annotations, the part annotated `ok` alone" in str(learnt)
 
 
 @pytest.mark.slow
 def test_a_split_that_only_sets_missing_features_apart_can_be_saved(tmp_path):
     recordings = [faulty(seed, "tone", 1.0) for seed in range(6)]
-    frames = models.Frames.joined(models.frames_of(recordings, RECIPE))
-    trained = models.General.train(frames, RECIPE)
+    frames = nc.Frames.joined(nc.frames_of(recordings, RECIPE))
+    trained = nc.General.train(frames, RECIPE)
     assert np.isfinite(trained.estimator.threshold).all()
     trained.save(tmp_path / "general.npz")
-    assert isinstance(models.load(tmp_path / "general.npz"), models.General)
+    assert isinstance(nc.load(tmp_path / "general.npz"), nc.General)
 
 
 def test_too_little_good_motion_is_refused(general):
-    short = models.GoodMotion.read([good(0, seconds=29.0)], general.profile)
+    short = nc.GoodMotion.read([good(0, seconds=29.0)], general.profile)
     wanted = "29 s of good motion are too short to learn from, expected 30 s or more"
-    with pytest.raises(models.DatasetError, match=wanted):
-        models.adapt(general, short)
+    with pytest.raises(nc.DatasetError, match=wanted):
+        nc.adapt(general, short)
 
 
 @pytest.mark.parametrize("budget", [0.0, -1.0, np.nan, np.inf])
 def test_a_budget_of_no_alarm_is_refused(general, motion, budget):
-    with pytest.raises(models.ProfileError, match="alarms per hour, expected more than 0: say, 1"):
-        models.adapt(general, motion, alarms=budget)
+    with pytest.raises(nc.ProfileError, match="alarms per hour, expected more than 0: say, 1"):
+        nc.adapt(general, motion, alarms=budget)
 
 
 def test_only_a_general_model_can_be_adapted(general, motion):
-    other = replace(general, profile=models.EACH.at(RATE))
+    other = replace(general, profile=nc.EACH.at(RATE))
     wanted = "only a general model, whose features take a reference, can be adapted"
-    with pytest.raises(models.ProfileError, match=wanted):
-        models.adapt(other, motion)
+    with pytest.raises(nc.ProfileError, match=wanted):
+        nc.adapt(other, motion)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -368,14 +368,14 @@ class Watching:
 
     def events(self):
         number, row = divmod(len(self.seen) - 1, 1 + len(LEVELS))
-        return tuple(models.Event("impact", *span, 1.0) for span in self.rule(number, row))
+        return tuple(nc.Event("impact", *span, 1.0) for span in self.rule(number, row))
 
 
 def test_faults_go_through_all_kinds_joints_and_levels_and_are_found_where_findings_overlap():
     recordings = [good(seed, seconds=30.0) for seed in range(2)]
     start = np.append(np.arange(3.0, 27.0, 0.5), np.arange(4.0, 26.0, 0.5))
     runs = np.array(["good0"] * 48 + ["good1"] * 44)
-    where = models.GoodMotion(np.zeros((92, 1)), runs, start, start + 0.4, {})
+    where = nc.GoodMotion(np.zeros((92, 1)), runs, start, start + 0.4, {})
     places = [int(number * 92 / CASES) for number in range(CASES)]
 
     def lasting(number):
@@ -446,5 +446,5 @@ def test_a_fault_of_a_joint_is_in_all_signals_that_contain_the_joint():
 
 
 def test_recall_takes_joints(general, motion):
-    norms = models.Recording("norms", {"measured": np.ones(9000)}, RATE)
+    norms = nc.Recording("norms", {"measured": np.ones(9000)}, RATE)
     assert recall({"general": general}, [norms], motion) is None

@@ -16,16 +16,16 @@ from predicted_runs import (
     predicted,
 )
 
-import models
-from models.confusion import Evaluation
-from models.evaluation.assessment import WORDS, measure, number, table
-from models.evaluation.intervals import Estimate
-from models.evaluation.predictions import Unanswered
-from models.labels import Event
-from models.recording import Fault
+import noiseclassifier as nc
+from noiseclassifier.confusion import Evaluation
+from noiseclassifier.evaluation.assessment import WORDS, measure, number, table
+from noiseclassifier.evaluation.intervals import Estimate
+from noiseclassifier.evaluation.predictions import Unanswered
+from noiseclassifier.labels import Event
+from noiseclassifier.recording import Fault
 
 RATE = 1000.0
-PROFILE = models.LogBands(classes=("ok", "oscillations")).at(RATE)
+PROFILE = nc.LogBands(classes=("ok", "oscillations")).at(RATE)
 
 
 def recording(name, seed, *, swings=True):
@@ -33,16 +33,16 @@ def recording(name, seed, *, swings=True):
     time = np.arange(4000) / RATE
     noise = 1 + 0.01 * np.random.default_rng(seed).normal(size=4000)
     swing = 0.3 * np.sin(2 * np.pi * 200 * time) * (time >= 2)
-    blocks = [models.Block(0.0, 1.95, "ok"), models.Block(2.0, 4.0, "oscillations")]
+    blocks = [nc.Block(0.0, 1.95, "ok"), nc.Block(2.0, 4.0, "oscillations")]
     if not swings:
-        return models.Recording(name, noise, RATE, (models.Block(0.0, 4.0, "ok"),))
-    return models.Recording(name, noise + swing, RATE, tuple(blocks))
+        return nc.Recording(name, noise, RATE, (nc.Block(0.0, 4.0, "ok"),))
+    return nc.Recording(name, noise + swing, RATE, tuple(blocks))
 
 
 @pytest.fixture(scope="module")
 def classifier():
     training = [recording(f"panda/swing-{seed:03d}", seed) for seed in range(3)]
-    return models.Classifier.train(models.Dataset.of(training, PROFILE), PROFILE)
+    return nc.Classifier.train(nc.Dataset.of(training, PROFILE), PROFILE)
 
 
 def fresh(seeds=range(10, 16)):
@@ -52,7 +52,7 @@ def fresh(seeds=range(10, 16)):
 
 
 def test_a_model_is_measured_by_runs_outside_of_its_training_set(classifier):
-    found = models.assess(classifier, iter(fresh()))
+    found = nc.assess(classifier, iter(fresh()))
     assert (found.runs, found.groups) == (12, 6)
     assert found.blocks == {"ok": 12, "oscillations": 6}
     assert found.runs_with == {"ok": 12, "oscillations": 6}
@@ -64,9 +64,9 @@ def test_a_model_is_measured_by_runs_outside_of_its_training_set(classifier):
 
 
 def test_frames_are_those_that_were_always_counted(classifier):
-    found = models.assess(classifier, fresh())
-    dataset = models.Dataset.of(fresh(), PROFILE, training=False)
-    whole = models.evaluate(classifier, dataset)
+    found = nc.assess(classifier, fresh())
+    dataset = nc.Dataset.of(fresh(), PROFILE, training=False)
+    whole = nc.evaluate(classifier, dataset)
     assert found.frames.evaluation.confusion.tolist() == whole.confusion.tolist()
 
 
@@ -121,12 +121,12 @@ def test_perfect_predictions_score_one_with_the_exact_bound_of_their_groups():
 
 def test_runs_of_the_training_set_are_refused_or_listed(classifier):
     known = recording("panda/swing-001", 1)
-    with pytest.raises(models.SeenError, match=r"panda/swing-001: .* on the same recording as"):
-        models.assess(classifier, [*fresh(), known])
+    with pytest.raises(nc.SeenError, match=r"panda/swing-001: .* on the same recording as"):
+        nc.assess(classifier, [*fresh(), known])
     sibling = recording("panda/good-002", 50, swings=False)
-    with pytest.raises(models.SeenError, match="'panda/swing-002', which shares its motion"):
-        models.assess(classifier, [sibling])
-    found = models.assess(classifier, [*fresh(), known, sibling], seen_too=True)
+    with pytest.raises(nc.SeenError, match="'panda/swing-002', which shares its motion"):
+        nc.assess(classifier, [sibling])
+    found = nc.assess(classifier, [*fresh(), known, sibling], seen_too=True)
     assert list(found.seen) == ["panda/swing-001", "panda/good-002"]
     assert "NOT A TEST: 2 of these runs were trained on" in str(found)
     assert found.runs == 14
@@ -134,9 +134,9 @@ def test_runs_of_the_training_set_are_refused_or_listed(classifier):
 
 def test_a_run_that_equals_another_is_no_more_evidence(classifier):
     runs = fresh()
-    found = models.assess(classifier, [*runs, replace(runs[0], name="panda/copy-010")])
+    found = nc.assess(classifier, [*runs, replace(runs[0], name="panda/copy-010")])
     assert found.copies == {"panda/copy-010": "panda/swing-010"}
-    assert found.as_dict()["frames"] == models.assess(classifier, runs).as_dict()["frames"]
+    assert found.as_dict()["frames"] == nc.assess(classifier, runs).as_dict()["frames"]
     assert "panda/copy-010 (panda/swing-010)" in str(found)
 
 
@@ -144,47 +144,47 @@ def test_names_that_repeat_and_runs_without_blocks_are_refused(classifier):
     run = fresh()[0]
     short = replace(run, signal=run.signal[:100], blocks=(), sha256="")
     with pytest.raises(
-        models.DatasetError,
+        nc.DatasetError,
         match="none of 1 recordings has a verdict; panda/swing-010: .* too short",
     ):
-        models.assess(classifier, [short])
-    with pytest.raises(models.DatasetError, match="two recordings are called 'panda/swing-010'"):
-        models.assess(classifier, [run, replace(run, signal=run.signal + 1.0, sha256="")])
-    with pytest.raises(models.DatasetError, match="no annotated frame in 1 recordings"):
-        models.assess(classifier, [replace(run, blocks=())])
-    with pytest.raises(models.DatasetError, match="no annotated frame in 0 recordings"):
-        models.assess(classifier, [])
+        nc.assess(classifier, [short])
+    with pytest.raises(nc.DatasetError, match="two recordings are called 'panda/swing-010'"):
+        nc.assess(classifier, [run, replace(run, signal=run.signal + 1.0, sha256="")])
+    with pytest.raises(nc.DatasetError, match="no annotated frame in 1 recordings"):
+        nc.assess(classifier, [replace(run, blocks=())])
+    with pytest.raises(nc.DatasetError, match="no annotated frame in 0 recordings"):
+        nc.assess(classifier, [])
 
 
 def test_a_run_without_a_verdict_is_listed_and_not_left_out_in_silence(classifier):
     short = replace(fresh()[0], name="panda/short-010", signal=np.ones(100), blocks=(), sha256="")
-    slow = models.Unanswered("slow", {"robot": "ur5"}, "rate 200 Hz < 1000 Hz")
-    found = models.assess(classifier, [*fresh(), short, slow])
+    slow = nc.Unanswered("slow", {"robot": "ur5"}, "rate 200 Hz < 1000 Hz")
+    found = nc.assess(classifier, [*fresh(), short, slow])
     assert found.runs == 12
     assert found.protocol.not_answered == pytest.approx(2 / 14)
     text = str(found)
     assert "not answered: 1 run (rate 200 Hz < 1000 Hz) of ur5" in text
     assert "is too short: a frame takes 400) of panda" in text
-    with pytest.raises(models.DatasetError, match="two recordings are called 'slow'"):
-        models.assess(classifier, [slow, slow])
+    with pytest.raises(nc.DatasetError, match="two recordings are called 'slow'"):
+        nc.assess(classifier, [slow, slow])
 
 
 def test_a_run_whose_blocks_lie_in_gaps_is_classified_from_end_to_end(classifier):
     valid = np.ones(4000, dtype=bool)
     valid[1000:3000:100] = False
-    gappy = replace(fresh()[0], valid=valid, blocks=(models.Block(1.2, 2.8, "oscillations"),))
-    found = models.assess(classifier, [gappy, *fresh()[1:]])
+    gappy = replace(fresh()[0], valid=valid, blocks=(nc.Block(1.2, 2.8, "oscillations"),))
+    found = nc.assess(classifier, [gappy, *fresh()[1:]])
     assert found.frames.evaluation.confusion.sum() < count_frames(classifier)
     assert found.blocks["oscillations"] == 6
     assert len(found.score.missed()) == 1  # no frame of it can be classified
 
 
 def count_frames(classifier):
-    return models.assess(classifier, fresh()).frames.evaluation.confusion.sum()
+    return nc.assess(classifier, fresh()).frames.evaluation.confusion.sum()
 
 
 def test_everything_goes_through_json(classifier):
-    plain = models.assess(classifier, fresh()).as_dict()
+    plain = nc.assess(classifier, fresh()).as_dict()
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
     assert plain["format"] == "noise-evaluation/2"
     assert plain["calibration_error"] is plain["reliability"] is None

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import models
-from models.estimators.baseline import MOTION, NOISE_ALONE, Baseline, distance, k_centers
-from models.novelty.frames import GUARD, parts
-from models.novelty.limit import HOUR, PEAKS, Limit, alarm_peaks, counted, limit
-from models.novelty.training import Learnt, check
+import noiseclassifier as nc
+from noiseclassifier.estimators.baseline import MOTION, NOISE_ALONE, Baseline, distance, k_centers
+from noiseclassifier.novelty.frames import GUARD, parts
+from noiseclassifier.novelty.limit import HOUR, PEAKS, Limit, alarm_peaks, counted, limit
+from noiseclassifier.novelty.training import Learnt, check
 
 RATE = 1000.0
 PROFILE = MOTION.at(RATE)
@@ -27,8 +27,8 @@ def signals(seed, rattle=0.0, seconds=SECONDS):
 
 
 def recording(name, seed, rattle=0.0, blocks=(), **more):
-    blocks = tuple(models.Block(*block) for block in blocks)
-    return models.Recording(name, signals(seed, rattle), RATE, blocks, **more)
+    blocks = tuple(nc.Block(*block) for block in blocks)
+    return nc.Recording(name, signals(seed, rattle), RATE, blocks, **more)
 
 
 GOOD = [recording(f"good{seed}", seed) for seed in range(6)]
@@ -36,21 +36,21 @@ GOOD = [recording(f"good{seed}", seed) for seed in range(6)]
 
 @pytest.fixture(scope="module")
 def learnt():
-    return models.learn_baseline(models.GoodMotion.read(GOOD, PROFILE), PROFILE, alarms=5.0)
+    return nc.learn_baseline(nc.GoodMotion.read(GOOD, PROFILE), PROFILE, alarms=5.0)
 
 
 def motion(apart, run=None, hop=1.0):
     """Good motion whose frames of 0.4 s start every `hop` seconds."""
     start = hop * np.arange(len(apart))
     run = np.full(len(apart), "run") if run is None else np.array(run)
-    return models.GoodMotion(np.zeros((len(apart), 1)), run, start, start + 0.4, {})
+    return nc.GoodMotion(np.zeros((len(apart), 1)), run, start, start + 0.4, {})
 
 
 def test_what_good_runs_do_is_no_anomaly_and_a_rattle_is_one_when_it_happens(learnt):
     model = learnt.classifier
     assert model.classify(signals(11), RATE).events() == ()
     (event,) = model.classify(signals(12, rattle=0.3), RATE).events()
-    assert event.label == models.ANOMALY
+    assert event.label == nc.ANOMALY
     assert 3.5 < event.start <= 4.0
     assert 6.0 <= event.stop < 6.5
     assert event.score > 1.0
@@ -113,7 +113,7 @@ def test_so_much_good_motion_is_enough_and_no_less():
     good = motion(np.zeros(75))
     assert good.seconds == pytest.approx(30.0)
     check(good, 0.1, good.seconds)
-    with pytest.raises(models.DatasetError, match=r"^30 s of good motion are too short to learn"):
+    with pytest.raises(nc.DatasetError, match=r"^30 s of good motion are too short to learn"):
         check(good, 0.1, good.seconds + 1e-9)
 
 
@@ -234,20 +234,20 @@ def test_little_good_motion_gives_a_remark(learnt):
 
 
 def test_of_a_single_run_parts_are_left_out_with_time_between():
-    long = models.Recording("long", signals(0, seconds=30), RATE)
-    good = models.GoodMotion.read([long], PROFILE)
+    long = nc.Recording("long", signals(0, seconds=30), RATE)
+    good = nc.GoodMotion.read([long], PROFILE)
     for train, test in parts(good):
         gap = np.maximum(good.start[train][:, None] - good.stop[test], 0)
         gap += np.maximum(good.start[test] - good.stop[train][:, None], 0)
         assert gap.min() >= GUARD
-    alone = models.learn_baseline(good, PROFILE)
+    alone = nc.learn_baseline(good, PROFILE)
     assert "which does not show how much another run differs" in str(alone)
     assert alone.classifier.classify(signals(12, rattle=0.3), RATE).events()
 
 
 def test_of_an_annotated_run_only_ok_blocks_are_for_training():
     blocks = ((0.0, 3.0, "ok"), (4.0, 6.0, "impact"), (6.0, 8.0, "ok"))
-    good = models.GoodMotion.read([recording("one", 0, 0.3, blocks)], PROFILE)
+    good = nc.GoodMotion.read([recording("one", 0, 0.3, blocks)], PROFILE)
     assert ((good.stop <= 3.0 + 1e-9) | (good.start >= 6.0 - 1e-9)).all()
     assert good.seconds == pytest.approx(5.0, abs=0.01)
     assert good.annotated == ("one",)
@@ -256,16 +256,16 @@ def test_of_an_annotated_run_only_ok_blocks_are_for_training():
 def test_frames_that_touch_a_gap_are_not_for_training():
     valid = np.ones(SECONDS * 1000, dtype=bool)
     valid[3000:3500] = False
-    good = models.GoodMotion.read([recording("one", 0, valid=valid)], PROFILE)
+    good = nc.GoodMotion.read([recording("one", 0, valid=valid)], PROFILE)
     assert ((good.stop <= 3.0 + 1e-9) | (good.start >= 3.5 - 1e-9)).all()
 
 
 def test_a_baseline_is_a_model_file_and_the_same_runs_give_the_same_bytes(learnt, tmp_path):
     learnt.classifier.save(tmp_path / "one.npz")
-    again = models.learn_baseline(models.GoodMotion.read(GOOD, PROFILE), PROFILE, alarms=5.0)
+    again = nc.learn_baseline(nc.GoodMotion.read(GOOD, PROFILE), PROFILE, alarms=5.0)
     again.classifier.save(tmp_path / "two.npz")
     assert (tmp_path / "one.npz").read_bytes() == (tmp_path / "two.npz").read_bytes()
-    loaded = models.Classifier.load(tmp_path / "one.npz")
+    loaded = nc.Classifier.load(tmp_path / "one.npz")
     assert isinstance(loaded.estimator, Baseline)
     loaded_labels, labels = (
         m.classify(signals(12, 0.3), RATE) for m in (loaded, learnt.classifier)
@@ -276,13 +276,13 @@ def test_a_baseline_is_a_model_file_and_the_same_runs_give_the_same_bytes(learnt
 def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
     odd = replace(learnt.classifier.estimator, limit=np.ones(2))
     replace(learnt.classifier, estimator=odd).save(tmp_path / "odd.npz")
-    with pytest.raises(models.ModelFileError, match=r"array 'limit' has shape \(2,\)"):
-        models.Classifier.load(tmp_path / "odd.npz")
+    with pytest.raises(nc.ModelFileError, match=r"array 'limit' has shape \(2,\)"):
+        nc.Classifier.load(tmp_path / "odd.npz")
 
 
 def test_a_stream_has_the_labels_of_the_whole_signal(learnt):
     whole = signals(12, rattle=0.3)
-    stream = models.Stream(learnt.classifier)
+    stream = nc.Stream(learnt.classifier)
     parts = [
         stream.push({name: signal[first : first + 370] for name, signal in whole.items()})
         for first in range(0, SECONDS * 1000, 370)
@@ -290,54 +290,54 @@ def test_a_stream_has_the_labels_of_the_whole_signal(learnt):
     labels = np.concatenate([each.label for each in parts])
     batch = learnt.classifier.classify(whole, RATE)
     np.testing.assert_array_equal(labels, batch.label[: len(labels)])
-    assert models.ANOMALY in labels
+    assert nc.ANOMALY in labels
 
 
 def test_a_failure_of_any_class_is_an_anomaly(learnt):
     blocks = ((0.0, 3.5, "ok"), (4.0, 6.0, "oscillations"), (6.5, 8.0, "ok"))
     tests = [recording(f"bad{seed}", seed, 0.3, blocks) for seed in (21, 22)]
-    measured = models.assess(learnt.classifier, tests)
+    measured = nc.assess(learnt.classifier, tests)
     assert measured.events.all_found.value == 1.0
     assert measured.events.false_alarms == 0
     assert measured.frames.failure_recall.value == 1.0
     assert measured.calibration_error is None
-    with pytest.raises(models.SeenError, match="good0"):
-        models.assess(learnt.classifier, [recording("good0", 0, blocks=((0.0, 8.0, "ok"),))])
+    with pytest.raises(nc.SeenError, match="good0"):
+        nc.assess(learnt.classifier, [recording("good0", 0, blocks=((0.0, 8.0, "ok"),))])
 
 
 def test_the_noise_alone_is_enough_for_a_baseline():
     profile = NOISE_ALONE.at(RATE)
-    good = models.GoodMotion.read(GOOD, profile)
-    model = models.learn_baseline(good, profile).classifier
+    good = nc.GoodMotion.read(GOOD, profile)
+    model = nc.learn_baseline(good, profile).classifier
     assert model.classify(signals(11), RATE).events() == ()
     assert model.classify(signals(12, rattle=1.0), RATE).events()
 
 
 @pytest.mark.parametrize("alarms", [0.0, -1.0, np.nan, np.inf])
 def test_a_budget_of_no_alarm_is_refused(alarms):
-    good = models.GoodMotion.read(GOOD[:2], PROFILE)
-    with pytest.raises(models.ProfileError, match="alarms per hour, expected more than 0"):
-        models.learn_baseline(good, PROFILE, alarms=alarms)
+    good = nc.GoodMotion.read(GOOD[:2], PROFILE)
+    with pytest.raises(nc.ProfileError, match="alarms per hour, expected more than 0"):
+        nc.learn_baseline(good, PROFILE, alarms=alarms)
 
 
 def test_too_little_good_motion_is_refused():
-    short = models.Recording("short", signals(0, seconds=3), RATE)
-    with pytest.raises(models.DatasetError, match="3 s of good motion are too short to learn"):
-        models.learn_baseline(models.GoodMotion.read([short], PROFILE), PROFILE)
+    short = nc.Recording("short", signals(0, seconds=3), RATE)
+    with pytest.raises(nc.DatasetError, match="3 s of good motion are too short to learn"):
+        nc.learn_baseline(nc.GoodMotion.read([short], PROFILE), PROFILE)
 
 
 def test_runs_without_a_good_frame_are_refused():
     bad = recording("bad", 0, blocks=((0.0, 8.0, "impact"),))
-    tiny = models.Recording("tiny", signals(0, seconds=0.2), RATE)
-    with pytest.raises(models.DatasetError, match="no good frame in 2 recordings"):
-        models.GoodMotion.read([bad, tiny], PROFILE)
+    tiny = nc.Recording("tiny", signals(0, seconds=0.2), RATE)
+    with pytest.raises(nc.DatasetError, match="no good frame in 2 recordings"):
+        nc.GoodMotion.read([bad, tiny], PROFILE)
 
 
 def test_recordings_that_do_not_fit_are_refused_by_name():
-    with pytest.raises(models.DatasetError, match="two recordings are called 'good0'"):
-        models.GoodMotion.read([GOOD[0], GOOD[0]], PROFILE)
-    with pytest.raises(models.RateError, match="'good0' does not fit"):
-        models.GoodMotion.read(GOOD, MOTION.at(500.0))
-    alone = models.Recording("alone", np.ones(5000), RATE)
-    with pytest.raises(models.RecordingError, match="alone: no signal desired, measured, error"):
-        models.GoodMotion.read([alone], PROFILE)
+    with pytest.raises(nc.DatasetError, match="two recordings are called 'good0'"):
+        nc.GoodMotion.read([GOOD[0], GOOD[0]], PROFILE)
+    with pytest.raises(nc.RateError, match="'good0' does not fit"):
+        nc.GoodMotion.read(GOOD, MOTION.at(500.0))
+    alone = nc.Recording("alone", np.ones(5000), RATE)
+    with pytest.raises(nc.RecordingError, match="alone: no signal desired, measured, error"):
+        nc.GoodMotion.read([alone], PROFILE)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import models
-from models import classifier as classifier_module
+import noiseclassifier as nc
+from noiseclassifier import classifier as classifier_module
 
 RATE = 1000.0
 RANDOM = np.random.default_rng(11)
@@ -30,17 +30,17 @@ def knocks(seconds):
 def recordings():
     made = {"ok": noise(6.0), "impact": knocks(4.0), "oscillations": noise(4.0, hum=0.2)}
     for label, signal in made.items():
-        block = models.Block(0.0, float("inf"), label)
-        yield models.Recording(label, signal, RATE, (block,))
+        block = nc.Block(0.0, float("inf"), label)
+        yield nc.Recording(label, signal, RATE, (block,))
 
 
 DATA = list(recordings())
-OURS = models.LogBands().at(RATE)
-PAPER = replace(models.Profile.paper(), rate=RATE, length=400, hop=100, window=256, stride=48)
+OURS = nc.LogBands().at(RATE)
+PAPER = replace(nc.Profile.paper(), rate=RATE, length=400, hop=100, window=256, stride=48)
 
 
 def trained(profile):
-    return models.Classifier.train(models.Dataset.of(DATA, profile), profile)
+    return nc.Classifier.train(nc.Dataset.of(DATA, profile), profile)
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +49,7 @@ def ours():
 
 
 def test_the_training_set_is_classified_right(ours):
-    report = models.evaluate(ours, models.Dataset.of(DATA, OURS))
+    report = nc.evaluate(ours, nc.Dataset.of(DATA, OURS))
     assert report.subset_accuracy == 1.0
     assert ours.metrics["training"] == report.as_dict()
     assert not trained(PAPER).mean.any()
@@ -59,13 +59,13 @@ def test_the_training_set_is_classified_right(ours):
 
 
 def test_a_validation_set_is_measured_along(ours):
-    dataset = models.Dataset.of(DATA, OURS)
-    validated = models.Classifier.train(dataset, OURS, validation=dataset)
+    dataset = nc.Dataset.of(DATA, OURS)
+    validated = nc.Classifier.train(dataset, OURS, validation=dataset)
     assert validated.metrics["validation"] == ours.metrics["training"]
 
 
 def test_features_that_hardly_change_are_not_amplified():
-    features = models.features(models.Dataset.of(DATA, OURS).frames, OURS)
+    features = nc.features(nc.Dataset.of(DATA, OURS).frames, OURS)
     scale = trained(replace(OURS, least_deviation=1.0)).scale
     changing = features.std(axis=0) > 1.0
     assert 0 < changing.sum() < len(scale)
@@ -76,7 +76,7 @@ def test_features_that_hardly_change_are_not_amplified():
 @pytest.mark.parametrize("profile", [OURS, PAPER], ids=["ours", "paper"])
 def test_scores_are_largest_for_what_is_predicted(profile):
     classifier = trained(profile)
-    frames = models.Dataset.of(DATA, profile).frames
+    frames = nc.Dataset.of(DATA, profile).frames
     scores = classifier.scores(frames)
     assert scores.shape == (len(frames), 3)
     best = np.array(classifier.classes)[scores.argmax(axis=1)]
@@ -136,7 +136,7 @@ def test_labels_do_not_depend_on_chunks(ours, monkeypatch):
 
 def test_labels_are_those_of_the_frames_alone(ours):
     signal = np.concatenate([knocks(2.0), noise(2.0)])
-    frames = models.frame(signal, length=400, hop=100)
+    frames = nc.frame(signal, length=400, hop=100)
     labels = ours.classify(signal, RATE)
     assert np.array_equal(labels.label, ours.predict(frames))
     pieces = ours.classify_pieces([(signal[:1500], None), (signal[1500:], None)], RATE)
@@ -171,58 +171,58 @@ def test_all_gaps_are_no_labels(ours):
     ],
 )
 def test_signals_that_cannot_be_classified_are_refused(ours, signal, reason):
-    with pytest.raises(models.SignalError, match=reason):
+    with pytest.raises(nc.SignalError, match=reason):
         ours.classify(signal, RATE)
 
 
 def test_validity_of_another_length_is_refused(ours):
-    with pytest.raises(models.SignalError, match=r"validity of shape \(3,\)"):
+    with pytest.raises(nc.SignalError, match=r"validity of shape \(3,\)"):
         ours.classify(np.zeros(500), RATE, valid=np.ones(3, bool))
 
 
 @pytest.mark.parametrize("rate", [970.0, 10_000.0, 0.0, float("nan")])
 def test_a_signal_of_another_rate_is_refused(ours, rate):
-    with pytest.raises(models.RateError, match="rates are 1000 Hz: lower the signal's rate"):
+    with pytest.raises(nc.RateError, match="rates are 1000 Hz: lower the signal's rate"):
         ours.classify(np.zeros(500), rate)
 
 
 def test_a_baseline_is_not_trained_on_classes():
     profile = replace(OURS, estimator="baseline")
-    with pytest.raises(models.ProfileError, match="learns from good runs alone: call models.lea"):
-        models.Classifier.train(models.Dataset.of(DATA, OURS), profile)
+    with pytest.raises(nc.ProfileError, match="learns from good runs alone: call models.lea"):
+        nc.Classifier.train(nc.Dataset.of(DATA, OURS), profile)
 
 
 def test_one_class_is_not_enough_to_learn():
-    alone = models.Dataset.of(DATA[:1], OURS)
-    with pytest.raises(models.DatasetError, match="two classes or more of .*; the frames are ok"):
-        models.Classifier.train(alone, OURS)
+    alone = nc.Dataset.of(DATA[:1], OURS)
+    with pytest.raises(nc.DatasetError, match="two classes or more of .*; the frames are ok"):
+        nc.Classifier.train(alone, OURS)
 
 
 def test_failures_are_classified_without_ok():
     profile = OURS
-    classifier = models.Classifier.train(models.Dataset.of(DATA[1:], profile), profile)
+    classifier = nc.Classifier.train(nc.Dataset.of(DATA[1:], profile), profile)
     assert classifier.classes == ("impact", "oscillations")
     assert classifier.classify(noise(1.0, hum=0.2), RATE).events()[0].label == "oscillations"
 
 
 def test_the_nearest_model_is_the_one_below(ours):
-    fast = replace(ours, profile=models.LogBands().at(10_000.0))
+    fast = replace(ours, profile=nc.LogBands().at(10_000.0))
     library = {"fast": fast, "ours": ours}
-    assert models.nearest(library, 10_000.0) == ("fast", fast)
-    assert models.nearest(library, 9_995.0) == ("fast", fast)  # within 0.1 %
-    assert models.nearest(library, 9_000.0) == ("ours", ours)
-    assert models.nearest(library, 48_000.0) == ("fast", fast)
-    with pytest.raises(models.RateError, match="rate of 500 Hz; the models' rates are 1000, 10000"):
-        models.nearest(library, 500.0)
-    with pytest.raises(models.RateError, match="the models' rates are none Hz"):
-        models.nearest({}, 500.0)
+    assert nc.nearest(library, 10_000.0) == ("fast", fast)
+    assert nc.nearest(library, 9_995.0) == ("fast", fast)  # within 0.1 %
+    assert nc.nearest(library, 9_000.0) == ("ours", ours)
+    assert nc.nearest(library, 48_000.0) == ("fast", fast)
+    with pytest.raises(nc.RateError, match="rate of 500 Hz; the models' rates are 1000, 10000"):
+        nc.nearest(library, 500.0)
+    with pytest.raises(nc.RateError, match="the models' rates are none Hz"):
+        nc.nearest({}, 500.0)
 
 
 def test_classifying_needs_neither_scikit_learn_nor_scipy(ours, tmp_path):
     ours.save(tmp_path / "model.npz")
     code = (
-        "import sys, numpy, models\n"
-        "model = models.Classifier.load(sys.argv[1])\n"
+        "import sys, numpy, noiseclassifier\n"
+        "model = noiseclassifier.Classifier.load(sys.argv[1])\n"
         "print(len(model.classify(numpy.zeros(2000), 1000.0)))\n"
         "print(sorted({'sklearn', 'scipy', 'noisemodel', 'joblib'} & set(sys.modules)))\n"
     )
@@ -232,5 +232,5 @@ def test_classifying_needs_neither_scikit_learn_nor_scipy(ours, tmp_path):
 
 
 def test_the_package_lists_its_public_names_alone():
-    assert dir(models) == sorted(models.__all__)
-    assert all(hasattr(models, name) for name in dir(models))
+    assert dir(nc) == sorted(nc.__all__)
+    assert all(hasattr(nc, name) for name in dir(nc))

@@ -5,14 +5,12 @@ from math import inf
 import numpy as np
 import pytest
 
-import models
-from models.dataset import cut
-from models.recording import Block, Recording
+import noiseclassifier as nc
+from noiseclassifier.dataset import cut
+from noiseclassifier.recording import Block, Recording
 
-PROFILE = replace(models.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)
-THEIRS = replace(
-    models.Profile.noisytest(), rate=1000.0, length=400, hop=100, window=256, stride=48
-)
+PROFILE = replace(nc.Profile.paper(), rate=1000.0, length=400, hop=100, window=256, stride=48)
+THEIRS = replace(nc.Profile.noisytest(), rate=1000.0, length=400, hop=100, window=256, stride=48)
 
 
 def recording(*blocks, samples=3000, **changes):
@@ -36,7 +34,7 @@ def test_time_counts_from_the_start_of_the_recording():
 
 def test_an_open_block_reaches_the_last_sample():
     assert cut_block(2.5, inf).tolist() == list(range(2500, 3000))
-    ours = replace(models.LogBands().at(1000.0), spread_failures=False)
+    ours = replace(nc.LogBands().at(1000.0), spread_failures=False)
     assert cut_block(2.5, inf, ours).tolist() == list(range(2500, 3000))
 
 
@@ -50,7 +48,7 @@ def test_a_short_block_is_widened_on_both_sides_otherwise():
 
 
 def test_a_profile_may_widen_in_training_too():
-    ours = replace(models.LogBands().at(1000.0), spread_failures=False)
+    ours = replace(nc.LogBands().at(1000.0), spread_failures=False)
     assert cut_block(1.0, 1.2, ours, training=True).tolist() == list(range(900, 1300))
 
 
@@ -72,19 +70,19 @@ def test_noisytest_widens_by_a_sample_more_and_pads_at_the_ends():
 
 
 def test_a_recording_shorter_than_a_frame_cannot_be_widened():
-    with pytest.raises(models.RecordingError, match="walk: 300 samples are too short"):
+    with pytest.raises(nc.RecordingError, match="walk: 300 samples are too short"):
         cut_block(0.1, 0.2, training=False, samples=300)
 
 
 def test_a_block_between_two_samples_is_refused():
-    with pytest.raises(models.RecordingError, match=r"from 1.0001 s to 1.0002 s holds no sample"):
+    with pytest.raises(nc.RecordingError, match=r"from 1.0001 s to 1.0002 s holds no sample"):
         cut_block(1.0001, 1.0002)
 
 
 def test_a_dataset_keeps_labels_runs_and_hashes():
     walk = recording(Block(0.0, 0.5, "ok"), Block(0.6, 0.7, "impact"))
     stand = recording(Block(1.0, 1.6, "ok"), name="stand", sha256="abc")
-    dataset = models.Dataset.of([walk, stand], PROFILE)
+    dataset = nc.Dataset.of([walk, stand], PROFILE)
     assert dataset.labels.tolist() == ["ok", "ok", "impact", "ok", "ok", "ok"]
     assert dataset.runs.tolist() == ["walk"] * 3 + ["stand"] * 3
     assert dataset.frames[:, 0].tolist() == [0, 100, 600, 1000, 1100, 1200]
@@ -100,44 +98,44 @@ def test_frames_that_touch_a_gap_are_left_out():
     valid = np.ones(3000, bool)
     valid[450] = False
     walk = recording(Block(0.0, 1.0, "ok"), Block(0.44, 0.46, "ok"), valid=valid)
-    dataset = models.Dataset.of([walk], PROFILE)
+    dataset = nc.Dataset.of([walk], PROFILE)
     assert dataset.frames[:, 0].tolist() == [0, 500, 600]
     assert dataset.labels.tolist() == ["ok"] * 3
 
 
 def test_a_label_that_is_no_class_is_named():
     with pytest.raises(
-        models.UnknownLabelError, match="walk: label 'rattle' is no class; there are ok, impact"
+        nc.UnknownLabelError, match="walk: label 'rattle' is no class; there are ok, impact"
     ):
-        models.Dataset.of([recording(Block(0.0, 1.0, "rattle"))], PROFILE)
+        nc.Dataset.of([recording(Block(0.0, 1.0, "rattle"))], PROFILE)
 
 
 def test_a_class_of_ones_own_needs_only_its_name():
     profile = replace(PROFILE, classes=("ok", "rattle"))
-    dataset = models.Dataset.of([recording(Block(0.0, 0.4, "rattle"))], profile)
+    dataset = nc.Dataset.of([recording(Block(0.0, 0.4, "rattle"))], profile)
     assert dataset.labels.tolist() == ["rattle"]
 
 
 def test_a_recording_of_another_rate_is_refused():
-    with pytest.raises(models.RateError, match=r"rate of 970 Hz; .* 1000 Hz: recording 'walk'"):
-        models.Dataset.of([recording(Block(0.0, 1.0, "ok"), rate=970.0)], PROFILE)
+    with pytest.raises(nc.RateError, match=r"rate of 970 Hz; .* 1000 Hz: recording 'walk'"):
+        nc.Dataset.of([recording(Block(0.0, 1.0, "ok"), rate=970.0)], PROFILE)
 
 
 def test_two_recordings_of_one_name_are_refused():
-    with pytest.raises(models.DatasetError, match="two recordings are called 'walk'"):
-        models.Dataset.of([recording(), recording()], PROFILE)
+    with pytest.raises(nc.DatasetError, match="two recordings are called 'walk'"):
+        nc.Dataset.of([recording(), recording()], PROFILE)
 
 
 def test_a_recording_whose_blocks_lie_all_in_gaps_is_passed_over():
     lost = recording(Block(0.0, 1.0, "ok"), name="lost", valid=np.zeros(3000, bool))
-    examples = models.Examples.read([lost, recording(Block(0.0, 1.0, "ok"))], PROFILE)
+    examples = nc.Examples.read([lost, recording(Block(0.0, 1.0, "ok"))], PROFILE)
     assert set(examples.runs.tolist()) == {"walk"}
     assert set(examples.hashes) == {"lost", "walk"}
 
 
 def test_no_frame_at_all_is_refused():
-    with pytest.raises(models.NoFrameError, match="no annotated frame in 1 recordings"):
-        models.Dataset.of([recording()], PROFILE)
+    with pytest.raises(nc.NoFrameError, match="no annotated frame in 1 recordings"):
+        nc.Dataset.of([recording()], PROFILE)
 
 
 @pytest.mark.parametrize(
@@ -155,7 +153,7 @@ def test_no_frame_at_all_is_refused():
     ],
 )
 def test_blocks_that_cannot_be_are_refused(blocks, reason):
-    with pytest.raises(models.RecordingError, match=f"walk: .*{reason}"):
+    with pytest.raises(nc.RecordingError, match=f"walk: .*{reason}"):
         recording(*blocks)
 
 
@@ -169,7 +167,7 @@ def test_annotations_may_be_off_by_a_sample():
         [Block(0.0, 1.0012, "ok"), late],
         [Block(1.0, 1.0, "ok")],
     ):
-        with pytest.raises(models.RecordingError):
+        with pytest.raises(nc.RecordingError):
             recording(*wrong)
 
 
@@ -198,16 +196,16 @@ def test_blocks_that_overlap_and_agree_are_accepted():
     ],
 )
 def test_recordings_that_cannot_be_are_refused(changes, reason):
-    with pytest.raises(models.RecordingError, match=f"walk: .*{reason}"):
+    with pytest.raises(nc.RecordingError, match=f"walk: .*{reason}"):
         recording(**changes)
 
 
 @pytest.mark.parametrize("duration", [0.1, 0.2, 0.3, 0.7])
 def test_our_profile_trains_on_failures_anywhere_in_a_frame(duration):
-    profile = models.LogBands().at(1000.0)
+    profile = nc.LogBands().at(1000.0)
     signal = np.arange(4000.0)
     block = Block(2.0, 2.0 + duration, "impact")
-    dataset = models.Dataset.of([Recording("a", signal, 1000.0, (block,))], profile)
+    dataset = nc.Dataset.of([Recording("a", signal, 1000.0, (block,))], profile)
     first = dataset.frames[:, 0]
     overlap = np.minimum(first + 400, 2000 + 1000 * duration) - np.maximum(first, 2000)
     assert len(first) > 2
@@ -216,16 +214,16 @@ def test_our_profile_trains_on_failures_anywhere_in_a_frame(duration):
 
 
 def test_failures_are_spread_in_training_alone_and_ok_never_is():
-    profile = models.LogBands().at(1000.0)
+    profile = nc.LogBands().at(1000.0)
     blocks = (Block(0.5, 0.9, "ok"), Block(2.0, 2.1, "impact"))
     recording = Recording("a", np.arange(4000.0), 1000.0, blocks)
-    assert models.Dataset.of([recording], profile).labels.tolist().count("ok") == 1
-    measured = models.Dataset.of([recording], profile, training=False)
+    assert nc.Dataset.of([recording], profile).labels.tolist().count("ok") == 1
+    measured = nc.Dataset.of([recording], profile, training=False)
     assert measured.labels.tolist() == ["ok", "impact"]
 
 
 def test_spreading_a_failure_stays_inside_the_recording():
-    profile = models.LogBands().at(1000.0)
+    profile = nc.LogBands().at(1000.0)
     blocks = (Block(0.0, 0.1, "impact"), Block(0.9, 1.0, "impact"))
     recording = Recording("a", np.arange(1000.0), 1000.0, blocks)
-    assert models.Dataset.of([recording], profile).frames.shape[1] == 400
+    assert nc.Dataset.of([recording], profile).frames.shape[1] == 400

@@ -3,8 +3,8 @@ import json
 import numpy as np
 import pytest
 
-import models
-from models.confusion import Evaluation
+import noiseclassifier as nc
+from noiseclassifier.confusion import Evaluation
 
 TRUTH = np.array(["ok"] * 6 + ["impact"] * 2 + ["oscillations"] * 2)
 CLASSES = ("ok", "impact", "oscillations")
@@ -111,7 +111,7 @@ def test_it_prints_a_small_evaluation_whole():
 
 
 def test_nothing_to_compare_is_refused():
-    with pytest.raises(models.DatasetError, match="0 labels and 0 predictions"):
+    with pytest.raises(nc.DatasetError, match="0 labels and 0 predictions"):
         Evaluation.of(np.array([]), np.array([]), CLASSES)
-    with pytest.raises(models.DatasetError, match="10 labels and 1 predictions"):
+    with pytest.raises(nc.DatasetError, match="10 labels and 1 predictions"):
         Evaluation.of(TRUTH, np.array(["ok"]), CLASSES)

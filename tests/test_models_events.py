@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from predicted_runs import GOOD, IMPACT, OSCILLATION, blocks, frames, many, perfect, predicted
 
-from models.evaluation.eventmeasures import measure
-from models.evaluation.eventscore import score
-from models.evaluation.intervals import Resampling
-from models.evaluation.matching import Matched
+from noiseclassifier.evaluation.eventmeasures import measure
+from noiseclassifier.evaluation.eventscore import score
+from noiseclassifier.evaluation.intervals import Resampling
+from noiseclassifier.evaluation.matching import Matched
 
 COUNT = len(frames())
 

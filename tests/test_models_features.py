@@ -5,18 +5,18 @@ import pytest
 from scipy.fft import dct as scipy_dct
 from scipy.signal import get_window
 
-import models
-from models.features import band_shares, compress, dct, feature_count, spectrogram
-from models.pooling import pool
+import noiseclassifier as nc
+from noiseclassifier.features import band_shares, compress, dct, feature_count, spectrogram
+from noiseclassifier.pooling import pool
 
 RANDOM = np.random.default_rng(7)
 PROFILES = [
-    *(models.Profile.noisytest(kernel) for kernel in ("rbf", "linear")),
-    *(models.Profile.paper(kernel) for kernel in ("rbf", "linear")),
-    *(models.LogBands().at(rate) for rate in (250.0, 333.0, 1000.0, 10_000.0, 48_000.0)),
-    *(replace(models.SCALAR, speed=True).at(rate) for rate in (250.0, 1000.0, 10_000.0)),
+    *(nc.Profile.noisytest(kernel) for kernel in ("rbf", "linear")),
+    *(nc.Profile.paper(kernel) for kernel in ("rbf", "linear")),
+    *(nc.LogBands().at(rate) for rate in (250.0, 333.0, 1000.0, 10_000.0, 48_000.0)),
+    *(replace(nc.SCALAR, speed=True).at(rate) for rate in (250.0, 1000.0, 10_000.0)),
 ]
-QUICK = replace(models.SCALAR, speed=True).at(1000.0)
+QUICK = replace(nc.SCALAR, speed=True).at(1000.0)
 NAMES = [f"{each.name}-{each.estimator}-{each.kernel}-{each.rate:g}" for each in PROFILES]
 
 
@@ -33,7 +33,7 @@ def distances(features):
 @pytest.mark.parametrize("profile", PROFILES, ids=NAMES)
 def test_every_profile_gives_finite_features_of_its_count(profile):
     for frames in (RANDOM.random((3, profile.length)), np.zeros((3, profile.length))):
-        features = models.features(frames, profile)
+        features = nc.features(frames, profile)
         assert features.shape == (3, feature_count(profile))
         assert np.isfinite(features).all()
 
@@ -41,8 +41,8 @@ def test_every_profile_gives_finite_features_of_its_count(profile):
 @pytest.mark.parametrize("profile", PROFILES, ids=NAMES)
 def test_a_frames_features_do_not_depend_on_other_frames(profile):
     frames = RANDOM.random((5, profile.length))
-    together = models.features(frames, profile)
-    alone = np.vstack([models.features(frames[i : i + 1], profile) for i in range(5)])
+    together = nc.features(frames, profile)
+    alone = np.vstack([nc.features(frames[i : i + 1], profile) for i in range(5)])
     np.testing.assert_allclose(together, alone, rtol=1e-6 if profile.single_precision else 1e-9)
 
 
@@ -99,14 +99,14 @@ def test_the_cosine_transform_changes_no_distance():
 
 @pytest.mark.parametrize("frequency", [60.0, 200.0, 1000.0, 3333.0])
 def test_a_tone_lands_in_its_band(frequency):
-    paper = models.Profile.paper()
+    paper = nc.Profile.paper()
     amplitude = spectrogram(tone(paper, frequency) - 3.0, window=1024, stride=834)
     loudest = compress(amplitude)[0].argmax(axis=1)
     width = 3 * paper.rate / paper.window
     assert np.abs(loudest * width - frequency).max() <= width
 
-    ours = models.LogBands().at(10_000.0)
-    mean = models.features(tone(ours, frequency), ours)[0, : len(ours.edges) - 1]
+    ours = nc.LogBands().at(10_000.0)
+    mean = nc.features(tone(ours, frequency), ours)[0, : len(ours.edges) - 1]
     low, high = ours.edges[mean.argmax()], ours.edges[mean.argmax() + 1]
     assert low <= frequency <= high
 
@@ -114,19 +114,19 @@ def test_a_tone_lands_in_its_band(frequency):
 @pytest.mark.parametrize("rate", [333.0, 1000.0, 48_000.0])
 def test_log_bands_of_a_tone_are_equal_at_any_rate(rate):
     def mean(profile):
-        return models.features(tone(profile, 61.0), profile)[0, 4]
+        return nc.features(tone(profile, 61.0), profile)[0, 4]
 
-    low, high = models.LogBands().at(rate), models.LogBands().at(10_000.0)
+    low, high = nc.LogBands().at(rate), nc.LogBands().at(10_000.0)
     # At 333 Hz, a window of 34 samples is a fiftieth longer than 0.1 s.
     assert mean(low) == pytest.approx(mean(high), abs=0.08)
 
 
 def test_log_bands_do_not_depend_on_the_time_of_a_burst():
-    profile = models.LogBands().at(10_000.0)
+    profile = nc.LogBands().at(10_000.0)
     burst = RANDOM.standard_normal(300)
     frames = np.zeros((2, 4000))
     frames[0, 1100:1400] = frames[1, 2100:2400] = burst
-    early, late = models.features(frames, profile)
+    early, late = nc.features(frames, profile)
     np.testing.assert_allclose(early, late, atol=1e-9)
 
 
@@ -145,14 +145,14 @@ def test_quick_windows_separate_a_short_burst_from_a_longer_one():
     frames[0, 190:210] += 0.3 * hiss
     frames[1, 160:240] += 0.15 * np.resize(hiss, 80)
     bands = len(profile.quick_edges) - 1
-    burst, murmur = models.features(frames, profile)[:, -2 * bands - 1 : -bands - 1]
+    burst, murmur = nc.features(frames, profile)[:, -2 * bands - 1 : -bands - 1]
     assert (burst[1:] - murmur[1:] > 0.5).all()  # the loudest moment, in all but the speed's band
 
 
 def test_the_first_quick_band_alone_holds_the_speed():
     profile = QUICK
     quick = len(profile.quick_edges) - 1
-    steady = models.features(np.full((1, 400), 5.0), profile)[0]
+    steady = nc.features(np.full((1, 400), 5.0), profile)[0]
     mean = steady[-3 * quick - 1 : -2 * quick - 1] + steady[-1]
     np.testing.assert_allclose(mean[1:], np.log(profile.floor), atol=1e-3)
     assert mean[0] > np.log(5.0)
@@ -164,18 +164,18 @@ def test_a_steady_level_has_no_deviation():
 
 
 def test_three_signals_that_grow_alike_change_the_level_of_the_whole_frame_alone():
-    profile = models.GENERAL.at(1000.0)
+    profile = nc.GENERAL.at(1000.0)
     frames = 1e6 * RANDOM.standard_normal((2, 3, 400))
-    change = models.features(8.0 * frames, profile) - models.features(frames, profile)
+    change = nc.features(8.0 * frames, profile) - nc.features(frames, profile)
     np.testing.assert_allclose(change[:, :-1], 0.0, atol=1e-6)
     np.testing.assert_allclose(change[:, -1], np.log(8.0), atol=1e-6)
 
 
 def test_a_signal_that_grows_alone_is_relative_to_the_frame_and_to_its_neighbours():
-    profile = models.GENERAL.at(1000.0)
+    profile = nc.GENERAL.at(1000.0)
     frames = 1e6 * RANDOM.standard_normal((1, 3, 400))
     louder = frames * np.array([1.0, 8.0, 1.0])[:, None]
-    change = (models.features(louder, profile) - models.features(frames, profile))[0]
+    change = (nc.features(louder, profile) - nc.features(frames, profile))[0]
     # Desired, measured and error above the frame; measured above desired, error above measured.
     expected = np.array([-1.0, 2.0, -1.0, 3.0, -3.0]) / 3.0 * np.log(8.0)
     first = 0
@@ -192,37 +192,37 @@ def test_a_signal_that_grows_alone_is_relative_to_the_frame_and_to_its_neighbour
 
 
 def test_a_constant_signal_has_power_only_at_zero_hertz():
-    profile = models.LogBands().at(1000.0)
-    features = models.features(np.full((1, 400), 5.0), profile)
+    profile = nc.LogBands().at(1000.0)
+    features = nc.features(np.full((1, 400), 5.0), profile)
     silent, bands = np.log(profile.floor), len(profile.edges) - 1
     np.testing.assert_allclose(features[0, : 2 * bands], silent, atol=1e-6)
 
 
 def test_single_precision_rounds_to_32_bits():
-    profile = models.Profile.noisytest()
+    profile = nc.Profile.noisytest()
     frames = RANDOM.random((2, 4000))
-    features = models.features(frames, profile)
+    features = nc.features(frames, profile)
     assert np.array_equal(features, features.astype(np.float32))
-    assert np.array_equal(features, models.features(frames.astype(np.float32), profile))
-    exact = models.features(frames, replace(profile, single_precision=False))
+    assert np.array_equal(features, nc.features(frames.astype(np.float32), profile))
+    exact = nc.features(frames, replace(profile, single_precision=False))
     np.testing.assert_allclose(features, exact, atol=1e-2)
 
 
 def test_frames_of_another_length_are_refused():
-    with pytest.raises(models.SignalError, match=r"shape \(2, 400\), expected \(frames, 4000\)"):
-        models.features(np.zeros((2, 400)), models.Profile.paper())
-    with pytest.raises(models.SignalError, match=r"shape \(4000,\), expected \(frames, 4000\)"):
-        models.features(np.zeros(4000), models.Profile.paper())
+    with pytest.raises(nc.SignalError, match=r"shape \(2, 400\), expected \(frames, 4000\)"):
+        nc.features(np.zeros((2, 400)), nc.Profile.paper())
+    with pytest.raises(nc.SignalError, match=r"shape \(4000,\), expected \(frames, 4000\)"):
+        nc.features(np.zeros(4000), nc.Profile.paper())
 
 
 def test_a_frame_that_is_not_finite_is_named():
     frames = np.zeros((3, 4000))
     frames[1, 7] = np.inf
-    with pytest.raises(models.SignalError, match="frame 1 holds a value that is not finite"):
-        models.features(frames, models.Profile.paper())
+    with pytest.raises(nc.SignalError, match="frame 1 holds a value that is not finite"):
+        nc.features(frames, nc.Profile.paper())
 
 
-EACH = models.EACH.at(1000.0)
+EACH = nc.EACH.at(1000.0)
 
 
 def joined(norms, joints):
@@ -245,16 +245,16 @@ def test_the_order_of_joints_does_not_matter():
     norms, joints = RANDOM.standard_normal((2, 3, 400)), RANDOM.standard_normal((2, 3, 5, 400))
     swapped = joints[:, :, [3, 1, 4, 0, 2]]
     np.testing.assert_allclose(
-        models.features(joined(norms, swapped), EACH),
-        models.features(joined(norms, joints), EACH),
+        nc.features(joined(norms, swapped), EACH),
+        nc.features(joined(norms, joints), EACH),
         atol=1e-9,
     )
 
 
 def test_joints_that_all_do_the_same_are_one_joint_and_none_is_above_the_others():
     norms, one = RANDOM.standard_normal((1, 3, 400)), RANDOM.standard_normal((1, 3, 1, 400))
-    alone = models.features(joined(norms, one), EACH)[0]
-    many = models.features(joined(norms, np.tile(one, (7, 1))), EACH)[0]
+    alone = nc.features(joined(norms, one), EACH)[0]
+    many = nc.features(joined(norms, np.tile(one, (7, 1))), EACH)[0]
     np.testing.assert_allclose(many, alone, atol=1e-9)
     for spectra in split(alone):
         np.testing.assert_allclose(spectra[10:], 0.0, atol=1e-9)
@@ -262,8 +262,8 @@ def test_joints_that_all_do_the_same_are_one_joint_and_none_is_above_the_others(
 
 def test_joints_leave_the_features_of_the_norms_as_they_are():
     norms, joints = RANDOM.standard_normal((1, 3, 400)), RANDOM.standard_normal((1, 3, 5, 400))
-    whole = models.features(joined(norms, joints), EACH)[0]
-    alone = models.features(norms, models.GENERAL.at(1000.0))[0]
+    whole = nc.features(joined(norms, joints), EACH)[0]
+    alone = nc.features(norms, nc.GENERAL.at(1000.0))[0]
     first = 0
     for spectra in split(whole):
         own = spectra[:5].ravel()
@@ -277,9 +277,7 @@ def test_one_joint_whose_error_grows_is_above_the_mean_of_all():
     norms = 1e6 * RANDOM.standard_normal((1, 3, 400))
     louder = joints.copy()
     louder[0, 2, 1] *= 8.0
-    change = models.features(joined(norms, louder), EACH) - models.features(
-        joined(norms, joints), EACH
-    )
+    change = nc.features(joined(norms, louder), EACH) - nc.features(joined(norms, joints), EACH)
     # Loudest desired, measured, error; measured less desired, error less measured; above the mean.
     expected = np.log(8.0) * np.array([0, 0, 1, 0, 1, 0, 0, 3 / 4])
     for spectra in split(change[0]):
@@ -293,5 +291,5 @@ def test_one_joint_whose_error_grows_is_above_the_mean_of_all():
 @pytest.mark.parametrize("rows", [3, 5, 7])
 def test_frames_without_a_whole_number_of_joints_are_refused(rows):
     expected = rf"shape \(1, {rows}, 400\), expected \(frames, 3 \+ 3 joints, 400\)"
-    with pytest.raises(models.SignalError, match=expected):
-        models.features(np.zeros((1, rows, 400)), EACH)
+    with pytest.raises(nc.SignalError, match=expected):
+        nc.features(np.zeros((1, rows, 400)), EACH)

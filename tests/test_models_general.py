@@ -10,14 +10,14 @@ from generalmodel import RATES, RECIPE, frames, recording, signals, trained
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import models
-from models.estimators.trees import Trees
-from models.framefeatures import frame_features
-from models.general import LEARNT
-from models.logbands import HIGHEST, INPUTS, LOWEST
-from models.pooling import columns
-from models.reference import Reference
-from models.signals import JOINTS, MOTION, NOISE
+import noiseclassifier as nc
+from noiseclassifier.estimators.trees import Trees
+from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.general import LEARNT
+from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST
+from noiseclassifier.pooling import columns
+from noiseclassifier.reference import Reference
+from noiseclassifier.signals import JOINTS, MOTION, NOISE
 
 GIVEN = {
     "motion and joints": (*MOTION, *JOINTS),
@@ -48,7 +48,7 @@ def streamed(classifier, signals, cuts):
     """Labels of a signal in pieces, as those of the whole."""
     count = next(iter(signals.values())).shape[-1]
     joints = next((each.shape[0] for each in signals.values() if each.ndim > 1), 1)
-    stream = models.Stream(classifier, joints=joints)
+    stream = nc.Stream(classifier, joints=joints)
     parts = [
         stream.push({name: each[..., a:b] for name, each in signals.items()})
         for a, b in pairwise([0, *sorted(cuts), count])
@@ -96,7 +96,7 @@ def test_a_feature_has_one_name_at_any_rate(names):
         assert (
             len(found)
             == len(set(found))
-            == models.features(np.zeros((1, *frame_shape(profile))), profile).shape[1]
+            == nc.features(np.zeros((1, *frame_shape(profile))), profile).shape[1]
         )
         assert set(fewer) <= set(found)
         places = RECIPE.places(profile)
@@ -139,7 +139,7 @@ def test_a_model_takes_the_most_signals_that_a_log_has():
     assert model.at(200.0, (*MOTION, "measured_joints")).profile.signals == MOTION
     assert model.at(200.0, ("measured", "desired")).profile.signals == ("measured",)
     assert model.at(200.0).profile.signals == (NOISE,)
-    with pytest.raises(models.MissingSignalError, match="no signal noise; there is desired"):
+    with pytest.raises(nc.MissingSignalError, match="no signal noise; there is desired"):
         model.at(200.0, ("desired",))
 
 
@@ -149,7 +149,7 @@ def test_a_model_takes_rates_from_the_lowest_to_the_highest():
     assert model.at(LOWEST * (1 - 1e-4)).rate == pytest.approx(LOWEST, rel=1e-3)
     assert model.at(333.3).rate == 333.3
     assert model.at(48_000.0).rate == HIGHEST
-    with pytest.raises(models.RateError, match="rate of 79 Hz; the models' rates are 80 Hz: too"):
+    with pytest.raises(nc.RateError, match="rate of 79 Hz; the models' rates are 80 Hz: too"):
         model.at(79.0)
 
 
@@ -157,11 +157,11 @@ def test_a_general_model_is_nearer_than_one_of_a_lower_rate_and_yields_to_more_s
     general = trained()
     slow = replace(general.at(125.0), sha256="slow")
     library = {"general": general, "slow": slow}
-    assert models.nearest(library, 500.0)[0] == "general"
-    name, chosen = models.nearest(library, 125.0, ("measured",))
+    assert nc.nearest(library, 500.0)[0] == "general"
+    name, chosen = nc.nearest(library, 125.0, ("measured",))
     assert (name, chosen.profile.signals) == ("general", ("measured",))
-    with pytest.raises(models.RateError, match="rate of 50 Hz; .* log at 80 Hz or above"):
-        models.nearest(library, 50.0)
+    with pytest.raises(nc.RateError, match="rate of 50 Hz; .* log at 80 Hz or above"):
+        nc.nearest(library, 50.0)
 
 
 def test_a_reference_of_good_motion_takes_the_place_of_the_run_itself():
@@ -187,7 +187,7 @@ def test_a_reference_of_good_motion_takes_the_place_of_the_run_itself():
 
 def test_frames_are_those_that_classifying_cuts_once_for_each_input_that_they_feed():
     one = recording(500.0, "oscillations", 0)
-    parts = list(models.frames_of([one], RECIPE))
+    parts = list(nc.frames_of([one], RECIPE))
     feeding = [names for names in LEARNT if set(names) <= {*one.signal, NOISE}]
     assert len(parts) == len(feeding)
     for names, part in zip(feeding, parts, strict=True):
@@ -209,15 +209,15 @@ def test_every_so_many_ok_frames_are_kept_and_all_others():
     ok, bad = recording(500.0, "ok", 0), recording(500.0, "impact", 0)
     for one, share in ((ok, 4), (bad, 1)):
         (whole, *_), (thin, *_) = (
-            list(models.frames_of([one], RECIPE, thin=count)) for count in (1, 4)
+            list(nc.frames_of([one], RECIPE, thin=count)) for count in (1, 4)
         )
         assert len(thin.labels) == len(whole.labels) // share
-    bare = next(models.frames_of([replace(ok, blocks=())], RECIPE))
+    bare = next(nc.frames_of([replace(ok, blocks=())], RECIPE))
     assert bare.features.shape == (0, len(RECIPE.columns))
 
 
 def test_odds_are_corrected_for_frames_of_good_motion_that_were_left_out():
-    plain, thin = trained(), models.General.train(frames(), RECIPE, thin=4)
+    plain, thin = trained(), nc.General.train(frames(), RECIPE, thin=4)
     shift = thin.estimator.calibration - plain.estimator.calibration
     np.testing.assert_allclose(shift, [0.0, np.log(4), 0.0, 0.0], atol=1e-12)
 
@@ -230,9 +230,9 @@ def test_features_relative_to_a_reference_are_never_novel():
 
 
 def test_training_takes_two_classes():
-    alone = models.Frames.joined(models.frames_of([recording(500.0, "ok", 0)], RECIPE))
-    with pytest.raises(models.DatasetError, match="two classes or more of ok, impact, .* are ok"):
-        models.General.train(alone, RECIPE)
+    alone = nc.Frames.joined(nc.frames_of([recording(500.0, "ok", 0)], RECIPE))
+    with pytest.raises(nc.DatasetError, match="two classes or more of ok, impact, .* are ok"):
+        nc.General.train(alone, RECIPE)
 
 
 def test_a_split_sends_a_missing_feature_where_training_chose():
@@ -264,7 +264,7 @@ def test_trees_have_the_probabilities_of_scikit_learn_where_features_are_missing
     features = random.normal(size=(500, 5))
     targets = (features[:, 0] > features[:, 2]).astype(int) + (features[:, 1] > 0.5)
     features[random.random(features.shape) < 0.3] = np.nan
-    profile = replace(models.GENERAL.at(1000.0), rounds=10, leaves=leaves)
+    profile = replace(nc.GENERAL.at(1000.0), rounds=10, leaves=leaves)
     ours = Trees.fit(features, targets, np.array(["one"] * 500), profile)
     theirs = HistGradientBoostingClassifier(
         max_iter=10, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
@@ -283,7 +283,7 @@ def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
         for seed, rate in enumerate((80.0, 125.0, 125.0, 500.0))
         for label in ("ok", "oscillations")
     ]
-    model = models.General.train(models.Frames.joined(models.frames_of(recordings, RECIPE)), RECIPE)
+    model = nc.General.train(nc.Frames.joined(nc.frames_of(recordings, RECIPE)), RECIPE)
     shaken = signals(500.0, "oscillations", seed=12)
     labels = model.at(500.0, shaken).classify(shaken, 500.0)
     assert "oscillations" in {event.label for event in labels.events()}
@@ -293,8 +293,8 @@ def test_a_part_of_the_frames_may_lack_a_feature_that_others_have():
 
 
 def test_a_model_that_was_saved_decides_as_before(path):
-    loaded = models.load(path)
-    assert isinstance(loaded, models.General)
+    loaded = nc.load(path)
+    assert isinstance(loaded, nc.General)
     assert (loaded.recipe, loaded.classes) == (RECIPE, trained().classes)
     assert (loaded.runs, loaded.metrics) == (trained().runs, trained().metrics)
     for rate in RATES:
@@ -307,15 +307,15 @@ def test_a_model_that_was_saved_decides_as_before(path):
 
 
 def test_a_model_saved_twice_has_the_same_bytes(path, tmp_path):
-    models.load(path).save(tmp_path / "again.npz")
+    nc.load(path).save(tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
-    with pytest.raises(models.OutputError, match="exists already"):
+    with pytest.raises(nc.OutputError, match="exists already"):
         trained().save(path)
 
 
 @pytest.mark.slow
 def test_training_twice_gives_the_same_bytes(path, tmp_path):
-    models.General.train(frames(), RECIPE).save(tmp_path / "again.npz")
+    nc.General.train(frames(), RECIPE).save(tmp_path / "again.npz")
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
 
 
@@ -326,7 +326,7 @@ def test_a_model_bound_to_a_robot_is_a_file_of_its_own(tmp_path):
     reference = Reference.of(good[:, : good.shape[1] // 2])
     bound = trained().at(rate, names, reference=reference)
     bound.save(tmp_path / "model.npz")
-    loaded = models.load(tmp_path / "model.npz")
+    loaded = nc.load(tmp_path / "model.npz")
     there = signals(rate, "impact", seed=31)
     np.testing.assert_array_equal(
         loaded.classify(there, rate).scores, bound.classify(there, rate).scores
@@ -339,13 +339,13 @@ def test_a_model_bound_to_a_robot_is_a_file_of_its_own(tmp_path):
     ):
         bound.save(tmp_path / "model.npz", overwrite=True)
         rewrite(tmp_path / "model.npz", **changes)
-        with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
-            models.load(tmp_path / "model.npz")
+        with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+            nc.load(tmp_path / "model.npz")
 
 
 def test_a_model_for_any_rate_is_no_classifier(path):
-    with pytest.raises(models.ModelFileError, match="is a model for any rate"):
-        models.Classifier.load(path)
+    with pytest.raises(nc.ModelFileError, match="is a model for any rate"):
+        nc.Classifier.load(path)
 
 
 @pytest.mark.parametrize(
@@ -376,8 +376,8 @@ def test_a_model_for_any_rate_is_no_classifier(path):
 def test_a_wrong_recipe_is_refused(path, changes, reason):
     recipe = [] if changes is None else {**asdict(RECIPE), **changes}
     rewrite(path, {"recipe": recipe})
-    with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
-        models.load(path)
+    with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+        nc.load(path)
 
 
 @pytest.mark.parametrize(
@@ -398,8 +398,8 @@ def test_a_damaged_file_is_refused(path, name, change, reason):
     with np.load(path, allow_pickle=False) as members:
         array = members[name]
     rewrite(path, **{name: change(array)})
-    with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
-        models.load(path)
+    with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+        nc.load(path)
 
 
 # --- files of older formats
@@ -419,15 +419,15 @@ def older(path, version):
 
 @pytest.mark.parametrize("version", [4, 5])
 def test_trees_of_older_formats_decide_as_before(version, tmp_path):
-    profile = replace(models.EACH.at(500.0), rounds=5)
+    profile = replace(nc.EACH.at(500.0), rounds=5)
     recordings = [
         recording(500.0, label, seed) for seed in range(2) for label in ("ok", "oscillations")
     ]
-    before = models.Classifier.train(models.Dataset.of(recordings, profile), profile)
+    before = nc.Classifier.train(nc.Dataset.of(recordings, profile), profile)
     before.save(tmp_path / "model.npz")
     older(tmp_path / "model.npz", version)
-    loaded = models.load(tmp_path / "model.npz")
-    assert isinstance(loaded, models.Classifier)
+    loaded = nc.load(tmp_path / "model.npz")
+    assert isinstance(loaded, nc.Classifier)
     assert loaded.profile == profile
     there = signals(500.0, "oscillations", seed=40)
     np.testing.assert_array_equal(

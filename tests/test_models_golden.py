@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-import models
-from models.estimators.svm import fit
-from models.features import compress, dct, spectrogram
+import noiseclassifier as nc
+from noiseclassifier.estimators.svm import fit
+from noiseclassifier.features import compress, dct, spectrogram
 
 SETS = ("training", "validation", "validation_reduced_joints")
 COUNTS = {"training": [208, 22, 14, 47], "validation": [129, 11, 12, 39]}
@@ -13,7 +13,7 @@ COUNTS = {"training": [208, 22, 14, 47], "validation": [129, 11, 12, 39]}
 
 @pytest.fixture(scope="module")
 def recordings(lola):
-    return {name: list(models.noisytest.read_folder(lola / name)) for name in SETS}
+    return {name: list(nc.noisytest.read_folder(lola / name)) for name in SETS}
 
 
 @pytest.fixture(scope="module", params=["rbf", "linear"])
@@ -21,12 +21,11 @@ def trial(request, recordings, golden):
     """A kernel's profile, data sets and classifier, with NoisyTest's arrays and results."""
     arrays, results = golden
     kernel = request.param
-    profile = models.Profile.noisytest(kernel)
+    profile = nc.Profile.noisytest(kernel)
     sets = {
-        name: models.Dataset.of(recordings[name], profile, training=name == "training")
-        for name in SETS
+        name: nc.Dataset.of(recordings[name], profile, training=name == "training") for name in SETS
     }
-    classifier = models.Classifier.train(sets["training"], profile)
+    classifier = nc.Classifier.train(sets["training"], profile)
     mine = {
         name.removeprefix(f"{kernel}_"): array
         for name, array in arrays.items()
@@ -36,14 +35,14 @@ def trial(request, recordings, golden):
 
 
 def classes(indices):
-    return np.array(models.CLASSES)[indices]
+    return np.array(nc.CLASSES)[indices]
 
 
 @pytest.mark.parametrize("name", ["training", "validation"])
 def test_frames_are_noisytests_to_the_bit(trial, name):
     _, sets, _, theirs, _ = trial
     labels = sets[name].labels
-    assert [int((labels == each).sum()) for each in models.CLASSES] == COUNTS[name]
+    assert [int((labels == each).sum()) for each in nc.CLASSES] == COUNTS[name]
     assert np.array_equal(labels, classes(theirs[f"{name}_target"]))
     frames = sets[name].frames
     assert frames.dtype == np.float32
@@ -63,7 +62,7 @@ def test_every_stage_is_noisytests(trial, name):
     loudness = np.log(bands + profile.floor)
     assert np.abs(loudness - theirs[f"{name}_log"]).max() < 4.5e-3
     assert np.abs(dct(loudness) - theirs[f"{name}_dct"]).max() < 4.5e-3
-    features = models.features(theirs[f"{name}_frames"], profile)
+    features = nc.features(theirs[f"{name}_frames"], profile)
     assert np.abs(features - theirs[f"{name}_flat"]).max() < 4.5e-3
 
 
@@ -86,16 +85,16 @@ def test_every_decision_is_noisytests(trial, name):
 
 def test_support_vectors_are_noisytests(trial):
     profile, sets, _, theirs, _ = trial
-    features = models.features(sets["training"].frames, profile)
-    targets = np.array([models.CLASSES.index(each) for each in sets["training"].labels])
+    features = nc.features(sets["training"].frames, profile)
+    targets = np.array([nc.CLASSES.index(each) for each in sets["training"].labels])
     assert np.array_equal(fit(features, targets, profile).vectors, features[theirs["support"]])
 
 
 def test_every_label_of_a_run_is_noisytests(trial, lola):
     _, _, classifier, _, results = trial
     for name, run in results["run"].items():
-        time, noise = models.read_log(lola / name.removeprefix("data/"))
-        labels = classifier.classify(noise, models.nominal_rate(time), start=float(time[0]))
+        time, noise = nc.read_log(lola / name.removeprefix("data/"))
+        labels = classifier.classify(noise, nc.nominal_rate(time), start=float(time[0]))
         assert labels.label.tolist() == classes(run["pred"]).tolist()
         warnings = [
             f"WARNING:possible {label} in time region {start:.2}-{stop:.2}"
@@ -108,7 +107,7 @@ def test_every_label_of_a_run_is_noisytests(trial, lola):
 @pytest.mark.parametrize("name", SETS)
 def test_every_measure_is_noisytests(trial, name):
     _, sets, classifier, _, results = trial
-    report, theirs = models.evaluate(classifier, sets[name]), results[name]
+    report, theirs = nc.evaluate(classifier, sets[name]), results[name]
     assert report.confusion.tolist() == theirs["confusion_rows_true"]
     measures = report.as_dict()
     assert measures["false_negative_errors"] == pytest.approx(theirs["FN"])
@@ -126,17 +125,17 @@ def test_every_measure_is_noisytests(trial, name):
 def test_our_own_profile_beats_both_on_the_same_data(recordings):
     def balanced(profile):
         training, validation = (
-            models.Dataset.of(recordings[name], profile, training=name == "training")
+            nc.Dataset.of(recordings[name], profile, training=name == "training")
             for name in ("training", "validation")
         )
-        classifier = models.Classifier.train(training, profile)
-        return models.evaluate(classifier, validation).balanced_accuracy
+        classifier = nc.Classifier.train(training, profile)
+        return nc.evaluate(classifier, validation).balanced_accuracy
 
-    ours = balanced(models.LogBands().at(10_000.0))
+    ours = balanced(nc.LogBands().at(10_000.0))
     assert ours > 0.9
     for theirs in (
-        models.Profile.noisytest(),
-        models.Profile.paper(),
-        models.Profile.paper("linear"),
+        nc.Profile.noisytest(),
+        nc.Profile.paper(),
+        nc.Profile.paper("linear"),
     ):
         assert ours > balanced(theirs)

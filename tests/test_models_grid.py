@@ -2,10 +2,10 @@ from dataclasses import fields, replace
 
 import pytest
 
-import models
-from models.tuning.grid import MOST, SETTINGS, Grid, GridError
+import noiseclassifier as nc
+from noiseclassifier.tuning.grid import MOST, SETTINGS, Grid, GridError
 
-RBF = models.Profile.noisytest("rbf")
+RBF = nc.Profile.noisytest("rbf")
 
 
 def test_the_papers_grid_is_noisytests_to_the_bit():
@@ -29,7 +29,7 @@ def test_the_papers_grid_of_the_linear_kernel_has_no_gamma():
 
 
 def test_whatever_can_be_tuned_is_a_setting_of_a_profile():
-    assert set(SETTINGS) <= {field.name for field in fields(models.Profile)}
+    assert set(SETTINGS) <= {field.name for field in fields(nc.Profile)}
 
 
 def test_points_come_in_noisytests_order_however_the_grid_is_written():
@@ -100,7 +100,7 @@ def test_what_is_wrong_with_a_grid_is_named(texts, reason):
     ("text", "profile", "reason"),
     [
         ("stride=4001", RBF, "stride of 4001 samples is longer than a frame of 4000"),
-        ("gamma=1", models.Profile.noisytest("linear"), "gamma does nothing with the linear"),
+        ("gamma=1", nc.Profile.noisytest("linear"), "gamma does nothing with the linear"),
         ("leaves=8", RBF, "leaves does nothing with support vector machines; leave it out"),
         ("C=1", replace(RBF, estimator="trees"), "regularization does nothing with trees"),
         ("C=0", RBF, "regularization is 0.0, expected more than 0"),
@@ -109,5 +109,5 @@ def test_what_is_wrong_with_a_grid_is_named(texts, reason):
     ],
 )
 def test_a_grid_that_makes_no_sense_with_a_profile_is_refused(text, profile, reason):
-    with pytest.raises(models.ModelsError, match=reason):
+    with pytest.raises(nc.ModelsError, match=reason):
         Grid.of([text]).profiles(profile)

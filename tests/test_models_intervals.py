@@ -3,8 +3,8 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from models.evaluation.eventmeasures import quantile_of
-from models.evaluation.intervals import Resampling, garwood
+from noiseclassifier.evaluation.eventmeasures import quantile_of
+from noiseclassifier.evaluation.intervals import Resampling, garwood
 
 
 def each_its_own(runs):

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from models import UNKNOWN, Event, Labels
-from models.labels import confirmed
+from noiseclassifier import UNKNOWN, Event, Labels
+from noiseclassifier.labels import confirmed
 
 CLASSES = ("ok", "impact", "oscillations")
 HOP, LENGTH = 0.1, 0.4

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import models
+import noiseclassifier as nc
 
-PROFILE = models.LogBands(classes=("ok", "rattle", "squeal")).at(500.0)
+PROFILE = nc.LogBands(classes=("ok", "rattle", "squeal")).at(500.0)
 RANDOM = np.random.default_rng(5)
 
 
@@ -17,15 +17,15 @@ def trained(profile=PROFILE):
     time = np.arange(2000) / profile.rate
     hums = {"ok": 30.0, "rattle": 90.0, "squeal": 180.0}
     recordings = [
-        models.Recording(
+        nc.Recording(
             label,
             1.0 + 0.1 * np.sin(2 * np.pi * hum * time) + 0.01 * np.cos(np.arange(2000) ** 2),
             profile.rate,
-            (models.Block(0.0, float("inf"), label),),
+            (nc.Block(0.0, float("inf"), label),),
         )
         for label, hum in hums.items()
     ]
-    return models.Classifier.train(models.Dataset.of(recordings, profile), profile)
+    return nc.Classifier.train(nc.Dataset.of(recordings, profile), profile)
 
 
 CLASSIFIER = trained()
@@ -55,8 +55,8 @@ def rewrite_manifest(path, **changes):
 
 
 def refused(path, reason):
-    with pytest.raises(models.ModelFileError, match=rf"model.npz: .*{reason}"):
-        models.Classifier.load(path)
+    with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+        nc.Classifier.load(path)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def refused(path, reason):
 def test_a_model_that_was_saved_decides_as_before(tmp_path, changes):
     classifier = trained(replace(PROFILE, **changes))
     classifier.save(tmp_path / "model.npz")
-    loaded = models.Classifier.load(tmp_path / "model.npz")
+    loaded = nc.Classifier.load(tmp_path / "model.npz")
     assert np.array_equal(loaded.decision(FRAMES), classifier.decision(FRAMES))
     assert np.array_equal(loaded.predict(FRAMES), classifier.predict(FRAMES))
     assert loaded.profile == classifier.profile
@@ -109,15 +109,15 @@ def test_of_two_that_write_one_model_at_once_the_second_fails(path, monkeypatch,
         link(temporary, name)
 
     monkeypatch.setattr(os, "link", late)
-    with pytest.raises(models.OutputError, match=r"new\.npz: exists already"):
-        models.Classifier.load(path).save(target)
+    with pytest.raises(nc.OutputError, match=r"new\.npz: exists already"):
+        nc.Classifier.load(path).save(target)
     assert target.read_text() == "first"
     assert sorted(os.listdir(path.parent)) == sorted({path.name, "new.npz"})
 
 
 def test_a_model_is_not_overwritten_unless_requested(path):
     before = path.read_bytes()
-    with pytest.raises(models.OutputError, match=r"model.npz: exists already; choose another name"):
+    with pytest.raises(nc.OutputError, match=r"model.npz: exists already; choose another name"):
         CLASSIFIER.save(path)
     assert path.read_bytes() == before
     path.write_bytes(b"old")
@@ -143,16 +143,16 @@ def test_a_failed_write_leaves_nothing_behind(path, monkeypatch):
 
     monkeypatch.setattr(os, "fsync", fail)
     before = path.read_bytes()
-    with pytest.raises(models.OutputError, match="cannot be written .No space left on device"):
+    with pytest.raises(nc.OutputError, match="cannot be written .No space left on device"):
         CLASSIFIER.save(path, overwrite=True)
     assert path.read_bytes() == before
     assert list(path.parent.iterdir()) == [path]
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path):
-    with pytest.raises(models.OutputError, match=r"none/model.npz: cannot be written .No such"):
+    with pytest.raises(nc.OutputError, match=r"none/model.npz: cannot be written .No such"):
         CLASSIFIER.save(tmp_path / "none" / "model.npz")
-    with pytest.raises(models.OutputError, match="is a folder; name a file"):
+    with pytest.raises(nc.OutputError, match="is a folder; name a file"):
         CLASSIFIER.save(tmp_path)
 
 
@@ -182,8 +182,8 @@ def test_a_flipped_bit_anywhere_is_refused_or_harmless(path):
         damaged[position] ^= 1 << int(RANDOM.integers(8))
         path.write_bytes(damaged)
         try:
-            loaded = models.Classifier.load(path)
-        except models.ModelFileError:
+            loaded = nc.Classifier.load(path)
+        except nc.ModelFileError:
             refusals += 1
         else:
             assert np.array_equal(loaded.decision(FRAMES), expected)
@@ -274,7 +274,7 @@ def test_what_an_archive_holds_is_named_up_to_200_characters(path):
 
 
 def test_a_version_that_is_not_installed_is_said(monkeypatch):
-    from models import modelfile
+    from noiseclassifier import modelfile
 
     def lacking(name):
         raise modelfile.metadata.PackageNotFoundError(name)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import models
-from models.estimators.calibration import calibrate, calibrated
-from models.estimators.mlp import Networks, _fit, _parts
+import noiseclassifier as nc
+from noiseclassifier.estimators.calibration import calibrate, calibrated
+from noiseclassifier.estimators.mlp import Networks, _fit, _parts
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")
@@ -17,7 +17,7 @@ def test_networks_have_the_probabilities_of_scikit_learn():
     generator = np.random.default_rng(0)
     features = generator.normal(size=(300, 5))
     targets = (features[:, 0] > 0).astype(int) + (features[:, 1] > 0.5)
-    profile = models.SCALAR.at(1000.0)
+    profile = nc.SCALAR.at(1000.0)
     alone = replace(profile, units=16, epochs=40, networks=1, decay=0.0)
     groups = np.array(["one"] * 300)
     ours = Networks.fit(features, targets, groups, alone)
@@ -55,7 +55,7 @@ def of_scikit_learn(profile, seed, features, targets):
 def test_networks_leave_groups_out_in_turn_and_their_mean_is_calibrated_there():
     features, targets = drawn(3)
     groups = np.repeat([f"group {number}" for number in range(6)], 20)
-    profile = replace(models.SCALAR.at(1000.0), units=4, epochs=5, networks=3, decay=0.01)
+    profile = replace(nc.SCALAR.at(1000.0), units=4, epochs=5, networks=3, decay=0.01)
     ours = Networks.fit(features, targets, groups, profile)
     parts = _parts(targets, groups, 3)
     assert sorted(np.concatenate([test for _, test in parts])) == list(range(len(targets)))
@@ -80,7 +80,7 @@ def test_networks_leave_groups_out_in_turn_and_their_mean_is_calibrated_there():
 def test_a_class_without_training_frames_is_never_probable(classes, there):
     features, targets = drawn(classes)
     train = np.flatnonzero(np.isin(targets, there))
-    profile = replace(models.SCALAR.at(1000.0), units=4, epochs=3)
+    profile = replace(nc.SCALAR.at(1000.0), units=4, epochs=3)
     ours = _fit(1, features[train], targets[train], profile, classes)
     expected = np.zeros((len(features), classes))
     dense = np.searchsorted(there, targets[train])
@@ -106,7 +106,7 @@ def test_a_part_without_a_second_class_to_learn_from_is_not_left_out():
 def test_a_thousandth_of_the_training_frames_lies_below_a_feature_and_above_it():
     order = np.random.default_rng(0).permutation(10_000).astype(float)
     features = np.stack((order, -2.0 * order), axis=1) / 10_000
-    profile = replace(models.SCALAR.at(1000.0), units=1, epochs=1, networks=1)
+    profile = replace(nc.SCALAR.at(1000.0), units=1, epochs=1, networks=1)
     targets = (order > 5000).astype(int)
     ours = Networks.fit(features, targets, np.array(["one"] * len(order)), profile)
     assert (features < ours.known[0]).sum(axis=0).tolist() == [10, 10]

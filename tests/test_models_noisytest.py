@@ -8,8 +8,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import models
-from models.noisytest import profile_from_config, read_annotations, read_folder, read_recording
+import noiseclassifier as nc
+from noiseclassifier.noisytest import (
+    profile_from_config,
+    read_annotations,
+    read_folder,
+    read_recording,
+)
 
 IN_PLACE = settings(
     deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture]
@@ -24,7 +29,7 @@ chunk_labels = ["ok", "impact"]
 @pytest.fixture(params=[0, 1_000_000], ids=["Arrow", "NumPy"])
 def log(tmp_path, monkeypatch, request):
     """Writes a `.log` of some text, for either reader."""
-    monkeypatch.setattr("models.logfile.LARGE", request.param)
+    monkeypatch.setattr("noiseclassifier.logfile.LARGE", request.param)
 
     def write(text, name="walk.log"):
         path = tmp_path / name
@@ -51,7 +56,7 @@ def rows(samples, rate=10_000):
     ids=["header", "bare", "tabs-crlf", "blanks", "byte-order-mark", "umlaut"],
 )
 def test_logs_are_read_in_every_common_layout(log, text):
-    time, noise = models.read_log(log(text))
+    time, noise = nc.read_log(log(text))
     assert time.tolist() == [0.0, 0.1, 0.2]
     assert noise.tolist() == [1.5, 2.5, 3.5]
 
@@ -65,7 +70,7 @@ def test_logs_are_read_in_every_common_layout(log, text):
 )
 def test_logs_give_back_what_was_written(log, noise, start, gap, end):
     text = end.join(f"{start + i}{gap}{value!r}" for i, value in enumerate(noise))
-    time, read = models.read_log(log(text))
+    time, read = nc.read_log(log(text))
     assert time.tolist() == [start + i for i in range(len(noise))]
     assert read.tolist() == noise
 
@@ -75,15 +80,15 @@ def test_both_readers_read_the_same_bits(log):
         100
     )
     path = log("# t p\n" + "".join(f"{i / 1000:.12f} {v:.15e}\n" for i, v in enumerate(values)))
-    _, noise = models.read_log(path)
+    _, noise = nc.read_log(path)
     assert (noise == [float(f"{value:.15e}") for value in values]).all()
 
 
 @IN_PLACE
 @given(st.text(max_size=60))
 def test_any_text_is_read_or_refused_with_a_reason(log, text):
-    with suppress(models.DataFileError):
-        time, noise = models.read_log(log(text))
+    with suppress(nc.DataFileError):
+        time, noise = nc.read_log(log(text))
         assert len(time) == len(noise) >= 2
 
 
@@ -109,23 +114,23 @@ def test_any_text_is_read_or_refused_with_a_reason(log, text):
     ],
 )
 def test_what_is_wrong_with_a_log_is_named(log, text, reason):
-    with pytest.raises(models.DataFileError, match=reason):
-        models.read_log(log(text))
+    with pytest.raises(nc.DataFileError, match=reason):
+        nc.read_log(log(text))
 
 
 def test_a_log_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(models.DataFileError, match=r"none.log: cannot be read"):
-        models.read_log(tmp_path / "none.log")
+    with pytest.raises(nc.DataFileError, match=r"none.log: cannot be read"):
+        nc.read_log(tmp_path / "none.log")
 
 
 def test_the_rate_is_that_of_the_whole_log():
     time = np.round(np.arange(2000) / 1000, 3) + 5.0
-    assert models.nominal_rate(time) == 1000.0
+    assert nc.nominal_rate(time) == 1000.0
 
 
 def test_annotations_take_integers_and_open_ends(log):
     blocks = read_annotations(log(TOML, "walk.toml"))
-    assert blocks == (models.Block(0.0, 0.5, "ok"), models.Block(1.25, inf, "impact"))
+    assert blocks == (nc.Block(0.0, 0.5, "ok"), nc.Block(1.25, inf, "impact"))
 
 
 @pytest.mark.parametrize(
@@ -148,7 +153,7 @@ def test_annotations_take_integers_and_open_ends(log):
     ],
 )
 def test_what_is_wrong_with_annotations_is_named(log, text, reason):
-    with pytest.raises(models.DataFileError, match=reason):
+    with pytest.raises(nc.DataFileError, match=reason):
         read_annotations(log(text, "walk.toml"))
 
 
@@ -162,21 +167,21 @@ def test_a_recording_joins_signal_annotations_and_hash(log):
 
 def test_a_log_without_annotations_is_refused(log, tmp_path):
     log(rows(10))
-    with pytest.raises(models.DataFileError, match=r"walk.toml: .* each .log needs its .toml"):
+    with pytest.raises(nc.DataFileError, match=r"walk.toml: .* each .log needs its .toml"):
         list(read_folder(tmp_path))
 
 
 def test_a_log_of_another_rate_is_refused(log, tmp_path):
     log(TOML, "walk.toml")
     log(rows(20_000, rate=9_200))
-    with pytest.raises(models.RateError, match=r"rate of 9200 Hz; .* 10000 Hz: .*walk.log"):
+    with pytest.raises(nc.RateError, match=r"rate of 9200 Hz; .* 10000 Hz: .*walk.log"):
         list(read_folder(tmp_path, rate=10_000.0))
 
 
 def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(models.DataFileError, match=r"has no .log file; name a folder"):
+    with pytest.raises(nc.DataFileError, match=r"has no .log file; name a folder"):
         list(read_folder(tmp_path))
-    with pytest.raises(models.DataFileError, match="is no folder"):
+    with pytest.raises(nc.DataFileError, match="is no folder"):
         list(read_folder(tmp_path / "none"))
 
 
@@ -202,7 +207,7 @@ def test_noisytests_configuration_becomes_a_profile(tmp_path):
 def test_an_empty_configuration_is_noisytests_default(tmp_path):
     path = tmp_path / "config.json"
     path.write_text("{}")
-    assert profile_from_config(path) == models.Profile.noisytest("rbf")
+    assert profile_from_config(path) == nc.Profile.noisytest("rbf")
 
 
 @pytest.mark.parametrize(
@@ -232,9 +237,9 @@ def test_an_empty_configuration_is_noisytests_default(tmp_path):
 def test_what_is_wrong_with_a_configuration_is_named(tmp_path, text, reason):
     path = tmp_path / "config.json"
     path.write_text(text)
-    with pytest.raises(models.DataFileError, match=rf"config.json: .*{reason}"):
+    with pytest.raises(nc.DataFileError, match=rf"config.json: .*{reason}"):
         profile_from_config(path)
 
 
 def test_the_stand_ins_configuration_is_the_golden_profile(lola):
-    assert profile_from_config(lola / "noisytest-config.json") == models.Profile.noisytest("rbf")
+    assert profile_from_config(lola / "noisytest-config.json") == nc.Profile.noisytest("rbf")

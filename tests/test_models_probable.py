@@ -8,18 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import models
-from models.estimators.calibration import calibrate, calibrated
-from models.estimators.estimator import ESTIMATORS
-from models.examples import Examples
-from models.signals import stacked
+import noiseclassifier as nc
+from noiseclassifier.estimators.calibration import calibrate, calibrated
+from noiseclassifier.estimators.estimator import ESTIMATORS
+from noiseclassifier.examples import Examples
+from noiseclassifier.signals import stacked
 
 RATE = 1000.0
-PROFILE = models.GENERAL.at(RATE)
+PROFILE = nc.GENERAL.at(RATE)
 PROFILES = {
     "networks": replace(PROFILE, estimator="networks", units=16, epochs=40),
     "trees": replace(PROFILE, estimator="trees", rounds=30, leaves=8),
-    "joints": replace(models.EACH.at(RATE), rounds=30, leaves=8),
+    "joints": replace(nc.EACH.at(RATE), rounds=30, leaves=8),
 }
 JOINTS = 3
 SECONDS = 6
@@ -42,13 +42,13 @@ def recording(robot, seed, label):
         "measured_joints": mine * (desired + error),
         "error_joints": mine * error,
     }
-    blocks = (models.Block(0.5, SECONDS - 0.5, label),)
-    return models.Recording(f"{robot}/{label}-{seed:03d}", signals, RATE, blocks)
+    blocks = (nc.Block(0.5, SECONDS - 0.5, label),)
+    return nc.Recording(f"{robot}/{label}-{seed:03d}", signals, RATE, blocks)
 
 
 def alike(signal):
     """The same for all norms and joints."""
-    names = (*models.EACH.signals[:3],), (*models.EACH.signals[3:],)
+    names = (*nc.EACH.signals[:3],), (*nc.EACH.signals[3:],)
     return dict.fromkeys(names[0], signal) | dict.fromkeys(names[1], np.tile(signal, (JOINTS, 1)))
 
 
@@ -66,7 +66,7 @@ def fit(features, targets, groups, profile):
 @pytest.fixture(scope="module", params=PROFILES)
 def classifier(request):
     profile = PROFILES[request.param]
-    return models.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)
+    return nc.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)
 
 
 def test_classes_are_found_in_other_runs(classifier):
@@ -141,7 +141,7 @@ def test_calibration_finds_the_scale_of_overconfident_logits():
 
 def test_a_lower_alarm_threshold_predicts_more_failure_frames(classifier):
     decisions = classifier.decision(
-        models.frame(
+        nc.frame(
             stacked(RECORDINGS[13].signal, classifier.profile.signals),
             length=PROFILE.length,
             hop=PROFILE.hop,
@@ -194,7 +194,7 @@ def test_training_frames_are_not_unknown(classifier):
 def test_a_stream_has_the_same_labels(classifier, chunk):
     each = RECORDINGS[14]
     batch = classifier.classify(each.signal, RATE)
-    stream, found = models.Stream(classifier, joints=JOINTS), []
+    stream, found = nc.Stream(classifier, joints=JOINTS), []
     for first in range(0, each.samples, chunk):
         piece = slice(first, first + chunk)
         signals = {name: signal[..., piece] for name, signal in each.signal.items()}
@@ -210,7 +210,7 @@ def test_a_stream_has_the_same_labels(classifier, chunk):
 
 def test_a_missing_signal_is_named(classifier):
     signals = RECORDINGS[0].signal
-    with pytest.raises(models.SignalError, match=r"no signal error.*; there is desired, measured"):
+    with pytest.raises(nc.SignalError, match=r"no signal error.*; there is desired, measured"):
         classifier.classify({name: signals[name] for name in ("desired", "measured")}, RATE)
 
 
@@ -218,7 +218,7 @@ def test_frames_after_a_gap_are_classified_as_without_it(classifier):
     signals = RECORDINGS[14].signal
     parts = [slice(0, 2000), slice(2000, None)]
     first, rest = ({name: each[..., part] for name, each in signals.items()} for part in parts)
-    stream = models.Stream(classifier, joints=JOINTS)
+    stream = nc.Stream(classifier, joints=JOINTS)
     stream.push(first)
     stream.skip(12_000)
     found, alone = stream.push(rest), classifier.classify(rest, RATE)
@@ -227,21 +227,21 @@ def test_frames_after_a_gap_are_classified_as_without_it(classifier):
 
 
 def test_a_stream_of_other_joints_is_refused():
-    classifier = models.Classifier.train(
+    classifier = nc.Classifier.train(
         Examples.read(RECORDINGS[:12], PROFILES["joints"]), PROFILES["joints"]
     )
-    with pytest.raises(models.SignalError, match="12 rows of norms and joints, expected 15"):
-        models.Stream(classifier, joints=4).push(RECORDINGS[0].signal)
+    with pytest.raises(nc.SignalError, match="12 rows of norms and joints, expected 15"):
+        nc.Stream(classifier, joints=4).push(RECORDINGS[0].signal)
 
 
 @pytest.mark.slow
 def test_training_twice_gives_the_same_bytes_and_they_are_read_back(classifier, tmp_path):
     profile = classifier.profile
-    again = models.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)
+    again = nc.Classifier.train(Examples.read(RECORDINGS[:12], profile), profile)
     for name, each in (("a", classifier), ("b", again)):
         each.save(tmp_path / f"{name}.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
-    read = models.Classifier.load(tmp_path / "a.npz")
+    read = nc.Classifier.load(tmp_path / "a.npz")
     signal = RECORDINGS[13].signal
     np.testing.assert_array_equal(
         read.classify(signal, RATE).scores, classifier.classify(signal, RATE).scores

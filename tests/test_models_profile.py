@@ -6,20 +6,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import models
-from models.logbands import HIGHEST, LOWEST
-from models.novelty.faults import with_fault
-from models.pooling import columns
-from models.signals import JOINTS, MOTION
+import noiseclassifier as nc
+from noiseclassifier.logbands import HIGHEST, LOWEST
+from noiseclassifier.novelty.faults import with_fault
+from noiseclassifier.pooling import columns
+from noiseclassifier.signals import JOINTS, MOTION
 
-GENERAL = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
+GENERAL = Path(__file__).parents[1] / "models" / "general.npz"
 
 
 LOG = {"bands": "log", "edges": (15.0, 30.0), "reference": True}
 QUICK = {"quick_window": 200, "quick_stride": 9, "quick_edges": (75.0, 150.0)}
 
 
-@pytest.mark.parametrize("recipe", [models.Profile.noisytest, models.Profile.paper])
+@pytest.mark.parametrize("recipe", [nc.Profile.noisytest, nc.Profile.paper])
 @pytest.mark.parametrize(("kernel", "transforms"), [("rbf", 4), ("linear", 8)])
 def test_hyper_parameters_are_of_the_papers_table(recipe, kernel, transforms):
     profile = recipe(kernel)
@@ -30,7 +30,7 @@ def test_hyper_parameters_are_of_the_papers_table(recipe, kernel, transforms):
 
 
 def test_noisytest_differs_from_the_paper_by_named_settings():
-    ours, theirs = models.Profile.noisytest().as_dict(), models.Profile.paper().as_dict()
+    ours, theirs = nc.Profile.noisytest().as_dict(), nc.Profile.paper().as_dict()
     assert {name for name in ours if ours[name] != theirs[name]} == {
         "name",
         "bands",
@@ -44,23 +44,21 @@ def test_noisytest_differs_from_the_paper_by_named_settings():
     }
 
 
-@pytest.mark.parametrize(
-    "profile", [models.Profile.noisytest("linear"), models.LogBands().at(1234.5)]
-)
+@pytest.mark.parametrize("profile", [nc.Profile.noisytest("linear"), nc.LogBands().at(1234.5)])
 def test_a_profile_is_equal_after_json(profile):
-    assert models.Profile.of(json.loads(json.dumps(profile.as_dict()))) == profile
+    assert nc.Profile.of(json.loads(json.dumps(profile.as_dict()))) == profile
 
 
 def test_durations_become_samples_at_any_rate():
-    profile = models.LogBands().at(1000.0)
+    profile = nc.LogBands().at(1000.0)
     assert (profile.length, profile.hop, profile.window, profile.stride) == (400, 100, 100, 25)
-    assert models.LogBands().at(10_000.0).length == 4000
-    assert models.LogBands().at(333.0).length == 133  # 133.2, to the nearest sample
+    assert nc.LogBands().at(10_000.0).length == 4000
+    assert nc.LogBands().at(333.0).length == 133  # 133.2, to the nearest sample
 
 
 @pytest.mark.parametrize("rate", [250.0, 333.0, 1000.0, 10_000.0, 48_000.0])
 def test_band_edges_do_not_depend_on_the_rate(rate):
-    low, high = models.LogBands().at(rate).edges, models.LogBands().at(96_000.0).edges
+    low, high = nc.LogBands().at(rate).edges, nc.LogBands().at(96_000.0).edges
     assert low == high[: len(low)]
     assert low[-1] <= rate / 2
     assert len(low) == len(high) or high[len(low)] > rate / 2
@@ -68,25 +66,25 @@ def test_band_edges_do_not_depend_on_the_rate(rate):
 
 
 def test_quick_bands_begin_with_the_speed_and_drop_out_where_it_does_not_fit():
-    edges = models.GENERAL.at(1000.0).quick_edges
+    edges = nc.GENERAL.at(1000.0).quick_edges
     assert edges == pytest.approx((0.0, 75.0, 75.0 * 2 ** (4 / 3), 75.0 * 2 ** (8 / 3)))
-    assert edges == models.GENERAL.at(10_000.0).quick_edges[:4]
-    assert (models.GENERAL.at(1000.0).quick_window, models.GENERAL.at(1000.0).quick_stride) == (
+    assert edges == nc.GENERAL.at(10_000.0).quick_edges[:4]
+    assert (nc.GENERAL.at(1000.0).quick_window, nc.GENERAL.at(1000.0).quick_stride) == (
         20,
         10,
     )
-    assert models.GENERAL.at(140.0).quick_window == 0
+    assert nc.GENERAL.at(140.0).quick_window == 0
 
 
 def test_the_model_that_ships_has_the_settings_of_the_code():
     with np.load(GENERAL, allow_pickle=False) as members:
         manifest = json.loads(str(members["manifest"]))
-    assert models.LogBands.of(manifest["recipe"]) == models.ANY
-    assert models.Profile.of(manifest["profile"]) == models.ANY.bound(HIGHEST)
-    assert manifest["classes"] == list(models.ANY.classes)
+    assert nc.LogBands.of(manifest["recipe"]) == nc.ANY
+    assert nc.Profile.of(manifest["profile"]) == nc.ANY.bound(HIGHEST)
+    assert manifest["classes"] == list(nc.ANY.classes)
     # As docs/classifier.md has it: 300 rounds against `ok`, a third of them for each failure.
     with np.load(GENERAL, allow_pickle=False) as members:
-        leaves = members["leaf"].reshape(models.ANY.rounds, len(models.CLASSES), -1)
+        leaves = members["leaf"].reshape(nc.ANY.rounds, len(nc.CLASSES), -1)
     grown = leaves.any(axis=2)
     assert grown[:, 0].all()
     assert grown[:100, 1:].all()
@@ -94,22 +92,22 @@ def test_the_model_that_ships_has_the_settings_of_the_code():
 
 
 def test_quick_bands_are_those_above_the_speed_where_that_is_none():
-    plain, fast = replace(models.GENERAL, speed=False), models.GENERAL
+    plain, fast = replace(nc.GENERAL, speed=False), nc.GENERAL
     assert plain.at(1000.0).quick_edges == fast.at(1000.0).quick_edges[1:]
-    assert models.LogBands(quick=0.02).at(1000.0).quick_edges == plain.at(1000.0).quick_edges
+    assert nc.LogBands(quick=0.02).at(1000.0).quick_edges == plain.at(1000.0).quick_edges
     assert fast.at(150.0).quick_edges == (0.0, 75.0)  # a band and a half fit, and no less
     assert fast.at(149.9).quick_edges == plain.at(150.0).quick_edges == ()
 
 
 def test_the_kernel_parameter_goes_with_the_number_of_features():
     for rate in (250.0, 1000.0):
-        profile = models.LogBands().at(rate)
-        count = models.features(np.zeros((1, profile.length)), profile).shape[1]
+        profile = nc.LogBands().at(rate)
+        count = nc.features(np.zeros((1, profile.length)), profile).shape[1]
         assert profile.gamma * count == pytest.approx(0.5)
 
 
 def test_features_that_rise_with_a_fault_never_fall_as_it_gets_louder():
-    profile = models.ANY.bound(1000.0, (*MOTION, *JOINTS))
+    profile = nc.ANY.bound(1000.0, (*MOTION, *JOINTS))
     time = np.arange(profile.length) / profile.rate
     joints = np.stack([0.5 * np.cos(2 * np.pi * f * time) for f in (0.3, 0.7)])
     measured = joints + 1e-3 * np.random.default_rng(0).normal(size=joints.shape)
@@ -119,9 +117,9 @@ def test_features_that_rise_with_a_fault_never_fall_as_it_gets_louder():
     for level in (1.0, 4.0):
         louder = with_fault(signals, 1, level * np.sin(2 * np.pi * 140.0 * time))
         frame = np.vstack([louder[name] for name in profile.signals])
-        found.append(models.features(frame[None], profile)[0])
+        found.append(nc.features(frame[None], profile)[0])
     change = found[1] - found[0]
-    rising = models.ANY.rising[models.ANY.places(profile)].astype(bool)
+    rising = nc.ANY.rising[nc.ANY.places(profile)].astype(bool)
     names = np.array(columns(profile))
     assert change[rising].min() > -1e-3
     # All others are free: desired motion, the speed itself, and differences that may fall.
@@ -140,11 +138,11 @@ def test_a_rate_that_leaves_no_bands_is_refused():
             f"a rate of {rate:g} Hz leaves {bands} bands up to {rate / 2:g} Hz, expected 2 or more:"
             f" take a rate of {least} Hz at least"
         )
-        recipe = replace(models.LogBands(), lowest=lowest)
-        with pytest.raises(models.ProfileError, match=f"^{re.escape(text)}$"):
+        recipe = replace(nc.LogBands(), lowest=lowest)
+        with pytest.raises(nc.ProfileError, match=f"^{re.escape(text)}$"):
             recipe.at(rate)
         assert len(recipe.at(float(least)).edges) == 3
-        with pytest.raises(models.ProfileError):
+        with pytest.raises(nc.ProfileError):
             recipe.at(least - 1.0)
 
 
@@ -156,18 +154,18 @@ def test_numbers_of_a_recipe_lie_from_0_to_the_highest_rate(name, right, wrong):
     with np.load(GENERAL, allow_pickle=False) as members:
         recipe = json.loads(str(members["manifest"]))["recipe"]
     for value in right:
-        assert getattr(models.LogBands.of(recipe | {name: value}), name) == value
+        assert getattr(nc.LogBands.of(recipe | {name: value}), name) == value
     for value in wrong:
         text = f"{name} is {value!r}, expected a number from 0 to 10000"
-        with pytest.raises(models.ProfileError, match=f"^{re.escape(text)}$"):
-            models.LogBands.of(recipe | {name: value})
+        with pytest.raises(nc.ProfileError, match=f"^{re.escape(text)}$"):
+            nc.LogBands.of(recipe | {name: value})
 
 
 def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
     assert (LOWEST, HIGHEST) == (80.0, 10_000.0)  # as docs/classifier.md promises
-    recipe = models.ANY.bound(LOWEST)
+    recipe = nc.ANY.bound(LOWEST)
     assert recipe.edges[-1] <= LOWEST / 2
-    assert models.ANY.bound(HIGHEST).edges[-1] <= 5000.0
+    assert nc.ANY.bound(HIGHEST).edges[-1] <= 5000.0
 
 
 @pytest.mark.parametrize(
@@ -249,8 +247,8 @@ def test_a_recipe_is_tried_at_the_lowest_and_at_the_highest_rate():
     ],
 )
 def test_settings_that_cannot_be_are_refused(change, text):
-    with pytest.raises(models.ProfileError, match=text):
-        replace(models.Profile.paper(), **change)
+    with pytest.raises(nc.ProfileError, match=text):
+        replace(nc.Profile.paper(), **change)
 
 
 @pytest.mark.parametrize(
@@ -274,7 +272,7 @@ def test_settings_that_cannot_be_are_refused(change, text):
     ],
 )
 def test_settings_at_their_limits_are_taken(change):
-    profile = replace(models.Profile.paper(), **change)
+    profile = replace(nc.Profile.paper(), **change)
     assert {name: getattr(profile, name) for name in change} == change
 
 
@@ -286,16 +284,16 @@ def test_settings_at_their_limits_are_taken(change):
     ],
 )
 def test_what_has_to_be_above_0_is_neither_0_nor_less(name):
-    kind = type(getattr(models.Profile.paper(), name))
+    kind = type(getattr(nc.Profile.paper(), name))
     for value in (kind(0), kind(-1)):
-        with pytest.raises(models.ProfileError, match=f"^{name} is {value!r}, expected more than"):
-            replace(models.Profile.paper(), **{name: value})
+        with pytest.raises(nc.ProfileError, match=f"^{name} is {value!r}, expected more than"):
+            replace(nc.Profile.paper(), **{name: value})
 
 
 def test_settings_that_are_unknown_or_missing_are_named():
-    settings = models.Profile.paper().as_dict()
-    with pytest.raises(models.ProfileError, match="setting 'colour' is unknown"):
-        models.Profile.of(settings | {"colour": "red"})
+    settings = nc.Profile.paper().as_dict()
+    with pytest.raises(nc.ProfileError, match="setting 'colour' is unknown"):
+        nc.Profile.of(settings | {"colour": "red"})
     del settings["hop"]
-    with pytest.raises(models.ProfileError, match="setting 'hop' is missing"):
-        models.Profile.of(settings)
+    with pytest.raises(nc.ProfileError, match="setting 'hop' is missing"):
+        nc.Profile.of(settings)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, blocks, frames, many, predicted
 
-from models.evaluation import assessment, protocol, spans
-from models.evaluation.intervals import Resampling, fay_feuer, garwood
-from models.evaluation.outcomes import SHIFTS, Outcome, confirmed_at, meet, one_to_one
-from models.evaluation.predictions import Unanswered
-from models.evaluation.protocoltable import lines_of
-from models.evaluation.ranking import auc, harmonic_mean, partial_auc, run_score
-from models.labels import Event, Labels
-from models.recording import Fault
+from noiseclassifier.evaluation import assessment, protocol, spans
+from noiseclassifier.evaluation.intervals import Resampling, fay_feuer, garwood
+from noiseclassifier.evaluation.outcomes import SHIFTS, Outcome, confirmed_at, meet, one_to_one
+from noiseclassifier.evaluation.predictions import Unanswered
+from noiseclassifier.evaluation.protocoltable import lines_of
+from noiseclassifier.evaluation.ranking import auc, harmonic_mean, partial_auc, run_score
+from noiseclassifier.labels import Event, Labels
+from noiseclassifier.recording import Fault
 
 COUNT = len(frames())
 

@@ -8,11 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import models
-from models.framefeatures import frame_features
-from models.reference import LEAST, MOST, NORMAL, Reference, RunningReference
+import noiseclassifier as nc
+from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.reference import LEAST, MOST, NORMAL, Reference, RunningReference
 
-RECIPE = replace(models.ANY, rounds=5)
+RECIPE = replace(nc.ANY, rounds=5)
 RATES = (80.0, 125.0, 500.0, 1000.0)
 
 

@@ -8,9 +8,9 @@ import pytest
 from sklearn.base import clone
 from sklearn.utils.estimator_checks import parametrize_with_checks
 
-import models
-import models.sklearn
-from models.sklearn import NoiseClassifier, NoiseFeatures
+import noiseclassifier as nc
+import noiseclassifier.sklearn
+from noiseclassifier.sklearn import NoiseClassifier, NoiseFeatures
 
 RATE = 1000.0
 QUICK = {"networks": 2, "units": 4, "epochs": 3}
@@ -45,7 +45,7 @@ def frames(groups=4, each=15):
 
 
 def test_the_example_of_the_documentation_runs():
-    assert doctest.testmod(models.sklearn).failed == 0
+    assert doctest.testmod(noiseclassifier.sklearn).failed == 0
 
 
 def test_the_example_of_the_page_runs():
@@ -60,8 +60,8 @@ def test_the_example_of_the_page_runs():
 
 def test_features_are_those_of_the_profile():
     noise, _, _ = frames()
-    profile = models.SCALAR.at(RATE)
-    expected = models.features(noise, profile)
+    profile = nc.SCALAR.at(RATE)
+    expected = nc.features(noise, profile)
     transformer = NoiseFeatures(rate=RATE).fit(noise)
     assert transformer.profile_ == profile
     np.testing.assert_array_equal(transformer.transform(noise), expected)
@@ -73,7 +73,7 @@ def test_several_signals_are_one_after_the_other_in_a_row():
     random = np.random.default_rng(1)
     signals = random.standard_normal((5, 3, 400))
     found = NoiseFeatures("general").fit_transform(signals.reshape(5, -1))
-    np.testing.assert_array_equal(found, models.features(signals, models.GENERAL.at(RATE)))
+    np.testing.assert_array_equal(found, nc.features(signals, nc.GENERAL.at(RATE)))
 
 
 @pytest.mark.parametrize("estimator", ["networks", "trees", "svm"])
@@ -81,8 +81,8 @@ def test_scores_are_those_of_a_classifier_of_models(estimator):
     noise, labels, groups = frames()
     noise, labels, groups = (each[labels != "impact"] for each in (noise, labels, groups))
     settings = {"estimator": estimator, "rounds": 10, "epochs": 10}
-    profile = replace(models.SCALAR.at(RATE), classes=("ok", "oscillations"), **settings)
-    ours = models.Classifier.train(models.Dataset(noise, labels, groups, {}), profile)
+    profile = replace(nc.SCALAR.at(RATE), classes=("ok", "oscillations"), **settings)
+    ours = nc.Classifier.train(nc.Dataset(noise, labels, groups, {}), profile)
     theirs = NoiseClassifier(settings=settings).fit(noise, labels, groups)
     scores = ours.scores(noise)
     if estimator == "svm":
@@ -116,20 +116,20 @@ def test_groups_calibrate():
         (
             NoiseFeatures("loud"),
             400,
-            models.ProfileError,
+            nc.ProfileError,
             "no profile 'loud'; there are scalar",
         ),
-        (NoiseFeatures("general"), 400, models.SignalError, "rows of 400 numbers, expected frames"),
-        (NoiseFeatures(rate=50.0), 400, models.ProfileError, "take a rate of 70 Hz at least"),
+        (NoiseFeatures("general"), 400, nc.SignalError, "rows of 400 numbers, expected frames"),
+        (NoiseFeatures(rate=50.0), 400, nc.ProfileError, "take a rate of 70 Hz at least"),
         (
             NoiseFeatures(settings={"colour": 1}),
             400,
-            models.ProfileError,
+            nc.ProfileError,
             "setting 'colour' is",
         ),
         (NoiseFeatures(), 1, ValueError, r"1 feature\(s\) .* while a minimum of 2 is required"),
         (
-            NoiseFeatures(models.Profile.paper()).fit(np.ones((1, 4000))),
+            NoiseFeatures(nc.Profile.paper()).fit(np.ones((1, 4000))),
             400,
             ValueError,
             "X has 400 features, but NoiseFeatures is expecting 4000",
@@ -143,8 +143,8 @@ def test_what_does_not_fit_is_refused(estimator, width, error, reason):
 
 
 def test_frames_of_another_length_than_a_profile_has_are_refused():
-    with pytest.raises(models.SignalError, match=r"expected \(frames, 4000\) for profile 'paper'"):
-        NoiseFeatures(models.Profile.paper()).fit_transform(np.ones((3, 400)))
+    with pytest.raises(nc.SignalError, match=r"expected \(frames, 4000\) for profile 'paper'"):
+        NoiseFeatures(nc.Profile.paper()).fit_transform(np.ones((3, 400)))
 
 
 @pytest.mark.parametrize("shape", [(59,), (61,), (60, 1), (30,)])
@@ -168,15 +168,15 @@ def test_a_frame_shorter_than_a_window_has_the_bins_of_its_own_transform(length,
 
 def test_a_frame_as_long_as_a_window_has_the_bands_of_the_profile():
     found = NoiseFeatures(rate=RATE).fit(np.ones((1, 100))).profile_
-    assert found == replace(models.SCALAR.at(RATE), length=100)
+    assert found == replace(nc.SCALAR.at(RATE), length=100)
 
 
 def test_many_rows_have_the_features_of_each():
-    noise = np.random.default_rng(0).normal(size=(models.sklearn.CHUNK + 3, 100))
+    noise = np.random.default_rng(0).normal(size=(nc.sklearn.CHUNK + 3, 100))
     transformer = NoiseFeatures(rate=RATE).fit(noise)
     found = transformer.transform(noise)
-    last = transformer.transform(noise[models.sklearn.CHUNK - 1 :])
-    np.testing.assert_array_equal(found[models.sklearn.CHUNK - 1 :], last)
+    last = transformer.transform(noise[nc.sklearn.CHUNK - 1 :])
+    np.testing.assert_array_equal(found[nc.sklearn.CHUNK - 1 :], last)
     assert len(found) == len(noise)
 
 

@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-import models
-from models.splitting import (
+import noiseclassifier as nc
+from noiseclassifier.splitting import (
     check_apart,
     folds,
     group_of,
@@ -70,7 +70,7 @@ def test_every_fold_has_something_to_measure_even_if_each_group_is_a_robots_only
 
 @pytest.mark.parametrize("count", [1, 0, 22])
 def test_folds_that_cannot_be_are_refused(count):
-    with pytest.raises(models.DatasetError, match=f"{count} folds of 21 groups, expected two"):
+    with pytest.raises(nc.DatasetError, match=f"{count} folds of 21 groups, expected two"):
         folds(GROUPS, count)
 
 
@@ -92,7 +92,7 @@ def test_each_robot_is_left_out_once():
         assert {robots[i] for i in test} == {name}
         assert name not in {robots[i] for i in train}
         assert len(train) + len(test) == len(RUNS)
-    with pytest.raises(models.DatasetError, match=r"one robot .* of 1 \(go2\); expected two"):
+    with pytest.raises(nc.DatasetError, match=r"one robot .* of 1 \(go2\); expected two"):
         leave_one_out(["go2", "go2"])
 
 
@@ -118,7 +118,7 @@ def test_what_is_apart_passes():
     ],
 )
 def test_a_run_a_group_or_a_content_on_both_sides_is_refused(test, text):
-    with pytest.raises(models.SeenError, match=text) as caught:
+    with pytest.raises(nc.SeenError, match=text) as caught:
         check_apart(TRAIN, {"fresh": "ee", **test})
     assert set(caught.value.seen) == set(test)
     assert str(caught.value).endswith("; measure it on other runs")
@@ -127,5 +127,5 @@ def test_a_run_a_group_or_a_content_on_both_sides_is_refused(test, text):
 
 def test_the_refusal_names_the_number_of_runs():
     names = {f"talos/curve-001-{copy}": "" for copy in range(3)} | {"other": "aa", "run8": "bb"}
-    with pytest.raises(models.SeenError, match=r"\(and 1 more of 5\); measure it on other runs$"):
+    with pytest.raises(nc.SeenError, match=r"\(and 1 more of 5\); measure it on other runs$"):
         check_apart(TRAIN, names)

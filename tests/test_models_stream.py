@@ -10,30 +10,30 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import models
-from models import windows
-from models.framefeatures import FrameFeatures, frame_features
-from models.logbands import INPUTS
-from models.signals import by_joint, stacked
+import noiseclassifier as nc
+from noiseclassifier import windows
+from noiseclassifier.framefeatures import FrameFeatures, frame_features
+from noiseclassifier.logbands import INPUTS
+from noiseclassifier.signals import by_joint, stacked
 
 RATE = 1000.0
-OURS = models.LogBands().at(RATE)
+OURS = nc.LogBands().at(RATE)
 PROFILES = {
     "ours": OURS,
     # Windows of different frames never coincide, and some frames share none.
     "noisytest": replace(
-        models.Profile.noisytest(), rate=RATE, length=400, hop=100, window=64, stride=71
+        nc.Profile.noisytest(), rate=RATE, length=400, hop=100, window=64, stride=71
     ),
-    "paper": replace(models.Profile.paper(), rate=RATE, length=400, hop=100, window=64, stride=48),
+    "paper": replace(nc.Profile.paper(), rate=RATE, length=400, hop=100, window=64, stride=48),
     "frames apart": replace(OURS, hop=650, stride=37),
-    "two windows": models.LogBands(relative=True, quick=0.02, speed=True).at(RATE),
+    "two windows": nc.LogBands(relative=True, quick=0.02, speed=True).at(RATE),
 }
 CORES = {name: (profile, 1) for name, profile in PROFILES.items()} | {
-    "norms": (models.GENERAL.at(RATE), 1),
-    "one joint": (models.EACH.at(RATE), 1),
-    "twelve joints": (models.EACH.at(RATE), 12),
+    "norms": (nc.GENERAL.at(RATE), 1),
+    "one joint": (nc.EACH.at(RATE), 1),
+    "twelve joints": (nc.EACH.at(RATE), 12),
     # Its short windows have a single band.
-    "low rate": (models.EACH.at(250.0), 12),
+    "low rate": (nc.EACH.at(250.0), 12),
 }
 
 
@@ -50,10 +50,10 @@ def noise(samples, seed=0):
 def classifier(name):
     """A classifier that is trained to find a hum."""
     blocks = [(0.0, 1.9, "ok"), (2.1, 4.0, "oscillations")]
-    blocks = tuple(models.Block(start, stop, label) for start, stop, label in blocks)
-    recording = models.Recording("walk", noise(4000, seed=1), RATE, blocks)
+    blocks = tuple(nc.Block(start, stop, label) for start, stop, label in blocks)
+    recording = nc.Recording("walk", noise(4000, seed=1), RATE, blocks)
     profile = PROFILES[name]
-    return models.Classifier.train(models.Dataset.of([recording], profile), profile)
+    return nc.Classifier.train(nc.Dataset.of([recording], profile), profile)
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 10])
@@ -65,7 +65,7 @@ def test_the_chunk_that_completes_a_frame_finds_nearly_all_its_windows_done(chun
         return original(samples, *rest)
 
     monkeypatch.setattr(windows, "log_band_energies", counted)
-    stream, signal = models.Stream(classifier("two windows")), noise(4000)
+    stream, signal = nc.Stream(classifier("two windows")), noise(4000)
     for first in range(0, len(signal), chunk):
         transformed.clear()
         if len(stream.push(signal[first : first + chunk])):
@@ -85,7 +85,7 @@ def streamed(stream, signal, cuts, valid=None):
 def joined(parts):
     """The labels of several chunks as those of one."""
     fields = ("start", "stop", "label", "scores")
-    return models.Labels(
+    return nc.Labels(
         *(np.concatenate([getattr(part, name) for part in parts]) for name in fields),
         parts[0].classes,
     )
@@ -106,7 +106,7 @@ def test_labels_are_those_of_the_whole_signal_however_it_is_cut(name, data):
     samples = data.draw(st.integers(401, 3000))
     cuts = data.draw(st.lists(st.integers(0, samples), max_size=30))
     signal = noise(samples, seed=samples)
-    stream = models.Stream(classifier(name), start=5.0)
+    stream = nc.Stream(classifier(name), start=5.0)
     batch = classifier(name).classify(signal, RATE, start=5.0)
     assert_equal(streamed(stream, signal, cuts), batch)
 
@@ -122,7 +122,7 @@ def test_frames_that_touch_a_gap_are_left_out_as_in_the_whole_signal(name, data)
         valid[first : first + data.draw(st.integers(1, 900))] = False
     signal = noise(samples) * valid
     batch = classifier(name).classify(signal, RATE, valid=valid)
-    assert_equal(streamed(models.Stream(classifier(name)), signal, cuts, valid), batch)
+    assert_equal(streamed(nc.Stream(classifier(name)), signal, cuts, valid), batch)
 
 
 def cut_features(samples, profile, cuts, valid):
@@ -151,7 +151,7 @@ def test_features_do_not_depend_on_the_chunks_bit_for_bit(name, data):
     assert np.array_equal(ours, features)
     frames = np.array([samples[:, start : start + profile.length] for start in starts])
     if len(frames):
-        alone = models.features(frames if len(samples) > 1 else frames[:, 0], profile)
+        alone = nc.features(frames if len(samples) > 1 else frames[:, 0], profile)
         np.testing.assert_allclose(features, alone, rtol=1e-9, atol=1e-9)
 
 
@@ -164,7 +164,7 @@ def random_signals(profile, joints, count):
     }
 
 
-SHIPPED = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
+SHIPPED = Path(__file__).parents[1] / "models" / "general.npz"
 
 
 @pytest.mark.parametrize("signals", INPUTS, ids=[" ".join(names) for names in INPUTS])
@@ -172,14 +172,14 @@ SHIPPED = Path(__file__).parents[1] / "assets" / "models" / "general.npz"
 def test_the_shipped_model_decides_the_same_whole_and_in_chunks_bit_for_bit(
     rate, signals, monkeypatch
 ):
-    decided, original = [], models.Classifier.decide
+    decided, original = [], nc.Classifier.decide
 
     def decide(self, features):
         decided.append(original(self, features))
         return decided[-1]
 
-    monkeypatch.setattr(models.Classifier, "decide", decide)
-    model = models.load(SHIPPED).at(rate, signals)
+    monkeypatch.setattr(nc.Classifier, "decide", decide)
+    model = nc.load(SHIPPED).at(rate, signals)
     hop = model.profile.hop
     count = round(3.037 * rate)
     signals, valid = random_signals(model.profile, 12, count), np.ones(count, dtype=bool)
@@ -187,7 +187,7 @@ def test_the_shipped_model_decides_the_same_whole_and_in_chunks_bit_for_bit(
     whole = model.classify(signals, rate, valid=valid)
     expected = decided.pop()
     for chunk in (max(round(rate / 1000), 7), round(rate / 50), hop, 3 * hop + 1):
-        stream = models.Stream(model, joints=12)
+        stream = nc.Stream(model, joints=12)
         pieces = [slice(first, first + chunk) for first in range(0, count, chunk)]
         parts = [
             stream.push({name: each[..., piece] for name, each in signals.items()}, valid[piece])
@@ -206,7 +206,7 @@ def test_the_shipped_model_decides_the_same_whole_and_in_chunks_bit_for_bit(
 @pytest.mark.parametrize("name", PROFILES)
 def test_skipping_is_pushing_a_gap(name, before, lost, after):
     signal = noise(before + after)
-    skipping, pushing = models.Stream(classifier(name)), models.Stream(classifier(name))
+    skipping, pushing = nc.Stream(classifier(name)), nc.Stream(classifier(name))
     parts = [skipping.push(signal[:before])]
     skipping.skip(lost)
     parts += [skipping.push(signal[before:]), skipping.finish()]
@@ -217,14 +217,14 @@ def test_skipping_is_pushing_a_gap(name, before, lost, after):
 
 
 def test_a_label_comes_with_the_last_sample_of_its_frame():
-    stream, signal = models.Stream(classifier("ours")), noise(1000)
+    stream, signal = nc.Stream(classifier("ours")), noise(1000)
     complete = [i for i in range(1000) if len(stream.push(signal[i : i + 1]))]
     assert complete == [399, 499, 599, 699, 799, 899, 999]
     assert stream.count == 1000
 
 
 def test_a_gap_of_a_year_is_passed_at_once_and_the_clock_goes_on():
-    stream = models.Stream(classifier("ours"))
+    stream = nc.Stream(classifier("ours"))
     stream.push(noise(1000))
     year = round(365 * 86_400 * RATE)
     stream.skip(year)
@@ -235,21 +235,21 @@ def test_a_gap_of_a_year_is_passed_at_once_and_the_clock_goes_on():
 
 
 def test_after_its_end_another_signal_begins():
-    stream, signal, other = models.Stream(classifier("ours")), noise(1234), 2.0 * noise(900, 1)
+    stream, signal, other = nc.Stream(classifier("ours")), noise(1234), 2.0 * noise(900, 1)
     once, changed, again = (streamed(stream, each, [17]) for each in (signal, other, signal))
     assert_equal(once, again)
-    assert_equal(changed, streamed(models.Stream(classifier("ours")), other, [17]))
+    assert_equal(changed, streamed(nc.Stream(classifier("ours")), other, [17]))
     assert stream.count == 0
 
 
 def test_a_signal_shorter_than_a_frame_has_no_labels():
-    labels = streamed(models.Stream(classifier("ours")), noise(399), [5])
+    labels = streamed(nc.Stream(classifier("ours")), noise(399), [5])
     assert len(labels) == 0
     assert labels.scores.shape == (0, 2)
 
 
 def test_memory_does_not_grow():
-    stream, signal = models.Stream(classifier("noisytest")), noise(1000)
+    stream, signal = nc.Stream(classifier("noisytest")), noise(1000)
     sizes = []
     for _ in range(20):
         stream.push(signal)
@@ -261,7 +261,7 @@ def test_memory_does_not_grow():
 
 
 def test_every_transform_is_computed_once(monkeypatch):
-    import models.windows as module
+    import noiseclassifier.windows as module
 
     transformed = []
 
@@ -270,7 +270,7 @@ def test_every_transform_is_computed_once(monkeypatch):
         return original(windows, profile, resolution)
 
     original = module.log_band_energies
-    stream = models.Stream(classifier("ours"))
+    stream = nc.Stream(classifier("ours"))
     monkeypatch.setattr(module, "log_band_energies", counted)
     for sample in np.split(noise(1000), 40):
         stream.push(sample)
@@ -282,13 +282,13 @@ def test_every_transform_is_computed_once(monkeypatch):
 
 @pytest.mark.parametrize("rate", [10_000.0, 970.0, 0.0, float("nan")])
 def test_a_signal_of_another_rate_is_refused(rate):
-    with pytest.raises(models.RateError, match="rates are 1000 Hz: lower the motion's rate"):
-        models.Stream(classifier("ours"), rate=rate)
+    with pytest.raises(nc.RateError, match="rates are 1000 Hz: lower the motion's rate"):
+        nc.Stream(classifier("ours"), rate=rate)
 
 
 def test_a_rate_that_is_nearly_the_models_counts_time_by_its_own():
     signal = noise(1500)
-    stream = models.Stream(classifier("ours"), rate=1000.5)
+    stream = nc.Stream(classifier("ours"), rate=1000.5)
     batch = classifier("ours").classify(signal, 1000.5)
     assert_equal(streamed(stream, signal, [700]), batch)
 
@@ -302,9 +302,9 @@ def test_a_rate_that_is_nearly_the_models_counts_time_by_its_own():
     ],
 )
 def test_samples_that_make_no_signal_are_refused_and_none_is_taken(samples, valid, reason):
-    stream = models.Stream(classifier("ours"))
+    stream = nc.Stream(classifier("ours"))
     stream.push(np.zeros(10))
-    with pytest.raises(models.SignalError, match=reason):
+    with pytest.raises(nc.SignalError, match=reason):
         stream.push(samples, valid)
     assert stream.count == 10
 
@@ -312,8 +312,8 @@ def test_samples_that_make_no_signal_are_refused_and_none_is_taken(samples, vali
 def test_streaming_needs_neither_scikit_learn_nor_scipy(tmp_path):
     classifier("ours").save(tmp_path / "model.npz")
     code = (
-        "import sys, numpy, models\n"
-        "stream = models.Stream(models.Classifier.load(sys.argv[1]))\n"
+        "import sys, numpy, noiseclassifier\n"
+        "stream = noiseclassifier.Stream(noiseclassifier.Classifier.load(sys.argv[1]))\n"
         "print(len(stream.push(numpy.zeros(2000))))\n"
         "print(sorted({'sklearn', 'scipy', 'noisemodel', 'joblib'} & set(sys.modules)))\n"
     )

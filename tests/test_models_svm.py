@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from sklearn.svm import SVC
 
-import models
-from models.estimators.svm import choose, fit, score, svm_count
+import noiseclassifier as nc
+from noiseclassifier.estimators.svm import choose, fit, score, svm_count
 
 RANDOM = np.random.default_rng(3)
 CENTRES = RANDOM.standard_normal((4, 20))
@@ -32,7 +32,7 @@ def theirs(features, targets, profile):
 
 @pytest.fixture(params=["linear", "rbf"])
 def one_vs_one(request):
-    profile = models.Profile.noisytest(request.param)
+    profile = nc.Profile.noisytest(request.param)
     return replace(profile, gamma=0.02, single_precision=False)
 
 
@@ -68,7 +68,7 @@ def test_two_classes_are_one_svm_whose_positive_side_is_the_first(one_vs_one):
 @pytest.mark.parametrize("classes", [2, 4])
 @pytest.mark.parametrize("kernel", ["linear", "rbf"])
 def test_one_vs_rest_is_an_svm_for_each_class_with_its_own_c(kernel, classes):
-    profile = replace(models.Profile.paper(kernel), gamma=0.02)
+    profile = replace(nc.Profile.paper(kernel), gamma=0.02)
     features, targets = blobs(classes)
     decisions = fit(features, targets, profile).condensed().decision(features)
     for estimator in range(classes):
@@ -84,7 +84,7 @@ def test_one_vs_rest_is_an_svm_for_each_class_with_its_own_c(kernel, classes):
 
 def test_linear_svms_condense_to_one_vector_each():
     features, targets = blobs(4)
-    svms = fit(features, targets, models.Profile.noisytest("linear"))
+    svms = fit(features, targets, nc.Profile.noisytest("linear"))
     assert len(svms.vectors) > 6
     assert svms.condensed().vectors.shape == (6, 20)
 

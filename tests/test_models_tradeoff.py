@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
-from models.evaluation.calibration import are_probabilities, reliability
-from models.evaluation.eventscore import score
-from models.evaluation.intervals import Resampling
-from models.evaluation.matching import Matched
-from models.evaluation.tradeoff import POINTS, failure_score, trade_off
-from models.labels import Labels
+from noiseclassifier.evaluation.calibration import are_probabilities, reliability
+from noiseclassifier.evaluation.eventscore import score
+from noiseclassifier.evaluation.intervals import Resampling
+from noiseclassifier.evaluation.matching import Matched
+from noiseclassifier.evaluation.tradeoff import POINTS, failure_score, trade_off
+from noiseclassifier.labels import Labels
 
 COUNT = len(frames())
 

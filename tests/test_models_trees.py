@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits
 
-import models
-from models.estimators import trees as module
-from models.estimators.calibration import calibrate
-from models.estimators.trees import Detector, Trees
+import noiseclassifier as nc
+from noiseclassifier.estimators import trees as module
+from noiseclassifier.estimators.calibration import calibrate
+from noiseclassifier.estimators.trees import Detector, Trees
 
 
 @pytest.mark.parametrize("leaves", [2, 5, 16])
@@ -21,7 +21,7 @@ def test_trees_have_the_probabilities_of_scikit_learn(leaves, classes):
     features = generator.normal(size=(500, 5))
     targets = (features[:, 0] > features[:, 2]).astype(int) + (features[:, 1] > 0.5)
     targets = np.minimum(targets, classes - 1)
-    profile = replace(models.GENERAL.at(1000.0), rounds=30, leaves=leaves)
+    profile = replace(nc.GENERAL.at(1000.0), rounds=30, leaves=leaves)
     ours = Trees.fit(features, targets, np.array(["one"] * 500), profile)
     theirs = HistGradientBoostingClassifier(
         max_iter=30, learning_rate=0.15, max_leaf_nodes=leaves, l2_regularization=1.0,
@@ -74,7 +74,7 @@ def of_scikit_learn(profile, rounds, **options):
 def test_a_detector_tells_failures_from_ok_and_then_names_them(rounds, naming):
     features, targets = drawn(4)
     rising = np.array([1, 1, 0, 0, 0])
-    profile = replace(models.ANY.bound(1000.0), rounds=rounds, leaves=4, learning_rate=0.2)
+    profile = replace(nc.ANY.bound(1000.0), rounds=rounds, leaves=4, learning_rate=0.2)
     groups = np.array(["one"] * len(targets))
     ours = Detector.fit(features, targets, groups, profile, rising)
     failing = targets > 0
@@ -91,7 +91,7 @@ def test_a_detector_tells_failures_from_ok_and_then_names_them(rounds, naming):
 def test_a_class_without_training_frames_is_never_probable(classes, there):
     features, targets = drawn(classes)
     train = np.flatnonzero(np.isin(targets, there))
-    profile = replace(models.GENERAL.at(1000.0), rounds=5, leaves=4)
+    profile = replace(nc.GENERAL.at(1000.0), rounds=5, leaves=4)
     ours = Trees.uncalibrated(features, targets, train, profile)
     expected = np.zeros((len(features), classes))
     if len(there) > 1:
@@ -108,7 +108,7 @@ def test_a_class_without_training_frames_is_never_probable(classes, there):
 def test_trees_are_calibrated_by_trees_that_left_a_third_of_the_groups_out():
     features, targets = drawn(3, 300)
     groups = np.repeat([f"group {number}" for number in range(6)], 50)
-    profile = replace(models.GENERAL.at(1000.0), rounds=4)
+    profile = replace(nc.GENERAL.at(1000.0), rounds=4)
     parts = module._parts(targets, groups)
     assert [len(test) for _, test in parts] == [100, 100, 100]
     assert sorted(np.concatenate([test for _, test in parts])) == list(range(300))
@@ -136,7 +136,7 @@ def test_parts_whose_training_frames_are_of_one_class_do_not_calibrate():
 def test_a_thousandth_of_the_training_frames_lies_above_the_bound_of_a_feature():
     order = np.random.default_rng(0).permutation(10_000).astype(float)
     features = np.stack((order, -order), axis=1)
-    profile = replace(models.GENERAL.at(1000.0), rounds=1, leaves=2)
+    profile = replace(nc.GENERAL.at(1000.0), rounds=1, leaves=2)
     targets = (order > 5000).astype(int)
     ours = Trees.fit(features, targets, np.array(["one"] * len(order)), profile)
     assert (features > ours.known).sum(axis=0).tolist() == [10, 10]
@@ -159,7 +159,7 @@ def test_processes_are_started_for_many_frames_alone(monkeypatch, frames, jobs):
     monkeypatch.setattr(joblib, "Parallel", parallel)
     monkeypatch.setattr(module, "MANY", 50)
     features, targets = drawn(2, frames)
-    profile = replace(models.GENERAL.at(1000.0), rounds=1)
+    profile = replace(nc.GENERAL.at(1000.0), rounds=1)
     Trees.fit(features, targets, np.array(["one"] * frames), profile)
     assert started == [jobs]
 

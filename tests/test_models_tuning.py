@@ -3,25 +3,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-import models
-from models.recording import Block, Recording
-from models.splitting import folds
-from models.tuning import kernels
-from models.tuning.grid import Grid
-from models.tuning.search import CRITERIA, Measures, measure, order, validate
-from models.tuning.trial import Trial
+import noiseclassifier as nc
+from noiseclassifier.recording import Block, Recording
+from noiseclassifier.splitting import folds
+from noiseclassifier.tuning import kernels
+from noiseclassifier.tuning.grid import Grid
+from noiseclassifier.tuning.search import CRITERIA, Measures, measure, order, validate
+from noiseclassifier.tuning.trial import Trial
 
 SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
 PROFILES = {
-    "noisytest": replace(models.Profile.noisytest(), **SMALL, open_end=100),
-    "noisytest-linear": replace(models.Profile.noisytest("linear"), **SMALL, open_end=100),
-    "paper": replace(models.Profile.paper(), **SMALL),
-    "paper-linear": replace(models.Profile.paper("linear"), **SMALL),
-    "logbands": models.LogBands().at(1000.0),
+    "noisytest": replace(nc.Profile.noisytest(), **SMALL, open_end=100),
+    "noisytest-linear": replace(nc.Profile.noisytest("linear"), **SMALL, open_end=100),
+    "paper": replace(nc.Profile.paper(), **SMALL),
+    "paper-linear": replace(nc.Profile.paper("linear"), **SMALL),
+    "logbands": nc.LogBands().at(1000.0),
 }
 
 
-def recording(number, classes=models.CLASSES):
+def recording(number, classes=nc.CLASSES):
     """Ten seconds of noise in which each class has a stretch, hard to separate from the others."""
     random = np.random.default_rng(number)
     signal = random.standard_normal(10_000)
@@ -52,12 +52,12 @@ class Sets:
 
     def called(self, profile):
         """What a classifier of its own calls the frames to check."""
-        known = models.Dataset.of(self.learn, profile)
-        fresh = models.Dataset.of(self.check, profile, training=False)
-        return models.Classifier.train(known, profile).predict(fresh.frames)
+        known = nc.Dataset.of(self.learn, profile)
+        fresh = nc.Dataset.of(self.check, profile, training=False)
+        return nc.Classifier.train(known, profile).predict(fresh.frames)
 
 
-def sets(classes=models.CLASSES, learn=range(4), check=range(4, 7)):
+def sets(classes=nc.CLASSES, learn=range(4), check=range(4, 7)):
     return Sets([recording(n, classes) for n in learn], [recording(n, classes) for n in check])
 
 
@@ -142,8 +142,8 @@ def test_recordings_without_annotations_are_passed_over():
 def test_measures_are_those_of_an_evaluation():
     profile, given = PROFILES["noisytest"], sets()
     (found,) = measure([profile], given.trial)
-    truth = models.Dataset.of(given.check, profile, training=False).labels
-    report = models.Evaluation.of(truth, given.called(profile), models.CLASSES)
+    truth = nc.Dataset.of(given.check, profile, training=False).labels
+    report = nc.Evaluation.of(truth, given.called(profile), nc.CLASSES)
     assert 0.3 < report.balanced_accuracy < 1.0
     for name in ("balanced_accuracy", "failure_recall", "false_alarm_rate", "subset_accuracy"):
         assert getattr(found, name) == pytest.approx(getattr(report, name), abs=1e-9)
@@ -182,48 +182,48 @@ def test_the_point_that_is_better_in_all_measures_is_the_best(criterion):
 
 
 def test_one_class_cannot_be_tuned():
-    with pytest.raises(models.DatasetError, match="all frames are ok; tuning takes two classes"):
+    with pytest.raises(nc.DatasetError, match="all frames are ok; tuning takes two classes"):
         measure([PROFILES["paper"]], sets(("ok",)).trial)
 
 
 def test_recordings_without_any_annotation_cannot_be_tuned():
     trial = Trial.against([replace(recording(0), blocks=())], [recording(1)])
-    with pytest.raises(models.DatasetError, match="no annotated frame in 1 recordings; annotate"):
+    with pytest.raises(nc.DatasetError, match="no annotated frame in 1 recordings; annotate"):
         measure([PROFILES["paper"]], trial)
 
 
 def test_a_test_class_without_training_frames_is_named():
     trial = Trial.against([recording(0, ("ok", "impact"))], [recording(1)])
     reason = "no frame of highaccelerations to learn from where those of walk-1 are checked"
-    with pytest.raises(models.DatasetError, match=reason):
+    with pytest.raises(nc.DatasetError, match=reason):
         measure([PROFILES["paper"]], trial)
 
 
 def test_a_class_of_a_single_recording_cannot_be_folded():
-    recordings = [recording(n, models.CLASSES if n == 2 else ("ok", "impact")) for n in range(4)]
+    recordings = [recording(n, nc.CLASSES if n == 2 else ("ok", "impact")) for n in range(4)]
     trial = Trial(recordings, folds([each.name for each in recordings], 2))
     reason = "of walk-2 are checked; give more recordings of it, or take other folds"
-    with pytest.raises(models.DatasetError, match=reason):
+    with pytest.raises(nc.DatasetError, match=reason):
         measure([PROFILES["paper"]], trial)
 
 
 @pytest.fixture(scope="module")
 def stand_in(lola):
     """The recordings of the stand-in."""
-    each = [list(models.noisytest.read_folder(lola / name)) for name in ("training", "validation")]
+    each = [list(nc.noisytest.read_folder(lola / name)) for name in ("training", "validation")]
     return Sets(*each)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kernel", "count"), [("rbf", 8), ("linear", 3)])
 def test_points_of_the_papers_grid_predict_what_a_classifier_predicts(stand_in, kernel, count):
-    points = Grid.paper(kernel).profiles(models.Profile.noisytest(kernel))
+    points = Grid.paper(kernel).profiles(nc.Profile.noisytest(kernel))
     for index in np.random.default_rng(11).integers(len(points), size=count):
         assert_equal_to_training([points[index]], stand_in)
 
 
 def test_the_papers_own_point_is_golden(stand_in, golden):
     arrays, _ = golden
-    validation = validate([models.Profile.noisytest()], stand_in.trial)
-    assert validation.classes == models.CLASSES
+    validation = validate([nc.Profile.noisytest()], stand_in.trial)
+    assert validation.classes == nc.CLASSES
     assert np.array_equal(validation.decisions[0].chosen, arrays["rbf_validation_pred"])

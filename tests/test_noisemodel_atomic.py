@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from models import modelfile
+from noiseclassifier import modelfile
 from noisemodel import OutputError
 from noisemodel.atomic import TEMPORARY, _machine, _sweep, refuse_existing, replacing
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.lib import format as npy
 
-import models
+import noiseclassifier as nc
 from inspector.analysis.analyse import analyse
 from inspector.analysis.verdict import Verdict
 from inspector.hold import hold_length, without_hold
@@ -279,7 +279,7 @@ def test_names_of_signals_are_those_of_the_signals():
     for run in (shaken(), replace(shaken(), velocity_desired=shaken().velocity)):
         assert set(signal_names(run)) == set(signals_of(run))
     assert "error" not in signal_names(replace(shaken(), velocity_desired=shaken().velocity))
-    assert set(models.signals.JOINTS) < set(signal_names(shaken()))
+    assert set(nc.signals.JOINTS) < set(signal_names(shaken()))
 
 
 @pytest.mark.parametrize("row", range(1, 40))

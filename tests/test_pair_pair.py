@@ -20,7 +20,7 @@ from inspector.pair.levels import (
     whole,
 )
 from inspector.pair.recording import write
-from models import Event, Labels
+from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 
 LOUDER = 20 * np.log10(2)
@@ -348,7 +348,7 @@ def test_silence_in_both_is_no_change(tmp_path):
 @pytest.mark.slow
 def test_a_limit_cycle_is_new(tmp_path, library):
     pytest.importorskip("mujoco")
-    scenarios = pytest.importorskip("scenarios")
+    scenarios = pytest.importorskip("noiseclassifier.scenarios")
     runs = [scenarios.simulate("panda", scenario, 3) for scenario in ("straight", "limit-cycle")]
     pair = compared(tmp_path, *runs, library)
     assert abs(pair.alignment.seconds) < 0.01

@@ -15,7 +15,7 @@ from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
 from inspector.pair import colors, compare
 from inspector.pair.recording import write
-from models import Event, Labels
+from noiseclassifier import Event, Labels
 from noisemodel import Block, OutputError, Run
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")

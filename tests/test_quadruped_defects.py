@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from scenarios.defects import Obstacles, Scaled, SensorJumps, StepDown
-from scenarios.motions import Trot
-from scenarios.quadruped import scene
-from scenarios.quadruped.cases import QUADRUPED
-from scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
-from scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.defects import Obstacles, Scaled, SensorJumps, StepDown
+from noiseclassifier.scenarios.motions import Trot
+from noiseclassifier.scenarios.quadruped import scene
+from noiseclassifier.scenarios.quadruped.cases import QUADRUPED
+from noiseclassifier.scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
+from noiseclassifier.scenarios.table import SCENARIOS
 
 
 def plan(robot=GO2, seed=2, **motion):

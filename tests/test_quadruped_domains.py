@@ -4,15 +4,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scenarios import drives, simulation
-from scenarios.case import Case
-from scenarios.errors import DivergedError, UnknownGaitError
-from scenarios.motions import Trot
-from scenarios.quadruped import domains, scene
-from scenarios.quadruped.posing import SHIFT, TILT, poses
-from scenarios.quadruped.robots import A1, ANYMAL_C, GO2, HYQ, QUADRUPEDS
-from scenarios.quadruped.standing import GRAVITY, stand
-from scenarios.reduced import reduced_model
+from noiseclassifier.scenarios import drives, simulation
+from noiseclassifier.scenarios.case import Case
+from noiseclassifier.scenarios.errors import DivergedError, UnknownGaitError
+from noiseclassifier.scenarios.motions import Trot
+from noiseclassifier.scenarios.quadruped import domains, scene
+from noiseclassifier.scenarios.quadruped.posing import SHIFT, TILT, poses
+from noiseclassifier.scenarios.quadruped.robots import A1, ANYMAL_C, GO2, HYQ, QUADRUPEDS
+from noiseclassifier.scenarios.quadruped.standing import GRAVITY, stand
+from noiseclassifier.scenarios.reduced import reduced_model
 
 SIMILAR = [robot for robot in QUADRUPEDS if robot.name not in ("go2", "solo12", "anymal")]
 

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from scenarios.clock import TICK, times
-from scenarios.quadruped import steps
-from scenarios.quadruped.gait import GAITS, TROT, beats, loads, swings
-from scenarios.quadruped.robots import GO2
-from scenarios.quadruped.steering import CHANGE, steer
+from noiseclassifier.scenarios.clock import TICK, times
+from noiseclassifier.scenarios.quadruped import steps
+from noiseclassifier.scenarios.quadruped.gait import GAITS, TROT, beats, loads, swings
+from noiseclassifier.scenarios.quadruped.robots import GO2
+from noiseclassifier.scenarios.quadruped.steering import CHANGE, steer
 
 TIME = times(6000, TICK)
 

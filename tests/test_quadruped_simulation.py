@@ -5,19 +5,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-import scenarios
-from scenarios import simulation
-from scenarios.case import Case
-from scenarios.faults import Faults
-from scenarios.imperfections import Imperfections
-from scenarios.labels import annotate
-from scenarios.motions import Trot
-from scenarios.quadruped import scene
-from scenarios.quadruped.cases import QUADRUPED
-from scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
-from scenarios.quadruped.standing import stand
-from scenarios.reduced import reduced_model
-from scenarios.sensing import sensors_of
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios import simulation
+from noiseclassifier.scenarios.case import Case
+from noiseclassifier.scenarios.faults import Faults
+from noiseclassifier.scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.labels import annotate
+from noiseclassifier.scenarios.motions import Trot
+from noiseclassifier.scenarios.quadruped import scene
+from noiseclassifier.scenarios.quadruped.cases import QUADRUPED
+from noiseclassifier.scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
+from noiseclassifier.scenarios.quadruped.standing import stand
+from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.sensing import sensors_of
 
 SHORT = 3.0
 SEED = 2

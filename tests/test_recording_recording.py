@@ -29,7 +29,7 @@ from inspector.recording.noise import POINTS as NOISE_POINTS
 from inspector.recording.noise import scaled
 from inspector.recording.recording import linked, write
 from inspector.recording.spectrogram import HEIGHT
-from models import Event, Labels
+from noiseclassifier import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
 
 SOUND = b"RIFF....WAVE, as far as a recording is concerned"

@@ -119,7 +119,7 @@ def test_every_viewer_is_told_to_send_no_usage_data(monkeypatch, tmp_path, env):
 def test_nothing_but_the_viewer_s_own_starter_starts_one():
     starts = [
         path.relative_to(ROOT).as_posix()
-        for package in ("inspector", "models", "noisemodel", "scenarios")
+        for package in ("inspector", "models", "noisemodel")
         for path in (ROOT / package).rglob("*.py")
         if re.search(r"\bviewer\.command\(|\brr\.spawn\(|\bPopen\(|spawn=True", path.read_text())
     ]

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import models
+import noiseclassifier as nc
+from noiseclassifier.scenarios.sample import Sample
+from noiseclassifier.scenarios.signals import WHOLE
 from noisemodel import Block
-from scenarios.sample import Sample
-from scenarios.signals import WHOLE
 
 ROOT = Path(__file__).parents[1]
 
@@ -47,7 +47,7 @@ def data(tmp_path_factory):
                     decimated={name: signal[::10] for name, signal in signals.items()},
                     blocks=tuple(
                         Block(2.0 * at, 2.0 * at + 2.0, label)
-                        for at, label in enumerate(models.CLASSES)
+                        for at, label in enumerate(nc.CLASSES)
                     ),
                     meta={**meta, "sha256": f"{robot}-{seed}"},
                 ).save(folder / robot / f"{scenario}-{seed:03d}.npz")
@@ -58,23 +58,23 @@ def scored(count=100):
     """As many good frames as failures, all of one run."""
     labels = np.repeat(["ok", "impact"], count)
     runs = np.repeat("talos/straight-000", 2 * count)
-    return models.Dataset(np.zeros((2 * count, 400)), labels, runs, {})
+    return nc.Dataset(np.zeros((2 * count, 400)), labels, runs, {})
 
 
 def test_both_sides_have_every_robot_and_nothing_that_is_held_out(rockets, data):
     sides = [
-        {models.group_of(f"{path.parent.name}/{path.stem}") for path in side}
+        {nc.group_of(f"{path.parent.name}/{path.stem}") for path in side}
         for side in rockets.files(data, 4)
     ]
     assert not sides[0] & sides[1]
-    assert not any(models.held_out(group) for group in sides[0] | sides[1])
+    assert not any(nc.held_out(group) for group in sides[0] | sides[1])
     for side in sides:
         assert sorted(group.partition("-")[0] for group in side) == ["panda"] * 2 + ["talos"] * 2
 
 
 def test_a_run_that_equals_another_counts_once(rockets, data):
     paths = sorted(data.rglob("*-001.npz"))
-    profile = models.GENERAL.at(1000.0)
+    profile = nc.GENERAL.at(1000.0)
     cut = rockets.framed(paths, profile, training=False)
     assert len(paths) == 4
     assert sorted(set(cut.runs.tolist())) == ["panda/curve-001", "talos/curve-001"]

@@ -10,15 +10,15 @@ from itertools import islice
 import numpy as np
 import pytest
 
-import scenarios
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios import formats
+from noiseclassifier.scenarios.dataset import make
+from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.sample import Sample
+from noiseclassifier.scenarios.simulation import RECIPE
+from noiseclassifier.scenarios.statistics import Statistics
+from noiseclassifier.scenarios.tasks import DatasetSpec, Task, choose, grouped_by_twin, motion_of
 from noisemodel import Block, Run, parallel, runfile
-from scenarios import formats
-from scenarios.dataset import make
-from scenarios.folder import Folder
-from scenarios.sample import Sample
-from scenarios.simulation import RECIPE
-from scenarios.statistics import Statistics
-from scenarios.tasks import DatasetSpec, Task, choose, grouped_by_twin, motion_of
 
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
 ALL = DatasetSpec(choice=choose(["panda", "ur5"], ["1", "2", "7"]), seeds=2).tasks()

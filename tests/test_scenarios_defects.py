@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from scenarios.arm.cases import ARM
-from scenarios.arm.picking import pick
-from scenarios.defects import (
+from noiseclassifier.scenarios.arm.cases import ARM
+from noiseclassifier.scenarios.arm.picking import pick
+from noiseclassifier.scenarios.defects import (
     Decalibration,
     ForceGain,
     GivingWay,
@@ -15,10 +15,10 @@ from scenarios.defects import (
     ReferenceJumps,
     SensorJumps,
 )
-from scenarios.faults import pulses, ramps, sines, step
-from scenarios.motions import Picks
-from scenarios.shapes import Rod
-from scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.faults import pulses, ramps, sines, step
+from noiseclassifier.scenarios.motions import Picks
+from noiseclassifier.scenarios.shapes import Rod
+from noiseclassifier.scenarios.table import SCENARIOS
 
 TIME = np.arange(70_000) * 1e-4
 

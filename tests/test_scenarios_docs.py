@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-import scenarios
-from scenarios.labels import RULE
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios.labels import RULE
 
 PAGE = Path(__file__).parents[1] / "docs" / "scenarios.md"
 

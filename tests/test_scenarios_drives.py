@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from scenarios.arm.control import ToolControl
-from scenarios.arm.picking import Plan
-from scenarios.arm.robots import PANDA
-from scenarios.clock import STEP, TICK
-from scenarios.drives import Drives
-from scenarios.imperfections import Imperfections, real_model
+from noiseclassifier.scenarios.arm.control import ToolControl
+from noiseclassifier.scenarios.arm.picking import Plan
+from noiseclassifier.scenarios.arm.robots import PANDA
+from noiseclassifier.scenarios.clock import STEP, TICK
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.imperfections import Imperfections, real_model
 
 
 def imperfections(**changes: float) -> Imperfections:
@@ -98,7 +98,7 @@ def test_a_robot_has_the_mass_of_its_imperfections():
 
 
 def tool_control(plan: Plan) -> tuple[ToolControl, object]:
-    from scenarios.reduced import reduced_model
+    from noiseclassifier.scenarios.reduced import reduced_model
 
     model = reduced_model(PANDA)
     control = ToolControl(

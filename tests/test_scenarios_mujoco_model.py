@@ -5,14 +5,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from noiseclassifier.scenarios.collision import box_changes, set_collision
+from noiseclassifier.scenarios.errors import UnsupportedModelError
+from noiseclassifier.scenarios.floatingbase import pinocchio_base
+from noiseclassifier.scenarios.mujoco_model import build
+from noiseclassifier.scenarios.physics import Physics
+from noiseclassifier.scenarios.sensing import sensors_of
+from noiseclassifier.scenarios.shapes import Ball, Box, Rod, Sole
 from noisemodel import Robot
-from scenarios.collision import box_changes, set_collision
-from scenarios.errors import UnsupportedModelError
-from scenarios.floatingbase import pinocchio_base
-from scenarios.mujoco_model import build
-from scenarios.physics import Physics
-from scenarios.sensing import sensors_of
-from scenarios.shapes import Ball, Box, Rod, Sole
 
 ODD = """<robot name="odd"><link name="base"/>
 <link name="a"><inertial><origin xyz="0.1 0 0.2" rpy="0.3 0 0"/><mass value="2"/>

@@ -8,14 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
-import scenarios
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios import formats, noisytest
+from noiseclassifier.scenarios.dataset import make
+from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.tasks import DatasetSpec, choose
 from noisemodel import Block, Run
-from scenarios import formats, noisytest
-from scenarios.dataset import make
-from scenarios.folder import Folder
-from scenarios.tasks import DatasetSpec, choose
 
 META = {
     "scenario": "obstacle-toe",
@@ -43,7 +43,7 @@ def run() -> Run:
 
 def test_a_run_is_read_as_it_was_written(run, tmp_path):
     noisytest.write(run, tmp_path / "panda.log")
-    (read,) = models.noisytest.read_folder(tmp_path, rate=noisytest.RATE)
+    (read,) = nc.noisytest.read_folder(tmp_path, rate=noisytest.RATE)
     np.testing.assert_allclose(
         read.signal, nm.simplified(run.motion, run.velocity_desired), rtol=1e-8
     )
@@ -56,11 +56,11 @@ def test_a_run_is_read_as_it_was_written(run, tmp_path):
 
 def test_frames_of_a_folder_are_those_of_its_runs(run, tmp_path):
     noisytest.write(run, tmp_path / "panda.log")
-    profile = models.Profile.noisytest("rbf")
-    read = models.Dataset.read(tmp_path, profile)
+    profile = nc.Profile.noisytest("rbf")
+    read = nc.Dataset.read(tmp_path, profile)
     signal = nm.simplified(run.motion, run.velocity_desired)
-    blocks = tuple(models.Block(b.start, b.stop, b.label) for b in run.blocks)
-    direct = models.Dataset.of([models.Recording("panda", signal, 10_000.0, blocks)], profile)
+    blocks = tuple(nc.Block(b.start, b.stop, b.label) for b in run.blocks)
+    direct = nc.Dataset.of([nc.Recording("panda", signal, 10_000.0, blocks)], profile)
     assert read.labels.tolist() == direct.labels.tolist()
     np.testing.assert_allclose(read.frames, direct.frames, atol=2e-6)  # in single precision
 
@@ -95,8 +95,8 @@ def test_the_recipe_is_kept(run, tmp_path):
 
 def test_the_configuration_is_noisytests_profile(tmp_path):
     noisytest.write_config(tmp_path)
-    profile = models.noisytest.profile_from_config(tmp_path / "noisytest-config.json")
-    wanted = models.Profile.noisytest("rbf")
+    profile = nc.noisytest.profile_from_config(tmp_path / "noisytest-config.json")
+    wanted = nc.Profile.noisytest("rbf")
     for setting in ("classes", "rate", "length", "hop", "stride", "regularization", "gamma"):
         assert getattr(profile, setting) == getattr(wanted, setting)
 

@@ -6,22 +6,29 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from scenarios import simulation
-from scenarios.arm.domains import DEFECTS, motion, scaled, suited
-from scenarios.arm.reaching import KINDS, Plan
-from scenarios.arm.robots import ARMS, PANDA, SO101, Arm
-from scenarios.arm.scene import plan
-from scenarios.case import Case
-from scenarios.clock import TICK
-from scenarios.defects import Collisions, Defect, JointStops, NoDefect, Obstacles, Pushes
-from scenarios.defects.air import SLOW
-from scenarios.errors import UnsupportedModelError
-from scenarios.faults import Faults
-from scenarios.labels import deviation
-from scenarios.loads import Collision, JointStop, Payload, Push
-from scenarios.motions import Picks, Reach
-from scenarios.reduced import reduced_model
-from scenarios.simulation import Trial
+from noiseclassifier.scenarios import simulation
+from noiseclassifier.scenarios.arm.domains import DEFECTS, motion, scaled, suited
+from noiseclassifier.scenarios.arm.reaching import KINDS, Plan
+from noiseclassifier.scenarios.arm.robots import ARMS, PANDA, SO101, Arm
+from noiseclassifier.scenarios.arm.scene import plan
+from noiseclassifier.scenarios.case import Case
+from noiseclassifier.scenarios.clock import TICK
+from noiseclassifier.scenarios.defects import (
+    Collisions,
+    Defect,
+    JointStops,
+    NoDefect,
+    Obstacles,
+    Pushes,
+)
+from noiseclassifier.scenarios.defects.air import SLOW
+from noiseclassifier.scenarios.errors import UnsupportedModelError
+from noiseclassifier.scenarios.faults import Faults
+from noiseclassifier.scenarios.labels import deviation
+from noiseclassifier.scenarios.loads import Collision, JointStop, Payload, Push
+from noiseclassifier.scenarios.motions import Picks, Reach
+from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.simulation import Trial
 
 RNG = np.random.default_rng
 BY_NAME = {arm.name: arm for arm in ARMS}

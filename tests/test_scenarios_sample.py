@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import noisemodel as nm
-import scenarios
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios.limbs import limbs
+from noiseclassifier.scenarios.sample import FORMAT, Sample, digest, is_sample
 from noisemodel import Block, Run
-from scenarios.limbs import limbs
-from scenarios.sample import FORMAT, Sample, digest, is_sample
 
 SAMPLES = 200
 META = {"scenario": "straight", "seed": 3, "duration": 0.02, "recipe": 1}
@@ -206,7 +206,7 @@ def test_a_simulated_run_is_reproduced_bit_for_bit(simulated, tmp_path):
 
 
 def test_a_run_that_cannot_be_reproduced_names_recipe_and_versions(simulated, monkeypatch):
-    module = sys.modules["scenarios.reproduction"]
+    module = sys.modules["noiseclassifier.scenarios.reproduction"]
     monkeypatch.setattr(module, "simulate", lambda *_, **__: simulated)
     sample = Sample.of(simulated)
     made = {**sample.meta, "sha256": "0" * 64, "recipe": 1, "versions": {"mujoco": "1.2.3"}}
@@ -276,7 +276,7 @@ def test_samples_are_distinguished_from_runs(tmp_path):
 def test_a_full_disk_leaves_no_file(tmp_path):
     Sample.of(random_run(samples=20_000)).save(tmp_path / "small.npz")
     code = (
-        "import resource, sys; from scenarios import Sample; import noisemodel\n"
+        "import resource, sys; from noiseclassifier.scenarios import Sample; import noisemodel\n"
         "sample = Sample.load(sys.argv[1])\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))\n"
         "try:\n    sample.save(sys.argv[2])\n"

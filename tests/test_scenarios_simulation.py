@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import scenarios
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios import simulation
+from noiseclassifier.scenarios.case import Case
+from noiseclassifier.scenarios.defects import Multisine, Obstacles
+from noiseclassifier.scenarios.labels import deviation
+from noiseclassifier.scenarios.motions import Picks
 from noisemodel import Run
-from scenarios import simulation
-from scenarios.case import Case
-from scenarios.defects import Multisine, Obstacles
-from scenarios.labels import deviation
-from scenarios.motions import Picks
 
 SEEDS = (5, 10)
 SHORT = 3.0
@@ -175,7 +175,7 @@ def test_the_same_seed_gives_the_same_file_in_another_process(runs, tmp_path):
     here, there = tmp_path / "here.npz", tmp_path / "there.npz"
     runs["straight", 5].save(here)
     code = (
-        "import sys, scenarios;"
+        "import sys; from noiseclassifier import scenarios;"
         "scenarios.simulate('panda', 'straight', 5, duration=float(sys.argv[1])).save(sys.argv[2])"
     )
     subprocess.run([sys.executable, "-c", code, str(SHORT), str(there)], check=True, timeout=120)
@@ -259,7 +259,7 @@ def test_without_mujoco_the_error_names_what_to_install(monkeypatch):
 
 def test_listing_scenarios_needs_no_simulator():
     code = (
-        "import sys, scenarios; assert scenarios.SCENARIOS and scenarios.ROBOTS;"
+        "import sys; from noiseclassifier import scenarios as s; assert s.SCENARIOS and s.ROBOTS;"
         "loaded = {'mujoco', 'pinocchio', 'scipy.signal'} & set(sys.modules);"
         "assert not loaded, loaded"
     )

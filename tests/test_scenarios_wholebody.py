@@ -4,11 +4,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from scenarios.errors import UnsupportedModelError
-from scenarios.humanoid.robots import G1, TALOS
-from scenarios.reduced import reduced_model
-from scenarios.shapes import Sole
-from scenarios.wholebody import WholeBody
+from noiseclassifier.scenarios.errors import UnsupportedModelError
+from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
+from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.shapes import Sole
+from noiseclassifier.scenarios.wholebody import WholeBody
 
 LEVEL = np.eye(3)
 

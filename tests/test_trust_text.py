@@ -6,7 +6,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-import models
+import noiseclassifier as nc
 from inspector.analysis import state
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import classify_file
@@ -20,13 +20,13 @@ from inspector.logs.reading import read_log
 from inspector.logs.signals import column_signal, time_column
 from inspector.text import counted, plain
 from inspector.training import tuningfile
-from models import jsontext, noisytest
+from noiseclassifier import jsontext, noisytest
+from noiseclassifier.scenarios import DatasetError, SampleError
+from noiseclassifier.scenarios import noisytest as simulated
+from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.sample import Sample, is_sample
+from noiseclassifier.scenarios.signals import WHOLE
 from noisemodel import Block, Run
-from scenarios import DatasetError, SampleError
-from scenarios import noisytest as simulated
-from scenarios.folder import Folder
-from scenarios.sample import Sample, is_sample
-from scenarios.signals import WHOLE
 
 TIME = np.arange(40) / 100
 RUN = Run(time=TIME, velocity=np.ones((40, 1)), joint_names=("a",))
@@ -51,12 +51,12 @@ READERS = {
     "state": read_state,
     "tuned.jsonl": read_tuning,
     "noisytest.toml": noisytest.read_annotations,
-    "noisytest.log": models.read_log,
+    "noisytest.log": nc.read_log,
     "noisytest-config.json": noisytest.profile_from_config,
     "simulated.toml": simulated.read,
     "dataset.json": lambda path: Folder.opened(path.parent),
 }
-EXPECTED = (InspectorError, models.ModelsError, DatasetError, SampleError)
+EXPECTED = (InspectorError, nc.ModelsError, DatasetError, SampleError)
 
 
 @pytest.mark.parametrize("name", READERS)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.elsewhere.faults import Push, Throw
+from noiseclassifier.scenarios.events import Event
 from noisemodel.types import Array
-from scenarios.events import Event
 
 FLIGHT = 0.08
 """Time between the appearance of a ball and its arrival, in [s]."""

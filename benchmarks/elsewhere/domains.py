@@ -21,9 +21,9 @@ from benchmarks.elsewhere import (
 from benchmarks.elsewhere.faults import Control, Sizes
 from benchmarks.elsewhere.recorded import Recorded
 from benchmarks.elsewhere.references import Reference
+from noiseclassifier.scenarios.labels import RULE, Trace, annotate
 from noisemodel import Block, Run
 from noisemodel.types import Array
-from scenarios.labels import RULE, Trace, annotate
 
 VISIBLE = 2.0
 """Least ratio of a fault's power to the sensor's in one octave, for it to have a label (3 dB)."""

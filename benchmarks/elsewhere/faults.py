@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 
 from benchmarks.elsewhere.references import Reference
+from noiseclassifier.scenarios.events import Event
 from noisemodel.types import Array
-from scenarios.events import Event
 
 Range: TypeAlias = tuple[float, float]
 KINDS = ("push", "throw", "latency", "chatter", "jump", "hold", "decalibration")

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from noiseclassifier.scenarios.events import Event
 from noisemodel.types import Array
-from scenarios.events import Event
 
 FASTEST = 60.0
 """Joint speed beyond which a simulation has diverged, in [rad/s]."""

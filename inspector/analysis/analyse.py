@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
@@ -31,7 +31,7 @@ from inspector.library import (
 )
 from inspector.localisation.extent import extent
 from inspector.logs.opening import Opened, open_run
-from models import Event
+from noiseclassifier import Event
 from noisemodel.catalog import is_file_name, is_name
 from noisemodel.types import Array
 
@@ -70,7 +70,7 @@ class Analysis:
     status: Status
     run: nm.Run
     reason: str = ""
-    labels: models.Labels | None = None
+    labels: nc.Labels | None = None
     model: str = ""
     model_sha256: str = ""
     spans: tuple[Event, ...] = ()
@@ -137,11 +137,9 @@ class Analysis:
         apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1]) + 1
         groups = np.split(np.arange(len(labels)), apart)
         layers = [(float(labels.start[g[0]]), float(labels.stop[g[-1]]), "ok") for g in groups]
-        alone = np.flatnonzero((labels.label == models.UNKNOWN) & ~labels.flagged)
+        alone = np.flatnonzero((labels.label == nc.UNKNOWN) & ~labels.flagged)
         middle = (labels.start[alone] + labels.stop[alone]) / 2
-        layers += [
-            (t - hop(labels) / 2, t + hop(labels) / 2, models.UNKNOWN) for t in middle.tolist()
-        ]
+        layers += [(t - hop(labels) / 2, t + hop(labels) / 2, nc.UNKNOWN) for t in middle.tolist()]
         layers += [(event.start, event.stop, event.label) for event in self.findings]
         edges = np.unique([time for start, stop, _ in layers for time in (start, stop)])
         names = np.full(len(edges) - 1, "", dtype=object)
@@ -250,7 +248,7 @@ def analyse(
     )
     try:
         found = _labelled(empty, label_run(run, library, slower=slower), library)
-    except (CannotTellError, models.SignalError, nm.RunError) as error:
+    except (CannotTellError, nc.SignalError, nm.RunError) as error:
         return replace(empty, reason=str(error))
     if seen.observable or found.findings:
         return found
@@ -277,12 +275,12 @@ def analyse_noise(
     Returns:
         The analysis, without an audit, of a run of one joint.
     """
-    uniform = float(time[0]) + np.arange(len(time)) / models.nominal_rate(time)
+    uniform = float(time[0]) + np.arange(len(time)) / nc.nominal_rate(time)
     run = nm.Run(time=uniform, velocity=noise[:, None], joint_names=("noise",))
     empty = Analysis(name=name, status=Status.CANNOT_TELL, run=run, unknown=unknown)
     try:
         return _labelled(empty, label_noise(time, noise, library), library)
-    except (CannotTellError, models.SignalError) as error:
+    except (CannotTellError, nc.SignalError) as error:
         return replace(empty, reason=str(error))
 
 
@@ -357,11 +355,11 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     reported = empty.unknown is Unknown.FINDING
     labels = replace(labelled.labels, unknown_is_finding=reported)
     spans, findings = extents(empty.run, labels)
-    known = int((labels.label != models.UNKNOWN).sum())
+    known = int((labels.label != nc.UNKNOWN).sum())
     return replace(
         empty,
         status=status_of(len(labels) if findings else known, findings),
-        reason="" if findings or known else f"every frame is {models.UNKNOWN}",
+        reason="" if findings or known else f"every frame is {nc.UNKNOWN}",
         labels=labels,
         model=labelled.model,
         model_sha256=library[labelled.model].sha256,
@@ -372,7 +370,7 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     )
 
 
-def extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
+def extents(run: nm.Run, labels: nc.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
     """List the events of labels, and the same from onset to end, in the order of the latter.
 
     A stretch of flagged frames has an onset and an end, and each event an onset and an end within
@@ -399,7 +397,7 @@ def extents(run: nm.Run, labels: models.Labels) -> tuple[tuple[Event, ...], tupl
     return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)
 
 
-def _stretches(labels: models.Labels) -> list[tuple[float, float]]:
+def _stretches(labels: nc.Labels) -> list[tuple[float, float]]:
     """List the stretches of flagged frames, by the start of the first and the stop of the last."""
     own = np.flatnonzero(labels.flagged)
     apart = np.flatnonzero(labels.start[own[1:]] > labels.stop[own[:-1]]) + 1
@@ -407,7 +405,7 @@ def _stretches(labels: models.Labels) -> list[tuple[float, float]]:
     return [(float(labels.start[g[0]]), float(labels.stop[g[-1]])) for g in groups]
 
 
-def hop(labels: models.Labels) -> float:
+def hop(labels: nc.Labels) -> float:
     """Time from one frame to the next, in [s]; a frame's duration if there is no next one."""
     return float(np.diff(labels.start).min(initial=float(labels.stop[0] - labels.start[0])))
 

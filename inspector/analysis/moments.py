@@ -7,7 +7,7 @@ import numpy as np
 
 from inspector.analysis.analyse import Analysis
 from inspector.levels import FLOOR_DB, STEP
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array
 

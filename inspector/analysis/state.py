@@ -23,8 +23,8 @@ from inspector.analysis.verdict import Verdict
 from inspector.errors import FileError, InspectorError
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
-from models import Event
-from models.jsontext import from_json
+from noiseclassifier import Event
+from noiseclassifier.jsontext import from_json
 from noisemodel import OutputError
 
 KIND = "noise-classify-state/"

@@ -12,21 +12,21 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.analyse import Analysis, analyse, analyse_noise
 from inspector.analysis.status import EXIT, Status, Unknown, worst
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library
 from inspector.logs.opening import Reading, Source, open_source
-from models import Event
+from noiseclassifier import Event
 from noisemodel.parallel import DIED, Jobs, in_order
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
     from inspector.localisation.order import Order
 
-EXPECTED = (InspectorError, models.ModelsError, nm.NoiseModelError)
+EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
 """The errors that are printed in one line; all others are bugs."""
 
 
@@ -220,7 +220,7 @@ def classify_file(
     begun = perf_counter()
     try:
         if source.path.suffix == ".log" and not _has_header(source.path):
-            analysis = analyse_noise(*models.read_log(source.path), library, unknown=unknown)
+            analysis = analyse_noise(*nc.read_log(source.path), library, unknown=unknown)
         else:
             opened = open_source(source, reading)
             analysis = analyse(opened.run, library, unknown=unknown)

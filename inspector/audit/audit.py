@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 from inspector.audit.bandwidth import Bandwidth, bandwidth
 from inspector.audit.copies import copies
 from inspector.audit.observability import ClassObservability, Observability, observable_classes
@@ -76,7 +76,7 @@ class Audit:
         return any(each.observability is not Observability.CANNOT_TELL for each in self.classes)
 
 
-def audit(run: Run, library: Mapping[str, models.Model], *, slower: Run | None = None) -> Audit:
+def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = None) -> Audit:
     """Audit a run.
 
     Gaps are counted in the whole run; signals are examined in an excerpt of it.

@@ -8,7 +8,7 @@ from inspector.audit.differentiation import Differentiator, differentiator_of
 from inspector.audit.quantisation import floor_frequency, quantisation_noise, steps_of
 from inspector.audit.spectrum import PER_OCTAVE, Spectrum, smoothed, spectrum
 from inspector.hold import hold_length
-from models import LogBands
+from noiseclassifier import LogBands
 from noisemodel import Run
 from noisemodel.types import Array, Mask
 

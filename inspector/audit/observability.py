@@ -10,8 +10,7 @@ The limits:
   status is *cannot tell*.
 - *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
   or a filter.
-- *Two bands.* Fewer than two of the model's bands are no spectrum; `models.LogBands` has the same
-  limit.
+- *Two bands.* Fewer than two of the model's bands are no spectrum; `LogBands` has the same limit.
 - *The frame.* A model labels frames (the paper's 0.4 s) that touch no gap; there has to be one.
 
 A class is observable if all of its band is, partly if two bands of the model or more are, or if
@@ -24,12 +23,12 @@ from enum import StrEnum
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 from inspector.audit.bandwidth import Bandwidth
 from inspector.library import Library, nearest
 from inspector.text import plain
-from models import Profile
-from models.logbands import FEWEST, HIGHEST, LOWEST
+from noiseclassifier import Profile
+from noiseclassifier.logbands import FEWEST, HIGHEST, LOWEST
 from noisemodel.types import Array, Mask
 
 OSCILLATIONS = (20.0, 1000.0)
@@ -99,9 +98,9 @@ def observable_classes(
     logged = 2 * bandwidth.nyquist
     try:
         name, chosen = nearest(library, rate, signals, logged=logged)
-    except models.ModelsError as error:
+    except nc.ModelsError as error:
         classes = dict.fromkeys(name for model in library.values() for name in _failures(model))
-        if isinstance(error, models.MissingSignalError):
+        if isinstance(error, nc.MissingSignalError):
             return tuple(
                 ClassObservability(label, Observability.CANNOT_TELL, reason=str(error))
                 for label in classes
@@ -119,7 +118,7 @@ def observable_classes(
         return tuple(
             ClassObservability(label, Observability.CANNOT_TELL, reason=reason) for label in labels
         )
-    general = isinstance(library[name], models.General)
+    general = isinstance(library[name], nc.General)
     return tuple(
         _observability(label, bandwidth, profile, library, general=general) for label in labels
     )
@@ -179,22 +178,22 @@ def band_edges(profile: Profile) -> Array:
     return np.arange(1.0, profile.bins, 3.0) * bin_width
 
 
-def _failures(model: models.Model) -> tuple[str, ...]:
+def _failures(model: nc.Model) -> tuple[str, ...]:
     """All classes of a model but the first, which is `ok`."""
-    known = model.recipe if isinstance(model, models.General) else model.profile
+    known = model.recipe if isinstance(model, nc.General) else model.profile
     return known.classes[1:]
 
 
-def _lowest(model: models.Model) -> float:
+def _lowest(model: nc.Model) -> float:
     """Lowest rate that a model takes, in [Hz]."""
-    return LOWEST if isinstance(model, models.General) else model.rate
+    return LOWEST if isinstance(model, nc.General) else model.rate
 
 
 def _rate_for(frequency: float, library: Library) -> float:
     """Lowest rate at which a model has a band up to a frequency; without one, twice the latter."""
     reaching = []
     for model in library.values():
-        if isinstance(model, models.General):
+        if isinstance(model, nc.General):
             edges = band_edges(model.recipe.bound(HIGHEST))
             # A band is there from twice its upper edge on.
             above = edges[edges >= frequency]

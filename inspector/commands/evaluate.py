@@ -38,7 +38,7 @@ def evaluate(
     from inspector.training.evaluation import Outputs
     from inspector.training.evaluation import as_json as json_of
     from inspector.training.evaluation import evaluate as evaluate_model
-    from models.evaluation.assessment import table
+    from noiseclassifier.evaluation.assessment import table
 
     outputs = Outputs(output, picture, overwrite=overwrite)
     outputs.check()

@@ -12,7 +12,7 @@ from inspector.commands.options import Dask, Overwrite, jobs_or_dask
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from scenarios import Scenario
+    from noiseclassifier.scenarios import Scenario
 
 
 class OneRunUnlessNamed(TyperGroup):
@@ -76,7 +76,7 @@ def run(
     overwrite: Overwrite = False,
 ) -> None:
     """Simulate one run, with its failures annotated."""
-    import scenarios
+    from noiseclassifier import scenarios
     from noisemodel.atomic import refuse_existing
 
     if list_:
@@ -129,11 +129,11 @@ def dataset(
     from json import dumps
 
     from inspector.progress import progress
-    from scenarios import noisytest
-    from scenarios.dataset import make
-    from scenarios.folder import Folder
-    from scenarios.statistics import Statistics
-    from scenarios.tasks import DatasetSpec, choose
+    from noiseclassifier.scenarios import noisytest
+    from noiseclassifier.scenarios.dataset import make
+    from noiseclassifier.scenarios.folder import Folder
+    from noiseclassifier.scenarios.statistics import Statistics
+    from noiseclassifier.scenarios.tasks import DatasetSpec, choose
 
     where = jobs_or_dask(jobs, dask)
     choice = choose(_listed(robots), _listed(scenarios), healthy=only is Only.OK)
@@ -170,12 +170,12 @@ def domains(
 ) -> None:
     """Simulate wide domains: many robots, drives, controllers, motions; resumes if killed."""
     from inspector.progress import progress
-    from scenarios.dataset import make
-    from scenarios.domains import DISTRIBUTION
-    from scenarios.domainset import tasks
-    from scenarios.folder import Folder
-    from scenarios.robots import TARGETS, WIDE
-    from scenarios.statistics import Statistics
+    from noiseclassifier.scenarios.dataset import make
+    from noiseclassifier.scenarios.domains import DISTRIBUTION
+    from noiseclassifier.scenarios.domainset import tasks
+    from noiseclassifier.scenarios.folder import Folder
+    from noiseclassifier.scenarios.robots import TARGETS, WIDE
+    from noiseclassifier.scenarios.statistics import Statistics
 
     if list_ or output is None:
         sources = [robot for robot in WIDE if robot not in TARGETS]
@@ -211,9 +211,9 @@ def logs(
     """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
     from collections import Counter
 
-    from scenarios.domainset import logs as logs_of
-    from scenarios.domainset import write
-    from scenarios.folder import Folder
+    from noiseclassifier.scenarios.domainset import logs as logs_of
+    from noiseclassifier.scenarios.domainset import write
+    from noiseclassifier.scenarios.folder import Folder
 
     if not data.is_dir():
         raise typer.BadParameter(f"{data}: there is no such folder")

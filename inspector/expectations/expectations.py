@@ -11,8 +11,8 @@ from typing import Any
 
 from inspector.errors import FileError
 from inspector.library import Library
-from models.jsontext import from_toml, text_of, toml_shown
-from models.labels import UNKNOWN
+from noiseclassifier.jsontext import from_toml, text_of, toml_shown
+from noiseclassifier.labels import UNKNOWN
 from noisemodel.errors import hint
 
 NAME = "expect.toml"

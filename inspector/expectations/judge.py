@@ -9,7 +9,7 @@ from pathlib import Path
 from inspector.analysis.status import Status
 from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict
 from inspector.expectations.expectations import Entry, Expectations
-from models import Event
+from noiseclassifier import Event
 
 RULINGS = {
     "waive": Ruling.WAIVED,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 from inspector.export.content import Content
 from inspector.text import cell
 from noisemodel.types import Array
@@ -105,7 +105,7 @@ def _annotated(content: Content) -> list[str | None]:
     return labels
 
 
-def _framed(time: Array, labels: models.Labels) -> Iterator[tuple[str, Any]]:
+def _framed(time: Array, labels: nc.Labels) -> Iterator[tuple[str, Any]]:
     """Columns of the frame whose middle is nearest to each sample, null outside of all shares."""
     import pyarrow as pa
 

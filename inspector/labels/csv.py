@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from inspector.labels.entry import Entry, EntryError, Span, number
 from inspector.text import cell, uncell
-from models import Event
+from noiseclassifier import Event
 
 COLUMNS = ("start", "stop", "label")
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from inspector.errors import InspectorError, OptionError
 from inspector.labels import audacity, csv, noisytest
 from inspector.labels.entry import Entry, EntryError, LabelFileError, Span
-from models.jsontext import text_of
+from noiseclassifier.jsontext import text_of
 from noisemodel import Block, Run
 from noisemodel.atomic import replacing
 

@@ -1,15 +1,15 @@
 """Labels as NoisyTest's TOML: chunk_ranges and chunk_labels in a table [data].
 
-`models.noisytest` reads it and `scenarios.noisytest` writes it. A stop of -1 is the end of the
-recording, so that no other label may stop there.
+`noiseclassifier.noisytest` reads it and `scenarios.noisytest` writes it. A stop of -1 is the end of
+the recording, so that no other label may stop there.
 """
 
 from collections.abc import Iterator, Sequence
 from math import inf
 
 from inspector.labels.entry import Entry, EntryError, Span
-from models.errors import AnnotationError
-from models.noisytest import END, parse_annotations
+from noiseclassifier.errors import AnnotationError
+from noiseclassifier.noisytest import END, parse_annotations
 from noisemodel import Block
 
 
@@ -28,7 +28,7 @@ def render(spans: Sequence[Span]) -> str:
                 f"label {span.label!r} stops at -1 s, the end of the recording in NoisyTest;"
                 " use another format"
             )
-    from scenarios.noisytest import annotations  # brings all scenarios
+    from noiseclassifier.scenarios.noisytest import annotations  # brings all scenarios
 
     return annotations([Block(span.start, span.stop, span.label) for span in spans])
 

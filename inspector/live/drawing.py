@@ -20,8 +20,8 @@ from inspector.recording.series import TIMELINE, at, log_events, scalars, style_
 from inspector.recording.spectrogram import log_axis, style_bands
 from inspector.report.markdown import spoken
 from inspector.thinning import extremes
-from models import UNKNOWN, Event, Labels
-from models.labels import interval
+from noiseclassifier import UNKNOWN, Event, Labels
+from noiseclassifier.labels import interval
 from noisemodel.types import Array
 
 JOINT_POINTS = 400.0

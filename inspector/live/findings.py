@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from inspector.localisation.extent import END, ONSET
-from models import Event, Labels
+from noiseclassifier import Event, Labels
 
 SETTLED = 3
 """Hops after the start of an event by which its class is told from that of its edge."""

@@ -13,8 +13,8 @@ from inspector.expectations.expectations import Expectations
 from inspector.expectations.judge import judge
 from inspector.live.session import LiveSession, Summary
 from inspector.version import program_version
-from models import Event
-from models.labels import interval
+from noiseclassifier import Event
+from noiseclassifier.labels import interval
 
 FORMAT = "noise-live/1"
 NAME = Path("live")

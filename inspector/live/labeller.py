@@ -5,12 +5,12 @@ from math import ceil
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.library import Library
 from inspector.live.decimator import Decimator
-from models.profile import NOMINAL, TOLERANCE
-from models.signals import EFFORT, JOINTS, MOTION, NOISE
+from noiseclassifier.profile import NOMINAL, TOLERANCE
+from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE
 from noisemodel.decimation import EDGE
 from noisemodel.types import Array, Mask
 
@@ -83,17 +83,17 @@ class Labeller:
 
     def __init__(self, library: Library, rate: float, widths: Mapping[str, int]) -> None:
         self.rate, self.remark, self.model = rate, "", ""
-        self._stream: models.Stream | None = None
+        self._stream: nc.Stream | None = None
         self._decimator: Decimator | None = None
         self._signals, self._names = NoiseSignals(widths), tuple[str, ...]()
         self._ratio, self._samples = 1, 0
         try:
-            self.model, chosen = models.nearest(library, rate, self._signals.names)
-        except models.ModelsError as error:
+            self.model, chosen = nc.nearest(library, rate, self._signals.names)
+        except nc.ModelsError as error:
             self.remark = f"No labels: {error}."
             return
         ratio = round(rate / chosen.rate)
-        if rate > chosen.rate and isinstance(model := library[self.model], models.General):
+        if rate > chosen.rate and isinstance(model := library[self.model], nc.General):
             ratio = ceil(rate / chosen.rate * (1.0 - TOLERANCE))
             chosen = model.at(rate / ratio, self._signals.names)
         if abs(rate / ratio / chosen.rate - 1.0) > NOMINAL:
@@ -103,7 +103,7 @@ class Labeller:
             )
             return
         self._ratio, self._names = ratio, chosen.profile.signals
-        self._stream = models.Stream(chosen, rate=rate / ratio, joints=self._signals.joints)
+        self._stream = nc.Stream(chosen, rate=rate / ratio, joints=self._signals.joints)
         if ratio > 1:
             self._decimator = Decimator(ratio, self._signals.columns)
             self.remark = f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}."
@@ -130,7 +130,7 @@ class Labeller:
         """Time since the first sample, lost ones counted, in [s]: the clock of the labels."""
         return self._samples / self.rate
 
-    def push(self, motion: Array, valid: Mask) -> models.Labels | None:
+    def push(self, motion: Array, valid: Mask) -> nc.Labels | None:
         """Take samples.
 
         Args:

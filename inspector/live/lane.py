@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from models import Labels
+from noiseclassifier import Labels
 
 
 class Change(NamedTuple):

@@ -19,7 +19,7 @@ from inspector.live.sink import Sink
 from inspector.live.warnings import Warnings
 from inspector.live.worker import Worker
 from inspector.wrongrobot import LimitWatch, check_joints
-from models import Event
+from noiseclassifier import Event
 from noisemodel.bounds import beyond, limit
 from noisemodel.limits import joint_limits
 from noisemodel.types import Array

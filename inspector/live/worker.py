@@ -23,7 +23,7 @@ from inspector.live.sink import Sink
 from inspector.live.spectrogram import SpectrogramStream
 from inspector.live.warnings import Warnings
 from inspector.wrongrobot import LONG, LimitWatch
-from models import Event
+from noiseclassifier import Event
 from noisemodel.types import Array, Mask
 
 POSES = 40

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from inspector.localisation.quiet import quiet_stretches
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.links import FAST
 from noisemodel.types import Array, Real

@@ -14,7 +14,7 @@ import numpy as np
 
 from inspector.localisation.flow import Flow, flow
 from inspector.localisation.quiet import quiet_stretches
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array, Indices, Mask
 

@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 
 from inspector.localisation.stage import Localisation
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block
 from noisemodel.links import LinkNoise
 from noisemodel.types import Array

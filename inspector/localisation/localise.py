@@ -6,7 +6,7 @@ from dataclasses import replace
 from inspector.localisation.band import band
 from inspector.localisation.innovation import quiet_statistics
 from inspector.localisation.stage import Localisation, first_stage
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 
 __all__ = ["Localisation", "has_stages", "localise"]

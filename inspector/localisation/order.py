@@ -33,7 +33,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array, Real
 

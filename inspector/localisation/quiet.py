@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 
 MOST = 16

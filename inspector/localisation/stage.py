@@ -26,7 +26,7 @@ import numpy as np
 
 from inspector.localisation.flow import Flow, flow
 from inspector.localisation.innovation import WARM, Innovation, QuietStatistics
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block, Run
 from noisemodel.types import Array
 

@@ -17,7 +17,7 @@ from inspector.logs.opening import SUFFIXES, logs_in
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import Job, jobs_of
 from inspector.wrongrobot import limit_warnings
-from models.jsontext import from_json
+from noiseclassifier.jsontext import from_json
 from noisemodel import NoiseModelError, OutputError, archive
 from noisemodel.atomic import refuse_existing, replacing
 

@@ -29,7 +29,7 @@ from inspector.logs.log import Log, LogReader
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import TIMES, listed
 from inspector.text import counted
-from models.jsontext import from_json
+from noiseclassifier.jsontext import from_json
 from noisemodel.archive import ArchiveError, check_unpacked
 
 EPISODES = "data"

@@ -16,7 +16,7 @@ from inspector.logs.log import Field, Log, LogReader, Stamps
 from inspector.logs.options import ReadOptions
 from inspector.logs.signals import listed
 from inspector.text import counted
-from models.jsontext import from_json, text_of
+from noiseclassifier.jsontext import from_json, text_of
 
 STATE, ACTION, STAMP, FRAME = "observation.state", "action", "timestamp", "frame_index"
 

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from inspector.errors import InspectorError, OptionError
 from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS
-from models.jsontext import from_toml, text_of, toml_shown
+from noiseclassifier.jsontext import from_toml, text_of, toml_shown
 from noisemodel.atomic import replacing
 
 FORMAT = "noise-mapping/1"

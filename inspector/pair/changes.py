@@ -9,7 +9,7 @@ from inspector.analysis.analyse import Analysis
 from inspector.pair.levels import STEP, Level, steps, within
 from inspector.pair.pair import Pair
 from inspector.report.markdown import spoken
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Block
 
 NEW, LOUDER, UNCHANGED, QUIETER, RESOLVED = "new", "louder", "unchanged", "quieter", "resolved"

@@ -15,7 +15,7 @@ from inspector.recording import axes, series, unstable
 from inspector.recording.axes import Label, Panel
 from inspector.recording.gaps import log_gaps
 from inspector.report.markdown import brief, classes_of, finding_of, spoken
-from models import Event, Labels
+from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 
 Lane: TypeAlias = Sequence[tuple[float, float, str]]

@@ -17,7 +17,7 @@ from inspector.library import Library
 from inspector.logs.opening import open_run
 from inspector.pair.alignment import envelope
 from inspector.regression.levels import STEP, Levels, levels
-from models import Event
+from noiseclassifier import Event
 from noisemodel import Run
 from noisemodel.links import LinkNoise, vibrating
 from noisemodel.noise import decibel

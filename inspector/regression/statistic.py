@@ -27,7 +27,7 @@ from typing import Any
 
 import numpy as np
 
-from models.types import Index
+from noiseclassifier.types import Index
 from noisemodel.types import Array
 
 ALPHA = 0.004

@@ -14,8 +14,8 @@ from inspector.report import cases
 from inspector.report.cases import Case, Job, Outcome
 from inspector.text import counted
 from inspector.version import program_version
-from models import Event
-from models.labels import interval
+from noiseclassifier import Event
+from noiseclassifier.labels import interval
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation

@@ -5,8 +5,8 @@ from inspector.localisation.links import fault_links
 from inspector.localisation.localise import has_stages
 from inspector.report.localisation import words
 from inspector.text import counted
-from models import UNKNOWN, Event
-from models.labels import interval
+from noiseclassifier import UNKNOWN, Event
+from noiseclassifier.labels import interval
 from noisemodel import Block
 
 LOCALISATION = ("shows first in", "by joints", "band", "links, shares of the excess")

@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.library import load_library
 from inspector.logs.opening import Reading
 from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
 from inspector.training.recordings import Simulators
-from models.logbands import HIGHEST
-from models.novelty.faults import Recall, recall
+from noiseclassifier.logbands import HIGHEST
+from noiseclassifier.novelty.faults import Recall, recall
 from noisemodel.atomic import refuse_existing
 
 ITSELF = (
@@ -32,7 +32,7 @@ class Adapted:
             if the runs have no joints.
     """
 
-    learnt: models.Learnt
+    learnt: nc.Learnt
     recall: Recall | None
 
     def __str__(self) -> str:
@@ -79,9 +79,7 @@ def adapt(
     refuse_existing(output, overwrite=overwrite)
     name, general = _general(model)
 
-    def read(
-        task: str, remark: Callable[[str], None] = without_remarks
-    ) -> Iterator[models.Recording]:
+    def read(task: str, remark: Callable[[str], None] = without_remarks) -> Iterator[nc.Recording]:
         what, highest = "an adapted model", HIGHEST
         return good_runs(
             inputs,
@@ -96,24 +94,24 @@ def adapt(
 
     found = read("read", remark)
     first, simulators = next(found), Simulators()
-    bound = general.at(first.rate, models.signals.named(first.signal))
+    bound = general.at(first.rate, nc.signals.named(first.signal))
     try:
-        good = models.GoodMotion.read(simulators.noting(chain([first], found)), bound.profile)
-    except models.RecordingError as error:
+        good = nc.GoodMotion.read(simulators.noting(chain([first], found)), bound.profile)
+    except nc.RecordingError as error:
         hint = f"; {first.name} has it: give runs of the same signals"
         raise InspectorError(f"{error}{hint if 'no signal' in str(error) else ''}") from error
-    learnt = models.adapt(bound, good, alarms=alarms)
+    learnt = nc.adapt(bound, good, alarms=alarms)
     learnt = replace(learnt, classifier=simulators.signed(learnt.classifier))
     measured = recall({name: bound, "adapted": learnt.classifier}, read("put faults into"), good)
     learnt.classifier.save(output, overwrite=overwrite)
     return Adapted(learnt, measured)
 
 
-def _general(chosen: Path | None) -> tuple[str, models.General]:
+def _general(chosen: Path | None) -> tuple[str, nc.General]:
     """The general model of a file, or that which ships, with its name."""
     library = load_library([chosen] if chosen else [])
     for name, model in library.items():
-        if isinstance(model, models.General):
+        if isinstance(model, nc.General):
             return name, model
     raise InspectorError(
         f"{', '.join(library)}: of one rate, but only a general model can be adapted"

@@ -5,16 +5,16 @@ from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError, OptionError
 from inspector.logs.opening import Reading
 from inspector.training.goodruns import good_runs, without_remarks
 from inspector.training.part import Part
 from inspector.training.recordings import Simulators
-from models.estimators.baseline import MOTION, NOISE_ALONE
+from noiseclassifier.estimators.baseline import MOTION, NOISE_ALONE
 from noisemodel.atomic import refuse_existing
 
-PROFILES: dict[str, models.LogBands] = {"general": MOTION, "scalar": NOISE_ALONE}
+PROFILES: dict[str, nc.LogBands] = {"general": MOTION, "scalar": NOISE_ALONE}
 """Profiles of baselines, by the names of the classifier profiles with the same signals."""
 
 
@@ -29,7 +29,7 @@ def train(
     overwrite: bool = False,
     reading: Reading | None = None,
     remark: Callable[[str], None] = without_remarks,
-) -> models.Learnt:
+) -> nc.Learnt:
     """Train a baseline and write it.
 
     Args:
@@ -58,15 +58,15 @@ def train(
     refuse_existing(output, overwrite=overwrite)
     found = good_runs(inputs, "a baseline", rate=rate, part=part, reading=reading, remark=remark)
     first, simulators = next(found), Simulators()
-    there = models.signals.named(first.signal)
+    there = nc.signals.named(first.signal)
     richest = profile or ("general" if {*MOTION.signals} <= {*there} else "scalar")
     chosen = PROFILES[richest].at(first.rate)
     try:
-        good = models.GoodMotion.read(simulators.noting(chain([first], found)), chosen)
-    except models.RecordingError as error:
+        good = nc.GoodMotion.read(simulators.noting(chain([first], found)), chosen)
+    except nc.RecordingError as error:
         hint = "; --profile scalar takes the noise alone" if "no signal" in str(error) else ""
         raise InspectorError(f"{error}{hint}") from error
-    learnt = models.learn_baseline(good, chosen, alarms=alarms)
+    learnt = nc.learn_baseline(good, chosen, alarms=alarms)
     baseline = replace(learnt, classifier=simulators.signed(learnt.classifier))
     baseline.classifier.save(output, overwrite=overwrite)
     return baseline

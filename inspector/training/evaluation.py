@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.analyse import extents
 from inspector.colors import SERIES, Color, of_classes
@@ -17,15 +17,15 @@ from inspector.progress import progress
 from inspector.text import counted
 from inspector.training.part import Part
 from inspector.training.recordings import classified, count
-from models import Assessment
+from noiseclassifier import Assessment
 from noisemodel.atomic import refuse_existing, replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from models.evaluation.intervals import Estimate
+    from noiseclassifier.evaluation.intervals import Estimate
 
-Located = tuple[tuple[models.Event, ...], tuple[models.Event, ...]]
+Located = tuple[tuple[nc.Event, ...], tuple[nc.Event, ...]]
 """Findings by their frames, and from onset to end."""
 
 
@@ -48,20 +48,20 @@ def evaluate(
     Raises:
         SeenError: If it was trained on a run, unless ``seen_too``.
     """
-    classifier = models.load(model)
-    rate = None if isinstance(classifier, models.General) else classifier.rate
+    classifier = nc.load(model)
+    rate = None if isinstance(classifier, nc.General) else classifier.rate
     source: dict[str, nm.Run | None] = {}
 
-    def read() -> Iterator[models.Recording | models.Unanswered]:
+    def read() -> Iterator[nc.Recording | nc.Unanswered]:
         for recording, run in classified(inputs, rate, part):
             source.clear()  # one run at a time stays in memory
             source[recording.name] = run
             yield recording
 
-    def localise(recording: models.Recording, labels: models.Labels) -> Located:
+    def localise(recording: nc.Recording, labels: nc.Labels) -> Located:
         return extents(source[recording.name] or _run(recording), labels)
 
-    return models.assess(
+    return nc.assess(
         classifier,
         progress(read(), "evaluate", total=count(inputs)),
         seen_too=seen_too,
@@ -69,15 +69,15 @@ def evaluate(
     )
 
 
-def _run(recording: models.Recording) -> nm.Run:
+def _run(recording: nc.Recording) -> nm.Run:
     """A run of what a sample keeps: its joints, or its noise as the motion of one joint."""
-    signals = models.signals.named(recording.signal)
+    signals = nc.signals.named(recording.signal)
     desired = None
     if "measured_joints" in signals:
         velocity = signals["measured_joints"].T
         desired = signals["desired_joints"].T if "desired_joints" in signals else None
     else:
-        velocity = models.signals.stacked(recording.signal, (models.NOISE,))[:, None]
+        velocity = nc.signals.stacked(recording.signal, (nc.NOISE,))[:, None]
     return nm.Run(
         time=recording.time,
         velocity=velocity,

@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
-import models
+import noiseclassifier as nc
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.logs.opening import Reading, open_source, sources
@@ -15,8 +15,8 @@ from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import in_part, of_run, of_sample
 from inspector.wrongrobot import check_joints, limit_warnings
-from scenarios.sample import Sample, is_sample
-from scenarios.signals import WHOLE
+from noiseclassifier.scenarios.sample import Sample, is_sample
+from noiseclassifier.scenarios.signals import WHOLE
 
 
 class Source(NamedTuple):
@@ -46,7 +46,7 @@ def good_runs(
     task: str = "read",
     reading: Reading | None = None,
     remark: Callable[[str], None] = without_remarks,
-) -> Iterator[models.Recording]:
+) -> Iterator[nc.Recording]:
     """Recordings of good runs of one nominal rate and robot, as `inspector classify` takes them.
 
     Args:
@@ -93,10 +93,10 @@ def _read(
     highest: float,
     reading: Reading | None,
     remark: Callable[[str], None],
-) -> Iterator[tuple[Source, models.Recording]]:
+) -> Iterator[tuple[Source, nc.Recording]]:
     path = file.path
     if _is_noisytest(path):
-        for each in models.noisytest.read_folder(path, rate=rate):
+        for each in nc.noisytest.read_folder(path, rate=rate):
             yield Source(path / each.name, each.rate), each
     elif path.suffix == ".npz" and is_sample(path):
         own = Sample.load(path, only=WHOLE)
@@ -117,7 +117,7 @@ def _read(
 
 def _check(source: Source, first: Source, what: str) -> None:
     """Refuse a recording of another rate or robot than the first."""
-    if abs(source.rate / first.rate - 1) > models.profile.NOMINAL:
+    if abs(source.rate / first.rate - 1) > nc.profile.NOMINAL:
         lower = min(source.rate, first.rate)
         raise InspectorError(
             f"{source.path}: recorded at {source.rate:g} Hz, {first.path} at {first.rate:g} Hz;"
@@ -136,6 +136,6 @@ def _check(source: Source, first: Source, what: str) -> None:
         )
 
 
-def _signals(recording: models.Recording) -> dict[str, models.types.Real]:
+def _signals(recording: nc.Recording) -> dict[str, nc.types.Real]:
     """Signals by name, without the error if the desired motion is the measured one."""
-    return models.signals.without_zero_error(models.signals.named(recording.signal))
+    return nc.signals.without_zero_error(nc.signals.named(recording.signal))

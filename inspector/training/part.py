@@ -4,7 +4,7 @@ from enum import StrEnum
 
 
 class Part(StrEnum):
-    """A part of a data set; a hash decides what is in `test`, see ``models.held_out``."""
+    """A part of a data set; a hash decides what is in `test`, see ``noiseclassifier.held_out``."""
 
     ALL = "all"
     TRAINING = "training"
@@ -14,7 +14,7 @@ class Part(StrEnum):
         """Whether a recording belongs to this part.
 
         Args:
-            held_out: Result of ``models.held_out`` for its group.
+            held_out: Result of ``noiseclassifier.held_out`` for its group.
         """
         return self is Part.ALL or held_out == (self is Part.TEST)
 

@@ -6,17 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-import models
+import noiseclassifier as nc
 import noisemodel as nm
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
 from inspector.training.part import Part
 from inspector.wrongrobot import check_joints
-from models.logbands import HIGHEST, LOWEST
-from models.profile import NOMINAL
-from scenarios.sample import DECIMATED, Sample, is_sample
-from scenarios.signals import WHOLE
+from noiseclassifier.logbands import HIGHEST, LOWEST
+from noiseclassifier.profile import NOMINAL
+from noiseclassifier.scenarios.sample import DECIMATED, Sample, is_sample
+from noiseclassifier.scenarios.signals import WHOLE
 
 SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}
 """Software whose versions in the ``meta`` of a run go into the manifest of a model."""
@@ -24,7 +24,7 @@ SLOWER = 1e-3
 """Relative difference below which the rate of a sample is not lower."""
 
 
-Model = TypeVar("Model", models.Classifier, models.General)
+Model = TypeVar("Model", nc.Classifier, nc.General)
 
 
 class SlowRunError(InspectorError):
@@ -42,13 +42,13 @@ class SlowRunError(InspectorError):
         super().__init__(f"{path}: recorded at {own:g} Hz, the model needs {wanted:g} Hz")
 
 
-Read = tuple[models.Recording | models.Unanswered, nm.Run | None]
+Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
 """A recording, and the run file that it is of."""
 
 
 def recordings(
     inputs: Sequence[Path], rate: float, part: Part = Part.ALL
-) -> Iterator[models.Recording]:
+) -> Iterator[nc.Recording]:
     """Annotated noise of runs, samples and NoisyTest folders.
 
     Args:
@@ -65,9 +65,9 @@ def recordings(
             yield recording
 
 
-def in_part(recording: models.Recording | models.Unanswered, part: Part) -> bool:
+def in_part(recording: nc.Recording | nc.Unanswered, part: Part) -> bool:
     """Whether a recording belongs to a part of a data set."""
-    return part.has(held_out=models.held_out(models.group_of(recording.name)))
+    return part.has(held_out=nc.held_out(nc.group_of(recording.name)))
 
 
 def classified(
@@ -101,12 +101,12 @@ def classified(
             yield recording, run
 
 
-def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[models.Recording]:
+def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[nc.Recording]:
     def read(path: Path) -> Read:
         return of_sample(path, rate) if is_sample(path) else of_annotated_run(path, rate), None
 
     for recording, _ in _read(inputs, read, rate):
-        if isinstance(recording, models.Recording):
+        if isinstance(recording, nc.Recording):
             yield recording
 
 
@@ -116,7 +116,7 @@ def _read(
     taken: set[str] = set()
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
-            for each in models.noisytest.read_folder(path, rate=rate):
+            for each in nc.noisytest.read_folder(path, rate=rate):
                 yield _apart(each, path / each.name, taken), None
             continue
         for file in sorted(path.rglob("*.npz")) if path.is_dir() else [path]:
@@ -136,16 +136,16 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
             found = of_run(path, run if slower.rate < rate * (1 - NOMINAL) else slower, rate)
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {error.wanted:g} Hz"
-        return models.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
+        return nc.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
     if not (found.blocks or found.events or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
-    signals = models.signals.without_zero_error(models.signals.named(found.signal))
+    signals = nc.signals.without_zero_error(nc.signals.named(found.signal))
     return replace(found, signal=signals), run
 
 
 def _apart(
-    one: models.Recording | models.Unanswered, path: Path, taken: set[str]
-) -> models.Recording | models.Unanswered:
+    one: nc.Recording | nc.Unanswered, path: Path, taken: set[str]
+) -> nc.Recording | nc.Unanswered:
     """Name a recording apart from others of its name, by as much of its folder as it takes.
 
     A sample keeps its robot, scenario and seed, which tell the group.
@@ -162,7 +162,7 @@ def _apart(
     return one if name == one.name else replace(one, name=name)
 
 
-def of_annotated_run(path: Path, rate: float) -> models.Recording:
+def of_annotated_run(path: Path, rate: float) -> nc.Recording:
     """Annotated noise of a run file.
 
     Args:
@@ -182,7 +182,7 @@ def of_annotated_run(path: Path, rate: float) -> models.Recording:
     return found
 
 
-def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> models.Recording:
+def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> nc.Recording:
     """Noise of a run, annotated or not.
 
     Args:
@@ -206,11 +206,11 @@ def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> models.
         raise SlowRunError(path, run.rate, rate, known)
     rate = min(rate, run.rate)
     decimated = nm.decimated(run, rate)
-    return models.Recording(
+    return nc.Recording(
         name=_name(path, run.robot),
         signal={**nm.norms(decimated), **nm.by_joint(decimated)},
         rate=rate,
-        blocks=tuple(models.Block(b.start, b.stop, b.label) for b in decimated.blocks),
+        blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in decimated.blocks),
         start=float(decimated.time[0]),
         valid=decimated.mask,
         sha256=sha256 or hashlib.sha256(path.read_bytes()).hexdigest(),
@@ -219,7 +219,7 @@ def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> models.
     )
 
 
-def of_sample(path: Path, rate: float) -> models.Recording:
+def of_sample(path: Path, rate: float) -> nc.Recording:
     """Annotated noise of a sample.
 
     Args:
@@ -240,11 +240,11 @@ def of_sample(path: Path, rate: float) -> models.Recording:
     if sample.rate < rate * (1 - SLOWER):
         raise SlowRunError(path, sample.rate, rate, known)
     sample = sample.at(rate)
-    return models.Recording(
+    return nc.Recording(
         name=sample.name,
         signal={**{name: sample.signals[name] for name in WHOLE}, **sample.joints},
         rate=rate,
-        blocks=tuple(models.Block(b.start, b.stop, b.label) for b in sample.blocks),
+        blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in sample.blocks),
         sha256=str(sample.meta["sha256"]),
         events=faults(path, sample.meta, sample.blocks),
         facts=known,
@@ -286,7 +286,7 @@ class Simulators:
     def __init__(self) -> None:
         self.versions: dict[str, set[str]] = {}
 
-    def noting(self, found: Iterable[models.Recording]) -> Iterator[models.Recording]:
+    def noting(self, found: Iterable[nc.Recording]) -> Iterator[nc.Recording]:
         """Recordings as they are, once their software is noted."""
         for each in found:
             for name in SIMULATORS & each.facts.keys():
@@ -300,9 +300,7 @@ class Simulators:
         return replace(model, versions={**model.versions, **said})
 
 
-def faults(
-    path: Path, meta: Mapping[str, Any], blocks: Sequence[nm.Block]
-) -> tuple[models.Fault, ...]:
+def faults(path: Path, meta: Mapping[str, Any], blocks: Sequence[nm.Block]) -> tuple[nc.Fault, ...]:
     """All faults that were injected into a run, as the events of its meta have them.
 
     Args:
@@ -327,7 +325,7 @@ def faults(
             raise InspectorError(
                 f"{path}: an event of its meta lacks label, start or stop as numbers in s"
             ) from error
-        found.append(models.Fault(start, stop, label, felt))
+        found.append(nc.Fault(start, stop, label, felt))
     return tuple(found)
 
 

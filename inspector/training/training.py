@@ -4,12 +4,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError, OptionError
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import Simulators, classified, count, samples
-from models.logbands import HIGHEST, LOWEST
+from noiseclassifier.logbands import HIGHEST, LOWEST
 from noisemodel.atomic import refuse_existing
 
 ANY_RATE = "general"
@@ -19,15 +19,15 @@ RATE = 10_000.0
 THIN = 8
 """A general model learns from every so many `ok` frames of a log."""
 
-PROFILES: dict[str, Callable[[float], models.Profile]] = {
-    "joints": lambda rate: models.EACH.at(rate),
-    "norms": lambda rate: models.GENERAL.at(rate),
-    "scalar": lambda rate: models.SCALAR.at(rate),
-    "logbands": lambda rate: models.LogBands().at(rate),
-    "noisytest-rbf": lambda _: models.Profile.noisytest("rbf"),
-    "noisytest-linear": lambda _: models.Profile.noisytest("linear"),
-    "paper-rbf": lambda _: models.Profile.paper("rbf"),
-    "paper-linear": lambda _: models.Profile.paper("linear"),
+PROFILES: dict[str, Callable[[float], nc.Profile]] = {
+    "joints": lambda rate: nc.EACH.at(rate),
+    "norms": lambda rate: nc.GENERAL.at(rate),
+    "scalar": lambda rate: nc.SCALAR.at(rate),
+    "logbands": lambda rate: nc.LogBands().at(rate),
+    "noisytest-rbf": lambda _: nc.Profile.noisytest("rbf"),
+    "noisytest-linear": lambda _: nc.Profile.noisytest("linear"),
+    "paper-rbf": lambda _: nc.Profile.paper("rbf"),
+    "paper-linear": lambda _: nc.Profile.paper("linear"),
 }
 """Profiles by name, at a rate in [Hz]."""
 
@@ -50,8 +50,8 @@ class LeftOut:
     runs: dict[str, list[str]] = field(default_factory=dict)
 
     def without(
-        self, found: Iterable[models.Recording | models.Unanswered], profile: models.Profile
-    ) -> Iterator[models.Recording]:
+        self, found: Iterable[nc.Recording | nc.Unanswered], profile: nc.Profile
+    ) -> Iterator[nc.Recording]:
         """Recordings that have all signals of a profile, at its rate; notes the others.
 
         Args:
@@ -61,7 +61,7 @@ class LeftOut:
         for each in found:
             if reason := lacking(each, profile):
                 self.runs.setdefault(reason, []).append(each.name)
-            elif isinstance(each, models.Recording):
+            elif isinstance(each, nc.Recording):
                 yield each
 
     def __str__(self) -> str:
@@ -82,7 +82,7 @@ class Trained:
         left_out: Runs that it was not trained on.
     """
 
-    evaluation: models.Evaluation
+    evaluation: nc.Evaluation
     left_out: LeftOut
 
     def __str__(self) -> str:
@@ -131,17 +131,17 @@ def train(
     read = progress(classified(inputs, rate, part, bare_too=True), "read", total=count(inputs))
     try:
         usable = left_out.without((recording for recording, _ in read), chosen)
-        examples = models.Examples.read(simulators.noting(usable), chosen)
-    except models.NoFrameError as error:
+        examples = nc.Examples.read(simulators.noting(usable), chosen)
+    except nc.NoFrameError as error:
         if error.count or not left_out.runs:
             raise
         scalar = set(LACKING.values()) & left_out.runs.keys()
         hint = "; --profile scalar takes the noise alone" if scalar else ""
         raise InspectorError(f"no run to train {profile} on; {left_out}{hint}") from error
-    classifier = simulators.signed(models.Classifier.train(examples, chosen))
+    classifier = simulators.signed(nc.Classifier.train(examples, chosen))
     classifier.save(output, overwrite=overwrite)
     predicted = classifier.predict_features(examples.features)
-    evaluation = models.Evaluation.of(examples.labels, predicted, classifier.classes)
+    evaluation = nc.Evaluation.of(examples.labels, predicted, classifier.classes)
     return Trained(evaluation, left_out)
 
 
@@ -149,22 +149,22 @@ def _train_general(inputs: Sequence[Path], output: Path, *, part: Part, overwrit
     """Train a general model and write it, see `train`."""
     refuse_existing(output, overwrite=overwrite)
     left_out, simulators = LeftOut(), Simulators()
-    slowest = models.ANY.bound(LOWEST, (models.NOISE,))
+    slowest = nc.ANY.bound(LOWEST, (nc.NOISE,))
     fast = list(samples(inputs))  # have noise of two rates
-    parts: list[models.Frames] = []
+    parts: list[nc.Frames] = []
     for paths, rate in ((inputs, None), (fast, HIGHEST)):
         read = progress(classified(paths, rate, part, bare_too=True), "read", total=count(paths))
         usable = left_out.without((recording for recording, _ in read), slowest)
-        parts += models.frames_of(simulators.noting(usable), models.ANY, thin=THIN)
+        parts += nc.frames_of(simulators.noting(usable), nc.ANY, thin=THIN)
     if not parts:
         raise InspectorError(f"no run to train {ANY_RATE} on; {left_out}")
-    frames = models.Frames.joined(parts)
-    model = simulators.signed(models.General.train(frames, models.ANY, thin=THIN))
+    frames = nc.Frames.joined(parts)
+    model = simulators.signed(nc.General.train(frames, nc.ANY, thin=THIN))
     model.save(output, overwrite=overwrite)
     return Trained(model.evaluate(frames), left_out)
 
 
-def profile_at(name: str, rate: float) -> models.Profile:
+def profile_at(name: str, rate: float) -> nc.Profile:
     """A profile by its name.
 
     Args:
@@ -185,14 +185,14 @@ def profile_at(name: str, rate: float) -> models.Profile:
     return found
 
 
-def lacking(each: models.Recording | models.Unanswered, profile: models.Profile) -> str:
+def lacking(each: nc.Recording | nc.Unanswered, profile: nc.Profile) -> str:
     """Why a profile cannot be trained on a run, in a few words; empty if it can."""
-    if isinstance(each, models.Unanswered):
+    if isinstance(each, nc.Unanswered):
         return f"below {profile.rate:g} Hz"
     if not each.blocks:
         return "without annotated blocks"
-    there = models.signals.named(each.signal)
-    if models.signals.feeds(there, profile.signals):
+    there = nc.signals.named(each.signal)
+    if nc.signals.feeds(there, profile.signals):
         return ""
     gone = [name for name in profile.signals if name not in there]
     return next((LACKING[name] for name in gone if name in LACKING), "without joints")

@@ -9,18 +9,18 @@ from math import isnan
 from pathlib import Path
 from typing import Any, NoReturn
 
-import models
+import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.part import Part
 from inspector.training.recordings import Simulators, recordings
 from inspector.training.training import profile_at
 from inspector.training.tuningfile import opened
-from models.modelfile import versions
-from models.splitting import check_apart, folds, group_of
-from models.tuning.grid import ESTIMATOR_SETTINGS, Grid, Point
-from models.tuning.search import Criterion, Measures, Validation, measure, order, validate
-from models.tuning.trial import Trial
+from noiseclassifier.modelfile import versions
+from noiseclassifier.splitting import check_apart, folds, group_of
+from noiseclassifier.tuning.grid import ESTIMATOR_SETTINGS, Grid, Point
+from noiseclassifier.tuning.search import Criterion, Measures, Validation, measure, order, validate
+from noiseclassifier.tuning.trial import Trial
 from noisemodel.atomic import refuse_existing
 from noisemodel.parallel import DIED, Jobs, in_order
 
@@ -81,9 +81,9 @@ class Tuned:
 
     search: Search
     grid: Grid
-    profiles: Sequence[models.Profile]
+    profiles: Sequence[nc.Profile]
     measures: Sequence[Measures]
-    untuned: models.Profile
+    untuned: nc.Profile
     reference: Validation
     trial: Trial
 
@@ -106,9 +106,9 @@ class Tuned:
         best = self.profiles[self.ranked(criterion)[0]]
         learn, check = self._recordings()
         simulators = Simulators()
-        examples = models.Examples.read(simulators.noting(learn), best)
-        validation = models.Dataset.of(check, best, training=False) if check else None
-        trained = models.Classifier.train(examples, best, validation=validation)
+        examples = nc.Examples.read(simulators.noting(learn), best)
+        validation = nc.Dataset.of(check, best, training=False) if check else None
+        trained = nc.Classifier.train(examples, best, validation=validation)
         classifier = simulators.signed(trained)
         classifier.save(output, overwrite=overwrite)
 
@@ -200,7 +200,7 @@ class Tuned:
         best = min if name in ("log_loss", "false_alarm_rate") else max
         return values.count(best(values)) if values else 0
 
-    def _recordings(self) -> tuple[list[models.Recording], list[models.Recording]]:
+    def _recordings(self) -> tuple[list[nc.Recording], list[nc.Recording]]:
         """Recordings of the training set, and of the validation set."""
         if not self.search.validation:
             return list(self.trial.recordings), []
@@ -260,7 +260,7 @@ def tune(
     return Tuned(search, grid, profiles, results.measures, base, reference, trial)
 
 
-def _read(search: Search, paths: Sequence[Path]) -> list[models.Recording]:
+def _read(search: Search, paths: Sequence[Path]) -> list[nc.Recording]:
     found = list(recordings(paths, search.rate, search.part))
     if paths and not found:
         names = ", ".join(map(str, paths))
@@ -269,7 +269,7 @@ def _read(search: Search, paths: Sequence[Path]) -> list[models.Recording]:
 
 
 def _trial(
-    training: Sequence[models.Recording], validation: Sequence[models.Recording], count: int
+    training: Sequence[nc.Recording], validation: Sequence[nc.Recording], count: int
 ) -> Trial:
     if not validation:
         return Trial(training, folds([group_of(recording.name) for recording in training], count))
@@ -280,17 +280,17 @@ def _trial(
     return Trial.against(training, validation)
 
 
-def _validation_name(recording: models.Recording) -> str:
+def _validation_name(recording: nc.Recording) -> str:
     """A name that is not in the training set: both folders of NoisyTest have the same names."""
     name = recording.name
     return f"{name} of the validation set" if group_of(name) == name else name
 
 
 def _batches(
-    points: Sequence[Point], profiles: Sequence[models.Profile], least: int
-) -> list[list[models.Profile]]:
+    points: Sequence[Point], profiles: Sequence[nc.Profile], least: int
+) -> list[list[nc.Profile]]:
     """Points in groups that share their features, or their kernel matrix if those are too few."""
-    found: list[list[models.Profile]] = []
+    found: list[list[nc.Profile]] = []
     for fast in (ESTIMATOR_SETTINGS, ("regularization",)):
         keys = [tuple(v for name, v in point.items() if name not in fast) for point in points]
         pairs = groupby(zip(keys, profiles, strict=True), key=lambda pair: pair[0])
@@ -300,13 +300,13 @@ def _batches(
     return found
 
 
-def _died(batch: Sequence[models.Profile], names: Sequence[str]) -> NoReturn:
+def _died(batch: Sequence[nc.Profile], names: Sequence[str]) -> NoReturn:
     first = ", ".join(f"{name}={getattr(batch[0], name)}" for name in names)
     others = f" and {len(batch) - 1} more" if len(batch) > 1 else ""
     raise InspectorError(f"{first}{others}: {DIED}; the same command resumes there")
 
 
-def _digests(found: Sequence[models.Recording]) -> Mapping[str, Any]:
+def _digests(found: Sequence[nc.Recording]) -> Mapping[str, Any]:
     """SHA-256 of each recording with its annotations, by name."""
     return {
         each.name: hashlib.sha256(f"{each.sha256} {each.start} {each.blocks}".encode()).hexdigest()

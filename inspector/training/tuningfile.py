@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import IO, Any
 
 from inspector.errors import FileError, InspectorError
-from models.jsontext import from_json
-from models.tuning.grid import Point
-from models.tuning.search import Measures
+from noiseclassifier.jsontext import from_json
+from noiseclassifier.tuning.grid import Point
+from noiseclassifier.tuning.search import Measures
 
 FORMAT = "noise-tuning/1"
 

@@ -1,0 +1,158 @@
+"""Fuzz the readers with atheris, which needs the extra `fuzz`.
+
+    python -m benchmarks.fuzz.run "live rows, JSON" "expect.toml" --seconds 15
+    python -m benchmarks.fuzz.run --group text --seconds 600 --found found/
+
+The corpus begins with a whole file of each reader and with damaged ones. An error that is not
+expected is kept by its place, and fuzzing goes on; the exit status is 1 if there is one.
+"""
+
+import argparse
+import os
+import shutil
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+from random import Random
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import atheris
+
+with atheris.instrument_imports(include=["inspector", "noiseclassifier", "noisemodel"]):
+    from benchmarks.fuzz.damage import damaged
+    from benchmarks.fuzz.readers import EXPECTED, READERS
+
+GROUPS = {
+    "labels": tuple(name for name in READERS if name.startswith(("labels", "NoisyTest", "simul"))),
+    "settings": ("mapping", "expect.toml", "resume state", "tune state", "dataset.json"),
+    "rows": ("live rows, CSV", "live rows, JSON"),
+    "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
+    "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy", "sample"),
+    "models": ("model, small", "baseline"),
+    "bags": tuple(name for name in READERS if name.startswith(("MCAP", "ROS"))),
+    "robots": ("URDF", "MJCF", "STL", "STL, text", "OBJ", "DAE"),
+}
+"""Readers that are fuzzed together; each input goes to one of them."""
+
+SEEDS = 30
+"""Damaged files of each reader to begin with."""
+
+SHORT, LONGEST = 1000, 20_000
+"""Bytes that a whole text is cut to, and that an input has at most: short ones are read faster."""
+
+
+def main() -> None:
+    """Fuzz, print executions and places found by reader."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("readers", nargs="*", metavar="READER", help=", ".join(READERS))
+    parser.add_argument("--group", choices=GROUPS)
+    parser.add_argument("--seconds", type=int, default=15)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument(
+        "--found", type=Path, help="folder for inputs that raise what is not expected"
+    )
+    options = parser.parse_args()
+    names = tuple(options.readers) + GROUPS.get(options.group, ())
+    if not names or set(names) - set(READERS):
+        parser.error(f"name some of {', '.join(READERS)}, or a --group")
+    with tempfile.TemporaryDirectory(
+        dir="/dev/shm" if Path("/dev/shm").is_dir() else None
+    ) as folder:
+        fuzz(names, Path(folder), options.seconds, options.seed, options.found)
+
+
+def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: Path | None) -> None:
+    """Fuzz some readers; ends the process.
+
+    Args:
+        names: The readers; the first byte of an input chooses one.
+        folder: A folder for their files and the corpus.
+        seconds: How long, in [s].
+        seed: Of the mutations.
+        found: Folder for inputs that raise what is not expected.
+    """
+    corpus, paths = folder / "corpus", []
+    corpus.mkdir()
+    if found:
+        found.mkdir(parents=True, exist_ok=True)
+    for place, name in enumerate(names):
+        home = folder / str(place)
+        home.mkdir()
+        paths.append(READERS[name].make(home))
+        whole = paths[-1].read_bytes()
+        READERS[name].read(paths[-1])
+        if READERS[name].kind == "text":
+            whole = whole[:SHORT].rpartition(b"\n")[0] if len(whole) > SHORT else whole
+        (corpus / f"{place}").write_bytes(bytes((place,)) + whole)
+        for number in range(SEEDS):
+            data = damaged(whole, READERS[name].kind, Random(f"{name} {number}"))
+            if len(data) < LONGEST:
+                (corpus / f"{place}-{number}").write_bytes(bytes((place,)) + data)
+    one = target(names, paths, time.monotonic() + seconds, found, folder)
+    atheris.Setup(
+        [
+            *("fuzz", str(corpus), f"-seed={seed}", "-verbosity=0", "-rss_limit_mb=2048"),
+            *("-timeout=20", f"-max_len={LONGEST}", "-len_control=0", "-print_final_stats=0"),
+            f"-artifact_prefix={found or folder}/",
+        ],
+        one,
+    )
+    atheris.Fuzz()
+
+
+def target(
+    names: tuple[str, ...], paths: list[Path], until: float, found: Path | None, folder: Path
+) -> Callable[[bytes], None]:
+    """A function that gives an input to one of the readers, and notes what it raises.
+
+    Args:
+        names: The readers.
+        paths: Where each has its file.
+        until: When to print what was found and to end the process, by the monotonic clock.
+        found: Folder for inputs that raise what is not expected.
+        folder: Deleted at the end.
+    """
+    counts, places = Counter[str](), dict[str, str]()
+
+    def one(data: bytes) -> None:
+        if time.monotonic() > until:
+            for name in names:
+                print(f"{name}: {counts[name]} executions")
+            for where, text in places.items():
+                print(f"FOUND {where}: {text}")
+            sys.stdout.flush()
+            shutil.rmtree(folder, ignore_errors=True)
+            os._exit(bool(places))  # libFuzzer ends the process without unwinding it
+        place = data[0] % len(names) if data else 0
+        name, path = names[place], paths[place]
+        path.write_bytes(data[1:])
+        counts[name] += 1
+        try:
+            READERS[name].read(path)
+        except EXPECTED as error:
+            if "\n" not in str(error):
+                return
+            note(name, data, error, "more than one line: ")
+        except Exception as error:
+            note(name, data, error)
+
+    def note(name: str, data: bytes, error: Exception, more: str = "") -> None:
+        frames = traceback.extract_tb(error.__traceback__)
+        ours = [each for each in frames if "/site-packages/" not in each.filename]
+        where = f"{ours[-1].filename}:{ours[-1].lineno} {type(error).__name__}"
+        if where not in places:
+            places[where] = f"{name}: {more}{error!r}"[:300]
+            print(f"FOUND {where}: {places[where]}", file=sys.stderr, flush=True)
+            if found:
+                (found / f"{len(places)}-{type(error).__name__}").write_bytes(data)
+
+    return one
+
+
+if __name__ == "__main__":
+    main()

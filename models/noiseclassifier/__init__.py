@@ -1,0 +1,123 @@
+"""Classification of a robot's noise: from a signal to labels.
+
+    frames -> |STFT| -> bands -> log -> temporal pooling -> estimator -> class
+
+after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` holds
+all settings: NoisyTest's, the paper's, or ours for any rate (`LogBands`). A `Dataset` holds
+annotated frames, a `Classifier` is trained on them and labels signals, `evaluate` measures frames,
+and `assess` whole recordings. A `Stream` labels a signal sample by sample. `learn_baseline` takes
+good runs alone, and so does `adapt`, which adapts a general model to a robot.
+
+This package needs no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
+only to train.
+"""
+
+from noiseclassifier.choice import Model, load, nearest
+from noiseclassifier.classifier import Classifier
+from noiseclassifier.confusion import Evaluation
+from noiseclassifier.dataset import Dataset
+from noiseclassifier.errors import (
+    AnnotationError,
+    DataFileError,
+    DatasetError,
+    FileError,
+    MissingSignalError,
+    ModelFileError,
+    ModelsError,
+    NoFrameError,
+    OutputError,
+    ProfileError,
+    RateError,
+    RecordingError,
+    SeenError,
+    SignalError,
+    UnknownLabelError,
+)
+from noiseclassifier.evaluation.assessment import Assessment, assess
+from noiseclassifier.evaluation.framescore import evaluate
+from noiseclassifier.evaluation.predictions import Unanswered
+from noiseclassifier.examples import Examples
+from noiseclassifier.features import features
+from noiseclassifier.framing import frame
+from noiseclassifier.general import Frames, General, frames_of
+from noiseclassifier.labels import ANOMALY, UNKNOWN, Event, Labels
+from noiseclassifier.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
+from noiseclassifier.logfile import nominal_rate, read_log
+from noiseclassifier.novelty.adaptation import adapt
+from noiseclassifier.novelty.frames import GoodMotion
+from noiseclassifier.novelty.limit import Limit
+from noiseclassifier.novelty.training import Learnt, learn_baseline
+from noiseclassifier.profile import CLASSES, Profile
+from noiseclassifier.recording import Block, Fault, Recording
+from noiseclassifier.signals import NOISE, Signals
+from noiseclassifier.splitting import check_apart, folds, group_of, held_out, leave_one_out
+from noiseclassifier.stream import Stream
+
+__all__ = [
+    "ANOMALY",
+    "ANY",
+    "CLASSES",
+    "EACH",
+    "GENERAL",
+    "NOISE",
+    "SCALAR",
+    "UNKNOWN",
+    "AnnotationError",
+    "Assessment",
+    "Block",
+    "Classifier",
+    "DataFileError",
+    "Dataset",
+    "DatasetError",
+    "Evaluation",
+    "Event",
+    "Examples",
+    "Fault",
+    "FileError",
+    "Frames",
+    "General",
+    "GoodMotion",
+    "Labels",
+    "Learnt",
+    "Limit",
+    "LogBands",
+    "MissingSignalError",
+    "Model",
+    "ModelFileError",
+    "ModelsError",
+    "NoFrameError",
+    "OutputError",
+    "Profile",
+    "ProfileError",
+    "RateError",
+    "Recording",
+    "RecordingError",
+    "SeenError",
+    "SignalError",
+    "Signals",
+    "Stream",
+    "Unanswered",
+    "UnknownLabelError",
+    "adapt",
+    "assess",
+    "check_apart",
+    "evaluate",
+    "features",
+    "folds",
+    "frame",
+    "frames_of",
+    "group_of",
+    "held_out",
+    "learn_baseline",
+    "leave_one_out",
+    "load",
+    "nearest",
+    "noisytest",
+    "nominal_rate",
+    "read_log",
+]
+
+
+def __dir__() -> list[str]:
+    """The public names."""
+    return [*__all__]

@@ -1,0 +1,217 @@
+"""The data set: labelled frames of many recordings."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from types import MappingProxyType
+from typing import Self
+
+import numpy as np
+
+from noiseclassifier.errors import (
+    DatasetError,
+    NoFrameError,
+    RateError,
+    RecordingError,
+    UnknownLabelError,
+)
+from noiseclassifier.framing import frame, pad_end
+from noiseclassifier.noisytest import read_folder
+from noiseclassifier.profile import NOMINAL, Profile
+from noiseclassifier.recording import Block, Recording
+from noiseclassifier.signals import stacked
+from noiseclassifier.types import Mask, Real, Words
+
+
+@dataclass(frozen=True, eq=False)
+class Dataset:
+    """Labelled frames; recordings and their blocks keep their order.
+
+    Attributes:
+        frames: Stretches of noise signal, shape (frames, length), or (frames, signals, length)
+            if the profile has several.
+        labels: Class of each frame, shape (frames,).
+        runs: Name of the recording that each frame is from, shape (frames,).
+        hashes: SHA-256 of each recording, by name.
+    """
+
+    frames: Real
+    labels: Words
+    runs: Words
+    hashes: Mapping[str, str]
+
+    @classmethod
+    def of(
+        cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
+    ) -> Self:
+        """Frame the annotated blocks of recordings.
+
+        Args:
+            recordings: Annotated signals at the profile's rate, each of another name.
+            profile: How blocks are cut and framed, and which labels there are.
+            training: Whether the frames are for training; see `cut`.
+
+        Returns:
+            All frames without an invalid sample.
+
+        Raises:
+            RateError: If a recording has another rate than the profile.
+            UnknownLabelError: If a label is no class of the profile.
+            RecordingError: If a block cannot be cut.
+            NoFrameError: If there is no frame at all.
+            DatasetError: If a name repeats.
+        """
+        frames, labels, runs = [], [], []
+        hashes: dict[str, str] = {}
+        for recording in recordings:
+            _check(recording, profile, hashes)
+            hashes[recording.name] = recording.sha256
+            for block in recording.blocks:
+                signal, valid = cut(recording, block, profile, training=training)
+                whole = frame(valid, length=profile.length, hop=profile.hop).all(axis=1)
+                frames.append(frame(signal, length=profile.length, hop=profile.hop)[whole])
+                labels += [block.label] * len(frames[-1])
+                runs += [recording.name] * len(frames[-1])
+        if not labels:
+            raise NoFrameError(len(hashes), profile.classes)
+        return cls(
+            np.concatenate(frames),
+            np.array(labels),
+            np.array(runs),
+            MappingProxyType(hashes),
+        )
+
+    @classmethod
+    def read(cls, folder: str | Path, profile: Profile, *, training: bool = True) -> Self:
+        """Read and frame a folder of NoisyTest's ``.log`` and ``.toml`` files, in sorted order.
+
+        Args:
+            folder: Folder that holds a ``.toml`` beside each ``.log``.
+            profile: How blocks are cut and framed, and which labels there are.
+            training: Whether the frames are for training; see `cut`.
+
+        Returns:
+            All annotated frames.
+
+        Raises:
+            DataFileError: If a file is missing or cannot be understood.
+            ModelsError: As `of` does.
+        """
+        return cls.of(read_folder(folder, rate=profile.rate), profile, training=training)
+
+    def __len__(self) -> int:
+        return len(self.labels)
+
+
+def _check(recording: Recording, profile: Profile, hashes: Mapping[str, str]) -> None:
+    if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
+        raise RateError(
+            recording.rate,
+            [profile.rate],
+            f"recording {recording.name!r} does not fit; lower its rate, or take another profile",
+        )
+    for block in recording.blocks:
+        if block.label not in profile.classes:
+            raise UnknownLabelError(recording.name, block.label, profile.classes)
+    if recording.name in hashes:
+        raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
+
+
+def cut(
+    recording: Recording, block: Block, profile: Profile, *, training: bool
+) -> tuple[Real, Mask]:
+    """Samples of a block of a recording, one frame of them or more.
+
+    A block shorter than a frame is padded in training, lest a frame mixes failures that follow
+    each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
+    for widened ones in training too, and for failures in every place of a frame.
+
+    Args:
+        recording: Where the block lies.
+        block: One annotated stretch of it.
+        profile: How long a frame is, and how blocks are cut.
+        training: Whether the frames are for training.
+
+    Returns:
+        Samples, shape (samples,), or (signals, samples) if the profile has several, and
+        which of them are valid, shape (samples,); padding counts as valid.
+
+    Raises:
+        SignalError: If the recording lacks a signal.
+        RecordingError: If the block holds no sample, or the recording is shorter than a frame that
+            a block is widened to.
+    """
+    lost = int(profile.drop_first_sample)
+    precision = np.float32 if profile.single_precision else np.float64
+    time: Real = recording.time[lost:].astype(precision)
+    pad = training and profile.pad_short
+    spread = training and profile.spread_failures and block.label != profile.classes[0]
+    start, stop = _bounds(
+        time, _spread(block, time, profile) if spread else block, profile, pad=pad
+    )
+    samples = _samples(time, start, stop, profile)
+    whole = stacked(recording.signal, profile.signals)
+    signal: Real = whole[..., lost:][..., samples].astype(precision)
+    count = signal.shape[-1]
+    if not count:
+        raise RecordingError(
+            recording.name,
+            f"block {block.label!r} from {block.start:g} s to {block.stop:g} s holds no sample",
+        )
+    if count < profile.length and not (pad or profile.pad_widened):
+        raise RecordingError(
+            recording.name, f"{len(time)} samples are too short: one frame takes {profile.length}"
+        )
+    padding = max(profile.length - count, 0)
+    valid = np.ones(len(time), bool) if recording.valid is None else recording.valid[lost:]
+    return (
+        pad_end(signal, length=profile.length),
+        np.pad(valid[samples], (0, padding), constant_values=True),
+    )
+
+
+def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[float, float]:
+    """Start and stop of the samples, in NoisyTest's order of operations, for equal rounding.
+
+    Args:
+        time: Times of the recording's samples, shape (samples,), in [s].
+        block: The annotated block.
+        profile: How long a frame is.
+        pad: Whether a short block keeps its bounds, to be padded.
+
+    Returns:
+        Start and stop, in [s].
+    """
+    start, stop = block.start, block.stop
+    if stop == inf and len(time):
+        stop = time[-1] + profile.open_end / profile.rate
+    if pad or stop - start >= profile.duration:
+        return start, stop
+    start -= (profile.duration - (stop - start)) / 2.0
+    if not profile.pad_widened and len(time):
+        start = max(min(start, time[-1] + 1.0 / profile.rate - profile.duration), time[0])
+    return start, start + profile.duration + profile.widen_extra / profile.rate
+
+
+def _spread(block: Block, time: Real, profile: Profile) -> Block:
+    """A block widened to all frames that hold it whole, or that it fills by half or more.
+
+    In a signal, a failure enters a frame at its end and leaves at its start; an estimator that was
+    trained on failures in the middle alone confuses them there.
+    """
+    if not len(time):
+        return block
+    shared = min(block.stop - block.start, profile.duration / 2.0)
+    start = max(block.start + shared - profile.duration, float(time[0]))
+    stop = min(block.stop - shared + profile.duration, float(time[-1]) + 1.0 / profile.rate)
+    return Block(start, stop, block.label)
+
+
+def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
+    """Samples from a start to a stop, by their times or by their number."""
+    if profile.cut_by_time:
+        inside = np.flatnonzero((time >= start) & (time <= stop))
+        return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)
+    first = max(round((start - float(time[0])) * profile.rate), 0)
+    return slice(first, first + round((stop - start) * profile.rate))

@@ -1,0 +1,270 @@
+"""The general model: one for any rate and for whatever signals a log has.
+
+A log has the bands up to half its rate, and the features of its signals; all others are missing.
+Trees are trained on logs of many rates and of all inputs together, and learn where frames without a
+feature belong. Bound to a rate and to signals (`General.at`), the model is a `Classifier` like any
+other, without missing features.
+"""
+
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from noiseclassifier import modelfile
+from noiseclassifier.classifier import Classifier
+from noiseclassifier.confusion import Evaluation
+from noiseclassifier.errors import DatasetError, MissingSignalError, RateError
+from noiseclassifier.estimators.calibration import unthinned
+from noiseclassifier.estimators.trees import Detector, Trees
+from noiseclassifier.evaluation.matching import OK, UNCLEAR, Matched
+from noiseclassifier.evaluation.predictions import silent
+from noiseclassifier.features import standard
+from noiseclassifier.framefeatures import frame_features
+from noiseclassifier.labels import UNKNOWN
+from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST, LogBands
+from noiseclassifier.pooling import RELATIVE
+from noiseclassifier.profile import TOLERANCE
+from noiseclassifier.recording import Recording
+from noiseclassifier.reference import Reference
+from noiseclassifier.signals import NOISE, feeds, named
+from noiseclassifier.types import Array, Index, Real, Words
+
+LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
+"""Of the inputs, those that training takes of each log: the others lack features of the first."""
+UNBOUNDED = 1e9
+"""Highest value of features relative to a reference: they say nothing of novelty."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Labelled frames of logs, in all features that there are.
+
+    Attributes:
+        features: Not yet standardised; NaN where a feature is missing, shape (frames, features).
+        labels: Class of each frame, shape (frames,).
+        groups: Group of each, see `splitting.group_of`, shape (frames,).
+        hashes: SHA-256 of each recording, by name.
+    """
+
+    features: Real
+    labels: Words
+    groups: Words
+    hashes: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def joined(cls, parts: Iterable[Self]) -> Self:
+        """Frames of all parts, one or more."""
+        every = list(parts)
+        hashes = {name: digest for part in every for name, digest in part.hashes.items()}
+        return cls(
+            np.concatenate([part.features for part in every]),
+            np.concatenate([part.labels for part in every]),
+            np.concatenate([part.groups for part in every]),
+            hashes,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class General:
+    """A model for any rate, and for whatever signals there are.
+
+    Attributes:
+        recipe: Bands, frames and settings of the estimator, for any rate.
+        classes: Names of the classes that it was trained with, in the recipe's order.
+        estimator: Trees on all features.
+        mean: Mean of each feature, to be subtracted, shape (features,).
+        scale: Scale of each feature, to divide by, shape (features,).
+        runs: SHA-256 of each training recording, by name.
+        metrics: Measures of the training set.
+        versions: Of the software that trained it.
+        sha256: SHA-256 of the file that it was loaded from; empty if it was not.
+    """
+
+    recipe: LogBands
+    classes: tuple[str, ...]
+    estimator: Trees
+    mean: Array
+    scale: Array
+    runs: Mapping[str, str] = field(default_factory=dict)
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+    versions: Mapping[str, str] = field(default_factory=dict)
+    sha256: str = ""
+
+    @classmethod
+    def train(cls, frames: Frames, recipe: LogBands, *, thin: int = 1) -> Self:
+        """Train a model; needs scikit-learn.
+
+        Args:
+            frames: Of logs of any rates and signals.
+            recipe: All settings.
+            thin: They hold every ``thin``-th `ok` frame, for which the odds are corrected.
+
+        Returns:
+            The model; equal input gives an equal one.
+
+        Raises:
+            DatasetError: If the frames are of fewer than two classes.
+        """
+        there = set(frames.labels.tolist())
+        classes = tuple(name for name in recipe.classes if name in there)
+        if len(classes) < 2 or there - set(classes):
+            raise DatasetError(
+                f"training takes two classes or more of {', '.join(recipe.classes)};"
+                f" the frames are {', '.join(sorted(there))}"
+            )
+        # A feature that no frame has tells nothing, wherever its frames would be.
+        unknown = np.isnan(frames.features).all(axis=0)
+        features = np.where(unknown, 0.0, frames.features)
+        profile = recipe.bound(HIGHEST)
+        mean, scale = standard(features, profile)
+        targets = np.array([classes.index(label) for label in frames.labels.tolist()])
+        scaled = (features - mean) / scale
+        trees = Detector.fit(scaled, targets, frames.groups, profile, recipe.rising)
+        relative = np.array([name.startswith(RELATIVE) for name in recipe.columns])
+        trees = replace(
+            trees,
+            known=np.where(relative | unknown, UNBOUNDED, trees.known),
+            calibration=unthinned(trees.calibration, thin),
+        )
+        model = cls(recipe, classes, trees, mean, scale, dict(frames.hashes))
+        metrics = {"training": model.evaluate(frames).as_dict()}
+        return replace(model, metrics=metrics, versions=modelfile.versions())
+
+    def evaluate(self, frames: Frames) -> Evaluation:
+        """Measures of the model on frames."""
+        decisions = self.estimator.decision((frames.features - self.mean) / self.scale)
+        names = np.array((*self.classes, UNKNOWN))
+        return Evaluation.of(frames.labels, names[self.estimator.choose(decisions)], self.classes)
+
+    def at(
+        self,
+        rate: float,
+        signals: Collection[str] = (NOISE,),
+        *,
+        reference: Reference | None = None,
+    ) -> Classifier:
+        """Bind the model to a rate and to the signals of a log.
+
+        Args:
+            rate: Sample rate, in [Hz]; above ``HIGHEST``, the log has to be decimated to that.
+            signals: Names of the signals that there are.
+            reference: What features are relative to; by default, the signal itself.
+
+        Returns:
+            A classifier of that rate, which takes as many of the signals as it can.
+
+        Raises:
+            RateError: If the rate is below ``LOWEST``.
+            MissingSignalError: If there is none of the signals that it takes.
+        """
+        if rate < LOWEST * (1.0 - TOLERANCE):
+            raise RateError(rate, [LOWEST], "too low for any; log faster")
+        taken = next((names for names in INPUTS if feeds(signals, names)), None)
+        if taken is None:
+            raise MissingSignalError([NOISE], signals)
+        profile = self.recipe.bound(min(rate, HIGHEST), taken)
+        there = self.recipe.places(profile)
+        return Classifier(
+            profile,
+            self.classes,
+            self.estimator.at(there),
+            self.mean[there],
+            self.scale[there],
+            runs=self.runs,
+            metrics=self.metrics,
+            versions=self.versions,
+            sha256=self.sha256,
+            reference=reference,
+        )
+
+    @classmethod
+    def of(cls, manifest: Mapping[str, Any], arrays: Mapping[str, Array], sha256: str = "") -> Self:
+        """Make a model of what `modelfile.read` gave."""
+        recipe = LogBands.of(manifest["recipe"])
+        return cls(
+            recipe,
+            tuple(manifest["classes"]),
+            Detector.of(arrays, recipe.bound(HIGHEST)),
+            arrays["mean"],
+            arrays["scale"],
+            runs=manifest["runs"],
+            metrics=manifest["metrics"],
+            versions=manifest["versions"],
+            sha256=sha256,
+        )
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write a model file, whole or not at all; the same model gives the same bytes.
+
+        Raises:
+            OutputError: If the file exists or cannot be written.
+        """
+        manifest = {
+            "recipe": asdict(self.recipe),
+            "profile": self.recipe.bound(HIGHEST).as_dict(),
+            "classes": list(self.classes),
+            "rate": HIGHEST,
+            "runs": dict(self.runs),
+            "metrics": dict(self.metrics),
+            "versions": dict(self.versions),
+        }
+        arrays = {**self.estimator.arrays(), "mean": self.mean, "scale": self.scale}
+        modelfile.write(path, manifest, arrays, overwrite=overwrite)
+
+
+def frames_of(
+    recordings: Iterable[Recording],
+    recipe: LogBands,
+    *,
+    thin: int = 1,
+    inputs: Sequence[Sequence[str]] = LEARNT,
+) -> Iterator[Frames]:
+    """Labelled frames of recordings, once for each of the inputs that they feed.
+
+    Frames are those that classifying would cut, relative to the recording itself. Frames of which
+    the annotations tell no class are left out. Of inputs after the first that a recording feeds,
+    every other frame is enough.
+
+    Args:
+        recordings: Annotated, of any rates.
+        recipe: How they are framed, and what to compute.
+        thin: Keep every ``thin``-th `ok` frame.
+        inputs: Signals to take.
+
+    Yields:
+        Frames of a recording.
+    """
+    count = len(recipe.columns)
+    for recording in recordings:
+        fed = [names for names in inputs if feeds(named(recording.signal), names)]
+        for number, names in enumerate(fed):
+            profile = recipe.bound(recording.rate, names)
+            starts, features = frame_features(recording.signal, profile, recording.valid)
+            frames = silent(recording, starts, profile.duration)
+            truth = Matched.of([frames]).frames.truth
+            known = kept(truth, thin, first=not number)
+            full = np.full((len(known), count), np.nan, dtype=np.float32)
+            full[:, recipe.places(profile)] = features[known]
+            full[:, recipe.without_unit] = np.nan
+            groups = np.full(len(full), frames.group)
+            yield Frames(full, truth[known], groups, {recording.name: recording.sha256})
+
+
+def kept(truth: Words, thin: int, *, first: bool = True) -> Index:
+    """Frames to train on: all of a known class, but only every ``thin``-th `ok` one.
+
+    Args:
+        truth: True class of each frame, `UNCLEAR` where that is not known, shape (frames,).
+        thin: Of `ok` frames.
+        first: Whether they are of the first input that a recording feeds; of the others, every
+            other frame is enough.
+
+    Returns:
+        Their indices.
+    """
+    ok = truth == OK
+    known = np.flatnonzero((truth != UNCLEAR) & (~ok | (np.cumsum(ok) % thin == 0)))
+    return known if first else known[::2]

@@ -1,0 +1,256 @@
+"""Labels: the class that a classifier gives each frame of a signal, and the events they form.
+
+From frames to findings, the same for every estimator that gives probabilities:
+
+1. A frame whose probability of any failure is above the alarm threshold is *evidence*, whatever
+   its novelty: a fault does not become `ok` by being louder than all of the training set.
+2. A frame that is out of distribution and below the threshold is `unknown`, and evidence too: its
+   probabilities are not valid there, so that it cannot be `ok`.
+3. Consecutive frames that are not `ok` form a stretch. It is confirmed by two frames of evidence;
+   a frame at either end of the signal or beside a gap counts twice, since the neighbour that would
+   confirm it is missing. Failure frames of other stretches are `ok`, their `unknown` frames remain
+   `unknown` and raise nothing.
+4. In a confirmed stretch that holds failure frames, `unknown` frames take the class of the nearest
+   of them: one event, marked as out of distribution.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from noiseclassifier.types import Array, Index, Mask, Words
+
+if TYPE_CHECKING:
+    import pyarrow
+
+UNKNOWN = "unknown"
+"""Label of a frame that is out of distribution and below the alarm threshold."""
+ANOMALY = "anomaly"
+"""Label that a baseline, which is learnt from good runs alone, gives a frame beyond its limit."""
+
+CONFIRM = 2
+"""Frames of evidence in a stretch that make it a finding."""
+
+_ARRAYS = ("start", "stop", "label", "scores", "above_threshold", "novel")
+"""Fields of `Labels` with an entry for each frame."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A finding: neighbouring frames of one failure class, as one."""
+
+    label: str
+    """The class."""
+    start: float
+    """When its first frame starts, in [s]."""
+    stop: float
+    """When its last frame stops, in [s]."""
+    score: float
+    """The highest score of the class in one of its frames; of `unknown`, that of any failure."""
+    novel: bool = False
+    """Whether one of its frames is out of distribution."""
+
+    @property
+    def novelty(self) -> str:
+        """End of a text about the event: ", out of distribution", or nothing."""
+        return ", out of distribution" if self.novel else ""
+
+    def __str__(self) -> str:
+        score = f"(score {self.score:.2f}{self.novelty})"
+        return f"{self.label} from {interval(self.start, self.stop)} {score}"
+
+
+@dataclass(frozen=True, eq=False)
+class Labels:
+    """Predictions for each frame of a signal, in order of time.
+
+    Attributes:
+        start: When each frame starts, shape (frames,), in [s].
+        stop: When it stops, shape (frames,), in [s].
+        label: Its class, or `unknown`, by the frame alone, shape (frames,).
+        scores: How certain each class is, shape (frames, classes); comparable within one model.
+        classes: Names of the classes, `ok` first.
+        above_threshold: Whether a frame is above the alarm threshold, shape (frames,); None if
+            each frame that is not `ok` is.
+        novel: Whether a frame is out of distribution, shape (frames,); None if the estimator has
+            no measure of that.
+        unknown_is_finding: Whether `unknown` frames are evidence; if not, they raise nothing.
+    """
+
+    start: Array
+    stop: Array
+    label: Words
+    scores: Array
+    classes: tuple[str, ...]
+    above_threshold: Mask | None = None
+    novel: Mask | None = None
+    unknown_is_finding: bool = True
+
+    @cached_property
+    def flagged(self) -> Mask:
+        """Whether a frame belongs to a finding, shape (frames,)."""
+        unknown = self.label == UNKNOWN
+        suspect: Mask = self.label != "ok"
+        if not self.unknown_is_finding:
+            suspect = suspect & ~unknown
+        if self.above_threshold is None:
+            return suspect
+        evidence = self.above_threshold | (suspect & unknown)
+        apart = self.start[1:] > self.stop[:-1]
+        return confirmed(suspect, evidence, apart)
+
+    @cached_property
+    def debounced(self) -> Words:
+        """Label of each frame after confirmation by its neighbours, shape (frames,)."""
+        if self.above_threshold is None:
+            return self.label
+        unknown = self.label == UNKNOWN
+        labels = np.where(self.flagged | unknown, self.label, "ok")
+        joined, place = self._joined()
+        labels[joined] = labels[place]
+        return labels
+
+    def _joined(self) -> tuple[Index, Index]:
+        """Find `unknown` frames that join a failure: their places, and that frame's place."""
+        flagged, unknown = self.flagged, self.label == UNKNOWN
+        apart = np.append(True, self.start[1:] > self.stop[:-1])[: len(flagged)]
+        stretch = np.cumsum(apart | ~flagged)
+        failures = np.flatnonzero(flagged & ~unknown)
+        wanted = np.flatnonzero(flagged & unknown)
+        if not len(failures) or not len(wanted):
+            return wanted[:0], wanted[:0]
+        after = np.searchsorted(failures, wanted)
+        sides = np.stack(
+            (failures[np.maximum(after - 1, 0)], failures[np.minimum(after, len(failures) - 1)])
+        )
+        distance = np.abs(sides - wanted).astype(np.float64)
+        # A frame that is not flagged begins a stretch of its own, which the next ones join.
+        distance[stretch[sides] != stretch[wanted]] = np.inf
+        nearest = distance.argmin(axis=0)
+        near = np.isfinite(distance.min(axis=0))
+        return wanted[near], sides[nearest, np.arange(len(wanted))][near]
+
+    @property
+    def raw(self) -> Words:
+        """Label of each frame by itself, a failure only above the threshold, shape (frames,).
+
+        No other label is possible while the frames after it are still to come.
+        """
+        if self.above_threshold is None:
+            return self.label
+        keep = self.above_threshold | np.isin(self.label, ("ok", UNKNOWN))
+        return np.where(keep, self.label, "ok")
+
+    def score(self, frame: int) -> float:
+        """Give the score of a frame's label; 0 if it is unknown."""
+        label = str(self.label[frame])
+        known = label in self.classes
+        return float(self.scores[frame, self.classes.index(label)]) if known else 0.0
+
+    def events(self) -> tuple[Event, ...]:
+        """Merge flagged frames of one label that overlap or follow each other.
+
+        Returns:
+            Findings only, no `ok`, in order of time. Frames overlap, and so may events of
+            different classes; events of one class never do.
+        """
+        found: list[Event] = []
+        labels = self.debounced
+        for label in (*(name for name in self.classes if name != "ok"), UNKNOWN):
+            own = np.flatnonzero(self.flagged & (labels == label))
+            apart = np.flatnonzero(self.start[own[1:]] > self.stop[own[:-1]]) + 1
+            found += [self._event(label, group) for group in np.split(own, apart) if len(group)]
+        return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
+
+    def _event(self, label: str, frames: Index) -> Event:
+        known = label in self.classes
+        columns = [
+            place
+            for place, name in enumerate(self.classes)
+            if (name == label if known else name != "ok")
+        ]
+        return Event(
+            label,
+            float(self.start[frames[0]]),
+            float(self.stop[frames[-1]]),
+            float(self.scores[frames][:, columns].max()),
+            self.novel is not None and bool(self.novel[frames].any()),
+        )
+
+    @staticmethod
+    def concatenated(parts: Sequence["Labels"]) -> "Labels":
+        """Join labels of one model that follow each other, one or more."""
+        first = parts[0]
+        arrays: dict[str, Any] = {
+            name: np.concatenate([getattr(part, name) for part in parts])
+            for name in _ARRAYS
+            if getattr(first, name) is not None
+        }
+        return replace(first, **arrays)
+
+    def part(self, frames: slice) -> "Labels":
+        """Take the labels of some frames."""
+        arrays: dict[str, Any] = {
+            name: getattr(self, name)[frames] for name in _ARRAYS if getattr(self, name) is not None
+        }
+        return replace(self, **arrays)
+
+    def to_arrow(self) -> "pyarrow.Table":
+        """Give a table with a row for each frame.
+
+        Returns:
+            Columns ``start`` and ``stop`` in [s], ``label``, ``debounced``, ``flagged``, ``novel``
+            (null if the estimator has no measure of it) and ``score.<class>`` for each class.
+        """
+        import pyarrow
+
+        novel = [None] * len(self) if self.novel is None else self.novel.tolist()
+        columns = {
+            "start": self.start,
+            "stop": self.stop,
+            "label": self.label.tolist(),
+            "debounced": self.debounced.tolist(),
+            "flagged": self.flagged,
+            "novel": pyarrow.array(novel, pyarrow.bool_()),
+        }
+        scores = {f"score.{name}": self.scores[:, i] for i, name in enumerate(self.classes)}
+        return pyarrow.table({**columns, **scores})
+
+    def __len__(self) -> int:
+        return len(self.label)
+
+    def __str__(self) -> str:
+        found = [str(event) for event in self.events()] or ["no findings"]
+        return "\n".join([*found, f"in {len(self)} frames"])
+
+
+def interval(start: float, stop: float) -> str:
+    """Write two times in [s]: to a hundredth, or to a thousandth if they are less apart."""
+    digits = 2 if stop - start >= 0.01 else 3
+    return f"{start:.{digits}f} s to {stop:.{digits}f} s"
+
+
+def confirmed(suspect: Mask, evidence: Mask, apart: Mask, *, least: int = CONFIRM) -> Mask:
+    """Keep the frames of those stretches that hold enough frames of evidence.
+
+    A frame without a neighbour on one side counts twice: the neighbour would hold the failure too.
+
+    Args:
+        suspect: Whether a frame is not `ok` by itself, shape (frames,).
+        evidence: Whether it is evidence of a finding, shape (frames,).
+        apart: Whether a frame and the next neither overlap nor touch, shape (frames - 1,).
+        least: How many frames of evidence are enough.
+
+    Returns:
+        The frames that are kept, shape (frames,).
+    """
+    first = np.append(True, apart)[: len(suspect)]
+    last = np.append(apart, True)[: len(suspect)]
+    stretch = np.cumsum(suspect & (first | ~np.append(False, suspect)[: len(suspect)]))
+    count = np.where(first | last, 2, 1)[suspect & evidence]
+    enough = np.bincount(stretch[suspect & evidence], count, minlength=len(suspect) + 1) >= least
+    kept: Mask = suspect & enough[stretch]
+    return kept

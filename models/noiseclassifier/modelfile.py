@@ -1,0 +1,340 @@
+"""The model file, version 6: one uncompressed `.npz` of plain arrays and a JSON manifest.
+
+Members: ``manifest`` (one text), ``mean`` and ``scale`` (features,), and those of the estimator, as
+its ``DIMENSIONS`` list them. Nothing in it is ever unpickled; sizes are checked before an array is
+made. The same model is the same bytes. Of a general model, ``recipe`` is in the manifest, and the
+profile is that of its highest rate. A model with a reference of its own has ``location`` and
+``spread``, too. Versions 4 and 5 are read too: they know no missing features and no reference.
+"""
+
+import hashlib
+import io
+import json
+import os
+import stat
+import zipfile
+from collections.abc import Mapping
+from importlib import metadata
+from math import prod
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+import numpy as np
+from numpy.lib import format as npy
+from numpy.typing import NDArray
+
+from noiseclassifier.errors import ModelFileError, OutputError, ProfileError
+from noiseclassifier.estimators.estimator import ESTIMATORS
+from noiseclassifier.estimators.trees import Trees
+from noiseclassifier.features import feature_count
+from noiseclassifier.jsontext import from_json
+from noiseclassifier.labels import ANOMALY
+from noiseclassifier.logbands import HIGHEST, LogBands
+from noiseclassifier.profile import Profile
+from noiseclassifier.types import Array
+
+FORMAT = "noise-model/6"
+OLD_FORMATS = ("noise-model/4", "noise-model/5")
+LARGEST = 512 * 1024**2
+"""Bytes that a model file may have: a thousand times those of the shipped ones."""
+
+_REFERENCE = {"location": 1, "spread": 1}
+
+_KINDS = [
+    {"manifest": 0, "mean": 1, "scale": 1, **estimator.DIMENSIONS}
+    for estimator in ESTIMATORS.values()
+]
+_KINDS += [{**kind, **_REFERENCE} for kind in _KINDS] + [
+    {name: count for name, count in kind.items() if name != "missing"}
+    for kind in _KINDS
+    if "missing" in kind
+]
+
+
+def versions() -> dict[str, str]:
+    """Versions of the software that trains models, by name."""
+    import sklearn
+
+    try:
+        own = metadata.version("noise-inspector")
+    except metadata.PackageNotFoundError:
+        own = "not installed"
+    return {"noise-inspector": own, "numpy": np.__version__, "scikit-learn": sklearn.__version__}
+
+
+def write(
+    path: str | Path,
+    manifest: Mapping[str, Any],
+    arrays: Mapping[str, Array],
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write a model file, whole or not at all.
+
+    Args:
+        path: The file to write.
+        manifest: What is known of the model, as JSON can hold it.
+        arrays: The arrays that the module's docstring lists.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    text = json.dumps({"format": FORMAT, **manifest}, sort_keys=True, allow_nan=False)
+    content = io.BytesIO()
+    np.savez(content, allow_pickle=False, manifest=np.array(text), **arrays)  # dated 1980 always
+    _replace(Path(path), content.getvalue(), overwrite=overwrite)
+
+
+EXISTS = "exists already; choose another name, or overwrite it (--overwrite)"
+
+
+def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
+    """Write a file beside its place, and move it there when it is safely on the disk.
+
+    `noisemodel.atomic` offers a path for other writers; this package must not import it.
+    """
+    if path.is_dir():
+        raise OutputError(path, "is a folder; name a file")
+    if path.exists() and not path.is_file():
+        raise OutputError(path, "is no regular file; name one")
+    if path.exists() and not overwrite:
+        raise OutputError(path, EXISTS)
+    if path.is_symlink():  # the link stays
+        path = Path(os.path.realpath(path))
+    temporary = path.with_name(f".noise-inspector-{uuid4().hex[:8]}")  # swept by `noisemodel`
+    try:
+        file = temporary.open("xb")
+    except OSError as error:
+        raise OutputError(path, f"cannot be written ({error.strerror})") from error
+    try:
+        with file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        if overwrite:
+            temporary.replace(path)
+        else:
+            _place(temporary, path)
+    except OSError as error:
+        raise OutputError(path, f"cannot be written ({error.strerror or error})") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _place(temporary: Path, path: Path) -> None:
+    """Give a file its final name, unless another process has taken it meanwhile."""
+    try:
+        os.link(temporary, path)
+        return
+    except FileExistsError:
+        raise OutputError(path, EXISTS) from None
+    except OSError:  # a file system without hard links: the name is claimed by an empty file
+        try:
+            path.open("xb").close()
+        except FileExistsError:
+            raise OutputError(path, EXISTS) from None
+    temporary.replace(path)
+
+
+def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    """Manifest and arrays of a model file, once its table of contents is checked.
+
+    Args:
+        path: The file.
+
+    Returns:
+        The manifest and the arrays, which are finite and of the shapes that it asks for.
+
+    Raises:
+        ModelFileError: If the file is missing, damaged, no model file, of another version, or
+            contradicts itself.
+    """
+    try:
+        if not stat.S_ISREG(Path(path).stat().st_mode) and not Path(path).is_dir():
+            raise ModelFileError(path, "is no regular file")
+        with zipfile.ZipFile(path) as archive:
+            dimensions = _check_members(path, archive)
+            members = {name: _member(path, archive, name, n) for name, n in dimensions.items()}
+    except OSError as error:
+        raise ModelFileError(path, f"cannot be read ({error.strerror or error})") from error
+    except (zipfile.BadZipFile, EOFError, RuntimeError, UnicodeDecodeError) as error:
+        problem = f"is no model file, or a damaged one ({_one_line(error)})"
+        raise ModelFileError(path, problem) from error
+    manifest = _manifest(path, str(members.pop("manifest")))
+    if "threshold" in members:
+        members.setdefault("missing", np.zeros_like(members["threshold"]))
+    for name, array in members.items():
+        if not np.isfinite(array).all():
+            raise ModelFileError(path, f"array {name!r} holds values that are not finite")
+    check(path, manifest, members)
+    return manifest, members
+
+
+def digest(path: str | Path) -> str:
+    """SHA-256 of a model file."""
+    return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+
+
+def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]:
+    """Check the table of contents; dimensions of each array, by name."""
+    there = sorted(archive.namelist())
+    kinds = [kind for kind in _KINDS if there == sorted(f"{name}.npy" for name in kind)]
+    if not kinds:
+        wanted = " or ".join(", ".join(sorted(kind)) for kind in _KINDS[: len(ESTIMATORS)])
+        raise ModelFileError(
+            path, f"is no model file: holds {_escaped(', '.join(there))}, expected {wanted}"
+        )
+    for info in archive.infolist():
+        # Stored as they are, members cannot be larger than the file that holds them.
+        if info.compress_type != zipfile.ZIP_STORED or info.file_size != info.compress_size:
+            raise ModelFileError(path, f"member {info.filename!r} is compressed, expected stored")
+    if sum(info.file_size for info in archive.infolist()) > LARGEST:
+        raise ModelFileError(path, f"is larger than {LARGEST} bytes, the most that is read")
+    return kinds[0]
+
+
+def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: int) -> NDArray[Any]:
+    """One array, once its header is checked."""
+    content = archive.read(f"{name}.npy")
+    header = io.BytesIO(content)
+    try:
+        if npy.read_magic(header) != (1, 0):
+            raise ValueError("another version of .npy")
+        shape, _, dtype = npy.read_array_header_1_0(header)
+        size = prod(shape) * dtype.itemsize
+    except Exception as error:  # NumPy lets those of its parser through: any, by the bytes
+        raise ModelFileError(path, f"array {name!r} is damaged ({_one_line(error)})") from error
+    fits = dtype.kind == "U" if name == "manifest" else dtype == np.dtype("<f8")
+    if not fits or len(shape) != dimensions:
+        raise ModelFileError(
+            path,
+            f"array {name!r} is of type {dtype} and shape {shape},"
+            f" expected {'text' if name == 'manifest' else 'float64'}, {dimensions}-D",
+        )
+    if size != len(content) - header.tell() or min(shape, default=0) < 0 or not dtype.itemsize:
+        raise ModelFileError(path, f"array {name!r} is damaged: its size is not what it declares")
+    array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
+    return array
+
+
+def _escaped(text: str) -> str:
+    return text[:200].encode("unicode_escape").decode()
+
+
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
+
+
+def _manifest(path: str | Path, text: str) -> dict[str, Any]:
+    try:
+        manifest = from_json(text)
+    except ValueError as error:
+        raise ModelFileError(path, f"manifest is no JSON ({error})") from error
+    given = manifest.get("format") if isinstance(manifest, dict) else manifest
+    known = (FORMAT, *OLD_FORMATS)
+    if given not in known:
+        raise ModelFileError(
+            path,
+            f"is of format {given!r}, this version reads {', '.join(map(repr, known))}:"
+            " train it again, or read it by the version that wrote it",
+        )
+    return dict(manifest) if given == FORMAT else _renamed(manifest)
+
+
+def _renamed(manifest: dict[str, Any]) -> dict[str, Any]:
+    """Give the entries of versions 4 and 5 the names of version 6."""
+
+    def renamed(classes: Any) -> Any:
+        old = isinstance(classes, list)
+        return [ANOMALY if name == "departure" else name for name in classes] if old else classes
+
+    profile = manifest.get("profile")
+    if isinstance(profile, dict):
+        names = {"machine": "estimator"}
+        profile = {names.get(name, name): value for name, value in profile.items()}
+        profile["classes"] = renamed(profile.get("classes"))
+        profile.setdefault("reference", False)
+    return {**manifest, "profile": profile, "classes": renamed(manifest.get("classes"))}
+
+
+_JSON_TYPES = {
+    "format": str,
+    "profile": dict,
+    "classes": list,
+    "rate": float,
+    "runs": dict,
+    "metrics": dict,
+    "versions": dict,
+}
+
+
+def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
+    """Check a manifest, and the arrays against it.
+
+    Args:
+        path: The file that they are from.
+        manifest: The manifest of a known format.
+        arrays: Its arrays, each of the right dimensions.
+
+    Raises:
+        ModelFileError: If an entry is missing or wrong, or an array has not the shape that
+            profile and classes ask for.
+    """
+    for name, kind in _JSON_TYPES.items():
+        if not isinstance(manifest.get(name), kind):
+            raise ModelFileError(
+                path,
+                f"manifest has {name} = {str(manifest.get(name))[:80]}, expected a {kind.__name__}",
+            )
+    try:
+        profile = Profile.of(manifest["profile"])
+        count = feature_count(profile)
+        if "recipe" in manifest:
+            recipe = LogBands.of(manifest["recipe"])
+            if not (issubclass(ESTIMATORS[recipe.estimator], Trees) and recipe.reference):
+                raise ProfileError(
+                    f"a recipe for any rate has trees and a reference, not {recipe.estimator} and"
+                    f" reference {recipe.reference}"
+                )
+            count, profile = len(recipe.columns), recipe.bound(HIGHEST)
+    except ProfileError as error:
+        raise ModelFileError(path, f"manifest has a wrong profile: {error}") from error
+    classes = manifest["classes"]
+    if len(classes) < 2 or classes != [name for name in profile.classes if name in classes]:
+        raise ModelFileError(
+            path, f"classes {classes} are not two or more of {', '.join(profile.classes)}, in order"
+        )
+    if manifest["rate"] != profile.rate:
+        raise ModelFileError(
+            path, f"rate is {manifest['rate']} Hz, but {profile.rate} Hz in its profile"
+        )
+    _check_arrays(path, profile, count, len(classes), arrays)
+
+
+def _check_arrays(
+    path: str | Path, profile: Profile, count: int, classes: int, arrays: Mapping[str, Array]
+) -> None:
+    estimator = ESTIMATORS[profile.estimator]
+    if lacking := sorted(estimator.DIMENSIONS.keys() - arrays.keys()):
+        raise ModelFileError(
+            path, f"its profile asks for {profile.estimator}, but it has no {', '.join(lacking)}"
+        )
+    wanted = estimator.shapes(arrays, profile, features=count, classes=classes)
+    for name, shape in {**wanted, "mean": (count,), "scale": (count,)}.items():
+        if arrays[name].shape != shape:
+            raise ModelFileError(
+                path, f"array {name!r} has shape {arrays[name].shape}, its profile asks for {shape}"
+            )
+    if "location" in arrays and not (
+        arrays["location"].shape == arrays["spread"].shape == (count // 2,)
+        and profile.reference
+        and (arrays["spread"] >= 0).all()
+    ):
+        raise ModelFileError(path, "location and spread are no reference for its profile")
+    if not (arrays["scale"] > 0).all():
+        raise ModelFileError(path, "array 'scale' holds values that are not above 0")
+    for name, most in estimator.highest(profile, features=count).items():
+        if arrays[name].min() < 0 or arrays[name].max() > most:
+            raise ModelFileError(path, f"array {name!r} holds values beyond 0 to {most}")

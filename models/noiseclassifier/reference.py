@@ -1,0 +1,100 @@
+"""A reference: what features are relative to, beside being taken as they are.
+
+How loud good motion is differs from robot to robot by orders of magnitude. Relative to a reference,
+it differs far less: each feature less its location there, divided by its spread. The reference is
+good motion of the robot, or else the signal itself as far as it has come. A failure that fills a
+whole signal is invisible relative to the signal itself; therefore the features as they are stay
+beside.
+
+Conventions: spreads are those of a normal distribution, 1.48 times a median absolute deviation
+(P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009, Sec. 5.1).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from noiseclassifier.types import Array
+
+LEAST = 0.15
+"""Added to each spread, in [Np]: features of a robot that stands hardly vary at all."""
+MOST = 15.0
+"""Largest relative feature."""
+NORMAL = 1.48
+"""Standard deviation of a normal distribution, in median absolute deviations."""
+MEMORY = 600
+"""Frames that a running reference remembers at most, so that it follows slow changes: a minute."""
+FIRST = 0.3
+"""Spread before anything is known, in [Np]; it counts as ``FIRST_FRAMES`` frames."""
+FIRST_FRAMES = 10
+BOUND = 1.5
+"""Spreads by which a frame moves a running location at most, times its share."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Location and spread of the features of good motion.
+
+    Attributes:
+        location: Median of each feature, shape (features,).
+        spread: 1.48 times the median absolute deviation, shape (features,).
+    """
+
+    location: Array
+    spread: Array
+
+    @classmethod
+    def of(cls, good: Array) -> "Reference":
+        """Reference of the features of good frames, shape (frames, features), one or more."""
+        location = np.median(good, axis=0)
+        return cls(location, NORMAL * np.median(np.abs(good - location), axis=0))
+
+    def relative(self, features: Array) -> Array:
+        """Features relative to the reference, bounded, shape (frames, features)."""
+        return _relative(features, self.location, self.spread)
+
+
+class RunningReference:
+    """The reference that a signal itself is, as far as it has come.
+
+    Location and spread are recursive M-estimates: each frame moves them by a bounded step, which
+    falls with the number of frames (P. J. Huber and E. M. Ronchetti, *Robust Statistics*, 2009,
+    Sec. 3.2; H. Robbins and S. Monro, *A Stochastic Approximation Method*, 1951). They know nothing
+    of frames to come, so that a whole signal has the features of a stream.
+    """
+
+    def __init__(self) -> None:
+        self._frames = 0
+        self._location = self._spread = np.empty(0)
+
+    def relative(self, features: Array) -> Array:
+        """Features of the next frames relative to those so far, shape (frames, features)."""
+        found = np.empty_like(features)
+        for row, frame in enumerate(features):
+            self._take(frame)
+            found[row] = _relative(frame, self._location, self._spread)
+        return found
+
+    def _take(self, frame: Array) -> None:
+        if not self._frames:
+            self._location, self._spread = frame.copy(), np.full_like(frame, FIRST)
+            self._frames = 1
+            return
+        self._frames = min(self._frames + 1, MEMORY)
+        bound = BOUND * self._spread
+        step = np.maximum(np.minimum(frame - self._location, bound), -bound)
+        self._location += step / self._frames
+        # E |x| of a normal distribution is 0.8 of its standard deviation.
+        apart = np.minimum(np.abs(frame - self._location), 3.0 * self._spread) / 0.8
+        self._spread += (apart - self._spread) / (self._frames + FIRST_FRAMES)
+
+
+def _relative(features: Array, location: Array, spread: Array) -> Array:
+    found = (features - location) / (spread + LEAST)
+    return np.maximum(np.minimum(found, MOST, out=found), -MOST, out=found)
+
+
+def reference_of(arrays: Mapping[str, Array]) -> Reference | None:
+    """The reference among the arrays of a model file, None if there is none."""
+    return Reference(arrays["location"], arrays["spread"]) if "spread" in arrays else None

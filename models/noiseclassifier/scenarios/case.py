@@ -1,0 +1,32 @@
+"""A scenario for one family of robots."""
+
+from dataclasses import dataclass, field
+
+from noiseclassifier.scenarios.defects import Defect, NoDefect
+from noiseclassifier.scenarios.motions import Motion
+
+BANDS: tuple[tuple[int, int], ...] = (
+    (20, 30), (30, 40), (40, 50), (50, 60), (60, 100), (100, 150), (150, 250), (250, 350),
+    (900, 1000),
+)  # fmt: skip
+"""The paper's bands of oscillation, in [Hz]."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario for one family of robots.
+
+    Attributes:
+        motion: The motion of the robot; without the defect, it is that of the twin.
+        defect: The defect.
+        description: Replaces the description of the scenario, unless empty.
+    """
+
+    motion: Motion
+    defect: Defect = field(default_factory=NoDefect)
+    description: str = ""
+
+
+def multisine(low: int, high: int) -> str:
+    """Name of the scenario with oscillations in a band."""
+    return f"multisine-{low}-{high}"

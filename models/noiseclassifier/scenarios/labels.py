@@ -1,0 +1,253 @@
+"""The labelling rule: from a simulator's events to annotated blocks.
+
+A run is compared with its *twin*: the same seed without the defect, equal sample by sample until
+the defect acts. The high-passed difference of the measured joint velocities (above `Rule.lowest`)
+is the *deviation*; its *level* is the root mean square of its norm over `Rule.smoothing`. The
+deviation is *significant* while its level exceeds `Rule.felt` (gaps up to `Rule.gap` are bridged).
+
+After a disturbance, a walking robot does not return to the steps of its twin: two good walks
+deviate from each other at every touchdown. Therefore an event is compared with the *background*,
+the highest level of the `Rule.before` seconds before it, earlier events left out: its level must
+reach `Rule.contrast` times the background, and an oscillation counts only while it exceeds the
+background. An oscillation commanded in a band is detected in that band only.
+
+An event becomes blocks of its class: the significant stretches between its start and `Rule.tail`
+after its stop, but not beyond the next event, each on the condition of its class:
+
+- `impact`: the level reaches `Rule.blow`;
+- `highaccelerations`: the deviation of a joint changes faster than `Rule.acceleration`;
+- `oscillations`: the joint that deviates most has `Rule.periods` periods or more.
+
+An event that starts while the cause of another one acts belongs to that one, as when a shaking tool
+knocks on the table.
+
+All time that is neither significant nor part of an event, `Rule.margin` away from both, is `ok`
+(stretches shorter than `Rule.shortest` are left out). The rest, such as a commanded oscillation
+without an effect or an arm that lags behind its twin after an impact, has no label.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from noiseclassifier.scenarios.events import Event
+from noisemodel import Block
+from noisemodel.types import Array, Mask
+
+Span = tuple[int, int]
+"""First sample and the one after the last."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rule:
+    """Thresholds of the labelling rule; the metadata of runs has them by these names.
+
+    Attributes:
+        lowest: Cut-off frequency of the high-pass of the deviation, in [Hz].
+        smoothing: Window of the root mean square, in [s].
+        felt: Level above which a deviation is significant, in [rad/s].
+        contrast: Least ratio of the level of an event to its background.
+        before: Duration of the background before an event, in [s].
+        gap: Longest gap that is bridged, in [s].
+        tail: Time after the cause that still belongs to an event, in [s].
+        blow: Least level of an impact, in [rad/s].
+        acceleration: Least value of a high acceleration, in [rad/s²].
+        periods: Least number of periods of an oscillation.
+        margin: Unlabelled time around all that is not ok, in [s].
+        shortest: Shortest ok block, in [s].
+    """
+
+    lowest: float = 10.0
+    smoothing: float = 0.02
+    felt: float = 0.03
+    contrast: float = 1.5
+    before: float = 0.4
+    gap: float = 0.1
+    tail: float = 0.15
+    blow: float = 0.1
+    acceleration: float = 20.0
+    periods: int = 5
+    margin: float = 0.05
+    shortest: float = 0.2
+
+
+RULE = Rule()
+"""The rule that all simulated runs are labelled by."""
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The effect of an event on the motion.
+
+    Attributes:
+        event: The event.
+        labelled: Time with its label, in [s].
+        peak: Its highest level, in [rad/s].
+        acceleration: Fastest change of a joint's deviation, in [rad/s²].
+        background: Highest level of its background, in [rad/s].
+    """
+
+    event: Event
+    labelled: float
+    peak: float
+    acceleration: float
+    background: float
+
+    def record(self) -> dict[str, Any]:
+        """The trace as plain data."""
+        event = asdict(self.event)
+        return event | {
+            "labelled": round(self.labelled, 6),
+            "peak": round(self.peak, 6),
+            "acceleration": round(self.acceleration, 3),
+            "background": round(self.background, 6),
+        }
+
+
+def deviation(
+    velocity: Array,
+    twin: Array,
+    *,
+    rate: float,
+    band: tuple[float, float] | None = None,
+    rule: Rule = RULE,
+) -> Array:
+    """Fast part of the difference between a run and its twin.
+
+    Args:
+        velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
+        twin: Those of the twin, shape (samples, joints), in [rad/s].
+        rate: Sample rate, in [Hz].
+        band: Pass band, in [Hz], in place of the high-pass.
+        rule: The labelling rule.
+
+    Returns:
+        The difference after a causal filter of first order (a high-pass, or a band-pass), shape
+        (samples, joints), in [rad/s].
+    """
+    from scipy.signal import butter, sosfilt
+
+    if band:
+        sections = butter(1, band, "bandpass", fs=rate, output="sos")
+    else:
+        sections = butter(1, rule.lowest, "highpass", fs=rate, output="sos")
+    return np.asarray(sosfilt(sections, velocity - twin, axis=0), dtype=np.float64)
+
+
+def annotate(
+    velocity: Array, twin: Array, events: Sequence[Event], *, rate: float, rule: Rule = RULE
+) -> tuple[tuple[Block, ...], tuple[Trace, ...]]:
+    """Labels of a run by the rule of this module.
+
+    Args:
+        velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
+        twin: Those of the twin, shape (samples, joints), in [rad/s].
+        events: The events of the simulation.
+        rate: Sample rate, in [Hz].
+        rule: The labelling rule.
+
+    Returns:
+        The blocks, in order, and the effect of each event.
+    """
+    events = _independent(events)
+    fast = deviation(velocity, twin, rate=rate, rule=rule)
+    broadband = _level(fast, rate, rule)
+    samples, blocks, traces = len(fast), [], []
+    busy = np.zeros(samples, dtype=bool)
+    for first, end in _spans(broadband > rule.felt, round(rule.gap * rate)):
+        busy[first:end] = True
+    acting = np.zeros(samples, dtype=bool)
+    starts = [round(event.start * rate) for event in events] + [samples]
+    for event, first, following in zip(events, starts, starts[1:], strict=False):
+        end = min(round((event.stop + rule.tail) * rate), following, samples)
+        filtered, level = fast, broadband
+        if "band" in event.facts:
+            filtered = deviation(velocity, twin, rate=rate, band=event.facts["band"], rule=rule)
+            level = _level(filtered, rate, rule)
+        until = max(0, first - round(rule.smoothing * rate))  # the average is not causal
+        earlier = slice(max(0, until - round(rule.before * rate)), until)
+        background = float(level[earlier][~acting[earlier]].max(initial=0.0))
+        least = max(rule.felt, background if event.label == "oscillations" else 0.0)
+        significant = _spans(level > least, round(rule.gap * rate))
+        change = np.abs(np.diff(filtered[first:end], axis=0, prepend=filtered[first : first + 1]))
+        change = change.max(axis=1, initial=0.0) * rate
+        own = [
+            (a, b)
+            for a, b in _clipped(significant, first, end)
+            if level[a:b].max() > rule.contrast * background
+            and _confirms(
+                event.label, filtered[a:b], level[a:b], change[a - first : b - first], rule
+            )
+        ]
+        blocks += [Block(a / rate, b / rate, event.label) for a, b in own]
+        for a, b in [*own, (first, round(event.stop * rate))]:
+            busy[a:b] = True
+        acting[until:end] = True
+        traces.append(
+            Trace(
+                event,
+                labelled=sum(b - a for a, b in own) / rate,
+                peak=float(level[first:end].max(initial=0.0)),
+                acceleration=float(change.max(initial=0.0)),
+                background=background,
+            )
+        )
+    margin = 2 * round(rule.margin * rate) + 1
+    near = uniform_filter1d(busy.astype(float), margin, mode="constant") > 0.5 / margin
+    blocks += [
+        Block(a / rate, b / rate, "ok")
+        for a, b in _spans(~near, 0)
+        if b - a >= rule.shortest * rate
+    ]
+    return tuple(sorted(blocks)), tuple(traces)
+
+
+def _independent(events: Sequence[Event]) -> list[Event]:
+    """Events in order, without those that start while the cause of another one acts."""
+    kept: list[Event] = []
+    for event in sorted(events, key=lambda event: event.start):
+        if not kept or event.start >= kept[-1].stop:
+            kept.append(event)
+    return kept
+
+
+def _level(fast: Array, rate: float, rule: Rule) -> Array:
+    """Moving root mean square of the norm of the deviation, shape (samples,)."""
+    power = uniform_filter1d(np.square(fast).sum(axis=1), round(rule.smoothing * rate))
+    return np.asarray(np.sqrt(np.maximum(power, 0)), dtype=np.float64)
+
+
+def _confirms(label: str, fast: Array, level: Array, change: Array, rule: Rule) -> bool:
+    """Whether a significant stretch meets the condition of its class."""
+    if label == "impact":
+        return bool(level.max() >= rule.blow)
+    if label == "highaccelerations":
+        return bool(change.max() >= rule.acceleration)
+    return _sign_changes(fast) >= 2 * rule.periods
+
+
+def _sign_changes(fast: Array) -> int:
+    """Number of sign changes of the joint that deviates most, small values left out."""
+    joint = fast[:, np.argmax(np.square(fast).sum(axis=0))]
+    sign = np.sign(joint[np.abs(joint) > 0.3 * np.sqrt(np.mean(joint**2))])
+    return int(np.count_nonzero(np.diff(sign)))
+
+
+def _spans(mask: Mask, bridge: int) -> list[Span]:
+    """Spans in which a mask is true, gaps of up to ``bridge`` samples closed."""
+    edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
+    spans: list[Span] = []
+    for first, end in edges.reshape(-1, 2).tolist():
+        if spans and first - spans[-1][1] <= bridge:
+            spans[-1] = (spans[-1][0], end)
+        else:
+            spans.append((first, end))
+    return spans
+
+
+def _clipped(spans: Sequence[Span], first: int, end: int) -> list[Span]:
+    """Parts of spans that lie in a range."""
+    return [(max(a, first), min(b, end)) for a, b in spans if a < end and b > first]

@@ -1,0 +1,224 @@
+"""The simulation loop: one tick of control, then ten samples of drives and physics."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, Protocol, Self
+
+import mujoco
+import numpy as np
+
+from noiseclassifier.scenarios.clock import STEPS, TICK
+from noiseclassifier.scenarios.collision import set_collision
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.errors import DivergedError, FallenError
+from noiseclassifier.scenarios.events import Event
+from noisemodel.types import Array
+
+FASTEST = 50.0
+"""A joint that is faster than this has diverged, in [rad/s] or [m/s]."""
+
+_S = np.arange(STEPS)[:, None] / STEPS
+_POSITION = np.hstack(
+    (
+        2 * _S**3 - 3 * _S**2 + 1,
+        3 * _S**2 - 2 * _S**3,
+        TICK * (_S**3 - 2 * _S**2 + _S),
+        TICK * (_S**3 - _S**2),
+    )
+)
+"""Cubic Hermite polynomials at the samples of a tick: from the values and slopes at its ends."""
+_VELOCITY = np.hstack(
+    (6 * (_S**2 - _S) / TICK, 6 * (_S - _S**2) / TICK, 3 * _S**2 - 4 * _S + 1, 3 * _S**2 - 2 * _S)
+)
+"""Their slopes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Reference of the joints from one tick to the next.
+
+    Attributes:
+        position: At the two ticks, shape (2, joints), in [rad].
+        velocity: At the two ticks, shape (2, joints), in [rad/s].
+        planned: Velocity of the plan alone, at the two ticks, shape (2, joints).
+        torque: Feed-forward torque of the model, shape (joints,), in [N m].
+        lift: Movement of the joints per height of each effector, shape (effectors, joints),
+            in [rad/m].
+    """
+
+    position: Array
+    velocity: Array
+    planned: Array
+    torque: Array
+    lift: Array
+
+
+class Control(Protocol):
+    """A controller: from a plan and the sensors to references."""
+
+    def tick(self, number: int, sensors: Array) -> Reference:
+        """Advance by one tick, with the mean of each sensor over the tick before."""
+        ...
+
+    def fallen(self, sensors: Array) -> bool:
+        """Whether the robot has fallen, by the sensors' means over the tick before."""
+        ...
+
+
+class Force(Protocol):
+    """A force on the robot from outside, other than that of contacts."""
+
+    def apply(self, data: Any, sample: int) -> None:
+        """Add to ``data.qfrc_applied`` before a step, its sample counted from the recording."""
+        ...
+
+    def events(self) -> tuple[Event, ...]:
+        """The events that it was the cause of so far."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A robot in its environment, ready to be simulated.
+
+    Attributes:
+        model: The ``mujoco.MjModel``; its actuators are the joints, the last ones of its
+            configuration; its first sensors are the contact forces of the effectors.
+        start: True configuration at first, as MuJoCo has it.
+        control: The robot's controller.
+        effectors: How many effectors there are.
+        settling: Ticks before the recording during which the robot comes to rest.
+        noise: Standard deviation of each sensor's noise per tick, shape (sensors,).
+        changes: Boxes that appear or vanish: geoms, and whether they are present, by ticks of the
+            recording.
+        forces: Forces from outside.
+    """
+
+    model: Any
+    start: Array
+    control: Control
+    effectors: int
+    settling: int
+    noise: Array
+    changes: Mapping[int, Sequence[tuple[int, bool]]] = field(default_factory=dict)
+    forces: tuple[Force, ...] = ()
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events that forces from outside were the cause of so far."""
+        return tuple(event for force in self.forces for event in force.events())
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The recorded signals, before rounding.
+
+    Attributes:
+        position: As the drives report it, shape (samples, joints), in [rad].
+        velocity: As the drives report it, shape (samples, joints), in [rad/s].
+        position_desired: Reference of the drives, shape (samples, joints), in [rad].
+        velocity_desired: Reference of the drives, shape (samples, joints), in [rad/s].
+        planned: Velocities of the plan alone, shape (samples, joints), in [rad/s].
+        commanded: Velocities that the controller demands, shape (samples, joints), in [rad/s].
+        torque: As the drives measure it, shape (samples, joints), in [N m].
+        contact: True contact force of each effector, shape (samples, effectors), in [N].
+        base_pose: True pose of a floating base, as MuJoCo has it (quaternion w, x, y, z),
+            shape (samples, 7), or (samples, 0).
+        base_velocity: Its velocity, as MuJoCo has it (linear in the world's axes, angular in its
+            own), shape (samples, 6), or (samples, 0).
+    """
+
+    position: Array
+    velocity: Array
+    position_desired: Array
+    velocity_desired: Array
+    planned: Array
+    commanded: Array
+    torque: Array
+    contact: Array
+    base_pose: Array
+    base_velocity: Array
+
+    @classmethod
+    def empty(cls, samples: int, joints: int, effectors: int, *, floating: bool) -> Self:
+        """Zeros for a recording."""
+        base = [7, 6] if floating else [0, 0]
+        return cls(*(np.zeros((samples, width)) for width in [*[joints] * 7, effectors, *base]))
+
+    def since(self, sample: int) -> "Motion":
+        """The signals from a sample on."""
+        return Motion(*(getattr(self, field.name)[sample:] for field in fields(self)))
+
+
+def record(
+    scene: Scene,
+    drives: Drives,
+    *,
+    encoder_error: Array,
+    sensor_error: Array,
+    overlay: Array | None = None,
+) -> Motion:
+    """Simulate a robot.
+
+    Args:
+        scene: The robot in its environment.
+        drives: The robot's drives.
+        encoder_error: Error of the encoders, shape (samples, joints), in [rad].
+        sensor_error: Added to the sensor values of the controller, shape (ticks, sensors).
+        overlay: Heights of the effectors and their rates, added to the reference of the
+            drives, shape (samples, effectors, 2), in [m] and [m/s].
+
+    Returns:
+        The signals from when the robot has come to rest.
+
+    Raises:
+        DivergedError: If a joint is too fast, or its position is not a number.
+        FallenError: If the robot fell.
+    """
+    model, control = scene.model, scene.control
+    data = mujoco.MjData(model)
+    data.qpos[:] = scene.start
+    samples, joints = encoder_error.shape
+    base = model.nq - joints
+    motion = Motion.empty(samples, joints, scene.effectors, floating=base > 0)
+    joint_position, joint_velocity = data.qpos[-joints:], data.qvel[-joints:]
+    base_pose, base_velocity = data.qpos[:base], data.qvel[:-joints]
+    effector_force, sensed = data.sensordata[: scene.effectors], data.sensordata
+    readings = np.zeros((STEPS, model.nsensordata))
+    sensors = np.zeros(model.nsensordata)
+    for tick, error in enumerate(sensor_error):
+        now = slice(tick * STEPS, (tick + 1) * STEPS)
+        for geom, present in scene.changes.get(tick - scene.settling, ()):
+            set_collision(model, geom, present=present)
+        reference = control.tick(tick, sensors + error)
+        ends = np.concatenate((reference.position, reference.velocity))
+        targets, rates = _POSITION @ ends, _VELOCITY @ ends
+        motion.commanded[now] = rates
+        motion.planned[now] = (1 - _S) * reference.planned[0] + _S * reference.planned[1]
+        if overlay is not None:
+            wave = np.einsum("seo,ej->osj", overlay[now], reference.lift)
+            targets, rates = targets + wave[0], rates + wave[1]
+        targets, rates, torque = drives.command(targets, rates, reference.torque)
+        motion.position_desired[now], motion.velocity_desired[now] = targets, rates
+        for step, sample in enumerate(range(now.start, now.stop)):
+            position, velocity = drives.read(joint_position, encoder_error[sample])
+            acting = drives.torque(position, velocity, targets[step], rates[step], torque)
+            data.ctrl[:] = acting
+            motion.position[sample], motion.velocity[sample] = position, velocity
+            motion.torque[sample] = drives.measured(acting)
+            if base:
+                motion.base_pose[sample], motion.base_velocity[sample] = base_pose, base_velocity
+            if scene.forces:
+                data.qfrc_applied[:] = 0.0
+                for force in scene.forces:
+                    force.apply(data, sample - scene.settling * STEPS)
+            mujoco.mj_step(model, data)
+            readings[step], motion.contact[sample] = sensed, effector_force
+        sensors = readings.mean(axis=0)
+        time = (tick + 1 - scene.settling) * TICK
+        fastest = np.abs(joint_velocity).max()
+        if not fastest < FASTEST:  # also true of NaN
+            raise DivergedError(time, f"a joint moved at {fastest:.3g} rad/s")
+        if control.fallen(sensors):
+            raise FallenError(time)
+    return motion.since(scene.settling * STEPS)

@@ -1,0 +1,117 @@
+"""Signals: the input of a classifier, one noise estimate or several signals by name.
+
+A signal is a norm, shape (samples,), or what the norm is of, joint by joint, shape
+(joints, samples), by its name. Stacked, they are rows: norms first, and then all joints of
+one signal after those of the other.
+"""
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import TypeAlias
+
+import numpy as np
+
+from noiseclassifier.errors import MissingSignalError, SignalError
+from noiseclassifier.types import Mask, Real
+
+NOISE = "noise"
+"""The one signal of the paper, p_hat = sqrt(|qd|^2 + |qd_desired|^2) (Sec. II-A)."""
+
+MOTION = ("desired", "measured", "error")
+"""Norms of the velocities of a run with a desired motion."""
+
+JOINTS = tuple(f"{name}_joints" for name in MOTION)
+"""The same, joint by joint."""
+
+EFFORT = "effort_joints"
+"""Joint torques, forces or motor currents, in any unit."""
+
+Signals: TypeAlias = Real | Mapping[str, Real]
+"""The noise, shape (samples,), or signals by name: norms of that shape, and what goes joint by
+joint, shape (joints, samples)."""
+
+
+def named(signals: Signals) -> Mapping[str, Real]:
+    """Signals by name; one alone is the noise."""
+    return signals if isinstance(signals, Mapping) else {NOISE: signals}
+
+
+def by_joint(name: str) -> bool:
+    """Whether a signal has a row for each joint, by its name."""
+    return name in JOINTS or name == EFFORT
+
+
+def without_zero_error(signals: Mapping[str, Real]) -> dict[str, Real]:
+    """All signals but the error where it is zero: the log has no desired motion of its own."""
+    return {
+        name: each for name, each in signals.items() if not name.startswith("error") or np.any(each)
+    }
+
+
+def feeds(there: Collection[str], names: Sequence[str]) -> bool:
+    """Whether all that are named are there; the noise can be computed from its two parts."""
+    parts = "measured" in there and "desired" in there
+    return all(name in there or (name == NOISE and parts) for name in names)
+
+
+def stacked(signals: Signals, names: Sequence[str]) -> Real:
+    """Signals as rows of one array.
+
+    Args:
+        signals: The noise, or signals by name.
+        names: Those to stack, norms first. ``noise`` is computed from ``measured`` and ``desired``
+            where it is missing.
+
+    Returns:
+        One norm as it is, shape (samples,); several signals as rows, shape (rows, samples).
+
+    Raises:
+        MissingSignalError: If one is not there.
+        SignalError: If one is of another shape than its name requires, or they differ in length
+            or in their joints.
+    """
+    there = named(signals)
+    if lacking := [name for name in names if name not in there]:
+        if not feeds(there, names):
+            raise MissingSignalError(lacking, there)
+        there = {**there, NOISE: np.hypot(there["measured"], there["desired"])}
+    chosen = [np.asarray(there[name]) for name in names]
+    if not _fit(names, chosen):
+        found = ", ".join(f"{name} {s.shape}" for name, s in zip(names, chosen, strict=True))
+        joints = ", and (joints, samples) joint by joint" * any(map(by_joint, names))
+        raise SignalError(f"a signal has another shape, {found}, expected (samples,){joints}")
+    if len(chosen) == 1:
+        return chosen[0]
+    return np.vstack(chosen)
+
+
+def _fit(names: Sequence[str], chosen: Sequence[Real]) -> bool:
+    """Whether all norms have one shape, and all that goes joint by joint has another one."""
+    count, joints = chosen[0].shape[-1:], chosen[-1].shape[:-1]
+    wanted = [joints + count if by_joint(name) else count for name in names]
+    alike = [each.shape for each in chosen] == wanted
+    return alike and len(count) == 1 and len(joints) == by_joint(names[-1]) and 0 not in joints
+
+
+def check(samples: Real, valid: Mask | None, *, first: int) -> None:
+    """Check the input of a classifier.
+
+    Args:
+        samples: Shape (samples,) or (rows, samples).
+        valid: False in gaps; None if there are none.
+        first: Number of the first sample.
+
+    Raises:
+        SignalError: If the shapes do not fit, or a value is not finite.
+    """
+    count = samples.shape[-1]
+    if valid is not None and valid.shape != (count,):
+        raise SignalError(
+            f"samples of shape {samples.shape} and validity of shape {valid.shape},"
+            " expected (samples,) for both"
+        )
+    if not np.isfinite(samples).all():
+        plain = samples.reshape(-1, count)
+        number, row = np.argwhere(~np.isfinite(plain))[0].tolist()
+        raise SignalError(
+            f"sample {first + row} of the signal is not finite ({plain[number, row]})"
+        )
