@@ -68,14 +68,7 @@ AGAIN = ("panda-early-height", "go2-force-jump")
 
 @dataclass(frozen=True)
 class Checkout:
-    """A checkout and the Python that runs it.
-
-    Attributes:
-        folder: Its root.
-        python: A Python with what it depends on.
-        scratch: Folder for caches of its own, so that nothing is written into the checkout and
-            neither reads what the other has computed.
-    """
+    """A checkout and the Python that runs it."""
 
     folder: Path
     python: Path
@@ -126,12 +119,7 @@ class Checkout:
         }
 
     def probe(self, output: Path, **job: Mapping[str, object]) -> None:
-        """Compute results in this checkout.
-
-        Args:
-            output: Folder of the results; must not exist.
-            job: What to compute, see `TASKS`; nothing of what is not given.
-        """
+        """Compute results in this checkout."""
         output.mkdir(parents=True)
         tasks = {task: job.get(task, {}) for task in TASKS}
         place = {"checkout": self.folder, "output": output, "renamed": self.renamed}
@@ -146,13 +134,7 @@ class Checkout:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One result of both checkouts.
-
-    Attributes:
-        item: The run, and what was computed.
-        contents: The arrays that were compared.
-        differences: What differs, a phrase each; empty if all bytes are the same.
-    """
+    """One result of both checkouts."""
 
     item: str
     contents: str
@@ -170,15 +152,7 @@ def names() -> list[tuple[str, str]]:
 
 
 def compare(before: Path, after: Path) -> list[Comparison]:
-    """Compare two folders of results, file by file.
-
-    Args:
-        before: Results of the older checkout.
-        after: Results of the newer one.
-
-    Returns:
-        A comparison for each file that one of them has.
-    """
+    """Compare two folders of results, file by file."""
     found = {path.relative_to(side) for side in (before, after) for path in side.rglob("*.npz")}
     return [_compare_files(path, before / path, after / path) for path in sorted(found)]
 
@@ -236,13 +210,7 @@ def standin(folder: Path) -> Path | None:
 
 
 def simulated(checkout: Checkout, folder: Path, cases: Mapping[str, Case]) -> dict[str, Path]:
-    """Run files of simulated runs, by name; those that the folder lacks are simulated.
-
-    Args:
-        checkout: The checkout that simulates.
-        folder: Where run files are kept.
-        cases: What each run is.
-    """
+    """Run files of simulated runs, by name; those that the folder lacks are simulated."""
     files = {name: folder / name / "simulated run.npz" for name in cases}
     for name in [name for name, file in files.items() if not file.exists()]:
         fresh = folder.with_suffix(".part")
@@ -256,14 +224,7 @@ def simulated(checkout: Checkout, folder: Path, cases: Mapping[str, Case]) -> di
 def compare_checkouts(
     before: Checkout, after: Checkout, folder: Path, wanted: Sequence[str]
 ) -> list[Comparison]:
-    """Compute everything in both checkouts, and compare it.
-
-    Args:
-        before: The older checkout.
-        after: The newer one.
-        folder: Where inputs are kept and results are written.
-        wanted: Names of runs, "lola" for the stand-in, and paths of run files.
-    """
+    """Compute everything in both checkouts, and compare it."""
     chosen = {name: case for name, case in SIMULATED.items() if name in wanted}
     runs = simulated(after, folder / "runs", chosen)
     runs |= {"demo": DEMO} if "demo" in wanted else {}

@@ -31,12 +31,7 @@ CHUNK = 64
 
 
 def older(name: str, renamed: Mapping[str, str]) -> str:
-    """Old name of what a newer version calls by a dotted name.
-
-    Args:
-        name: The new name.
-        renamed: Old names by new ones; the longest that `name` begins with counts.
-    """
+    """Old name of what a newer version calls by a dotted name."""
     parts = name.split(".")
     for stop in range(len(parts), 0, -1):
         if (head := ".".join(parts[:stop])) in renamed:
@@ -45,12 +40,7 @@ def older(name: str, renamed: Mapping[str, str]) -> str:
 
 
 def resolve(name: str) -> Any:
-    """Module, class, function, attribute or dataclass field of a dotted name.
-
-    Raises:
-        ImportError: If its first part is no module.
-        AttributeError: If a module or a class has no such attribute or field.
-    """
+    """Module, class, function, attribute or dataclass field of a dotted name."""
     first, *rest = name.split(".")
     found, path = importlib.import_module(first), first
     for part in rest:
@@ -72,11 +62,7 @@ def resolve(name: str) -> Any:
 
 @dataclass(frozen=True)
 class Names:
-    """Names of a newer version, translated for an older checkout.
-
-    Attributes:
-        renamed: Old names by new ones; empty for a checkout that knows the new ones.
-    """
+    """Names of a newer version, translated for an older checkout."""
 
     renamed: Mapping[str, str]
 
@@ -90,12 +76,7 @@ class Names:
 
 
 class Probe:
-    """One checkout at work.
-
-    Attributes:
-        names: Finds what the newer version calls by a name.
-        output: Folder of the results.
-    """
+    """One checkout at work."""
 
     def __init__(self, names: Names, output: Path, models: Mapping[str, str]) -> None:
         """Load the models, by the names of their files."""

@@ -82,14 +82,7 @@ class Robot:
 
 @dataclass
 class Shown:
-    """What is drawn and played of a data set.
-
-    Attributes:
-        robots: By name.
-        spectra: Spectra of good logs by family, each as of `spectrum`.
-        rippled: Good logs of arms of which a ripple could be seen.
-        sounds: Logs by the names of their files.
-    """
+    """What is drawn and played of a data set."""
 
     robots: Mapping[str, Robot]
     spectra: dict[str, list[Array]] = field(default_factory=lambda: defaultdict(list))

@@ -101,12 +101,7 @@ class Threshold(NamedTuple):
 
 
 class TargetError(InspectorError):
-    """A run of a target domain, on which nothing is chosen.
-
-    Args:
-        name: Of the run.
-        what: What of it belongs to the target domains.
-    """
+    """A run of a target domain, on which nothing is chosen."""
 
     def __init__(self, name: str, what: str) -> None:
         self.name, self.what = name, what
@@ -122,8 +117,6 @@ class Known:
     """What is kept of a run.
 
     Attributes:
-        profile: How it is framed.
-        base: The run, without predictions.
         failing: Whether each frame of the whole run is a failure, shape (frames,).
         starts: First sample of each, shape (frames,).
         start: Time of the first sample, in [s].
@@ -167,8 +160,6 @@ class Linear(Probable):
     Features that are missing are at the mean of those that are not.
 
     Attributes:
-        weights: Shape (features, classes).
-        offset: Shape (classes,).
         known: Highest value of each feature in nearly all training frames, shape (features,).
     """
 
@@ -222,13 +213,9 @@ class Measured:
     """Predictions of a candidate on all runs, each by a model without its robot.
 
     Attributes:
-        name: Of the candidate.
         robots: Of the runs, shape (runs,).
-        parts: Rates and inputs of the runs.
         score: Of the runs, shape (runs,).
-        thresholds: All thresholds.
         counts: Counts of each run at each threshold, by name, shape (thresholds, runs).
-        seconds: Time that training took with all others that are trained together.
     """
 
     name: str
@@ -270,11 +257,7 @@ class Measured:
         )
 
     def chosen(self, budget: float) -> int | None:
-        """Number of the threshold that finds most felt faults within a budget, None without one.
-
-        Args:
-            budget: Mean false alarms per hour.
-        """
+        """Number of the threshold that finds most felt faults within a budget, None without one."""
         false, found = self.mean("false_alarms", "ok_hours"), self.mean("found_felt", "felt")
         allowed = np.flatnonzero(false <= budget)
         if not len(allowed):
@@ -383,13 +366,7 @@ def wanted(
     """A profile by its name, and the names of its features if it is the general one.
 
     Args:
-        name: ``ANY_RATE``, or one of `inspector.training.training.PROFILES`.
         rate: Of a profile of one rate, in [Hz].
-        without: Features of the general profile to leave out, of ``WITHOUT``.
-
-    Raises:
-        InspectorError: If there is no such profile, a setting is another profile's, or no feature
-            is left.
     """
     if name != ANY_RATE:
         if without:
@@ -417,20 +394,7 @@ def read(
     wildest: float = inf,
     jobs: int = 1,
 ) -> tuple[list[Known], LeftOut]:
-    """Features of runs; only they are kept, and runs that lack a signal are left out.
-
-    Args:
-        paths: Run files.
-        profile: What to compute, at one rate or, with ``names``, at that of each run.
-        thin: Train on every ``thin``-th `ok` frame of a run.
-        names: Of the features of the general profile.
-        wildest: No frame to train on is of a domain whose wildness is above.
-        jobs: Processes.
-
-    Raises:
-        TargetError: If a run is of a target domain.
-        InspectorError: If a run names no robot, or none is left.
-    """
+    """Features of runs; only they are kept, and runs that lack a signal are left out."""
     runs: list[Known] = []
     left_out = LeftOut()
     each = (delayed(known)(path, profile, thin, names, wildest) for path in paths)
@@ -545,15 +509,7 @@ def target(robot: str, meta: Mapping[str, Any]) -> str:
 
 
 def robot_folds(robots: Sequence[str], count: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Split runs so that no line of robots is on both sides, and families are spread evenly.
-
-    Args:
-        robots: Robot of each run.
-        count: How many folds.
-
-    Returns:
-        For each fold, indices of the training runs, and of those left out.
-    """
+    """Split runs so that no line of robots is on both sides, and families are spread evenly."""
     every = {**ROBOTS, **WIDE}
 
     def name(robot: str) -> str:
@@ -571,16 +527,7 @@ def line_of(robot: str) -> str:
 def candidates(
     profile: nc.Profile, grid: Sequence[str], names: Sequence[str] = ()
 ) -> Iterator[Candidates]:
-    """Points of a grid; trees that differ in their number of rounds alone are trained together.
-
-    Args:
-        profile: What the grid changes.
-        grid: Settings and their values.
-        names: Features of a general model; of a profile of one rate, none.
-
-    Raises:
-        GridError: If the grid is wrong.
-    """
+    """Points of a grid; trees that differ in their number of rounds alone are trained together."""
     if not grid:
         profiles, points = [profile], [profile.estimator]
     else:
@@ -631,24 +578,7 @@ def measure(
     thin: int = 1,
     quick: bool = False,
 ) -> list[Measured]:
-    """Measures of candidates on runs that they were not trained on.
-
-    Args:
-        runs: All runs.
-        split: Indices of training runs and of those left out, which are each left out once.
-        several: The candidates.
-        profile: What the features are of.
-        thresholds: All thresholds.
-        measured: How many of the runs are measured on, the first ones; all unless given.
-        names: Of the features of the general profile.
-        thin: The runs have every ``thin``-th `ok` frame to train on; the prior of `ok` is corrected
-            for it.
-        quick: Whether trees are not calibrated, in a third of the time: to rank candidates, as
-            their thresholds are others then.
-
-    Raises:
-        DatasetError: If there is one class alone.
-    """
+    """Measures of candidates on runs that they were not trained on."""
     candidates = [name for each in several for name in each.names]
     own_runs = runs[:measured]
     counts = np.zeros((len(candidates), len(COUNTS), len(thresholds), len(own_runs)))
@@ -702,8 +632,6 @@ def corrected(estimator: Any, thin: int, unbounded: np.ndarray) -> Any:
     """An estimator for all frames, of one trained on every ``thin``-th `ok` frame.
 
     Args:
-        estimator: Any.
-        thin: The odds of `ok` are multiplied by it.
         unbounded: Whether a feature says nothing of novelty, shape (features,).
     """
     if unbounded.any():

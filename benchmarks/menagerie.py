@@ -37,14 +37,7 @@ class Row:
     """What is measured of one robot; what was not is 0.
 
     Attributes:
-        name: As it was given.
-        problem: Why it is not supported; empty if it is.
-        floating: Whether its base floats.
-        joints: Joints that a run can name.
-        links: Links that move.
-        shaped: Those with geometry.
         level: Sound power in the fixed motion, in [dB re 1 pW].
-        drawn: Links, or the foot of an arm, with a mesh in a recording that is read back.
     """
 
     name: str
@@ -58,11 +51,7 @@ class Row:
 
 
 def measured(name: str) -> Row:
-    """Load, move and draw a robot.
-
-    Args:
-        name: A name, or the path of a URDF or an MJCF.
-    """
+    """Load, move and draw a robot."""
     try:
         robot = nm.Robot.load(name)
         drawing = triangles(robot, "auto")

@@ -97,16 +97,7 @@ class Peer:
 
 
 def race(pythons: dict[str, str], folder: Path, repeats: int) -> Found:
-    """Results of all tasks; the sides take turns.
-
-    Args:
-        pythons: The Python of each side.
-        folder: The files.
-        repeats: Number of repeats.
-
-    Returns:
-        The results.
-    """
+    """Results of all tasks; the sides take turns."""
     found: Found = {side: {} for side in pythons}
     for _ in range(repeats):
         peers = {side: Peer(python, side, folder) for side, python in pythons.items()}

@@ -183,12 +183,7 @@ class Ours:
 
 
 def serve(side: type[Original] | type[Ours], folder: Path) -> None:
-    """Do the tasks named on standard input, line by line.
-
-    Args:
-        side: The side that does them.
-        folder: NoisyTest's ``training``, ``validation`` and configuration.
-    """
+    """Do the tasks named on standard input, line by line."""
     output, sys.stdout = sys.stdout, sys.stderr  # a library may print
 
     def report(started: tuple[float, float], times: int, answer: Any) -> None:

@@ -78,15 +78,7 @@ class Score(NamedTuple):
 
 @dataclass(frozen=True)
 class Measured:
-    """The measures of a model.
-
-    Attributes:
-        name: Its name.
-        trained_on: Number of runs that it was trained on.
-        whole: On all runs.
-        reduced: On those of robots with limbs, with all joints and with half of the limbs; empty
-            for a linear kernel, as in the paper.
-    """
+    """The measures of a model."""
 
     name: str
     trained_on: int

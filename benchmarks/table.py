@@ -18,13 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @dataclass(frozen=True)
 class Given:
-    """What a user gives the benchmarks.
-
-    Attributes:
-        noisytest: Folder with NoisyTest's data set and configuration, None without.
-        original: Python of an environment with NoisyTest 0.0.1; empty without.
-        before: An older checkout, None without.
-    """
+    """What a user gives the benchmarks."""
 
     noisytest: Path | None = None
     original: str = ""
@@ -37,17 +31,7 @@ class LeftOutError(Exception):
 
 @dataclass(frozen=True)
 class Row:
-    """A line of the table.
-
-    Attributes:
-        name: What is measured.
-        ours: The median of ours, in ``unit``.
-        against: What it is compared with; empty without.
-        other: The median of that, in ``unit``; None if it was not measured.
-        wanted: Least ratio of the other to ours; None if any is right.
-        most: The most that ours may be, in ``unit``; None if anything is right.
-        unit: ``s`` or ``MB``.
-    """
+    """A line of the table."""
 
     name: str
     ours: float
@@ -95,13 +79,7 @@ def _shown(value: float, unit: str) -> str:
 def in_turns(
     sides: Mapping[str, Callable[[], float]], repeats: int, *, warm: int = 0
 ) -> dict[str, float]:
-    """Medians of what each side returns; they take turns.
-
-    Args:
-        sides: What is measured, by name: it returns the time that it took.
-        repeats: How often each is measured.
-        warm: Turns before these that do not count: they compile modules and fill caches.
-    """
+    """Medians of what each side returns; they take turns."""
     found: dict[str, list[float]] = {side: [] for side in sides}
     for turn in range(-warm, repeats):
         for side, work in sides.items():
@@ -125,17 +103,7 @@ def of_process(
     environment: Mapping[str, str] | None = None,
     stdin: Path | None = None,
 ) -> float:
-    """CPU time of a process and its children, in [s].
-
-    Args:
-        command: What is started.
-        folder: Where.
-        environment: Its variables; those of this process unless given.
-        stdin: A file that it reads.
-
-    Raises:
-        SystemExit: If it failed; findings are no failure.
-    """
+    """CPU time of a process and its children, in [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with (stdin or Path(os.devnull)).open("rb") as stream:
         done = subprocess.run(

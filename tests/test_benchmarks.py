@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import noiseclassifier as nc
 from noiseclassifier.scenarios.limbs import limbs
 from noiseclassifier.scenarios.sample import Sample
 from noisemodel import Block
@@ -111,21 +110,6 @@ def test_the_three_tables_are_filled(paper, data, tmp_path, monkeypatch, capsys)
     assert "of 3 runs in 3 groups; false alarms" in out  # go2's seed 7, talos's 7 and 9
     assert "ok motion of 4 runs in 4 groups." in out
     assert "Runs trained on: paper-linear 6, noisytest-rbf 6." in out
-
-
-def test_the_robot_that_is_left_out_is_measured_and_not_trained_on(
-    paper, data, tmp_path, monkeypatch, capsys
-):
-    from benchmarks import unseen
-
-    given = [data, "--output", tmp_path, "--profiles", "noisytest-rbf", "--seeds", 2]
-    monkeypatch.setattr(sys, "argv", ["", *map(str, given), "--robots", "go2"])
-    unseen.main()
-    out = capsys.readouterr().out
-    assert "| noisytest-rbf | go2 | 4 | 2, 2 | 96.4% | 100.0%" in out  # go2's seeds 2 and 7
-    (model,) = tmp_path.glob("*.npz")
-    learnt = nc.Classifier.load(model).runs
-    assert {nc.group_of(run).rpartition("-")[0] for run in learnt} == {"panda", "talos"}
 
 
 def test_a_model_of_other_runs_is_refused(paper, data, tmp_path):

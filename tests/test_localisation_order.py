@@ -125,17 +125,6 @@ def test_a_tone_in_the_loudest_joint_masks_the_ripple_of_another():
     assert order(replace(run, velocity=velocity), FINDING) is None
 
 
-def test_simulated_faults_are_not_called_ripple_and_the_orders_of_ripple_are_right(monkeypatch):
-    monkeypatch.syspath_prepend(Path(__file__).parents[1])
-    from benchmarks.ripple import one
-
-    cases = [one(seed) for seed in range(60)]
-    assert not any(case.found for case in cases if case.kind != "ripple")
-    found = [case for case in cases if case.kind == "ripple" and case.found]
-    assert len(found) >= 2
-    assert all(case.right for case in found)
-
-
 def test_ripple_is_found_through_turning_back_and_beside_gaps():
     long = Event("oscillations", 0.2, 3.8, 0.9)
     assert order(run_with(ripple(0.05)), long).periods_per_turn == pytest.approx(160, rel=0.01)

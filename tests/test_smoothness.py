@@ -235,16 +235,3 @@ def test_the_picture_has_a_histogram_of_each_score(folder, tmp_path):
     status, _, err = call("smoothness", folder, "--picture", picture)
     assert status == 3
     assert "exists" in err
-
-
-def test_rollouts_of_the_benchmark_are_the_same_for_a_seed_and_chatter_by_their_defect(monkeypatch):
-    pytest.importorskip("mujoco")
-    monkeypatch.syspath_prepend(ROOT)
-    from benchmarks.smoothness import CLEAN, DEFECTS, RIGS, rollout
-
-    for rig in RIGS:
-        clean = rollout(rig, CLEAN, 7)
-        np.testing.assert_array_equal(clean.velocity, rollout(rig, CLEAN, 7).velocity)
-        assert clean.rate == 50.0
-        smooth = scored(clean, CLEAN).scores["level"]
-        assert all(scored(rollout(rig, each, 7), each).scores["level"] > smooth for each in DEFECTS)

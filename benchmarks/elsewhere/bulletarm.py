@@ -18,12 +18,8 @@ class BulletArm:
     """An arm of ``pybullet_data``.
 
     Attributes:
-        urdf: Path of its URDF.
-        joints: Names of its joints.
         force: Greatest torque of each motor, in [N m].
         home: Posture around which it moves, in [rad].
-        payload: Link that carries the payload.
-        links: Links that can be pushed or hit.
     """
 
     urdf: str
@@ -39,12 +35,9 @@ class Motors:
     """Settings of the motors, and the load.
 
     Attributes:
-        mode: "position" or "velocity".
         gain: Position gain: of the motor's constraint, or of the loop around it in [1/s].
-        lag: Age of the measurements of that loop, in ticks.
         payload: Mass added to the last link, in [kg].
         damping: Viscous friction of the joints, in [N m s].
-        feedforward: Whether the motors are given a velocity; a log has zeros otherwise.
     """
 
     mode: str

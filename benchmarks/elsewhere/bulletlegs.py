@@ -24,16 +24,11 @@ class BulletLegs:
     """A quadruped of ``pybullet_data``.
 
     Attributes:
-        urdf: Path of its URDF.
-        joints: Names of its joints, by leg: hip, thigh, calf; ``{}`` is the leg.
-        names: The same as a listed robot of noisemodel names them.
-        signs: Signs of the hips' axes, relative to the listed robot's.
         zeros: Joint angles of hip, thigh and calf at the zero of the URDF, in [rad].
         lengths: Lateral offset of a leg, thigh and calf, in [m].
         stance: Height of the hips over the feet, in [m].
         gains: Ranges of stiffness in [N m/rad] and damping in [N m s/rad].
         torque: Greatest torque of a joint, in [N m].
-        links: Links that can be pushed or hit.
     """
 
     urdf: str
@@ -109,7 +104,6 @@ def angles(legs: BulletLegs, x: Array, y: Array, z: Array) -> Array:
     """Joint angles that bring feet to places relative to their hips.
 
     Args:
-        legs: The robot.
         x: Places ahead of the hips, shape (samples, legs), in [m].
         y: Places to the left of the hips, same shape.
         z: Places above the hips, same shape.
@@ -127,11 +121,7 @@ def angles(legs: BulletLegs, x: Array, y: Array, z: Array) -> Array:
 
 
 def simulate(legs: BulletLegs, gait: Gait, control: Control, rate: float) -> Recorded:
-    """The motion of a quadruped under a control.
-
-    Raises:
-        DroppedError: If it fell, or the simulation diverged.
-    """
+    """The motion of a quadruped under a control."""
     world = World(legs.urdf, rate, height=legs.stance + 0.05)
     client, robot = world.client, world.robot
     joints = [world.names[name.format(leg)] for leg in LEGS for name in legs.joints]

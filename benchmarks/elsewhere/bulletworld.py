@@ -23,7 +23,6 @@ class World:
     """One robot in a simulation of its own.
 
     Args:
-        urdf: Path of its URDF below ``pybullet_data``.
         rate: Steps per second, in [Hz].
         height: Height of its base, in [m]; a floating base if it is above 0.
     """

@@ -21,8 +21,6 @@ class Servos:
 
     Attributes:
         gain: Of the position loop, in [1/s].
-        servo: Factor on the gain of dm_control's servos.
-        lag: Age of the loop's measurements, in ticks.
         armature: Reflected inertia of the rotors, in [kg m²].
         friction: Coulomb friction of the joints, in [N m].
         payload: Mass added to the last link, in [kg].

@@ -31,16 +31,7 @@ VISIBLE = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A robot with its motion and its settings: all that a seed draws but fault and sensor.
-
-    Attributes:
-        reference: The motion.
-        settings: Dataclass with the drawn settings of controller and load.
-        controller: The controller, in a few words.
-        sizes: Ranges of the faults.
-        links: Links that can be pushed or hit.
-        simulate: Simulation under a control.
-    """
+    """A robot with its motion and its settings: all that a seed draws but fault and sensor."""
 
     reference: Reference
     settings: Any
@@ -61,10 +52,6 @@ class Domain:
     """A robot, a simulator and a controller.
 
     Attributes:
-        name: Its name.
-        package: The simulator.
-        robot: The listed robot with the same joints, if there is one.
-        joints: Names of the joints.
         native: The rate of the simulator's own default or examples, in [Hz].
         scene: Draws a scene, from a random generator, a number, a duration in [s] and a rate in
             [Hz].
@@ -240,17 +227,8 @@ def make(domain: Domain, kind: str, seed: int, *, rate: float = 1000.0, duration
     """Labelled run of a domain.
 
     Args:
-        domain: The domain.
-        kind: "good", or one of ``faults.KINDS``.
-        seed: Random seed; all runs of a seed share their motion, settings and sensor.
         rate: Rate of the control, of the simulation and of the log, in [Hz].
         duration: Duration, in [s].
-
-    Returns:
-        The run; ``meta`` has the settings and the effect of each event.
-
-    Raises:
-        DroppedError: If the robot fell, or the simulation diverged.
     """
     scene, twin = _twin(domain.name, seed, rate, duration)
     control, recorded = scene.given(faults.healthy(scene.reference)), twin
@@ -329,7 +307,6 @@ def visible(
     """The blocks without those of faults that the sensor masks in all octaves.
 
     Args:
-        blocks: The blocks of a run.
         deviation: Velocities less those of the twin, shape (samples, joints), in [rad/s].
         error: Error of the sensor in the twin, same shape, in [rad/s].
         rate: Sample rate, in [Hz].

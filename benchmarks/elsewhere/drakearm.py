@@ -16,12 +16,8 @@ class DrakeArm:
     """An arm of example-robot-data; Drake's own models are a download.
 
     Attributes:
-        robot: Its listed name.
-        joints: Names of its joints.
-        controller: "InverseDynamicsController" or "JointStiffnessController".
         force: Greatest torque of each joint, in [N m].
         home: Posture around which it moves, in [rad].
-        links: Indices of joints whose links can be pushed.
     """
 
     robot: str
@@ -38,7 +34,6 @@ class Loop:
 
     Attributes:
         frequency: Frequency of the closed loop, in [rad/s].
-        damping: Its damping ratio.
         inertia: Reflected inertia of the rotors, in [kg m²].
         friction: Viscous friction of the joints, in [N m s].
         payload: Mass added to the last link, unknown to the controller, in [kg].

@@ -23,12 +23,9 @@ class Sizes:
         force: Peak of a push, in [N].
         ball: Mass of a thrown ball, in [kg]; None where nothing can be thrown.
         delay: Additional age of measurements or commands, in [s].
-        gain: Factor on the gains of a joint that chatters.
         jump: Jump of a joint's reference, in [rad].
         hold: Duration for which a command is held, in [s].
         offset: Offset of an encoder, in [rad].
-        late_commands: Whether commands are late rather than measurements.
-        slow: Whether late measurements make steps, rather than fast oscillations.
     """
 
     force: Range = (30.0, 150.0)
@@ -81,9 +78,6 @@ class Control:
         delay: Additional age of measurements, shape (ticks,), in ticks.
         late: Additional age of commands, shape (ticks,), in ticks.
         gain: Factor on the gains, shape (ticks, joints).
-        pushes: Forces on links.
-        throws: Thrown balls; their events are their contacts.
-        events: All other events.
     """
 
     position: Array
@@ -122,15 +116,7 @@ def draw(
     """A control with a few faults of one kind, at times that are at least a second apart.
 
     Args:
-        rng: Source of times, joints and sizes.
-        kind: One of ``KINDS``.
-        reference: The motion.
-        sizes: Ranges of the faults.
-        links: Links that can be pushed or hit.
         rate: Ticks per second, in [Hz].
-
-    Returns:
-        The control.
     """
     control = healthy(reference)
     ticks = len(reference.position)

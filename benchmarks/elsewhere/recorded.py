@@ -23,7 +23,6 @@ class Recorded:
         position: Joint positions, shape (samples, joints), in [rad].
         velocity: Joint velocities, shape (samples, joints), in [rad/s].
         effort: Joint torques, shape (samples, joints), in [N m].
-        events: Contacts with thrown balls.
     """
 
     position: Array
@@ -32,11 +31,7 @@ class Recorded:
     events: tuple[Event, ...] = ()
 
     def checked(self, rate: float) -> "Recorded":
-        """The same.
-
-        Raises:
-            DroppedError: If the simulation diverged.
-        """
+        """The same."""
         wild = ~(np.abs(self.velocity) < FASTEST).all(axis=1)
         if wild.any():
             raise DroppedError(f"diverged after {np.argmax(wild) / rate:.2f} s")

@@ -14,7 +14,6 @@ class Reference:
     """A motion in joint space.
 
     Attributes:
-        kind: One of ``KINDS``, or the name of a gait.
         position: Shape (samples, joints), in [rad].
         velocity: Its derivative, shape (samples, joints), in [rad/s].
     """
@@ -37,16 +36,11 @@ def draw(
     """A motion around a posture, which starts at rest there.
 
     Args:
-        rng: Source of places, speeds and pauses.
-        kind: One of ``KINDS``.
         home: The posture, shape (joints,), in [rad].
         reach: Greatest distance from it, in [rad].
         duration: Duration, in [s].
         rate: Sample rate, in [Hz].
         fastest: Highest speed from place to place, in [rad/s].
-
-    Returns:
-        The motion.
     """
     time = np.arange(round(duration * rate)) / rate
     if kind == "sine":

@@ -24,12 +24,7 @@ def sensed(
     Args:
         position: Joint positions, shape (samples, joints), in [rad].
         velocity: Joint velocities, shape (samples, joints), in [rad/s].
-        sensor: One of ``SENSORS``.
         rate: Sample rate, in [Hz].
-        rng: Source of the noise, and of the filter's cut-off frequency.
-
-    Returns:
-        Both, of the same shapes and units.
     """
     if sensor in NOISE:
         return position, velocity + NOISE[sensor] * rng.standard_normal(velocity.shape)

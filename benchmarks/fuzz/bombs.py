@@ -20,13 +20,7 @@ DEEP = 100_000
 
 @dataclass(frozen=True)
 class Bomb:
-    """A malformed file.
-
-    Attributes:
-        name: What is wrong with it.
-        content: Its bytes; or puts it where a whole file lies, and gives its path if it is another.
-        refuse: Whether a result of it is nonsense.
-    """
+    """A malformed file."""
 
     name: str
     content: bytes | str | Callable[[Path], object]
@@ -43,12 +37,7 @@ class Bomb:
 
 
 def bombs(name: str, whole: Path) -> Iterator[Bomb]:
-    """Files for a reader.
-
-    Args:
-        name: The reader.
-        whole: A whole file of it.
-    """
+    """Files for a reader."""
     reader, data = READERS[name], whole.read_bytes()
     yield Bomb("empty", b"", refuse=reader.kind != "text")
     yield from _texts(data)

@@ -27,13 +27,7 @@ KINDS = ("<f4", ">f8", "<f2", "<i8", "u1", "?", "<c16", "<U3", "S3", "<M8[ns]", 
 
 
 def damaged(data: bytes, kind: str, random: Random) -> bytes:
-    """Damage a file.
-
-    Args:
-        data: The whole file.
-        kind: "text", "arrays" (npz) or "bytes".
-        random: Decides what is changed.
-    """
+    """Damage a file."""
     of_kind = {"text": _words, "arrays": _arrays}.get(kind, _bytes)
     return (of_kind if random.random() < 0.7 else _bytes)(data, random)
 

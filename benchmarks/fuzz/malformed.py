@@ -51,13 +51,8 @@ class Result:
     """What became of a file.
 
     Attributes:
-        reader: Name of its reader.
-        case: What was done to it.
-        outcome: One of ``OUTCOMES``.
-        status: Exit status of the command, or minus the signal that ended it.
         seconds: Processor time, in [s].
         megabytes: Peak of the resident memory, in [MB].
-        said: The last line of what it printed.
     """
 
     reader: str
@@ -119,15 +114,7 @@ def table(found: list[Result]) -> str:
 def results(
     name: str, count: int, seed: int, scratch: Path, keep: Path | None = None
 ) -> Iterator[Result]:
-    """Read the malformed files of one reader.
-
-    Args:
-        name: The reader.
-        count: Number of files with random damage.
-        seed: Of the damage.
-        scratch: Folder for files.
-        keep: Folder for files that were not handled.
-    """
+    """Read the malformed files of one reader."""
     reader = READERS[name]
     whole = scratch / "whole"
     whole.mkdir()
@@ -233,13 +220,8 @@ def judged(
     """What became of a file.
 
     Args:
-        name: Its reader.
-        case: The file.
-        status: Exit status of the command, or minus the signal that ended it.
         seconds: Processor time, in [s].
         peak: Peak of the resident memory, in [byte].
-        out: What the command printed.
-        err: What it complained.
     """
     lines = (err.strip() or out.strip()).splitlines()
     if peak > BYTES:

@@ -103,17 +103,7 @@ percent = 5.5
 
 @dataclass(frozen=True)
 class Reader:
-    """A reader of files.
-
-    Attributes:
-        kind: What its files are: "text", "arrays" (npz), or "bytes".
-        make: Writes a whole file, and what it lies among, into a folder; the file to be damaged.
-        read: Reads the damaged file; anything but a result or one of ``EXPECTED`` is a bug.
-        command: Arguments of the command line that reads it: ``{}`` is the file, ``{folder}`` the
-            folder that it was made in, ``{parent}`` the one that the file lies in.
-        stdin: Whether the command reads the file from standard input.
-        before: Runs first in the process of the command.
-    """
+    """A reader of files."""
 
     kind: str
     make: Callable[[Path], Path]

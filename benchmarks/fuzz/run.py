@@ -70,11 +70,7 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
     """Fuzz some readers; ends the process.
 
     Args:
-        names: The readers; the first byte of an input chooses one.
-        folder: A folder for their files and the corpus.
         seconds: How long, in [s].
-        seed: Of the mutations.
-        found: Folder for inputs that raise what is not expected.
     """
     corpus, paths = folder / "corpus", []
     corpus.mkdir()
@@ -108,15 +104,7 @@ def fuzz(names: tuple[str, ...], folder: Path, seconds: int, seed: int, found: P
 def target(
     names: tuple[str, ...], paths: list[Path], until: float, found: Path | None, folder: Path
 ) -> Callable[[bytes], None]:
-    """A function that gives an input to one of the readers, and notes what it raises.
-
-    Args:
-        names: The readers.
-        paths: Where each has its file.
-        until: When to print what was found and to end the process, by the monotonic clock.
-        found: Folder for inputs that raise what is not expected.
-        folder: Deleted at the end.
-    """
+    """A function that gives an input to one of the readers, and notes what it raises."""
     counts, places = Counter[str](), dict[str, str]()
 
     def one(data: bytes) -> None:

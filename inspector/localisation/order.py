@@ -22,7 +22,7 @@ An order is stated if its line explains `LEAST` of the energy, and `MARGIN` of i
 line of fixed frequency. While the speed hardly varies both explain the same, and none is stated.
 The resolution of an order is the inverse of the number of periods, of which `PERIODS` are needed.
 Neither share depends on the scale of the vibration or the direction of time. The limits were chosen
-on simulated findings (`benchmarks/ripple.py`).
+on simulated findings.
 """
 
 import math
