@@ -14,13 +14,7 @@ BANDS: tuple[tuple[int, int], ...] = (
 
 @dataclass(frozen=True)
 class Case:
-    """A scenario for one family of robots.
-
-    Attributes:
-        motion: The motion of the robot; without the defect, it is that of the twin.
-        defect: The defect.
-        description: Replaces the description of the scenario, unless empty.
-    """
+    """A scenario for one family of robots."""
 
     motion: Motion
     defect: Defect = field(default_factory=NoDefect)

@@ -63,15 +63,7 @@ def set_collision(model: Any, geom: int, *, present: bool) -> None:
 
 
 def box_changes(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, bool]]]:
-    """Disable the boxes that are not present at first; the changes of all boxes.
-
-    Args:
-        model: The ``mujoco.MjModel``, made with these boxes.
-        boxes: The boxes.
-
-    Returns:
-        Geoms and whether they are present from then on, by ticks.
-    """
+    """Disable the boxes that are not present at first; the changes of all boxes."""
     changes: dict[int, list[tuple[int, bool]]] = {}
     for number, box in enumerate(boxes):
         geom = model.geom(_box(number)).id

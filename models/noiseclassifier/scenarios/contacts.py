@@ -24,7 +24,6 @@ class Contact:
         lift: When it is to lift off, in [s].
         stop: When it must have lifted off, in [s].
         place: x, y, z of the surface there, in [m].
-        effector: Index of the effector.
         yaw: Direction of the effector there, in [rad].
         approach: When it starts to descend to the place, in [s]; 0 for the first contact.
     """
@@ -55,7 +54,6 @@ def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
 
     Args:
         force: Contact force of each effector, shape (samples, effectors), in [N].
-        planned: The contacts that were planned.
 
     Returns:
         One event per contact that begins outside of the planned ones of its effector, with its

@@ -21,19 +21,6 @@ def make(folder: Folder, tasks: Sequence[Task], *, jobs: Jobs = 1) -> Iterator[T
     """Simulate the missing runs of a data set.
 
     Each run is written at once, so that a killed process loses only the runs in work.
-
-    Args:
-        folder: The folder of the data set.
-        tasks: The runs of the data set.
-        jobs: Number of parallel processes, or the address of a Dask scheduler.
-
-    Yields:
-        The runs in the order of completion, including those that fell.
-
-    Raises:
-        MissingSimulatorError: If MuJoCo is not installed.
-        DatasetError: If a run cannot be simulated or written, or a worker dies with it.
-        ClusterError: If the Dask scheduler cannot be reached, or is lost.
     """
     groups = grouped_by_twin(folder.missing(tasks), folder.format.motion)
     if groups and find_spec("mujoco") is None:

@@ -33,18 +33,7 @@ def tasks(
     faults: int = FAULTS,
     always: Sequence[str] = (),
 ) -> list[Task]:
-    """The runs of a data set, seed by seed.
-
-    Args:
-        robots: Names in ``noiseclassifier.scenarios.robots.WIDE``; by default all.
-        first: The first seed.
-        seeds: How many seeds.
-        faults: Faulty runs of each robot and seed, each of another fault, drawn by the seed.
-        always: Faults of each robot and seed besides, where they can act.
-
-    Raises:
-        ScenarioError: If a robot is unknown, a number is out of range, or no robot has a fault.
-    """
+    """The runs of a data set, seed by seed."""
     for robot in robots:
         if robot not in WIDE:
             raise UnsimulatedRobotError(robot, WIDE)
@@ -85,15 +74,7 @@ def logs(
     """Logs of the runs of a data set, each with its name: ``<robot>/<fault>[.copy]-<seed>``.
 
     Args:
-        folder: A data set of wide domains.
-        copies: Logs of each run, each of another logger.
         rate: Of all logs, in [Hz]; drawn by default. Runs kept at a lower rate have no log then.
-        side: Which domains and loggers to keep.
-        distribution: What loggers are drawn from.
-
-    Raises:
-        DatasetError: If the side is unknown, or the folder holds no run.
-        NoiseModelError: If a file is damaged.
     """
     if side not in get_args(Side):
         raise DatasetError(f"no side {side!r}; there are {', '.join(get_args(Side))}")
@@ -133,11 +114,7 @@ def side_of(robot: str, domain: Domain, logger: Logger) -> Side:
 
 
 def write(logs: Iterator[tuple[str, Run]], output: Path) -> Iterator[tuple[str, Run]]:
-    """Write logs as run files in a folder.
-
-    Raises:
-        OutputError: If a file cannot be written.
-    """
+    """Write logs as run files in a folder."""
     for name, run in logs:
         path = output / f"{name}.npz"
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -36,7 +36,6 @@ class Drives:
         damping: Velocity gains, shape (joints,), in [N m s/rad].
         limit: Largest torques, shape (joints,), in [N m].
         offset: Encoder error at rest, shape (joints,), in [rad].
-        imperfections: Encoder, filter and delay.
         step: Time between two samples, in [s].
     """
 
@@ -85,9 +84,6 @@ class Drives:
             targets: Positions of the reference, shape (samples, joints), in [rad].
             rates: Velocities of the reference, shape (samples, joints), in [rad/s].
             torque: Torques of the model, shape (joints,), in [N m].
-
-        Returns:
-            The same three, as the drives follow them.
         """
         return targets, rates, torque
 

@@ -8,7 +8,6 @@ class Drivetrain:
     """One drive per joint, nominal values.
 
     Attributes:
-        joints: Names of the joints; all others are locked.
         stiffness: Position gain of each drive, in [N m/rad].
         damping: Velocity gain of each drive, in [N m s/rad].
         torque: Limit of each drive, in [N m].

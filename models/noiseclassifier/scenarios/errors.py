@@ -10,12 +10,7 @@ class ScenarioError(ValueError):
 
 
 class UnknownScenarioError(ScenarioError):
-    """A scenario that is not in the table.
-
-    Args:
-        name: The name given.
-        known: The known scenarios.
-    """
+    """A scenario that is not in the table."""
 
     def __init__(self, name: str, known: Iterable[str]) -> None:
         self.name, self.known = name, tuple(known)
@@ -33,12 +28,7 @@ class UnknownGaitError(ScenarioError):
 
 
 class UnsimulatedRobotError(ScenarioError):
-    """A robot that cannot be simulated.
-
-    Args:
-        name: The name given.
-        known: The robots that can be simulated.
-    """
+    """A robot that cannot be simulated."""
 
     def __init__(self, name: str, known: Iterable[str]) -> None:
         self.name, self.known = name, tuple(known)
@@ -49,13 +39,7 @@ class UnsimulatedRobotError(ScenarioError):
 
 
 class UnsuitedScenarioError(ScenarioError):
-    """A scenario that does not exist for a robot.
-
-    Args:
-        scenario: The name of the scenario.
-        robot: The name of the robot.
-        known: The scenarios that the robot has.
-    """
+    """A scenario that does not exist for a robot."""
 
     def __init__(self, scenario: str, robot: str, known: Iterable[str]) -> None:
         self.scenario, self.robot, self.known = scenario, robot, tuple(known)
@@ -83,7 +67,6 @@ class DivergedError(ScenarioError):
 
     Args:
         time: When, in [s].
-        problem: The observation, in a few words.
     """
 
     def __init__(self, time: float, problem: str) -> None:
@@ -106,11 +89,7 @@ class SimulationError(ScenarioError):
     """A run that diverged, or in which the robot fell.
 
     Args:
-        robot: The robot.
-        scenario: The scenario.
-        seed: The seed of the run.
         time: Time of the failure, in [s].
-        problem: The observation, in a few words.
     """
 
     def __init__(self, robot: str, scenario: str, seed: int, time: float, problem: str) -> None:
@@ -123,12 +102,7 @@ class SimulationError(ScenarioError):
 
 
 class SampleError(ScenarioError):
-    """A file that is not a sample, or is damaged.
-
-    Args:
-        path: The file that was read.
-        problem: What is wrong with it, in one line.
-    """
+    """A file that is not a sample, or is damaged."""
 
     def __init__(self, path: Path, problem: str) -> None:
         self.path, self.problem = path, problem
@@ -136,13 +110,7 @@ class SampleError(ScenarioError):
 
 
 class ChangedRunError(ScenarioError):
-    """A run that cannot be reproduced with the present software.
-
-    Args:
-        name: The sample.
-        made: Recipe and versions of the sample.
-        here: Recipe and versions now.
-    """
+    """A run that cannot be reproduced with the present software."""
 
     def __init__(self, name: str, made: str, here: str) -> None:
         self.name, self.made, self.here = name, made, here

@@ -10,11 +10,8 @@ class Event:
     """An event that may lead to a failure.
 
     Attributes:
-        label: The class of that failure.
-        cause: The cause, in a few words.
         start: When it began, in [s].
         stop: When its cause ended, in [s].
-        facts: Further quantities, in SI units.
     """
 
     label: str

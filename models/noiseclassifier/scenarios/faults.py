@@ -22,8 +22,6 @@ class Faults:
     """The faults to inject into one run; by default none.
 
     Attributes:
-        boxes: Obstacles unknown to the controller.
-        ground: The real ground, if it differs from the planned one.
         decalibration: Offsets of encoders by the index of the joint, in [rad].
         shift: Added to the planned places of the effectors: time to shape
             (ticks, effectors, 3), in [m].
@@ -31,9 +29,6 @@ class Faults:
             (samples, effectors, 2), in [m] and [m/s].
         sensors: Added to the values of sensors, by name: time to shape (ticks, values).
         gain: Scale of the force control's gains: time to shape (ticks,).
-        loads: Forces from outside, other than those of boxes.
-        events: Events that are defined before the simulation.
-        facts: The drawn values, for the metadata of the run.
     """
 
     boxes: tuple[Box, ...] = ()
@@ -90,13 +85,9 @@ def sines(
         time: Shape (times,), in [s].
         rates: Of the sines, shape (sines,), in [rad/s].
         phases: Of the sines, shape (sines,), in [rad].
-        amplitude: Of one sine of equal power.
         start: When it starts, in [s].
         stop: When it ends, in [s].
         shares: Scale of each effector, shape (effectors,).
-
-    Returns:
-        Shape (times, effectors, 2).
     """
     out = np.zeros((len(time), len(shares), 2))
     inside = (start < time) & (time < stop)

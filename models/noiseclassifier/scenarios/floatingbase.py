@@ -11,9 +11,6 @@ def pinocchio_base(pose: Array, velocity: Array) -> tuple[Array, Array]:
     Args:
         pose: Position and quaternion (w, x, y, z), shape (samples, 7).
         velocity: Linear in the world's axes, angular in the base's own, shape (samples, 6).
-
-    Returns:
-        Position and quaternion (x, y, z, w); velocity, linear and angular in the base's own axes.
     """
     place, w, xyz = pose[:, :3], pose[:, 3:4], pose[:, 4:]
     linear = velocity[:, :3]

@@ -34,8 +34,6 @@ class Folder:
     """The folder of a data set.
 
     Attributes:
-        path: Its path.
-        format_name: A name in ``FORMATS``.
         duration: Duration of each run, in [s]; None is that of its motion.
     """
 
@@ -55,19 +53,7 @@ class Folder:
         """Open a folder, or create it.
 
         Args:
-            path: An empty folder, a new one, or one with the same settings.
-            format_name: A name in ``FORMATS``.
             duration: Duration of each run, in [s]; by default that of its motion.
-            any_recipe: Whether its runs may be of another version of the simulation: to be read,
-                not to be added to.
-
-        Returns:
-            The folder.
-
-        Raises:
-            DatasetError: If its settings differ, it holds other files or cannot be created, or the
-                duration is too short.
-            MissingSimulatorError: If it is new, and MuJoCo is not installed.
         """
         path = Path(path)
         if format_name not in FORMATS:
@@ -105,29 +91,17 @@ class Folder:
         return self.path / f"{self.format.stem(task)}{self.format.suffix}"
 
     def save(self, task: Task, run: Run) -> None:
-        """Write a run; an existing file is replaced.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Write a run; an existing file is replaced."""
         self.format.write(run, self._prepared(task))
 
     def save_fall(self, task: Task, fall: SimulationError) -> None:
-        """Record when and why a robot fell.
-
-        Raises:
-            OutputError: If it cannot be written.
-        """
+        """Record when and why a robot fell."""
         facts = {"robot": task.robot, "scenario": task.scenario, "seed": task.seed}
         record = {**facts, "time": fall.time, "problem": fall.problem, "recipe": self.format.recipe}
         _write_json(self._prepared(task).with_suffix(FALLEN), {**record, "duration": self.duration})
 
     def save_time(self, task: Task, seconds: float) -> None:
-        """Record the processor time of a run, in [s].
-
-        Raises:
-            DatasetError: If it cannot be written.
-        """
+        """Record the processor time of a run, in [s]."""
         path = self.path / TIMES
         try:
             with path.open("a", encoding="utf-8") as times:
@@ -136,11 +110,7 @@ class Folder:
             raise DatasetError(f"{path}: cannot be written ({error.strerror})") from error
 
     def read(self, task: Task) -> tuple[tuple[Block, ...], float]:
-        """Blocks of a run, and its duration, in [s].
-
-        Raises:
-            SampleError: If its file is damaged.
-        """
+        """Blocks of a run, and its duration, in [s]."""
         return self.format.read(self.file(task))
 
     def kept(self) -> list[Task]:
@@ -167,14 +137,7 @@ class Folder:
         return [task for task in tasks if task not in done]
 
     def clear(self, *, overwrite: bool) -> None:
-        """Check all files, and remove damaged ones.
-
-        Args:
-            overwrite: Whether to remove damaged files.
-
-        Raises:
-            SampleError: If a file is damaged and may not be removed.
-        """
+        """Check all files, and remove damaged ones."""
         for task in self.kept():
             try:
                 self.read(task)

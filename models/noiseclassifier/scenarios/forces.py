@@ -32,15 +32,7 @@ moment of the contact, unlike a damper beside a spring."""
 
 
 def forces(model: Any, loads: Iterable[Load]) -> tuple[Force, ...]:
-    """Forces of a simulation.
-
-    Args:
-        model: The ``mujoco.MjModel``, with a site on each effector.
-        loads: The forces, as data.
-
-    Returns:
-        One force per load.
-    """
+    """Forces of a simulation."""
     return tuple(_force(model, load) for load in loads)
 
 

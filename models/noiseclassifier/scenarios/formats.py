@@ -20,15 +20,7 @@ class Format:
     """A kind of data set.
 
     Attributes:
-        recipe: Version of the simulation.
-        suffix: Suffix of the files.
-        stem: Path of a run in the folder, without its suffix.
-        write: Writes a run atomically; replaces an existing file.
         read: Reads the blocks of a run, and its duration, in [s].
-        simulate: Simulates a run of so many seconds, or of its own duration.
-        motion: What else than robot and seed is equal in runs that share their twin.
-        robots: The robots that it may have.
-        scenarios: The scenarios that it may have; none for any.
     """
 
     recipe: object

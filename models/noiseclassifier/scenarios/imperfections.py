@@ -13,18 +13,10 @@ class Imperfections:
     """Deviations of one robot from its model; scales multiply the nominal values.
 
     Attributes:
-        stiffness: Scale of each drive's position gain.
-        damping: Scale of each drive's velocity gain.
-        force_gain: Scale of the force control's gain.
-        mass: Scale of each moving body's inertia; the controller's model has 1.
         payload: Mass unknown to the controller, in [kg].
-        friction: Scale of each joint's Coulomb friction.
-        viscous: Scale of each joint's viscous friction.
-        encoder_bits: Encoder counts per turn of a joint, as a power of two.
         encoder_noise: Standard deviation of the encoders' noise, in [rad].
         encoder_bandwidth: Natural frequency of the filter that reports velocities, in [Hz].
         force_noise: Standard deviation of the force sensors' noise per millisecond, in [N].
-        torque_delay: Samples between a reading and the torque computed from it.
     """
 
     stiffness: tuple[float, ...]
@@ -47,15 +39,8 @@ class Imperfections:
         """Draw the imperfections of one robot.
 
         Args:
-            rng: Random number generator.
-            joints: How many drives the robot has.
-            bodies: How many moving bodies it has.
             payload: Largest mass that the controller has no model of, in [kg].
             force: Largest standard deviation of the force sensors' noise, in [N].
-
-        Returns:
-            Gains and masses off by up to 5 %, frictions by up to half, an encoder of 21 to 23 bit
-            (a motor's encoder behind its gear), 0.2 to 0.6 ms of delay.
         """
 
         def scales(spread: float, count: int = joints) -> tuple[float, ...]:
@@ -86,13 +71,7 @@ def real_model(model: Any, frame: str, point: Array, imperfections: Imperfection
     """A robot's model with its real masses, unknown to its controller.
 
     Args:
-        model: The ``pinocchio.Model`` that the controller has.
-        frame: Name of the frame that carries the payload.
         point: Where it hangs, in the frame's axes, shape (3,), in [m].
-        imperfections: The imperfections of the robot.
-
-    Returns:
-        A changed copy of the model.
     """
     import pinocchio as pin
 

@@ -49,13 +49,11 @@ class Rule:
         lowest: Cut-off frequency of the high-pass of the deviation, in [Hz].
         smoothing: Window of the root mean square, in [s].
         felt: Level above which a deviation is significant, in [rad/s].
-        contrast: Least ratio of the level of an event to its background.
         before: Duration of the background before an event, in [s].
         gap: Longest gap that is bridged, in [s].
         tail: Time after the cause that still belongs to an event, in [s].
         blow: Least level of an impact, in [rad/s].
         acceleration: Least value of a high acceleration, in [rad/s²].
-        periods: Least number of periods of an oscillation.
         margin: Unlabelled time around all that is not ok, in [s].
         shortest: Shortest ok block, in [s].
     """
@@ -83,7 +81,6 @@ class Trace:
     """The effect of an event on the motion.
 
     Attributes:
-        event: The event.
         labelled: Time with its label, in [s].
         peak: Its highest level, in [rad/s].
         acceleration: Fastest change of a joint's deviation, in [rad/s²].
@@ -122,7 +119,6 @@ def deviation(
         twin: Those of the twin, shape (samples, joints), in [rad/s].
         rate: Sample rate, in [Hz].
         band: Pass band, in [Hz], in place of the high-pass.
-        rule: The labelling rule.
 
     Returns:
         The difference after a causal filter of first order (a high-pass, or a band-pass), shape
@@ -145,12 +141,7 @@ def annotate(
     Args:
         velocity: Measured joint velocities, shape (samples, joints), in [rad/s].
         twin: Those of the twin, shape (samples, joints), in [rad/s].
-        events: The events of the simulation.
         rate: Sample rate, in [Hz].
-        rule: The labelling rule.
-
-    Returns:
-        The blocks, in order, and the effect of each event.
     """
     events = _independent(events)
     fast = deviation(velocity, twin, rate=rate, rule=rule)

@@ -9,15 +9,7 @@ from noisemodel import Robot
 
 @lru_cache(maxsize=8)
 def limbs(name: str) -> Mapping[str, tuple[str, ...]]:
-    """Driven joints from the base to each effector of a robot.
-
-    Args:
-        name: A name in ``noiseclassifier.scenarios.ROBOTS``.
-
-    Returns:
-        Joints from the base outwards, by the effector's frame; nothing for a robot with one
-        effector, which is one limb as a whole.
-    """
+    """Driven joints from the base to each effector of a robot."""
     robot = ROBOTS[name]
     if len(robot.effectors) == 1:
         return {}

@@ -11,11 +11,8 @@ class Limits:
     """Drives with which a family's robots stay upright in at least four of five runs.
 
     Attributes:
-        stiffness: Scale of the position gains.
-        damping: Scale of the velocity gains.
         delay: Longest time from a reading to its torque, in [s].
         hold: Longest time for which targets are held, in [s].
-        feedforward: Least share of the model's torques.
         flexibility: Lowest natural frequency of rotors on elastic gears, in [Hz].
     """
 

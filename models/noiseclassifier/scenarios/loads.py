@@ -12,7 +12,6 @@ class Payload:
     """A mass that an effector holds for some time: its weight, its inertia left out.
 
     Attributes:
-        frame: Name of the effector's frame.
         start: When it is picked up, in [s].
         stop: When it is put down, in [s].
         mass: In [kg].
@@ -33,7 +32,6 @@ class Collision:
     It breaks loose at its limit of force, then resists with less, and at last not at all.
 
     Attributes:
-        frame: Name of the effector's frame.
         start: When the effector meets it; if it is slow then, as soon as it is fast, in [s].
         hold: Time in which its resistance fades, in [s].
         stiffness: In [N/m].
@@ -52,9 +50,7 @@ class JointStop:
     """A mechanical end stop of a joint.
 
     Attributes:
-        joint: Index of the joint.
         angle: Where it is, in [rad].
-        side: 1 if it is met upwards, -1 if downwards.
         stiffness: In [N m/rad].
     """
 
@@ -69,7 +65,6 @@ class Push:
     """A hand that pushes at the centre of mass of a link.
 
     Attributes:
-        along: Which link: 0 the first one, 1 the last one.
         start: When its force begins to rise, in [s].
         stop: When it has vanished, in [s].
         rise: Time in which it rises, in [s].

@@ -82,16 +82,7 @@ class Scene:
     """A robot in its environment, ready to be simulated.
 
     Attributes:
-        model: The ``mujoco.MjModel``; its actuators are the joints, the last ones of its
-            configuration; its first sensors are the contact forces of the effectors.
-        start: True configuration at first, as MuJoCo has it.
-        control: The robot's controller.
-        effectors: How many effectors there are.
-        settling: Ticks before the recording during which the robot comes to rest.
         noise: Standard deviation of each sensor's noise per tick, shape (sensors,).
-        changes: Boxes that appear or vanish: geoms, and whether they are present, by ticks of the
-            recording.
-        forces: Forces from outside.
     """
 
     model: Any
@@ -161,19 +152,10 @@ def record(
     """Simulate a robot.
 
     Args:
-        scene: The robot in its environment.
-        drives: The robot's drives.
         encoder_error: Error of the encoders, shape (samples, joints), in [rad].
         sensor_error: Added to the sensor values of the controller, shape (ticks, sensors).
         overlay: Heights of the effectors and their rates, added to the reference of the
             drives, shape (samples, effectors, 2), in [m] and [m/s].
-
-    Returns:
-        The signals from when the robot has come to rest.
-
-    Raises:
-        DivergedError: If a joint is too fast, or its position is not a number.
-        FallenError: If the robot fell.
     """
     model, control = scene.model, scene.control
     data = mujoco.MjData(model)

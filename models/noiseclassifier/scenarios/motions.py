@@ -16,8 +16,6 @@ class Picks:
     """An arm comes down on a table, presses, and goes up again.
 
     Attributes:
-        way: Its path: "straight" from place to place, in a "curve", in all "directions"
-            without ever touching, or up and down on one "spot".
         hover: Height over the table at which it slows down, in [m].
         force: Contact force, in [N].
         duration: Default duration of a run, in [s].
@@ -34,8 +32,6 @@ class Reach:
     """An arm moves its joints in the air, from rest to rest.
 
     Attributes:
-        kind: Its movements: "minimum-jerk", "trapezoid" (of the velocity), "spline" (through
-            way points), "sines", or "teleoperation" (a hand that wanders and hesitates).
         speed: Highest speed of a movement's fastest joint, in [rad/s].
         acceleration: Largest acceleration of a joint, in [rad/s²].
         spread: Furthest distance of a joint from its position at rest, in [rad].
@@ -63,12 +59,9 @@ class Walk:
     """A humanoid walks.
 
     Attributes:
-        way: Its path: "straight", in a "curve", in other "directions" (sideways or
-            backward), or on the "spot".
         height: How high the feet are lifted, in [m].
         single: Time on one foot, in [s].
         double: Time on both, in [s].
-        jitter: By which share each step's time on one foot varies.
         drop: Height of a platform that it walks down from, in [m]; 0 on flat ground.
         duration: Default duration of a run, in [s].
     """
@@ -87,18 +80,8 @@ class Trot:
     """A quadruped trots, or goes in another gait.
 
     Attributes:
-        way: Its path: "straight", in a "curve", in other "directions" (sideways or
-            backward), or on the "spot" (turning or not).
-        height: How high the feet are lifted, as a share of the robot's nominal height.
-        period: Time of a cycle, as a share of the robot's nominal period.
-        jitter: By which share each cycle's time varies.
         duration: Default duration of a run, in [s].
-        gait: A name in ``noiseclassifier.scenarios.quadruped.gait.GAITS``, or "stand".
-        speed: Highest speed, as a share of the robot's; turning too.
-        pauses: How often it stops and stands within the run.
         pause: How long it stands each time, in [s].
-        posing: Roll, pitch, height and shift of the body, as a share of the largest, see
-            ``noiseclassifier.scenarios.quadruped.posing``.
     """
 
     way: str = "straight"

@@ -27,23 +27,7 @@ TYPES = {
 def build(
     model: Any, physics: Physics, *, effectors: Sequence[Effector] = (), boxes: Sequence[Box] = ()
 ) -> Any:
-    """MuJoCo model with one torque actuator per joint.
-
-    Args:
-        model: A ``pinocchio.Model``, any tree of revolute, continuous and prismatic joints, its
-            root fixed or floating; every moving body has a mass.
-        physics: Properties that the Pinocchio model lacks.
-        effectors: Parts of the robot that may be in contact with the environment.
-        boxes: Obstacles and ground.
-
-    Returns:
-        A compiled ``mujoco.MjModel``; actuators are in joint order, sensors as `sensors_of` has
-        them, the contact forces of the effectors first.
-
-    Raises:
-        UnsupportedModelError: If a joint is of another kind, an effector's frame is missing, or
-            MuJoCo refuses a body.
-    """
+    """MuJoCo model with one torque actuator per joint."""
     spec = mujoco.MjSpec()
     spec.option.timestep = physics.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST

@@ -46,41 +46,20 @@ def part(seed: int) -> str:
 
 
 def write_config(folder: Path) -> None:
-    """Write ``noisytest-config.json``, which NoisyTest takes with ``--config``.
-
-    Args:
-        folder: The folder; an existing file is replaced.
-
-    Raises:
-        OutputError: If it cannot be written.
-    """
+    """Write ``noisytest-config.json``, which NoisyTest takes with ``--config``."""
     with replacing(folder / "noisytest-config.json", overwrite=True) as temporary:
         temporary.write_text(json.dumps(CONFIG, indent=2) + "\n", encoding="ascii")
 
 
 def missing_classes(folder: Path) -> tuple[str, ...]:
-    """Classes without a block in the folder ``training``.
-
-    Raises:
-        SampleError: If a ``.toml`` is damaged.
-    """
+    """Classes without a block in the folder ``training``."""
     logs = sorted((folder / "training").glob("*.log"))
     there = {block.label for log in logs for block in read(log)[0]}
     return tuple(label for label in CLASSES if label not in there)
 
 
 def write(run: Run, log: Path) -> None:
-    """Write the simplified noise of a run and its blocks; existing files are replaced.
-
-    Args:
-        run: A run as ``noiseclassifier.scenarios.simulate`` makes it.
-        log: The ``.log``; the ``.toml`` gets the same name. It is written last, so that there is
-            no ``.log`` without its ``.toml``.
-
-    Raises:
-        SampleError: If the run has another rate than NoisyTest's.
-        OutputError: If a file cannot be written.
-    """
+    """Write the simplified noise of a run and its blocks; existing files are replaced."""
     if run.rate != RATE:
         raise SampleError(log, f"NoisyTest takes {RATE:g} Hz only, the run has {run.rate:g} Hz")
     rows = np.column_stack((run.time, simplified(run.motion, run.velocity_desired)))
@@ -93,14 +72,8 @@ def write(run: Run, log: Path) -> None:
 def read(log: Path) -> tuple[tuple[Block, ...], float]:
     """Blocks and duration of a run, from its ``.toml``.
 
-    Args:
-        log: The ``.log``.
-
     Returns:
         The blocks, and the duration of the run, in [s].
-
-    Raises:
-        SampleError: If it cannot be read, or was not written by `write`.
     """
     path = log.with_suffix(".toml")
     try:
@@ -126,12 +99,6 @@ def annotations(blocks: Sequence[Block]) -> str:
 
     Both numbers of a range are written with a decimal point: NoisyTest's TOML reader takes no mixed
     ones.
-
-    Args:
-        blocks: Stretches with their labels.
-
-    Returns:
-        TOML: ``chunk_ranges`` and ``chunk_labels`` in a table ``data``.
     """
     ranges = "".join(f"    [{float(each.start)!r}, {float(each.stop)!r}],\n" for each in blocks)
     labels = "".join(f"    {json.dumps(each.label, ensure_ascii=False)},\n" for each in blocks)

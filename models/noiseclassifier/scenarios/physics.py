@@ -15,7 +15,6 @@ class Physics:
         damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
         friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
         contact: Time constant of a contact, in [s].
-        grip: Coefficient of friction of a contact.
     """
 
     timestep: float

@@ -34,17 +34,7 @@ class Reducible(Protocol):
 
 
 def reduced_model(robot: Reducible) -> Any:
-    """Pinocchio model of a robot, with all other joints locked.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        A ``pinocchio.Model``; every call returns the same one.
-
-    Raises:
-        UnsupportedModelError: If the URDF lacks a joint.
-    """
+    """Pinocchio model of a robot, with all other joints locked."""
     held = tuple(sorted(robot.held.items()))
     return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
 
@@ -53,11 +43,7 @@ def configuration(model: Any, joints: Array) -> Array:
     """Pinocchio's configuration of a robot with a fixed base.
 
     Args:
-        model: The ``pinocchio.Model``.
         joints: Joint positions, shape (joints,), in [rad].
-
-    Returns:
-        The same, but for continuous joints, which have a cosine and a sine.
     """
     if model.nq == model.nv:
         return joints

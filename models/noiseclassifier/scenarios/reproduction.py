@@ -10,18 +10,7 @@ from noisemodel import Run
 
 
 def reproduce(sample: Sample) -> Run:
-    """Simulate the run of a sample again.
-
-    Args:
-        sample: A sample.
-
-    Returns:
-        The run that it was made of, with all its signals, bit for bit.
-
-    Raises:
-        ChangedRunError: If the run differs, as it may with other versions of the software.
-        ScenarioError: As ``simulate`` does.
-    """
+    """Simulate the run of a sample again."""
     recipe = sample.meta
     run = simulate(sample.robot, recipe["scenario"], recipe["seed"], duration=recipe["duration"])
     if digest(run) != recipe["sha256"]:

@@ -55,12 +55,8 @@ class Sample:
     """The noise signals of a simulated run.
 
     Attributes:
-        robot: A name in ``noiseclassifier.scenarios.ROBOTS``.
         rate: Sample rate, in [Hz].
         signals: Noise signals by name, each of shape (samples,).
-        decimated: Norms of the run decimated to ``DECIMATED``, as a logger of that rate has them.
-        blocks: Annotated stretches.
-        meta: The recipe, and the hash of the run's arrays.
         joints: Desired, measured and error velocities of the decimated run, each of shape
             (joints, samples); none at another rate.
     """
@@ -103,12 +99,6 @@ class Sample:
 
         Args:
             rate: The rate of the sample, or ``DECIMATED``, in [Hz].
-
-        Returns:
-            The sample with its signals of that rate; without joints at its own rate.
-
-        Raises:
-            ScenarioError: If it has none of that rate.
         """
         if abs(rate / self.rate - 1) < CLOSE:
             return replace(self, joints={})
@@ -125,15 +115,7 @@ class Sample:
         )
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the sample atomically.
-
-        Args:
-            path: The file to write, ``*.npz``.
-            overwrite: Whether a file that exists may be replaced.
-
-        Raises:
-            OutputError: If the file exists or cannot be written.
-        """
+        """Write the sample atomically."""
         arrays = {
             "format": FORMAT,
             "robot": self.robot,
@@ -148,18 +130,7 @@ class Sample:
 
     @classmethod
     def load(cls, path: str | Path, *, only: Iterable[str] | None = None) -> Self:
-        """Read a sample.
-
-        Args:
-            path: A sample file.
-            only: Names of the signals to read; by default all.
-
-        Returns:
-            The sample.
-
-        Raises:
-            SampleError: If the file cannot be read, is not a sample, or lacks a signal.
-        """
+        """Read a sample."""
         path = Path(path)
         if not path.is_file():
             raise SampleError(path, "there is no such file")

@@ -20,13 +20,7 @@ in [m], the quaternion (w, x, y, z), velocities in [m/s], the angular velocity i
 
 
 def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> None:
-    """Add the sensors that `sensors_of` describes, the contact forces of the effectors first.
-
-    Args:
-        spec: The ``mujoco.MjSpec``, with a site on each effector.
-        effectors: Parts of the robot that may be in contact with the environment.
-        root: The base's body, if it floats.
-    """
+    """Add the sensors that `sensors_of` describes, the contact forces of the effectors first."""
     for effector in effectors:
         _add(spec, f"{effector.frame}.touch", "TOUCH", "SITE", effector.frame)
     for effector in effectors:
@@ -43,9 +37,6 @@ def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> N
 
 def sensors_of(model: Any) -> dict[str, slice]:
     """Slices of the sensors of a model from `noiseclassifier.scenarios.mujoco_model.build`.
-
-    Args:
-        model: The ``mujoco.MjModel``.
 
     Returns:
         Slice of each sensor in the vector of all, by name: ``<frame>.touch`` of each effector, its

@@ -33,7 +33,6 @@ class Rod:
     """A rod with round ends on the z axis of a robot's frame, from the frame's origin outwards.
 
     Attributes:
-        frame: Name of the frame.
         length: From the origin to the outermost point, in [m].
         radius: Radius of the rod and of its ends, in [m].
     """
@@ -58,7 +57,6 @@ class Sole:
     """A flat sole whose lower face has its middle at a point of a robot's frame.
 
     Attributes:
-        frame: Name of the frame, its z axis pointing up.
         patch: Half of its length and of its width, in [m].
         point: Middle of the lower face, in the frame's axes, in [m].
         thickness: In [m].
@@ -75,7 +73,6 @@ class Ball:
     """A ball around the origin of a robot's frame.
 
     Attributes:
-        frame: Name of the frame.
         radius: In [m].
     """
 

@@ -22,9 +22,6 @@ WHOLE = ("measured", "desired", "error")
 def signals(run: Run) -> Signals:
     """Noise signals of a simulated run.
 
-    Args:
-        run: A run as ``noiseclassifier.scenarios.simulate`` makes it.
-
     Returns:
         Norms of its velocities; and sound power, kind normal, in [W]: ``power`` of the measured
         motion and ``power_desired`` of the desired one, if the robot has a surface.
@@ -33,16 +30,7 @@ def signals(run: Run) -> Signals:
 
 
 def norms(run: Run) -> Signals:
-    """Norms of the velocities of a run, in [rad/s].
-
-    Args:
-        run: A run as ``noiseclassifier.scenarios.simulate`` makes it, or a decimated one.
-
-    Returns:
-        ``measured`` (a floating base's six count too), ``desired`` and ``error``, their
-        difference; the same of each limb as ``measured_<effector>``, if there are several; of
-        each stage under its name.
-    """
+    """Norms of the velocities of a run, in [rad/s]."""
     assert run.velocity_desired is not None
     desired, error = run.velocity_desired, run.velocity_desired - run.velocity
     whole = whole_norms(run)
@@ -56,14 +44,7 @@ def norms(run: Run) -> Signals:
 
 
 def joints(run: Run) -> Signals:
-    """Velocities of a run by joint.
-
-    Args:
-        run: A decimated run of ``noiseclassifier.scenarios.simulate``.
-
-    Returns:
-        As `with_error`, of all joints.
-    """
+    """Velocities of a run by joint."""
     assert run.velocity_desired is not None
     desired, measured = (each.T for each in (run.velocity_desired, run.velocity))
     return with_error(desired.astype(np.float32), measured.astype(np.float32))
@@ -75,9 +56,6 @@ def with_error(desired: NDArray[np.float32], measured: NDArray[np.float32]) -> S
     Args:
         desired: Velocities, shape (joints, samples), in [rad/s].
         measured: Velocities, shape (joints, samples), in [rad/s].
-
-    Returns:
-        ``desired_joints``, ``measured_joints`` and their difference, ``error_joints``.
     """
     return {
         "desired_joints": desired,

@@ -57,21 +57,7 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
     their twin.
 
     Args:
-        robot: A name in ``noiseclassifier.scenarios.ROBOTS``.
-        scenario: A name in ``noiseclassifier.scenarios.SCENARIOS``, or its number.
-        seed: Random seed of the motion, the imperfections and the defect; at least 0.
         duration: Duration of the run, in [s]; by default that of the motion.
-
-    Returns:
-        The run; equal arguments give equal runs, bit for bit. Stages ``planned`` and
-        ``commanded`` are the velocities before and after feedback; ``meta`` has the
-        drawn values, and the effect of each event on the motion.
-
-    Raises:
-        ScenarioError: If the robot or the scenario is unknown, the robot does not have the
-            scenario, the seed is negative, or the duration too short.
-        MissingSimulatorError: If MuJoCo is not installed.
-        SimulationError: If the simulation diverged, or the robot fell.
     """
     entry, simulated = look_up(robot, scenario)
     case = entry.cases[simulated.family]
@@ -125,11 +111,7 @@ def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | No
 
 
 def software() -> dict[str, str]:
-    """Versions of the software on which a simulated run depends, by name.
-
-    Raises:
-        MissingSimulatorError: If MuJoCo is not installed.
-    """
+    """Versions of the software on which a simulated run depends, by name."""
     try:
         import mujoco
     except ImportError as error:
@@ -141,18 +123,7 @@ def software() -> dict[str, str]:
 
 
 def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
-    """A scenario and a robot by their names.
-
-    Args:
-        robot: A name in ``noiseclassifier.scenarios.ROBOTS``.
-        scenario: A name in ``noiseclassifier.scenarios.SCENARIOS``, or its number.
-
-    Returns:
-        The scenario and the robot.
-
-    Raises:
-        ScenarioError: If one is unknown, or the robot does not have the scenario.
-    """
+    """A scenario and a robot by their names."""
     if robot not in ROBOTS:
         raise UnsimulatedRobotError(robot, ROBOTS)
     numbers = {str(entry.number): name for name, entry in SCENARIOS.items()}
@@ -225,22 +196,7 @@ def recorded(
     imperfections: Imperfections,
     rng: np.random.Generator,
 ) -> "Motion":
-    """Record a scene with given drives.
-
-    Args:
-        scene: The robot in its environment.
-        drives: Its drives.
-        plan: Plan of the motion.
-        faults: The faults to inject.
-        imperfections: The imperfections of the robot.
-        rng: Random numbers of the sensors' noise.
-
-    Returns:
-        The recorded signals.
-
-    Raises:
-        DivergedError: If it diverged, or the robot fell.
-    """
+    """Record a scene with given drives."""
     from noiseclassifier.scenarios.loop import record
     from noiseclassifier.scenarios.sensing import sensors_of
 

@@ -20,10 +20,7 @@ class Amount:
     """Amount of a class.
 
     Attributes:
-        blocks: Annotated stretches.
         seconds: Their total duration, in [s].
-        frames: Frames completely inside of one of them; a shorter one counts as one frame, to which
-            it is padded for training (paper, Sec. III-A).
     """
 
     blocks: int = 0
@@ -56,12 +53,7 @@ class Statistics:
     """Statistics of a data set.
 
     Attributes:
-        upright: Runs in which each robot stayed upright, and all of its runs, by robot and
-            scenario.
-        amounts: Amount of each class, by robot and class.
-        costs: Processor time, by robot.
         motion: Total duration of all runs, in [s].
-        size: Of all files, in bytes.
     """
 
     upright: Mapping[str, Mapping[str, tuple[int, int]]]
@@ -72,11 +64,7 @@ class Statistics:
 
     @classmethod
     def of(cls, folder: Folder) -> Self:
-        """Statistics of a folder.
-
-        Raises:
-            SampleError: If a file is damaged.
-        """
+        """Statistics of a folder."""
         kept, fallen, times = folder.kept(), folder.fallen(), folder.times()
         stood = Counter((task.robot, task.scenario) for task in kept)
         fell = Counter((task.robot, task.scenario) for task in fallen)

@@ -16,15 +16,7 @@ from noiseclassifier.scenarios.quadruped.cases import QUADRUPED
 
 @dataclass(frozen=True)
 class Scenario:
-    """One line of the table.
-
-    Attributes:
-        number: Its number; up to 24 that of the paper.
-        name: Its name.
-        description: One sentence.
-        labels: The classes that its runs may have.
-        cases: Motion and defect for each family of robots that has it.
-    """
+    """One line of the table."""
 
     number: int
     name: str

@@ -20,13 +20,7 @@ LEAST_RUNS = 20
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """A run of a data set.
-
-    Attributes:
-        robot: A name in ``scenarios.ROBOTS``; in wide domains, in ``scenarios.robots.WIDE``.
-        scenario: A name in ``scenarios.SCENARIOS`` that the robot has; in wide domains, a fault.
-        seed: The random seed.
-    """
+    """A run of a data set."""
 
     robot: str
     scenario: str
@@ -41,19 +35,7 @@ class Task:
 def choose(
     robots: Sequence[str], scenarios: Sequence[str] = (), *, healthy: bool = False
 ) -> dict[str, tuple[str, ...]]:
-    """Scenarios of each robot.
-
-    Args:
-        robots: Names in ``noiseclassifier.scenarios.ROBOTS``.
-        scenarios: Names or numbers; by default all. A robot skips those that it does not have.
-        healthy: Whether to keep only scenarios without a failure.
-
-    Returns:
-        Scenarios of each robot, in the order of the table.
-
-    Raises:
-        ScenarioError: If a robot or a scenario is unknown, or nothing is left for a robot.
-    """
+    """Scenarios of each robot."""
     if not robots:
         raise DatasetError(f"no robot is named; there are {', '.join(ROBOTS)}")
     chosen = {robot: _suited(robot, scenarios or tuple(SCENARIOS)) for robot in robots}
@@ -74,13 +56,7 @@ class DatasetSpec:
     """The size of a data set: a number of seeds, or of hours.
 
     Attributes:
-        choice: Scenarios of each robot.
-        first: The first seed.
-        seeds: How many seeds; 8 unless hours are given.
         hours: Total duration of all runs, in [h].
-
-    Raises:
-        DatasetError: If both are given, or a number is out of range.
     """
 
     choice: Choice
@@ -106,10 +82,6 @@ class DatasetSpec:
 
         Args:
             duration: Duration of each run, in [s]; by default that of its motion.
-            fallen: Runs that fell and do not count towards the hours.
-
-        Raises:
-            DatasetError: If a robot falls in more than half of its runs.
         """
         if self.hours is None:
             last = self.first + (8 if self.seeds is None else self.seeds)
@@ -150,15 +122,7 @@ class DatasetSpec:
 def grouped_by_twin(
     tasks: Iterable[Task], motion: Callable[[Task], object]
 ) -> list[tuple[Task, ...]]:
-    """Runs in groups that share their twin: one robot, one seed, one motion.
-
-    Args:
-        tasks: Runs.
-        motion: What else than robot and seed is equal in them.
-
-    Returns:
-        The groups, in the order of their first runs.
-    """
+    """Runs in groups that share their twin: one robot, one seed, one motion."""
     groups: dict[object, list[Task]] = {}
     for task in tasks:
         groups.setdefault((task.robot, task.seed, motion(task)), []).append(task)

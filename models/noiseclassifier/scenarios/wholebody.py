@@ -21,19 +21,12 @@ class WholeBody:
     """Inverse kinematics with one Newton step per call.
 
     Args:
-        model: A ``pinocchio.Model`` on a free-flyer.
-        effectors: The parts that it stands on.
         start: Configuration to start from, shape (nq,).
-        upper: How many joints, the last ones, move on their own.
 
     Attributes:
         configuration: The present configuration, as Pinocchio has it, shape (nq,).
         inverse: Inverse Jacobian of the last step: velocities, as Pinocchio has them, per rates of
             the equations, shape (nv, nv).
-
-    Raises:
-        UnsupportedModelError: If a frame is missing, or there are not as many equations as
-            unknowns.
     """
 
     def __init__(
@@ -79,7 +72,6 @@ class WholeBody:
             base: Rotation matrix of the base, shape (3, 3).
             upper: Positions of the upper body's joints, shape (upper,), in [rad]; by default they
                 stay.
-            steps: Number of Newton steps.
 
         Returns:
             The new configuration, shape (nq,).

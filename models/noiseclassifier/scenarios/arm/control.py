@@ -28,11 +28,8 @@ class ToolControl:
     """Follows a plan with a tool that points down, and presses with the planned force.
 
     Args:
-        model: The ``pinocchio.Model`` that the controller has.
-        frame: Name of the tool's frame.
         point: The tip in the frame's axes, shape (3,), in [m].
         rest: Joint positions at first, shape (joints,), in [rad].
-        plan: Plan of the motion.
         gain: Speed of the tool per error of the contact force at each tick, shape (ticks,),
             in [m/(s N)].
         time_constant: Low-pass on the contact force, in [s].
@@ -66,11 +63,7 @@ class ToolControl:
         """Advance by one tick.
 
         Args:
-            number: Which tick it is.
             sensors: Contact force that the sensor reports, shape (1,), in [N].
-
-        Returns:
-            Reference of the joints, one tick late: a velocity takes two neighbours.
         """
         tip = self._plan.position[number] + (0.0, 0.0, self._press(number, float(sensors[0])))
         joints, inverse = self._solve(tip, self._plan.yaw[number])

@@ -38,17 +38,7 @@ STANDING = (1.5, 4.0)
 def motion(
     rng: np.random.Generator, wildness: float, arm: Arm | None = None, *, soft: bool = False
 ) -> Picks | Reach:
-    """Motion of an arm.
-
-    Args:
-        rng: Random number generator.
-        wildness: 0 for slow and smooth motion without stops and payloads, to 1.
-        arm: The arm; one that cannot pick moves in the air only.
-        soft: Whether its drives are soft; it moves alike.
-
-    Returns:
-        The motion.
-    """
+    """Motion of an arm."""
     picks, kind, way = rng.uniform(size=3).tolist()
     fast, hard, wide, stops, carries, pace, force = rng.uniform(size=7).tolist()
     stands, long = rng.uniform(size=2).tolist()
@@ -99,15 +89,7 @@ _ON_CONTACT = ("obstacle", "giving-way", "force-gain", "force-jump")
 
 
 def suited(motion: Picks | Reach) -> tuple[str, ...]:
-    """Names of the faults that can act in a motion.
-
-    Args:
-        motion: The motion.
-
-    Returns:
-        Names in ``DEFECTS``: without those of contacts if it has none, and without end stops if its
-        joints are not planned; the others draw nothing for it.
-    """
+    """Names of the faults that can act in a motion."""
     idle: tuple[str, ...] = _ON_CONTACT if isinstance(motion, Reach) else ("joint-stop",)
     if isinstance(motion, Picks) and motion.way == "directions":
         idle += _ON_CONTACT
@@ -115,15 +97,7 @@ def suited(motion: Picks | Reach) -> tuple[str, ...]:
 
 
 def scaled(arm: Arm, factor: float) -> Arm:
-    """An arm of another size.
-
-    Args:
-        arm: The arm.
-        factor: Factor on all lengths.
-
-    Returns:
-        The arm; its table and the places on it come nearer or further as it does.
-    """
+    """An arm of another size."""
     tool = replace(arm.tool, length=arm.tool.length * factor, radius=arm.tool.radius * factor)
     reach = arm.reach
     if reach is not None:

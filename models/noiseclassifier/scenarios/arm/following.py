@@ -20,8 +20,6 @@ class JointControl:
     """Follows planned joint positions with the torque of the model as feed-forward.
 
     Args:
-        model: The ``pinocchio.Model`` that the controller has.
-        tool: The tool.
         joints: Planned positions, shape (ticks, joints), in [rad].
         shift: Added to the planned place of the tool's tip, shape (ticks, 3), in [m].
         fastest: Largest acceleration that the feed-forward torque has, in [rad/s²].

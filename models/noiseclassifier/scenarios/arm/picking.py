@@ -28,10 +28,6 @@ class Plan:
         yaw: Turn of the tool about the vertical since the start, shape (ticks,), in [rad].
         force: Force to press with; NaN while force control is off, shape (ticks,), in [N].
         keep: Share of the last offset of the force control that remains, shape (ticks,).
-        contacts: The planned contacts.
-        effectors: The tool.
-        ground: The table.
-        units: The units of the robot.
     """
 
     position: Array
@@ -96,17 +92,10 @@ def pick(
     """Plan of picks, one after the other.
 
     Args:
-        motion: The motion.
-        rng: Random number generator.
         start: Where the tip is at first, shape (3,), in [m].
-        tool: The tool.
         table: Height of the table, in [m].
         reach: Ranges of x and y on the table, in [m].
         duration: Duration of the plan, in [s].
-        units: The units of the robot, by which forces are multiplied.
-
-    Returns:
-        The plan; the beginning of a plan does not depend on its duration.
     """
     segments = [Segment(0.2, (float(start[0]), float(start[1]), float(start[2])), 0.0)]
     contacts = []

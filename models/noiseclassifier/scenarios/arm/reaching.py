@@ -61,11 +61,7 @@ class Plan:
     Attributes:
         joints: Positions, shape (ticks, joints), in [rad].
         position: Of the tool's tip, shape (ticks, 3), in [m].
-        effectors: The tool.
-        units: The units of the robot.
-        payloads: What the tool carries.
         stops: Times of emergency stops, in [s].
-        foreseen: Whether the controller knows the accelerations.
     """
 
     joints: Array
@@ -102,7 +98,6 @@ class Ability:
     """What an arm can do.
 
     Attributes:
-        model: Its ``pinocchio.Model``.
         rest: Joint positions around which it moves, shape (joints,), in [rad].
         low: Lowest positions, shape (joints,), in [rad].
         high: Highest positions, shape (joints,), in [rad].
@@ -125,7 +120,6 @@ class Ability:
         Args:
             positions: Of each tick, shape (ticks, joints), in [rad].
             fastest: Largest acceleration, in [rad/s²].
-            ticks: Over how many ticks accelerations are averaged.
         """
         coarse = positions[::ticks]
         if len(coarse) < 3:
@@ -161,18 +155,7 @@ def reach(
     """Plan of movements, one after the other.
 
     Args:
-        motion: The motion.
-        rng: Random number generator.
-        ability: What the arm can do.
-        tool: Its tool.
-        units: Its units.
         duration: Duration of the plan, in [s].
-
-    Returns:
-        The plan; the beginning of a plan does not depend on its duration.
-
-    Raises:
-        UnsupportedModelError: If the kind of motion is unknown, or no drive can follow.
     """
     if motion.kind not in KINDS:
         raise UnsupportedModelError(

@@ -14,9 +14,6 @@ class Arm:
     """An arm that picks from a table or moves in the air.
 
     Attributes:
-        name: Its name in ``noisemodel.ROBOTS``.
-        drives: Its drives, in the order of the URDF's joints.
-        tool: The rod that it holds.
         rest: Joint positions before it moves, in [rad]; the tool points down if it picks.
         table: Height of the table, in [m].
         reach: Ranges of x and of y of the places on the table, in [m]; None if it cannot pick.
@@ -25,9 +22,6 @@ class Arm:
         force_filter: Time constant of the low-pass on the contact force, in [s].
         payload: Largest mass at the tool that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensor's noise, in [N].
-        held: Positions of the locked joints that are not at zero, by name.
-        units: The units of its forces, torques and payloads.
-        length_scale: Factor on all lengths of its model.
     """
 
     name: str
@@ -135,12 +129,8 @@ def nominal(
     alone, with all others at rest, a natural frequency of 8 Hz and half the critical damping.
 
     Args:
-        joints: Names of the joints.
         inertia: Inertia that each joint moves at rest, in [kg m²].
         torque: Limit of each drive, in [N m].
-
-    Returns:
-        The drives.
     """
     rate = 2 * math.pi * 8.0
     armature = tuple(0.005 * one for one in torque)

@@ -35,16 +35,7 @@ def plan(
     """Plan of the motion of one run.
 
     Args:
-        arm: The arm.
-        motion: Plan of the motion.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
-
-    Returns:
-        The plan.
-
-    Raises:
-        UnsupportedModelError: If the arm cannot move like that.
     """
     model = reduced_model(arm)
     if isinstance(motion, Reach):
@@ -72,17 +63,7 @@ def plan(
 def scene(
     arm: Arm, plan: Plan | reaching.Plan, faults: Faults, imperfections: Imperfections
 ) -> Scene:
-    """Scene of one run.
-
-    Args:
-        arm: The arm.
-        plan: Plan of the motion.
-        faults: The faults to inject.
-        imperfections: The imperfections of the robot.
-
-    Returns:
-        The scene; it begins when the arm has come to rest.
-    """
+    """Scene of one run."""
     model, rest = reduced_model(arm), np.array(arm.rest)
     boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
     world = _world(arm, model, boxes, imperfections)

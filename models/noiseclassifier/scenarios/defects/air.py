@@ -122,7 +122,6 @@ class Pushes:
         force: Largest force, in [N], times the robot's unit of force.
         rise: Time in which it rises, and time in which it falls, in [s].
         hold: Time in between, in [s].
-        along: Which link is pushed: 0 the first one, 1 the last one.
     """
 
     every: float = 2.5

@@ -11,11 +11,7 @@ from noiseclassifier.scenarios.faults import Faults
 
 @dataclass(frozen=True)
 class Overhang:
-    """An edge of a platform nearer than planned: the last contact on it is partial.
-
-    Attributes:
-        share: Share of the effector's length without ground under it.
-    """
+    """An edge of a platform nearer than planned: the last contact on it is partial."""
 
     share: Range
 
@@ -44,7 +40,6 @@ class StepDown:
 
     Attributes:
         depth: Height of the step, in [m].
-        when: When the first foot steps over the edge, as a share of the run.
     """
 
     depth: Range

@@ -18,11 +18,6 @@ class Obstacles:
     Attributes:
         height: Height of a box, in [m].
         half: Half of its edge lengths along and across the effector, in [m].
-        offset: Offset of its centre, as a share of half the extent of the effector, along and
-            across.
-        effectors: Indices of the effectors that it may meet; empty for all.
-        share: Share of the contacts with a box; the first one always has one.
-        most: Largest number of boxes, drawn from all contacts but the last.
     """
 
     height: Range

@@ -12,12 +12,7 @@ from noiseclassifier.scenarios.faults import Faults
 
 @dataclass(frozen=True)
 class Scaled:
-    """A defect with settings in the units of the robot.
-
-    Attributes:
-        defect: The defect, its settings pairs of numbers.
-        units: "length", "force" or "torque", by the names of the settings in that unit.
-    """
+    """A defect with settings in the units of the robot."""
 
     defect: Any
     units: Mapping[str, str]

@@ -16,9 +16,7 @@ class Decalibration:
     """An encoder with an offset.
 
     Attributes:
-        joints: Index of the joint, or of several to draw from.
         angle: The offset, in [rad].
-        either: Whether the offset may have either sign.
     """
 
     joints: tuple[int, ...]
@@ -84,12 +82,8 @@ class SensorJumps:
 
     Attributes:
         size: Size of a jump, either way, in [N], [N m] or [rad].
-        sensor: Which of the effector's sensors: "touch", "force", "torque"; or one of the base,
-            such as "base.turn".
-        axes: Whether each value of the sensor jumps.
         hold: Duration of a jump, in [s].
         after: When the jumps of one contact begin, after its start, in [s].
-        share: Share of the contacts with jumps; the first one always has them.
     """
 
     size: Range
@@ -140,13 +134,7 @@ class SensorJumps:
 
 @dataclass(frozen=True)
 class ForceGain:
-    """Gains of the force control that are too high, so that it becomes a limit cycle.
-
-    Attributes:
-        factor: Factor on the gains.
-        start: When it starts, as a share of the run.
-        contacts: Whether it has an effect only during planned contacts.
-    """
+    """Gains of the force control that are too high, so that it becomes a limit cycle."""
 
     factor: Range
     start: Range = (0.0, 0.0)
@@ -180,8 +168,6 @@ class Multisine:
         amplitude: Of one sine of equal power, in [m].
         fastest: Upper limit of the speed, which reduces the amplitude in high bands, in [m/s]: the
             2 mm of the paper at 900 Hz would be 11 m/s, which no drive follows.
-        start: When it starts, as a share of the run.
-        stop: When it ends, as a share of the run.
     """
 
     bands: tuple[Range, ...]

@@ -33,15 +33,7 @@ ALL = 0.3
 
 
 def with_faults(run: Run, *, seed: int) -> Run:
-    """A good log with faults added to its measured velocities.
-
-    Args:
-        run: A log that is `ok` throughout.
-        seed: Of kinds, joints, frequencies, levels and times.
-
-    Returns:
-        The log with faults, one every ``APART``, and their labels; each is an event of ``meta``.
-    """
+    """A good log with faults added to its measured velocities."""
     rng = np.random.default_rng(seed)
     velocity = run.velocity.astype(np.float64)
     end, blocks, events = len(velocity) / run.rate, list[Block](), list[dict[str, Any]]()
@@ -79,12 +71,9 @@ def fault(
     """A fault of level 1.
 
     Args:
-        kind: One of ``KINDS``.
-        samples: How long it lasts.
         frequency: Of a tone, of the middle of an octave of noise, of what rings after a blow, in
             [Hz].
         rate: Sample rate, in [Hz].
-        rng: For phases.
 
     Returns:
         Shape (samples,), of root mean square 1.

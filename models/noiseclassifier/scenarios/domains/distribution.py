@@ -24,13 +24,7 @@ RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000
 
 
 class DistributionError(ScenarioError):
-    """A distribution out of range.
-
-    Args:
-        name: The setting.
-        ends: Its ends.
-        problem: What is wrong with it, in one line.
-    """
+    """A distribution out of range."""
 
     def __init__(self, name: str, ends: Any, problem: str) -> None:
         self.name, self.ends = name, ends
@@ -52,9 +46,6 @@ class Distribution:
 
     Each run draws its wildness, uniform from 0 to 1, and each value uniform (or uniform in its
     logarithm) between the mild end and the point so far on the way to the wild end.
-
-    Raises:
-        DistributionError: If an end is out of its range or not finite.
     """
 
     length: Ends = field(
@@ -296,15 +287,7 @@ class Distribution:
                 raise DistributionError(each.name, ends, problem)
 
     def domain(self, rng: np.random.Generator, limits: Limits) -> Domain:
-        """Draw the domain of one run.
-
-        Args:
-            rng: Random number generator.
-            limits: What the robot's family bears.
-
-        Returns:
-            The domain.
-        """
+        """Draw the domain of one run."""
         draw = _Draw(self, rng, float(rng.uniform()))
         control: Control = str(rng.choice(get_args(Control)))  # type: ignore[assignment]
         stiffness = draw("stiffness")
@@ -350,13 +333,8 @@ class Distribution:
         """Draw the logger of one run.
 
         Args:
-            rng: Random number generator.
-            domain: The domain of the run; its wildness is the logger's.
             most: Highest rate, that of the run, in [Hz].
             rate: The rate, in place of one that is drawn, in [Hz].
-
-        Returns:
-            The logger.
         """
         draw = _Draw(self, rng, domain.wildness)
         drawn = float(rng.choice([each for each in RATES if each <= most * (1 + 1e-6)]))

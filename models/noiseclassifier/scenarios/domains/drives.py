@@ -33,13 +33,8 @@ class DomainDrives(Drives):
 
     Args:
         start: Joint positions at rest, shape (joints,), in [rad].
-        domain: The domain.
-        drivetrain: The drives, gains and inertias already scaled by the domain.
-        imperfections: Encoder and filter; frictions.
-        fault: A fault of drives or commands.
         offset: Encoder error at rest, shape (joints,), in [rad].
         settling: Time before the recording, in [s].
-        rng: Random numbers of phases.
     """
 
     def __init__(

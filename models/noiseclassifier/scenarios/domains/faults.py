@@ -25,16 +25,12 @@ class DriveFault:
     """A fault of drives or commands; by default none.
 
     Attributes:
-        event: Its class, cause and times.
         stiffness: Factor of the position gains meanwhile, shape (joints,).
         damping: Factor of the velocity gains meanwhile, shape (joints,).
         delay: Further delay meanwhile, in [s].
-        power: Share of the torque that acts meanwhile.
         offset: Error of the encoders from the start of the event on, shape (joints,), in [rad].
         torque: Torque added meanwhile: from times since the start, shape (samples,), in [s], to
             shape (samples, joints), in [N m].
-        outside: Whether that torque is not of the drives, which do not measure it.
-        command: Changes targets and rates.
     """
 
     event: Event | None = None

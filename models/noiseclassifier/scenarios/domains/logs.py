@@ -40,12 +40,6 @@ SHARPNESS, GAIN = 8.0, 3.0
 def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
     """The log of a run.
 
-    Args:
-        run: A run of `noiseclassifier.scenarios.domains.simulate`.
-        twin: That of the same robot and seed without a fault; the run itself if it has none.
-        logger: Sensing and sampling.
-        seed: Of the random numbers; equal seeds give equal noise and equal phases.
-
     Returns:
         Measured velocities, what is desired and efforts (torques in [N m], or currents in [A]), at
         the logger's rate, with those of the failures' labels that can still be seen; ``meta`` has
@@ -91,10 +85,6 @@ def visible(
         floor: The signal without the fault, shape (samples, joints).
         rate: Sample rate, in [Hz].
         lowest: Lowest frequency of the bands, in [Hz].
-        centred: Whether each frame's mean is subtracted.
-
-    Returns:
-        Shape (frames,); frames begin every ``HOP``.
     """
     length, hop = round(FRAME * rate), round(HOP * rate)
     starts = np.arange(0, max(len(difference) - length, 0) + 1, hop)

@@ -78,15 +78,7 @@ class Trial:
 
 
 def faults_of(robot: str, seed: int | None = None) -> tuple[str, ...]:
-    """Names of the faults of a robot: of its drives and commands, and its family's own.
-
-    Args:
-        robot: A name in ``noiseclassifier.scenarios.robots.WIDE``.
-        seed: Only those that can act in the motion of this seed.
-
-    Raises:
-        UnsimulatedRobotError: If there is no such robot.
-    """
+    """Names of the faults of a robot: of its drives and commands, and its family's own."""
     entry = _look_up(robot)
     family = _family(entry)
     own = family.DEFECTS if seed is None else family.suited(_draw(entry, seed).motion)
@@ -106,21 +98,13 @@ def simulate(
     Equal robots and seeds share body, drives, control and motion, whatever the fault.
 
     Args:
-        robot: A name in ``noiseclassifier.scenarios.robots.WIDE``.
-        fault: One of `faults_of`, or ``good`` for none.
-        seed: Random seed, at least ``FIRST``.
         duration: Duration of the run, in [s].
-        distribution: What is drawn from.
 
     Returns:
         The run, as the drives report it, at ``SLOW`` or at 10 kHz; stage ``planned`` is the
         velocity of the plan. ``effort`` is the torque of the drives after gears, limits and
         delays, before the friction of the joints; ``meta`` has its limit of each joint, in [N m],
         the domain, the drawn fault and all events.
-
-    Raises:
-        ScenarioError: If the robot or the fault is unknown, or the seed is too low.
-        SimulationError: If the simulation diverged, or the robot fell.
     """
     entry = _look_up(robot)
     if fault != GOOD and fault not in faults_of(robot):
@@ -222,11 +206,7 @@ def _twin(robot: str, seed: int, duration: float, distribution: Distribution) ->
 
 
 def _refuse_rattling(velocity: Array) -> None:
-    """Refuse a run without a fault whose drives rattle all the same.
-
-    Raises:
-        DivergedError: If most of the time the motion above ``FAST`` is too large a share of it.
-    """
+    """Refuse a run without a fault whose drives rattle all the same."""
     from scipy.signal import butter, sosfilt
 
     fast = sosfilt(butter(2, FAST, "highpass", fs=RATE, output="sos"), velocity, axis=0)

@@ -23,11 +23,7 @@ class WalkControl:
     """Controller with a stabilizer and whole-body inverse kinematics.
 
     Args:
-        body: The nominal robot, standing as the plan starts.
-        stabilizer: The stabilizer.
-        plan: Plan of the motion.
         weight: Weight of the nominal robot, in [N].
-        where: Slice of each sensor.
     """
 
     def __init__(
@@ -52,15 +48,7 @@ class WalkControl:
         self._number = 0
 
     def tick(self, number: int, sensors: Array) -> Reference:
-        """Advance by one tick.
-
-        Args:
-            number: Index of the tick.
-            sensors: Values of the sensors.
-
-        Returns:
-            Reference of the joints, one tick late: a velocity takes two neighbours.
-        """
+        """Advance by one tick."""
         heights, tilts = self._stabilizer.step(number, sensors)
         places = self._places[number].copy()
         places[:, 2] += heights
@@ -107,9 +95,6 @@ def _rates(plan: Plan) -> Array:
 
 def bearing(plan: Plan) -> Array:
     """Planned ground forces on the soles, per weight of the robot.
-
-    Args:
-        plan: Plan of the motion.
 
     Returns:
         Force, and torque about the sole's middle in [m], of each sole, shape (ticks, 12).

@@ -87,14 +87,7 @@ stayed upright, with velocity errors below 0.2 rad/s rms."""
 
 
 def suited(motion: Stroll | Stand) -> tuple[str, ...]:
-    """Names of the faults that can act in a motion.
-
-    Args:
-        motion: The motion.
-
-    Returns:
-        Names in ``DEFECTS``: those of steps only if it walks, that of an edge only if there is one.
-    """
+    """Names of the faults that can act in a motion."""
     steps = tuple(name for name in DEFECTS if name.startswith("obstacle"))
     idle = (*steps, "edge") if isinstance(motion, Stand) else () if motion.walk.drop else ("edge",)
     return tuple(name for name in DEFECTS if name not in idle)
@@ -107,17 +100,7 @@ def motion(
     *,
     soft: bool = False,
 ) -> Stroll | Stand:
-    """Draw a motion.
-
-    Args:
-        rng: Random number generator.
-        wildness: From 0 (slow walks without stops, an upper body that hardly moves) to 1.
-        robot: The robot; all of them walk and stand.
-        soft: Whether its drives are soft; it moves alike.
-
-    Returns:
-        The motion.
-    """
+    """Draw a motion."""
     upper = Gesture(
         way=str(rng.choice(("still", "sines", "reaches"))),
         size=(0.0, 0.2 + 0.8 * wildness),

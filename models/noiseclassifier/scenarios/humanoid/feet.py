@@ -26,8 +26,6 @@ def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, A
     """Sampled paths of the soles.
 
     Args:
-        robot: The humanoid, its feet side by side at x = 0.
-        steps: The footsteps.
         time: Of each tick, shape (ticks,), in [s].
 
     Returns:
@@ -65,12 +63,7 @@ def contacts(robot: Humanoid, steps: Sequence[Step], duration: float) -> tuple[C
     """Planned contacts of the feet.
 
     Args:
-        robot: The humanoid, its feet side by side at x = 0.
-        steps: The footsteps.
         duration: How long the plan lasts, in [s].
-
-    Returns:
-        The contacts in the order of time.
     """
     stands = []
     for foot in (0, 1):
@@ -87,15 +80,7 @@ def contacts(robot: Humanoid, steps: Sequence[Step], duration: float) -> tuple[C
 
 
 def ground(robot: Humanoid, steps: Sequence[Step]) -> tuple[Box, ...]:
-    """Floor under the last step, and platform under the first ones if they are higher.
-
-    Args:
-        robot: The humanoid, walking straight ahead if there is a platform.
-        steps: The footsteps.
-
-    Returns:
-        The platform, if there is one, and the floor.
-    """
+    """Floor under the last step, and platform under the first ones if they are higher."""
     floor = min([0.0, *(step.place[2] for step in steps)])
     below = Box((0.0, 0.0, floor - 0.5), (10.0, 10.0, 0.5))
     if not floor:

@@ -21,7 +21,6 @@ class Step:
     """One step of one foot.
 
     Attributes:
-        foot: 0 for the left foot, 1 for the right one.
         place: x, y, z of its sole afterwards, in [m].
         yaw: Its direction afterwards, in [rad].
         shift: When the weight starts to shift to the other foot, in [s].
@@ -45,13 +44,7 @@ def footsteps(
     """Footsteps of a walk.
 
     Args:
-        robot: The humanoid, its feet side by side at x = 0.
-        motion: The motion.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
-
-    Returns:
-        The steps; the last one brings the feet side by side, in time to stand at the end.
     """
     single, double = (
         robot.pace * float(rng.uniform(*span)) for span in (motion.single, motion.double)
@@ -90,13 +83,7 @@ def stopping(
     """Footsteps of a walk with stops.
 
     Args:
-        robot: The humanoid, its feet side by side at x = 0.
-        motion: The motion.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
-
-    Returns:
-        The steps; fewer stops than wanted where the run is too short for walking between them.
     """
     pauses = rng.uniform(*motion.pause, motion.stops)
     pauses = pauses[np.cumsum(pauses) < duration / 2]

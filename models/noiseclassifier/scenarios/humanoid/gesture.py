@@ -18,9 +18,6 @@ def gesture(robot: Humanoid, motion: Gesture, rng: np.random.Generator, duration
     """Positions of the upper body's joints.
 
     Args:
-        robot: The humanoid.
-        motion: The movement.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
 
     Returns:

@@ -10,9 +10,6 @@ class Gesture:
     """Movement of the upper body's joints around their rest; nothing for a robot without.
 
     Attributes:
-        way: "still", "sines" (one per joint, that fades in), or "reaches" (minimum-jerk movements
-            from one drawn posture to the next).
-        size: Largest deviation of a joint, as a share of what the robot allows it.
         period: Of a sine, or duration of a reach, in [s].
     """
 
@@ -26,10 +23,7 @@ class Stroll:
     """A humanoid walks, stops on the way, and moves its upper body.
 
     Attributes:
-        walk: The walk.
-        stops: How often it stops with both feet on the ground.
         pause: How long, in [s].
-        upper: Movement of the upper body.
         duration: Default duration of a run, in [s].
     """
 
@@ -45,12 +39,8 @@ class Stand:
     """A humanoid stands on both feet; its centre of mass and its upper body move.
 
     Attributes:
-        sway: Amplitude of the zero-moment point, as a share of half the distance between the feet
-            (sideways) and of half a sole (along).
-        squat: How deep the centre of mass goes, as a share of its height.
         period: Of sway and squat, in [s], for a robot as high as TALOS; others have the same share
             of their own period.
-        upper: Movement of the upper body.
         duration: Default duration of a run, in [s].
     """
 

@@ -24,10 +24,6 @@ class Plan:
         centre: Centre of mass, shape (ticks, 3), in [m].
         upper: Positions of the upper body's joints, shape (ticks, joints), in [rad].
         rate: Natural frequency of the inverted pendulum, in [rad/s].
-        contacts: The planned contacts.
-        effectors: Left and right sole.
-        ground: The planned ground.
-        size: Size of the robot, relative to that which the scenarios are defined for.
     """
 
     places: Array

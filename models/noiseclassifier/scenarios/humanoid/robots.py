@@ -16,7 +16,6 @@ class Gains:
     """Gains of a stabilizer.
 
     Attributes:
-        capture: Shift of the zero-moment point per error of the capture point.
         integral: Its rate per error, in [1/s].
         tilt: Rate of a sole's tilt per error of its torque, in [rad/(s N m)].
         level: Rate at which soles return to level, in [1/s].
@@ -40,23 +39,13 @@ class Humanoid:
     """A humanoid that walks on two soles.
 
     Attributes:
-        name: Its name in ``noisemodel.ROBOTS``.
-        drives: Its drives, in the order of the URDF's joints: left leg, right leg, and those of its
-            upper body that move.
-        effectors: Left and right sole.
         rest: Joint positions near those in which it stands, in [rad].
         centre: Height of the centre of mass over the soles, in [m].
         apart: Half of the distance between the feet, in [m].
         stride: Longest step forwards and sideways, in [m], and its turn, in [rad].
-        pace: Duration of its steps, relative to that of the motion.
-        gains: Of its stabilizer.
-        carrier: Frame that carries the payload.
         payload: Largest mass that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
-        size: Its size, relative to that which the defects of the scenarios are defined for.
-        held: Positions of the locked joints that are not at zero, by name.
         reach: Largest deviation of each moving joint of the upper body from its rest, in [rad].
-        length_scale: Scale of all lengths of its description.
     """
 
     name: str
@@ -176,14 +165,8 @@ def similar(name: str, mass: float, joints: tuple[str, ...], centre: float, **ow
     and Jayes, A dynamic similarity hypothesis for the gaits of quadrupedal mammals, J. Zool. 1983).
 
     Args:
-        name: Its name in ``noisemodel.ROBOTS``.
         mass: In [kg].
-        joints: Of the left and of the right leg.
         centre: Height of the centre of mass over the soles, in [m].
-        own: The fields that no scale gives.
-
-    Returns:
-        The humanoid.
     """
     length, weight = centre / TALOS.centre, mass / TALOS_MASS
     time, torque = length**0.5, weight * length
@@ -218,12 +201,8 @@ def moving(robot: Humanoid, upper: Mapping[str, tuple[float, float]]) -> Humanoi
     """The same humanoid with an upper body that moves.
 
     Args:
-        robot: A humanoid whose legs move.
         upper: Rest and largest deviation of each joint of the upper body that is to move, in the
             order of the URDF's joints, in [rad].
-
-    Returns:
-        The humanoid, its upper body's drives as `UPPER` has them.
     """
     drives = {
         field: (
@@ -324,15 +303,7 @@ HUMANOIDS = (TALOS, G1, G1_MOVING, ALEXANDER, ROMEO, SIMPLE)
 
 
 def scaled(robot: Humanoid, factor: float) -> Humanoid:
-    """The same humanoid with all lengths times a factor.
-
-    Args:
-        robot: The humanoid.
-        factor: The factor.
-
-    Returns:
-        The humanoid; drives, gains and the times of its steps stay.
-    """
+    """The same humanoid with all lengths times a factor."""
     along, across, turn = robot.stride
     left, right = robot.effectors
     return replace(

@@ -40,13 +40,7 @@ def plan(
     """Plan of the motion of one run.
 
     Args:
-        robot: The humanoid.
-        motion: The motion.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
-
-    Returns:
-        The plan.
     """
     if isinstance(motion, Walk):
         return walk(robot, footsteps(robot, motion, rng, duration), duration)
@@ -57,17 +51,7 @@ def plan(
 
 
 def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
-    """Scene of one run.
-
-    Args:
-        robot: The humanoid.
-        plan: Plan of the motion.
-        faults: The faults to inject.
-        imperfections: The imperfections of the robot.
-
-    Returns:
-        The scene; it begins when the robot stands still.
-    """
+    """Scene of one run."""
     model = reduced_model(robot)
     boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
     world = _world(robot, model, boxes, imperfections)

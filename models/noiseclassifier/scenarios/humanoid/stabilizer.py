@@ -37,12 +37,8 @@ class Stabilizer:
     """Heights and tilts of the soles from plan and sensors, once per tick.
 
     Args:
-        plan: Plan of the motion.
-        soles: Left and right sole.
-        gains: Of the stabilizer.
         strength: Scale of the gains of the force control at each tick, shape (ticks,).
         weight: Weight of the nominal robot, in [N].
-        where: Slice of each sensor.
     """
 
     def __init__(
@@ -80,10 +76,6 @@ class Stabilizer:
 
     def step(self, number: int, sensors: Array) -> tuple[list[float], list[list[float]]]:
         """Advance by one tick.
-
-        Args:
-            number: Index of the tick.
-            sensors: Values of the sensors.
 
         Returns:
             Height of each sole over its plan, in [m], and its tilts about its own x and y axes,

@@ -23,13 +23,7 @@ def stand(robot: Humanoid, motion: Stand, rng: np.random.Generator, duration: fl
     """Plan of standing.
 
     Args:
-        robot: The humanoid, its feet side by side at x = 0.
-        motion: The motion.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
-
-    Returns:
-        The plan.
     """
     plan = walk(robot, (), duration, upper=gesture(robot, motion.upper, rng, duration))
     time = times(len(plan.zmp), TICK)

@@ -28,14 +28,9 @@ def walk(
     """Plan of a walk over footsteps.
 
     Args:
-        robot: The humanoid, its feet side by side at x = 0.
-        steps: The footsteps.
         duration: Duration of the plan, in [s].
         upper: Positions of the upper body's joints, shape (ticks, joints), in [rad]; by default at
             rest.
-
-    Returns:
-        The plan.
     """
     time = times(round(duration / TICK), TICK)
     places, yaws, swinging = paths(robot, steps, time)

@@ -23,11 +23,6 @@ class TrotControl:
     """Controller with attitude feedback of the base and foot placement.
 
     Args:
-        robot: The robot.
-        model: The ``pinocchio.Model`` that the controller has.
-        standing: The robot before the motion.
-        plan: Plan of the motion.
-        sensors: Slice of each sensor.
         gain: Scale of the feedback of forces at each tick, shape (ticks,).
     """
 
@@ -53,15 +48,7 @@ class TrotControl:
         self._velocity, self._planned = np.zeros(model.nv), np.zeros(model.nv - 6)
 
     def tick(self, number: int, sensors: Array) -> Reference:
-        """Advance by one tick.
-
-        Args:
-            number: Index of the tick.
-            sensors: Values of the sensors, as `scenarios.sensing.sensors_of` has them.
-
-        Returns:
-            Reference of the joints, one tick late: a velocity takes two neighbours.
-        """
+        """Advance by one tick."""
         before, here, after = self._configurations = [
             *self._configurations[1:],
             self._configuration(number, sensors),

@@ -47,17 +47,7 @@ def motion(
     *,
     soft: bool = False,
 ) -> Trot:
-    """Random motion.
-
-    Args:
-        rng: Random number generator.
-        wildness: From 0, near today's trot, to 1, slow to fast, with stops and moving body.
-        robot: The robot; all of them have all gaits.
-        soft: Whether its drives are soft, so that its steps have to be quick.
-
-    Returns:
-        The motion; each setting is drawn between its mild and its wild range.
-    """
+    """Random motion."""
     gait = str(rng.choice(list(GAITS), p=list(GAITS.values())))
 
     def draw(name: str) -> float:
@@ -101,28 +91,13 @@ LIMITS = Limits(
 
 
 def suited(motion: Trot) -> tuple[str, ...]:
-    """Names of the faults that can act in a motion.
-
-    Args:
-        motion: The motion.
-
-    Returns:
-        Names in ``DEFECTS``: without those of steps if it only stands.
-    """
+    """Names of the faults that can act in a motion."""
     steps = tuple(name for name, defect in DEFECTS.items() if isinstance(defect, Underfoot | Ahead))
     return tuple(name for name in DEFECTS if motion.gait != "stand" or name not in steps)
 
 
 def scaled(robot: Quadruped, factor: float) -> Quadruped:
-    """A quadruped of another size, at equal Froude numbers; masses and gains stay.
-
-    Args:
-        robot: The robot.
-        factor: Factor on all lengths.
-
-    Returns:
-        The robot; times and speeds grow with the square root of the factor.
-    """
+    """A quadruped of another size, at equal Froude numbers; masses and gains stay."""
     time = sqrt(factor)
     front_left, front_right, rear_left, rear_right = (
         Ball(foot.frame, factor * foot.radius) for foot in robot.feet
@@ -140,15 +115,7 @@ def scaled(robot: Quadruped, factor: float) -> Quadruped:
 
 @dataclass(frozen=True)
 class Underfoot:
-    """Boxes under feet, lower than the feet are lifted.
-
-    Attributes:
-        feet: Indices of the feet that may meet one.
-        rise: Height of a box, as a share of the highest lift of the feet.
-        half: Half of its edge lengths, as a share of the height of the robot.
-        share: Share of the contacts with a box.
-        most: Largest number of boxes.
-    """
+    """Boxes under feet, lower than the feet are lifted."""
 
     feet: tuple[int, ...]
     rise: Range = (0.35, 0.65)
@@ -174,11 +141,7 @@ class Underfoot:
 
 @dataclass(frozen=True)
 class Ahead:
-    """A defect that acts only if the feet get ahead of where they stand at first.
-
-    Attributes:
-        defect: The defect.
-    """
+    """A defect that acts only if the feet get ahead of where they stand at first."""
 
     defect: Defect
 

@@ -19,10 +19,6 @@ LOWEST, STEEPEST = 0.5, 0.7
 class StateEstimate:
     """State estimate, updated once per tick.
 
-    Args:
-        robot: The robot.
-        sensors: Slice of each sensor.
-
     Attributes:
         roll: Low-passed, less the planned one, in [rad].
         pitch: Low-passed, less the planned one, in [rad].
@@ -47,7 +43,6 @@ class StateEstimate:
         """Update the estimate with the sensors of one tick.
 
         Args:
-            sensors: Values of the sensors, as `scenarios.sensing.sensors_of` has them.
             place: Planned position of the centre of mass, shape (2,), in [m].
             velocity: Its planned velocity, shape (2,), in [m/s].
             yaw: The planned direction of the body, in [rad].

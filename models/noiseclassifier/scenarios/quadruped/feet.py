@@ -33,9 +33,6 @@ class Feet:
     """Places of the feet, corrected by feedback.
 
     Args:
-        robot: The robot.
-        standing: The robot before the motion.
-        plan: Plan of the motion.
         gain: Scale of the feedback of forces at each tick, shape (ticks,).
     """
 
@@ -53,10 +50,6 @@ class Feet:
 
     def places(self, number: int, estimate: StateEstimate) -> Array:
         """Places of the feet.
-
-        Args:
-            number: Index of the tick.
-            estimate: The state estimate.
 
         Returns:
             Shape (feet, 3), in [m].

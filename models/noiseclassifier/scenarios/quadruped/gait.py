@@ -15,16 +15,7 @@ LONGEST = 0.15
 
 @dataclass(frozen=True)
 class Gait:
-    """A gait.
-
-    Attributes:
-        groups: Group of each foot; feet of a group swing together, groups in the order of their
-            numbers.
-        duty: Share of a cycle in which a foot is on the ground.
-        period: Time of a cycle, as a multiple of the robot's nominal period.
-        level: Whether the body moves along the commanded path alone. It must move to and fro over
-            the feet on the ground where their middle is not below it.
-    """
+    """A gait."""
 
     groups: tuple[int, int, int, int]
     duty: float
@@ -56,7 +47,6 @@ class Beat:
     """One swing of one group of feet.
 
     Attributes:
-        group: Index of the group.
         begin: When the weight starts to shift to the other feet, in [s].
         lift: When the feet leave the ground, in [s].
         touch: When they touch it again, in [s].
@@ -80,15 +70,9 @@ def beats(
     """Beats of a gait.
 
     Args:
-        rng: Random number generator.
         begin: Start, in [s].
         end: When all feet have to be on the ground again, in [s].
         period: Mean time of a cycle, in [s].
-        jitter: Relative variation of the period of each cycle.
-        gait: The gait.
-
-    Returns:
-        One beat per cycle and group.
     """
     out: list[Beat] = []
     while True:
@@ -107,8 +91,6 @@ def loads(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
 
     Args:
         time: Shape (times,), in [s].
-        timing: The beats, in order.
-        gait: The gait.
     """
     knots = [[-1.0] for _ in range(gait.count)]
     bearing = [[1.0] for _ in range(gait.count)]
@@ -127,8 +109,6 @@ def swings(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
 
     Args:
         time: Shape (times,), in [s].
-        timing: The beats, in order.
-        gait: The gait.
     """
     groups = np.ones((len(time), gait.count))
     for beat in timing:

@@ -33,12 +33,7 @@ def poses(time: Array, rng: np.random.Generator, share: float, *, size: float) -
 
     Args:
         time: Shape (times,), in [s].
-        rng: Random number generator.
-        share: Amplitude as a share of the largest; no pose but the neutral one if 0.
         size: Height of the centre of mass, in [m].
-
-    Returns:
-        The poses.
     """
     if not share:
         return Poses(np.zeros((len(time), 2)), np.zeros((len(time), 3)))

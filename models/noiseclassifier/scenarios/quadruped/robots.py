@@ -12,22 +12,16 @@ class Quadruped:
     """A robot on four legs with round feet.
 
     Attributes:
-        name: Its name in ``noisemodel.ROBOTS``.
-        drives: Its drives, in the order of the URDF's joints.
-        feet: Its feet: front left, front right, rear left, rear right.
         rest: Joint positions when it stands, in [rad].
         period: Nominal time of a cycle, in which each foot steps once, in [s].
         height: Nominal height of a swing, in [m].
         speed: Highest speed ahead, in [m/s].
         turning: Highest speed of turning, in [rad/s].
-        attitude_gain: Tilt of the base against its measured tilt, as a share of it.
         attitude_filter: Time constant of the low-pass on the attitude, in [s].
         force_gain: Speed of a foot per error of its contact force, in [m/(s N)].
         force_filter: Time constant of the low-pass on the contact forces, in [s].
         payload: Largest mass on its back that the controller has no model of, in [kg].
         force_noise: Largest standard deviation of the force sensors' noise, in [N].
-        held: Positions of the locked joints that are not at zero, by name.
-        length_scale: Factor on all lengths of its URDF.
     """
 
     name: str
@@ -161,17 +155,10 @@ def _similar(
     Zoology 1983); gains, limits and losses follow from their units.
 
     Args:
-        name: Its name in ``noisemodel.ROBOTS``.
-        joints: Its joints, in the order of the URDF's.
-        feet: Frames of its feet: front left, front right, rear left, rear right.
         mass: Of the whole robot, in [kg].
         leg: Length of thigh and shank, in [m].
         rest: Joint positions when it stands, in [rad].
         torque: Limits of the drives of one leg, in [N m]; by default similar ones.
-        held: Positions of the locked joints that are not at zero, by name.
-
-    Returns:
-        The robot.
     """
     length, force = leg / _GO2_LEG, mass / _GO2_MASS
     time, moment = sqrt(length), force * length

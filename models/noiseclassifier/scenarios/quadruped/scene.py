@@ -35,29 +35,13 @@ def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: flo
     """Plan of the motion of one run.
 
     Args:
-        robot: The robot.
-        motion: Plan of the motion.
-        rng: Random number generator.
         duration: Duration of the run, in [s].
-
-    Returns:
-        The plan.
     """
     return trot(robot, stand(robot), motion, rng, duration)
 
 
 def scene(robot: Quadruped, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
-    """Scene of one run.
-
-    Args:
-        robot: The robot.
-        plan: Plan of the motion.
-        faults: The faults to inject.
-        imperfections: The imperfections of the robot.
-
-    Returns:
-        The scene; it begins when the robot has come to rest.
-    """
+    """Scene of one run."""
     model, standing = reduced_model(robot), stand(robot)
     boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
     world = _world(robot, model, boxes, imperfections)

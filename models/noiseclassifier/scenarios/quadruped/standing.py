@@ -35,14 +35,7 @@ class Standing:
 
 
 def stand(robot: Quadruped) -> Standing:
-    """Standing posture with the joints near their rest positions.
-
-    Args:
-        robot: The robot.
-
-    Returns:
-        The posture; every call returns the same.
-    """
+    """Standing posture with the joints near their rest positions."""
     return _stand(robot.name, robot.rest, robot.feet, reduced_model(robot))
 
 

@@ -27,9 +27,6 @@ def steer(
 
     Args:
         time: Shape (times,), in [s].
-        way: As `noiseclassifier.scenarios.motions.Trot` has it.
-        robot: The robot.
-        rng: Random number generator.
         bouts: Start and end of each motion, in [s].
 
     Returns:

@@ -51,14 +51,10 @@ def footholds(
     This is the neutral point of Raibert, Legged Robots That Balance, 1986.
 
     Args:
-        beats: Those in which the foot swings, in order.
         hip: Where the foot stands at first, shape (2,), in [m].
         way: Path of the body at every tick, shape (ticks, 2), in [m].
         yaw: Direction of the body at every tick, shape (ticks,), in [rad].
         stop: When the body is at rest, in [s].
-
-    Returns:
-        Where the foot stands at first, and after each beat.
     """
     ends = [*(beat.lift for beat in beats), np.inf][1:]
     middles = [(beat.touch + end) / 2 for beat, end in zip(beats, ends, strict=True)]
@@ -76,8 +72,6 @@ def path(time: Array, beats: Sequence[Beat], places: Sequence[Foothold], progres
 
     Args:
         time: Shape (times,), in [s].
-        beats: Those in which the foot swings, in order.
-        places: Where it stands at first, and after each beat.
         progress: Completed share of its path in its swing, shape (times,).
 
     Returns:
@@ -90,16 +84,7 @@ def path(time: Array, beats: Sequence[Beat], places: Sequence[Foothold], progres
 
 
 def contacts(foot: int, beats: Sequence[Beat], places: Sequence[Foothold]) -> list[Contact]:
-    """Planned contacts of a foot.
-
-    Args:
-        foot: Index of the foot.
-        beats: Those in which it swings, in order.
-        places: Where it stands at first, and after each beat.
-
-    Returns:
-        The contacts, the first one from before the beginning, the last one without end.
-    """
+    """Planned contacts of a foot."""
 
     def during(share: float) -> list[float]:
         return [beat.lift + share * (beat.touch - beat.lift) for beat in beats]

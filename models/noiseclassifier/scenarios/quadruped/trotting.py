@@ -41,9 +41,6 @@ class Plan:
         swing: Whether each foot is in the air, shape (ticks, feet).
         progress: Completed share of the path of each foot; 1 in stance, shape (ticks, feet).
         load: Planned share of the weight on each foot, shape (ticks, feet).
-        contacts: The planned contacts, in the order of time.
-        effectors: The feet.
-        ground: The floor.
         size: Height of the centre of mass, in [m].
         weight: In [N].
     """
@@ -107,17 +104,7 @@ def trot(
     """Plan of a gait from rest to rest.
 
     Args:
-        robot: The robot.
-        standing: The robot before the motion.
-        motion: The motion.
-        rng: Random number generator.
         duration: Duration of the plan, in [s].
-
-    Returns:
-        The plan; until the robot stops, a trot does not depend on the duration.
-
-    Raises:
-        UnknownGaitError: If there is no such gait.
     """
     shapes, steering, bending = rng.spawn(3)
     gait = _gait(motion.gait)
