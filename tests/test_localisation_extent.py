@@ -164,3 +164,11 @@ def test_frames_of_another_length_are_taken_into_account(rate):
     onset, end = extent(run, 2.0, 4.5, frame=0.8, hop=0.2)
     assert onset == pytest.approx(2.7, abs=0.03)
     assert end == pytest.approx(4.0, abs=0.03)
+
+
+@pytest.mark.parametrize("stop", [0.4, 0.4 + 1 / 3, 0.7, 4.9999999, 5.0])
+def test_a_finding_of_a_sample_at_the_end_of_a_run_has_an_onset_and_an_end(stop):
+    run = tone(1000.0)
+    for start in (stop - 1e-3, stop - 1e-3 - 1e-17, stop):
+        onset, end = extent(run, start, stop)
+        assert start - 2e-3 <= onset < end <= stop + 2e-3

@@ -139,7 +139,8 @@ class Analysis:
         layers = [(float(labels.start[g[0]]), float(labels.stop[g[-1]]), "ok") for g in groups]
         alone = np.flatnonzero((labels.label == nc.UNKNOWN) & ~labels.flagged)
         middle = (labels.start[alone] + labels.stop[alone]) / 2
-        layers += [(t - hop(labels) / 2, t + hop(labels) / 2, nc.UNKNOWN) for t in middle.tolist()]
+        half = labels.step / 2
+        layers += [(t - half, t + half, nc.UNKNOWN) for t in middle.tolist()]
         layers += [(event.start, event.stop, event.label) for event in self.findings]
         edges = np.unique([time for start, stop, _ in layers for time in (start, stop)])
         names = np.full(len(edges) - 1, "", dtype=object)
@@ -371,43 +372,11 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
 
 
 def extents(run: nm.Run, labels: nc.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
-    """List the events of labels, and the same from onset to end, in the order of the latter.
-
-    A stretch of flagged frames has an onset and an end, and each event an onset and an end within
-    these. An event is none of its own if it is left without any time when each frame counts for the
-    hop around its middle: its frames only touch what the next one covers.
-    """
-    frame, step = float(labels.stop[0] - labels.start[0]), hop(labels)
-    margin, events, pairs = (frame - step) / 2, labels.events(), []
-    for first, last in _stretches(labels):
-        onset, end = extent(run, first, last, frame=frame, hop=step)
-        found = []
-        for span in (each for each in events if first <= each.start and each.stop <= last):
-            start = max(onset, span.start + margin if span.start > first else onset)
-            stop = min(end, span.stop - margin if span.stop < last else end)
-            if start < stop:
-                own = extent(run, span.start, span.stop, frame=frame, hop=step)
-                if min(own[1], end) - max(own[0], onset) >= step:
-                    start, stop = max(own[0], onset), min(own[1], end)
-                found.append((span, replace(span, start=start, stop=stop)))
-            elif not found:
-                fallback = (span, replace(span, start=onset, stop=end))
-        pairs += found or [fallback]
-    pairs.sort(key=lambda pair: (pair[1].start, pair[1].stop))
-    return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)
-
-
-def _stretches(labels: nc.Labels) -> list[tuple[float, float]]:
-    """List the stretches of flagged frames, by the start of the first and the stop of the last."""
-    own = np.flatnonzero(labels.flagged)
-    apart = np.flatnonzero(labels.start[own[1:]] > labels.stop[own[:-1]]) + 1
-    groups = [group for group in np.split(own, apart) if len(group)]
-    return [(float(labels.start[g[0]]), float(labels.stop[g[-1]])) for g in groups]
-
-
-def hop(labels: nc.Labels) -> float:
-    """Time from one frame to the next, in [s]; a frame's duration if there is no next one."""
-    return float(np.diff(labels.start).min(initial=float(labels.stop[0] - labels.start[0])))
+    """List the events of labels, and the same from onset to end, in order of time."""
+    spans, frame = labels.events(), float(labels.stop[0] - labels.start[0])
+    times = [extent(run, e.start, e.stop, frame=frame, hop=labels.step) for e in spans]
+    pairs = zip(spans, times, strict=True)
+    return spans, tuple(replace(span, start=start, stop=stop) for span, (start, stop) in pairs)
 
 
 def _missing(run: nm.Run) -> Iterator[str]:

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from inspector.localisation.extent import END, ONSET
 from noiseclassifier import Event, Labels
 
 SETTLED = 3
@@ -15,7 +14,7 @@ SETTLED = 3
 class Findings:
     """Collects labels, and keeps of them what may still become part of an event.
 
-    A stretch of frames that are not `ok` is decided when it has ended. Memory grows with events and
+    A finding is decided when a frame begins after it. Memory grows with events and
     with the stretch that lasts, not with time.
 
     Attributes:
@@ -31,14 +30,17 @@ class Findings:
         """Take the labels of the next frames."""
         self.frames += len(labels)
         waiting = labels if self._open is None else Labels.concatenated((self._open, labels))
-        quiet = np.flatnonzero(waiting.label == "ok")
-        if not len(quiet):
+        quiet = waiting.label == "ok"
+        # How far the frames reach that are not `ok`; those that it touches join them.
+        reached = np.maximum.accumulate(np.where(quiet, -np.inf, waiting.stop))
+        apart = np.flatnonzero(quiet & (waiting.start > np.append(-np.inf, reached[:-1])))
+        if not len(apart):
             self._open = waiting
             return
         # The frame that is `ok` belongs to both parts: neither ends where the signal goes on.
-        last = int(quiet[-1])
-        if len(quiet) <= last:  # most often all of it is `ok`, and a label must not wait
-            self._closed = _merged(self._closed, waiting.part(slice(last + 1)).events())
+        last = int(apart[-1])
+        if not quiet[:last].all():  # most often all of it is `ok`, and a label must not wait
+            self._closed += waiting.part(slice(last + 1)).events()
         self._open = waiting.part(slice(last, None))
 
     @property
@@ -58,14 +60,12 @@ class Findings:
             above_threshold=None if last.above_threshold is None else np.zeros(1, dtype=bool),
             novel=None if last.novel is None else np.zeros(1, dtype=bool),
         )
-        rest = Labels.concatenated((self._open, quiet)).events()
-        return tuple(_merged(self._closed, rest))
+        return (*self._closed, *Labels.concatenated((self._open, quiet)).events())
 
     @property
     def events(self) -> tuple[Event, ...]:
         """The events so far, as if the signal ended here."""
-        rest = () if self._open is None else self._open.events()
-        return tuple(_merged(self._closed, rest))
+        return (*self._closed, *(() if self._open is None else self._open.events()))
 
 
 class News:
@@ -111,55 +111,3 @@ class News:
     def _lasts(self, event: Event) -> bool:
         """Whether an event has been told of before: it continues one of its class."""
         return self._begun.get(event.label, -float("inf")) >= event.start
-
-
-def lasting(events: Sequence[Event], frame: float, hop: float) -> tuple[Event, ...]:
-    """Leave out events whose frames only touch what another event covers.
-
-    Each frame counts for the hop around its middle. Where events of several classes follow each
-    other, onset and end of all are expected where `inspector.localisation.extent` does without the
-    signal. Those that keep less than three quarters of a hop in between are the edge of another.
-
-    Args:
-        events: Events, from the start of the first frame of each to the stop of its last.
-        frame: Duration of a frame, in [s].
-        hop: Time from one frame to the next, in [s].
-
-    Returns:
-        The others, in order of time; of events that follow each other the longest at least.
-    """
-    groups: list[list[Event]] = []
-    for event in sorted(events, key=lambda event: event.start):
-        if groups and event.start <= max(each.stop for each in groups[-1]):
-            groups[-1].append(event)
-        else:
-            groups.append([event])
-    kept: list[Event] = []
-    for group in groups:
-        onset = group[0].start + frame - ONSET * hop
-        end = max(each.stop for each in group) - END * hop
-        margin = (frame - hop) / 2
-        time = [min(end, each.stop - margin) - max(onset, each.start + margin) for each in group]
-        kept += [each for each, own in zip(group, time, strict=True) if own >= 0.75 * hop] or [
-            max(group, key=lambda each: each.stop - each.start)
-        ]
-    return tuple(sorted(kept, key=lambda event: (event.start, event.stop)))
-
-
-def _merged(events: Sequence[Event], others: Sequence[Event]) -> list[Event]:
-    """Join events with later ones of their label that overlap or touch, in order of time."""
-    found, latest = list(events), {event.label: place for place, event in enumerate(events)}
-    for other in others:
-        place = latest.get(other.label, -1)
-        if place >= 0 and found[place].stop >= other.start:
-            event = found[place]
-            found[place] = replace(
-                event,
-                stop=max(event.stop, other.stop),
-                score=max(event.score, other.score),
-                novel=event.novel or other.novel,
-            )
-        else:
-            latest[other.label] = len(found)
-            found.append(other)
-    return sorted(found, key=lambda event: (event.start, event.stop))

@@ -14,7 +14,7 @@ from inspector.live.blueprint import SHOWN, Contents, layout
 from inspector.live.buffer import SampleBuffer
 from inspector.live.clock import Clock
 from inspector.live.drawing import Drawing
-from inspector.live.findings import SETTLED, Findings, News, lasting
+from inspector.live.findings import SETTLED, Findings, News
 from inspector.live.labeller import NOISY, Labeller
 from inspector.live.lane import Lane
 from inspector.live.links import LinkLevels
@@ -130,15 +130,12 @@ class Worker:
     @property
     def findings(self) -> tuple[Event, ...]:
         """The findings so far, as if the signal ended here."""
-        return self._lasting(self._findings.events)
+        return self._findings.events
 
     @property
     def frames(self) -> int:
         """How many frames were labelled."""
         return self._findings.frames
-
-    def _lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
-        return lasting(events, self._labeller.length, self._labeller.hop)
 
     def work(self, buffer: SampleBuffer) -> None:
         """Show the samples that a buffer holds, and empty it."""
@@ -256,7 +253,7 @@ class Worker:
             shift = end - self._labeller.elapsed
             labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
             self._findings.add(labels)
-            told = self._lasting(self._findings.confirmed)
+            told = self._findings.confirmed
             self._news.update(told, self._findings.decided, float(labels.stop[-1]))
             labels = replace(labels, label=labels.raw)
             self._counts.update(labels.label.tolist())

@@ -71,10 +71,10 @@ def extent(
     begin, sample = float(run.time[0]), 1.0 / run.rate
     start = min(max(start, begin), begin + run.duration - sample)
     stop = max(min(stop, begin + run.duration), start + sample)
-    room = min(frame, stop - start - sample)
+    room = max(0.0, min(frame, stop - start - sample))  # not -1e-17 by rounding
     prior = frame - ONSET * hop, DEVIATION * hop
     onset = start + _rise(run, start, room, prior, frame=frame, hop=hop)
-    room = min(frame, stop - onset - sample)
+    room = max(0.0, min(frame, stop - onset - sample))
     prior = END * hop, DEVIATION * hop
     return onset, stop - _rise(run, stop, room, prior, frame=frame, hop=hop, backwards=True)
 

@@ -244,6 +244,7 @@ class Classifier:
             self.classes,
             self.estimator.above_threshold(decisions),
             self.estimator.novel(decisions),
+            hop=self.profile.hop / rate,
         )
 
     def decide(self, plain: Array) -> Array:

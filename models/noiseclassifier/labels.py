@@ -10,8 +10,8 @@ From frames to findings, the same for every estimator that gives probabilities:
    a frame at either end of the signal or beside a gap counts twice, since the neighbour that would
    confirm it is missing. Failure frames of other stretches are `ok`, their `unknown` frames remain
    `unknown` and raise nothing.
-4. In a confirmed stretch that holds failure frames, `unknown` frames take the class of the nearest
-   of them: one event, marked as out of distribution.
+4. Frames of confirmed stretches that overlap or touch are one event, of the class of most failure
+   frames. `unknown` frames in it mark it as out of distribution.
 """
 
 from collections.abc import Sequence
@@ -78,6 +78,8 @@ class Labels:
         novel: Whether a frame is out of distribution, shape (frames,); None if the estimator has
             no measure of that.
         unknown_is_finding: Whether `unknown` frames are evidence; if not, they raise nothing.
+        hop: Time from one frame to the next, in [s]; None takes the smallest distance of frames
+            but the last, which may be flush with the end of the signal.
     """
 
     start: Array
@@ -88,6 +90,15 @@ class Labels:
     above_threshold: Mask | None = None
     novel: Mask | None = None
     unknown_is_finding: bool = True
+    hop: float | None = None
+
+    @property
+    def step(self) -> float:
+        """Time from one frame to the next, in [s]; a frame's duration if there is no next one."""
+        if self.hop is not None:
+            return self.hop
+        apart = np.diff(self.start)[: max(1, len(self) - 2)]
+        return float(apart.min(initial=float(self.stop[0] - self.start[0])))
 
     @cached_property
     def flagged(self) -> Mask:
@@ -103,35 +114,28 @@ class Labels:
         return confirmed(suspect, evidence, apart)
 
     @cached_property
+    def stretches(self) -> tuple[Index, ...]:
+        """Flagged frames that overlap or touch: each group is one finding."""
+        own = np.flatnonzero(self.flagged)
+        apart = np.flatnonzero(self.start[own[1:]] > self.stop[own[:-1]]) + 1
+        return tuple(group for group in np.split(own, apart) if len(group))
+
+    @cached_property
     def debounced(self) -> Words:
         """Label of each frame after confirmation by its neighbours, shape (frames,)."""
         if self.above_threshold is None:
             return self.label
-        unknown = self.label == UNKNOWN
-        labels = np.where(self.flagged | unknown, self.label, "ok")
-        joined, place = self._joined()
-        labels[joined] = labels[place]
+        labels = np.where(self.label == UNKNOWN, self.label, "ok")
+        for frames in self.stretches:
+            labels[frames] = self._name(frames)
         return labels
 
-    def _joined(self) -> tuple[Index, Index]:
-        """Find `unknown` frames that join a failure: their places, and that frame's place."""
-        flagged, unknown = self.flagged, self.label == UNKNOWN
-        apart = np.append(True, self.start[1:] > self.stop[:-1])[: len(flagged)]
-        stretch = np.cumsum(apart | ~flagged)
-        failures = np.flatnonzero(flagged & ~unknown)
-        wanted = np.flatnonzero(flagged & unknown)
-        if not len(failures) or not len(wanted):
-            return wanted[:0], wanted[:0]
-        after = np.searchsorted(failures, wanted)
-        sides = np.stack(
-            (failures[np.maximum(after - 1, 0)], failures[np.minimum(after, len(failures) - 1)])
-        )
-        distance = np.abs(sides - wanted).astype(np.float64)
-        # A frame that is not flagged begins a stretch of its own, which the next ones join.
-        distance[stretch[sides] != stretch[wanted]] = np.inf
-        nearest = distance.argmin(axis=0)
-        near = np.isfinite(distance.min(axis=0))
-        return wanted[near], sides[nearest, np.arange(len(wanted))][near]
+    def _name(self, frames: Index) -> str:
+        """The class of most frames; `unknown` only where all are."""
+        names, first, count = np.unique(self.label[frames], return_index=True, return_counts=True)
+        known = names != UNKNOWN
+        best = max(range(len(names)), key=lambda place: (known[place], count[place], -first[place]))
+        return str(names[best])
 
     @property
     def raw(self) -> Words:
@@ -151,19 +155,12 @@ class Labels:
         return float(self.scores[frame, self.classes.index(label)]) if known else 0.0
 
     def events(self) -> tuple[Event, ...]:
-        """Merge flagged frames of one label that overlap or follow each other.
+        """Findings in order of time, none overlaps another: one for each stretch of flagged frames.
 
-        Returns:
-            Findings only, no `ok`, in order of time. Frames overlap, and so may events of
-            different classes; events of one class never do.
+        A stretch has the class of most of its time: the frames at both ends of an oscillation often
+        look like an impact.
         """
-        found: list[Event] = []
-        labels = self.debounced
-        for label in (*(name for name in self.classes if name != "ok"), UNKNOWN):
-            own = np.flatnonzero(self.flagged & (labels == label))
-            apart = np.flatnonzero(self.start[own[1:]] > self.stop[own[:-1]]) + 1
-            found += [self._event(label, group) for group in np.split(own, apart) if len(group)]
-        return tuple(sorted(found, key=lambda event: (event.start, event.stop)))
+        return tuple(self._event(self._name(frames), frames) for frames in self.stretches)
 
     def _event(self, label: str, frames: Index) -> Event:
         known = label in self.classes
