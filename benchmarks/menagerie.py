@@ -24,7 +24,7 @@ import noisemodel as nm
 from inspector.errors import InspectorError
 from inspector.recording import robot as scene
 from noisemodel.catalog import menagerie_names
-from noisemodel.geometry import triangles
+from noisemodel.surface import triangles
 from noisemodel.types import Array
 
 RATE = 200.0

@@ -10,14 +10,13 @@ from noisemodel.comparison import Comparison, RobotComparison
 from noisemodel.comparisons import Comparisons, LeftOut
 from noisemodel.errors import GeometryError, MotionError, NoiseModelError, UnknownKindError
 from noisemodel.estimates import SIMPLIFIED, check_length, estimates
-from noisemodel.geometry import GEOMETRIES
 from noisemodel.links import vibrating
 from noisemodel.motions import EXCITATION, Motions, Moving, Source, Task, tasks
 from noisemodel.noise import check_positive, check_stretches, decibel
 from noisemodel.parallel import DIED, Jobs, in_order
 from noisemodel.robot import Robot
 from noisemodel.speed import KINDS, check_motion
-from noisemodel.surface import Surface, check_surface
+from noisemodel.surface import GEOMETRIES, Surface, check_surface
 from noisemodel.types import Array, Real
 
 COMPARED = (SIMPLIFIED, "C", "paper", "mean", "rms", "normal")

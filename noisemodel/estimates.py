@@ -19,8 +19,7 @@ from noisemodel.similarity import (
 )
 from noisemodel.simplified import simplified
 from noisemodel.speed import chunk_speeds
-from noisemodel.surface import Surface
-from noisemodel.turning import TINY
+from noisemodel.surface import TINY, Surface
 from noisemodel.types import Array, Real
 
 SIMPLIFIED = "simplified"

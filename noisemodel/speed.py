@@ -9,12 +9,9 @@ import numpy as np
 from noisemodel.errors import MotionError, UnknownKindError
 from noisemodel.joints import Joint
 from noisemodel.kinematics import CHUNK, chunk_twists
-from noisemodel.linksurface import LinkSurface
-from noisemodel.quadrature import point_speeds
 from noisemodel.robot import Robot
 from noisemodel.subspace import own_twist
-from noisemodel.surface import Surface, check_surface
-from noisemodel.turning import turning_speed
+from noisemodel.surface import LinkSurface, Surface, check_surface, point_speeds, turning_speed
 from noisemodel.types import Array, Real
 
 BLOCK = 256

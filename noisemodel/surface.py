@@ -1,18 +1,520 @@
-"""The surface of a robot: that of every link that moves."""
+"""The surface of a robot: the triangles of every link that moves, and integrals over them."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Self
+import hashlib
+from collections import defaultdict
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cache
+from types import MappingProxyType
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel.errors import GeometryError
-from noisemodel.geometry import LinkTriangles, Missing, triangles
-from noisemodel.linksurface import LinkSurface
+from noisemodel import linkshapes, meshes, meshpath
+from noisemodel.cache import cached
+from noisemodel.errors import GeometryError, MeshError, MissingMeshError
+from noisemodel.linkshapes import LinkShape
 from noisemodel.robot import Robot
 from noisemodel.subspace import turning_axis
-from noisemodel.types import Array
+from noisemodel.types import Array, Indices
+
+Missing = Literal["error", "skip"]
+
+GEOMETRIES: Mapping[str, tuple[str, ...]] = MappingProxyType(
+    {
+        "visual": ("visual",),
+        "collision": ("collision",),
+        "hull": ("visual",),
+        "auto": ("visual", "collision"),
+    }
+)
+"""The geometries, and the shapes of the URDF or MJCF that each takes: the first that a link has."""
+
+VERSION = "link-3"
+"""Changes with what is computed here, so that nothing older is taken from the cache."""
+
+HALVINGS = 8
+"""1024 points for each link: mean speeds are right to about 1e-3, whatever the motion."""
+
+FINENESS = 2.0
+"""Panels of the fine points go this many times into the surface's thickness."""
+
+MOST = 1_000_000
+"""Fine points of a surface; more are placed only where there are many triangles."""
+
+SLENDEREST = 1e-3
+"""Thinner than this share of its length, a surface counts as that thin."""
+
+CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=np.float64)
+"""Of a tetrahedron: mean 0 and covariance 1 in all directions."""
+
+SIDE = 96
+"""Cells along one side of the table of turning; between its nodes it is right to about 3e-4."""
+
+TINY = 1e-300
+"""Keeps the direction of no rotation finite."""
+
+ALL: Indices = np.zeros(1, dtype=np.intp)
+"""Where the only cell begins, if all points are in one."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinkTriangles:
+    """The triangles of every link that moves; a link is all geometry that moves with one joint.
+
+    What is fixed to the world is left out.
+
+    Attributes:
+        joint: Index of the link's joint in Pinocchio, which is 1 to the last, shape (links,).
+        names: Name of each joint's child link.
+        triangles: The link's triangles in the joint's axes, for each link of shape
+            (triangles, 3 corners, 3), in [m]. Which side of a triangle is outside is not known.
+        kind: What each link was taken from: "visual", "collision", "hull" or "none".
+        missing: Addresses of the meshes that were not found and are left out.
+    """
+
+    joint: Indices
+    names: tuple[str, ...]
+    triangles: tuple[Array, ...]
+    kind: tuple[str, ...]
+    missing: tuple[str, ...]
+
+
+def triangles(
+    robot: Robot, geometry: str = "visual", *, missing: Missing = "error"
+) -> LinkTriangles:
+    """Draw all links of a robot with triangles.
+
+    Args:
+        robot: The robot.
+        geometry: "visual" or "collision", as the URDF or MJCF has them; "hull", the convex hull of
+            every visual by itself; or "auto", the visual or, of a link that has none, the
+            collision.
+        missing: What to do about a mesh that is not there: "error", or "skip" it with a warning.
+
+    Raises:
+        GeometryError: If there is no such geometry, or a shape of the URDF is wrong.
+        MeshError: If a mesh cannot be found or read, or has no surface.
+    """
+    for name, word, known in (
+        ("geometry", geometry, tuple(GEOMETRIES)),
+        ("missing", missing, get_args(Missing)),
+    ):
+        if word not in known:
+            raise GeometryError(f"{name} {word!r} is not known, expected one of {', '.join(known)}")
+    places, names = _links(robot)
+    mesh = _reader(robot, hull=geometry == "hull")
+    surfaces = [np.empty((0, 3, 3))] * len(names)
+    kinds = ["none"] * len(names)
+    absent: list[str] = []
+    for use in GEOMETRIES[geometry]:
+        if "none" not in kinds:
+            break
+        pieces: dict[int, list[Array]] = defaultdict(list)
+        for shape in shapes_of(robot, use):
+            joint, rotation, translation = places[shape.link]
+            if joint == 0 or kinds[joint - 1] != "none":
+                continue
+            try:
+                surface = _placed(shape, mesh, rotation, translation)
+            except MissingMeshError as error:
+                if missing == "error":
+                    raise
+                absent.append(error.mesh)
+            else:
+                pieces[joint].append(surface)
+        for joint, parts in pieces.items():
+            surfaces[joint - 1] = np.concatenate(parts)
+            kinds[joint - 1] = "hull" if geometry == "hull" else use
+    return LinkTriangles(
+        joint=np.arange(1, len(names) + 1),
+        names=names,
+        triangles=tuple(surfaces),
+        kind=tuple(kinds),
+        missing=tuple(dict.fromkeys(absent)),
+    )
+
+
+def shapes_of(robot: Robot, use: str) -> Sequence[LinkShape]:
+    """The geometry of all links as the URDF or MJCF has it; ``use`` is "visual" or "collision".
+
+    Raises:
+        GeometryError: If a shape of the URDF is wrong.
+    """
+    if robot.mjcf is None:
+        return linkshapes.read(robot.path, use)
+    return robot.mjcf.visual if use == "visual" else robot.mjcf.collision
+
+
+def link_names(robot: Robot) -> tuple[str, ...]:
+    """The child link of each joint, in the joints' order."""
+    return _links(robot)[1]
+
+
+def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
+    """Draw a robot piece by piece, what is fixed to the world included.
+
+    Of a link without visual geometry the collision geometry is drawn.
+
+    Yields:
+        Index of the joint that moves a piece in Pinocchio, 0 if none does; the piece as the file
+        has it; and its triangles in the joint's axes, shape (triangles, 3 corners, 3), in [m].
+
+    Raises:
+        GeometryError: As `triangles`.
+    """
+    places, _ = _links(robot)
+    mesh = _reader(robot, hull=False)
+    drawn: set[int] = set()
+    for use in GEOMETRIES["auto"]:
+        parts = [(*places[shape.link], shape) for shape in shapes_of(robot, use)]
+        parts = [part for part in parts if part[0] not in drawn]
+        for joint, rotation, translation, shape in parts:
+            yield joint, shape, _placed(shape, mesh, rotation, translation)
+        drawn |= {part[0] for part in parts}
+
+
+def _reader(robot: Robot, *, hull: bool) -> Callable[[str], Array]:
+    """Reads meshes by their addresses, each once: left and right often share one."""
+    read = meshes.hull if hull else meshes.read
+    return cache(lambda address: read(meshpath.find(address, robot.path, robot.package_roots)))
+
+
+def _links(robot: Robot) -> tuple[dict[str, tuple[int, Array, Array]], tuple[str, ...]]:
+    """Joint that moves each link of the robot, the link's pose there, and the links' names."""
+    from pinocchio import FrameType
+
+    bodies = [frame for frame in robot.model.frames if frame.type == FrameType.BODY]
+    places = {}
+    for frame in bodies:
+        place = frame.placement.copy()
+        places[frame.name] = (int(frame.parentJoint), place.rotation, place.translation)
+    first: dict[int, str] = {}
+    for name, (joint, *_) in places.items():  # a joint's own child comes before what is fixed to it
+        first.setdefault(joint, name)
+    return places, tuple(first[joint] for joint in range(1, robot.model.njoints))
+
+
+def _placed(
+    shape: LinkShape, mesh: Callable[[str], Array], rotation: Array, translation: Array
+) -> Array:
+    """Draw a piece of geometry in the axes of the joint that moves its link."""
+    own = mesh(shape.body) if isinstance(shape.body, str) else shape.body
+    turn, shift = rotation @ shape.matrix, rotation @ shape.translation + translation
+    points: Array = own.reshape(-1, 3) @ turn.T + shift
+    surface = points.reshape(-1, 3, 3)
+    a, b, c = np.moveaxis(surface, 1, 0)
+    with np.errstate(over="ignore", invalid="ignore"):  # then it is refused
+        area = float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    if not 0 < area < np.inf:
+        address = shape.body if isinstance(shape.body, str) else f"of link {shape.link!r}"
+        raise MeshError(address, f"has an area of {area:g} m² with its scale, expected a surface")
+    return surface
+
+
+# Integrals that are exact: area, centroid, and two quadratic forms of a link's twist.
+
+
+@dataclass(frozen=True)
+class Moments:
+    """What is exact about a surface; all is 0 where there is none, see `LinkSurface`."""
+
+    area: float
+    centroid: Array
+    mean_square: Array
+    mean_square_normal: Array
+
+
+def moments(triangles: Array) -> Moments:
+    """Integrate over triangles, shape (triangles, 3 corners, 3), in [m]."""
+    triangles, areas, normals = _faces(triangles)
+    area = float(areas.sum())
+    if area == 0.0:
+        return Moments(0.0, np.zeros(3), np.zeros((6, 6)), np.zeros((6, 6)))
+    points, weights = _edge_points(triangles, areas)
+    centroid = weights @ points
+    second = (points * weights[:, None]).T @ points
+    x, y, z = centroid
+    crossed = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    inertia = np.trace(second) * np.eye(3) - second
+    # <|v + w x r|²> = |v|² + 2 v.(w x <r>) + w.(tr<rr'> - <rr'>) w
+    mean_square = np.block([[np.eye(3), -crossed], [crossed, inertia]])
+    normals = np.repeat(normals, 3, axis=0)
+    pull = np.hstack((normals, np.cross(points, normals)))  # n.(v + w x r) = pull.(v, w)
+    return Moments(area, centroid, mean_square, (pull * weights[:, None]).T @ pull)
+
+
+def _faces(triangles: Array) -> tuple[Array, Array, Array]:
+    """Leave out triangles without area; add areas, in [m²], and unit normals, shape (n, 3)."""
+    across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    double = np.linalg.norm(across, axis=1)
+    real = double > 0.0
+    return triangles[real], 0.5 * double[real], across[real] / double[real, None]
+
+
+def _edge_points(triangles: Array, areas: Array) -> tuple[Array, Array]:
+    """Middles of the edges, which integrate polynomials of degree 2 exactly, and weights."""
+    middles = 0.5 * (triangles + np.roll(triangles, -1, axis=1))
+    return middles.reshape(-1, 3), np.repeat(areas / (3.0 * areas.sum()), 3)
+
+
+# Points for means of speeds, where no exact integral is known.
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """Points that a mean over the surface is taken at.
+
+    Attributes:
+        points: Shape (points, 3), in [m].
+        weights: Positive, sum 1, shape (points,).
+    """
+
+    points: Array
+    weights: Array
+
+
+def fine(triangles: Array) -> Cloud:
+    """Place thousands of points, so densely that means of speeds are right to 1e-4.
+
+    Means of polynomials of degree 2 are exact. Some of the triangles must have an area.
+    """
+    triangles, areas, _ = _faces(triangles)
+    _, (covariance,) = _statistics(*_edge_points(triangles, areas), ALL)
+    spread = np.linalg.eigvalsh(covariance)
+    # A slender link that spins about itself is resolved only by steps smaller than it is thick.
+    thickness, length = np.sqrt(np.maximum([spread[:2].sum(), spread[2]], 0.0))
+    step = max(thickness / FINENESS, SLENDEREST * length)
+    step = min(step, 0.05 * np.sqrt(areas.sum()))  # enough points for any number of cells
+    edges = np.linalg.norm(np.roll(triangles, -1, axis=1) - triangles, axis=2)
+    sides = np.stack((edges.max(axis=1), edges.min(axis=1)), axis=1)
+    while 4 * (panels := np.ceil(sides / step)).prod(axis=1).sum() > max(MOST, 8 * len(triangles)):
+        step *= 2.0  # fans of a thousand slender triangles, such as no link has
+    tip = edges.argmin(axis=1) + 2  # the corner opposite to the shortest edge
+    order = (tip[:, None] + np.arange(3)) % 3
+    triangles = np.take_along_axis(triangles, order[:, :, None], axis=1)
+    small = (panels == 1).all(axis=1)
+    points, weights = [], []
+    for along, across in np.unique(panels[~small], axis=0).astype(int):
+        alike = (panels == (along, across)).all(axis=1)
+        own, share = _on_triangle(along, across)
+        points.append(np.einsum("pc,tci->tpi", own, triangles[alike]).reshape(-1, 3))
+        weights.append(np.outer(areas[alike], share).ravel())
+    if small.any():
+        own, share = _edge_points(triangles[small], areas[small])
+        points.append(own)
+        weights.append(share * areas[small].sum())
+    return Cloud(np.concatenate(points), np.concatenate(weights) / areas.sum())
+
+
+def _on_triangle(along: int, across: int) -> tuple[Array, Array]:
+    """Place points on lines through the first corner: two by two (Gauss) in each panel.
+
+    Returns:
+        Shares of the three corners in each point, shape (points, 3), and weights of sum 1.
+    """
+    gauss = 0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0)
+    far = ((np.arange(along)[:, None] + gauss) / along).ravel()[:, None]
+    aside = ((np.arange(across)[:, None] + gauss) / across).ravel()
+    shares = np.stack(np.broadcast_arrays(1.0 - far, far * (1.0 - aside), far * aside), axis=2)
+    weights = np.broadcast_to(far, shares.shape[:2]).ravel()  # lines part with the distance
+    return shares.reshape(-1, 3), weights / weights.sum()
+
+
+def reduced(cloud: Cloud, *, halvings: int) -> Cloud:
+    """Replace the points by up to 4 * 2**halvings, cell by cell, with each cell's moments.
+
+    Mean and covariance of each cell stay: so means of polynomials of degree 2 stay as they are, and
+    weights stay positive. The mean speed over the new points, too, is at most their root mean
+    square, which is exact.
+    """
+    points, weights, starts = _cells(cloud, halvings)
+    share = np.add.reduceat(weights, starts)
+    center, covariance = _statistics(points, weights, starts)
+    spread, axes = np.linalg.eigh(covariance)
+    reach = axes * np.sqrt(np.maximum(spread, 0.0))[:, None, :]
+    corners = center[:, None, :] + np.einsum("ck,nik->nci", CORNERS, reach)
+    return Cloud(corners.reshape(-1, 3), np.repeat(share / len(CORNERS), len(CORNERS)))
+
+
+def point_speeds(points: Array, twists: Array) -> Array:
+    """Speed of points on a body that moves with a twist.
+
+    Args:
+        points: Shape (points, 3), in [m].
+        twists: Linear, then angular velocity, shape (6, samples), in [m/s] and [rad/s].
+
+    Returns:
+        Shape (points, samples), in [m/s].
+    """
+    (x, y, z), (vx, vy, vz, wx, wy, wz) = points.T, twists
+    # |v + w x r|² = |v|² + 2 r.(v x w) + |w|²|r|² - (w.r)²: one product of matrices for all
+    shape = [np.ones_like(x), 2 * x, 2 * y, 2 * z, y * y + z * z, x * x + z * z, x * x + y * y]
+    shape += [-2 * x * y, -2 * x * z, -2 * y * z]
+    motion = [vx * vx + vy * vy + vz * vz, vy * wz - vz * wy, vz * wx - vx * wz, vx * wy - vy * wx]
+    motion += [wx * wx, wy * wy, wz * wz, wx * wy, wx * wz, wy * wz]
+    squares: Array = np.stack(shape, axis=1) @ np.stack(motion)
+    np.maximum(squares, 0.0, out=squares)  # rounding, where the axis meets a point
+    return np.sqrt(squares, out=squares)
+
+
+def _cells(cloud: Cloud, halvings: int) -> tuple[Array, Array, Indices]:
+    """Points and weights sorted by cells, and where each cell begins.
+
+    Cells are cut at their mean across their longest axis. The cloud is transformed to axes in
+    which it is less slender: so a rod is cut around itself, too, and not only along.
+    """
+    points, weights = cloud.points @ _plumper(cloud), cloud.weights
+    order, starts = np.arange(len(points)), ALL
+    for _ in range(halvings):
+        center, covariance = _statistics(points[order], weights[order], starts)
+        cell = _cell(starts, len(points))
+        longest = np.linalg.eigh(covariance)[1][:, :, 2]
+        along = np.einsum("pi,pi->p", points[order] - center[cell], longest[cell])
+        ahead = along > 0.0
+        order = order[np.lexsort((ahead, cell))]
+        sizes = np.diff(starts, append=len(points))
+        behind = sizes - np.add.reduceat(ahead, starts, dtype=np.intp)
+        starts = np.union1d(starts, (starts + behind)[(behind > 0) & (behind < sizes)])
+    return cloud.points[order], weights[order], starts
+
+
+def _plumper(cloud: Cloud) -> Array:
+    """Find axes in which the cloud's lengths are to each other as their square roots are."""
+    _, (covariance,) = _statistics(cloud.points, cloud.weights, ALL)
+    spread, axes = np.linalg.eigh(covariance)
+    plumper: Array = axes / np.maximum(spread, SLENDEREST**2 * spread[2]) ** 0.25
+    return plumper
+
+
+def _statistics(points: Array, weights: Array, starts: Indices) -> tuple[Array, Array]:
+    """Mean, shape (cells, 3), and covariance, shape (cells, 3, 3), of the points in each cell."""
+    share = np.add.reduceat(weights, starts)
+    center = np.add.reduceat(points * weights[:, None], starts) / share[:, None]
+    offset = points - center[_cell(starts, len(points))]
+    products = offset[:, :, None] * (offset * weights[:, None])[:, None, :]
+    return center, np.add.reduceat(products, starts) / share[:, None, None]
+
+
+def _cell(starts: Indices, points: int) -> Indices:
+    """Number the cell that each point lies in."""
+    return np.repeat(np.arange(len(starts)), np.diff(starts, append=points))
+
+
+# Mean speed of a surface that turns about any axis through its origin, from a table.
+
+
+def rounding(inertia: Array) -> Array:
+    """Find the axes in which rotations of equal size have the same root-mean-square speed.
+
+    In these axes a slender link is as round as a ball, so that one table fits all.
+
+    Args:
+        inertia: Mean-square speed of unit rotations, w' J w, shape (3, 3), in [m²].
+
+    Returns:
+        The matrix U with |U w|² = w' J w, shape (3, 3), in [m].
+    """
+    spread, axes = np.linalg.eigh(inertia)
+    lengths = np.sqrt(np.maximum(spread, np.finfo(np.float64).eps * spread[2]))  # of a needle
+    return np.asarray(lengths[:, None] * axes.T, dtype=np.float64)
+
+
+def tabulate(cloud: Cloud, rounded: Array) -> Array:
+    """Tabulate the ratio of the mean to the root-mean-square speed over all axes.
+
+    Returns:
+        The ratio in [0, 1] at direction (a, b, 1 - |a| - |b|), for a and b from -1 to 1,
+        shape (97, 97); 0 where |a| + |b| is much above 1.
+    """
+    a, b = (
+        grid.ravel() for grid in np.meshgrid(*2 * [np.linspace(-1, 1, SIDE + 1)], indexing="ij")
+    )
+    directions = np.stack((a, b, 1 - np.abs(a) - np.abs(b)))
+    used = directions[2] > -4 / SIDE  # no lookup reaches further beyond z = 0
+    directions = directions[:, used] / np.linalg.norm(directions[:, used], axis=0)
+    turns = np.linalg.solve(rounded, directions)
+    table = np.zeros((SIDE + 1) ** 2)
+    table[used] = cloud.weights @ point_speeds(cloud.points, np.vstack((0.0 * turns, turns)))
+    return table.reshape(SIDE + 1, SIDE + 1)
+
+
+def turning_speed(table: Array, rounded: Array, angular: Array) -> Array:
+    """Mean speed <|w x r|> by `tabulate` and `rounding`, of w of shape (3, samples), in [m/s]."""
+    x, y, z = turned = rounded @ angular
+    # A rotation and its reverse are as fast: all axes lie on half an octahedron, which laid flat
+    # is the square |a| + |b| <= 1.
+    scale = np.copysign(0.5 * SIDE, z) / np.maximum(np.abs(turned).sum(axis=0), TINY)
+    a, b = x * scale + 0.5 * SIDE, y * scale + 0.5 * SIDE
+    row, column = (np.minimum(place.astype(np.intp), SIDE - 1) for place in (a, b))
+    a, b = a - row, b - column
+    corner = row * (SIDE + 1) + column
+    ratios = table.ravel()
+    low = ratios.take(corner) * (1 - b) + ratios.take(corner + 1) * b
+    high = ratios.take(corner + SIDE + 1) * (1 - b) + ratios.take(corner + SIDE + 2) * b
+    ratio = low * (1 - a) + high * a
+    speed: Array = np.sqrt(np.einsum("is,is->s", turned, turned)) * ratio
+    return speed
+
+
+@dataclass(frozen=True, eq=False)
+class LinkSurface:
+    """The surface of a link, in its joint's axes; all is 0 where there is no geometry.
+
+    Attributes:
+        area: In [m²].
+        centroid: Shape (3,), in [m].
+        lever: Mean distance from the axis that the joint turns about (the paper's G), in [m]; 0
+            for a joint that slides, nan for a floating base, which turns about any axis.
+        mean_square: Under a twist nu the mean-square speed is nu' M nu, shape (6, 6).
+        mean_square_normal: The same for the speed normal to the surface, shape (6, 6).
+        rounding: Axes in which equal rotations have equal mean-square speed, shape (3, 3).
+        turning: Ratio of mean to root-mean-square speed of rotations, by axis, as a table.
+        points: Weighted points on the surface.
+    """
+
+    area: float
+    centroid: Array
+    lever: float
+    mean_square: Array
+    mean_square_normal: Array
+    rounding: Array
+    turning: Array
+    points: Cloud
+
+    @classmethod
+    def of(cls, triangles: Array, axis: Array | None) -> Self:
+        """Integrate over a link's triangles, or take the integrals from the cache.
+
+        Args:
+            triangles: Corners in the joint's axes, shape (triangles, 3, 3), in [m].
+            axis: What the joint turns about, shape (3,); None if it turns about any axis.
+        """
+        content = hashlib.sha256(triangles.tobytes())
+        content.update(b"any" if axis is None else axis.tobytes())
+        kept = cached(f"{VERSION}-{content.hexdigest()}", lambda: _integrals(triangles, axis))
+        points = Cloud(kept.pop("points"), kept.pop("weights"))
+        area, lever = float(kept.pop("area")), float(kept.pop("lever"))
+        return cls(area=area, lever=lever, points=points, **kept)
+
+
+def _integrals(triangles: Array, axis: Array | None) -> dict[str, NDArray[Any]]:
+    found = asdict(moments(triangles))
+    if found["area"] == 0.0:
+        found |= {"lever": 0.0, "rounding": np.zeros((3, 3)), "turning": np.zeros((1, 1))}
+        found |= {"points": np.zeros((0, 3)), "weights": np.zeros(0)}
+    else:
+        dense = fine(triangles)
+        cloud = reduced(dense, halvings=HALVINGS)
+        rounded = rounding(found["mean_square"][3:, 3:])
+        lever = float("nan")
+        if axis is not None:  # the mean distance from it
+            turning = np.concatenate((np.zeros(3), axis))[:, None]
+            lever = float((dense.weights @ point_speeds(dense.points, turning))[0])
+        found |= {"lever": lever, "rounding": rounded, "turning": tabulate(cloud, rounded)}
+        found |= asdict(cloud)
+    return {name: np.asarray(value) for name, value in found.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +543,6 @@ class Surface:
             geometry: "visual", "collision", "hull" or "auto".
             missing: What to do about a mesh that is not there: "error", or "skip" it.
 
-        Returns:
-            The surface.
-
         Raises:
             GeometryError: If a shape or a mesh cannot be read, or has no surface.
         """
@@ -51,15 +550,7 @@ class Surface:
 
     @classmethod
     def of_triangles(cls, robot: Robot, drawn: LinkTriangles) -> Self:
-        """Integrate over triangles that have been read.
-
-        Args:
-            robot: The robot.
-            drawn: The triangles of each of its links.
-
-        Returns:
-            The surface.
-        """
+        """Integrate over triangles that have been read."""
         axes = [turning_axis(robot.joints[index - 1]) for index in drawn.joint]
         links = map(LinkSurface.of, drawn.triangles, axes)
         return cls(drawn.names, drawn.joint, tuple(links), drawn.missing)
@@ -67,12 +558,12 @@ class Surface:
     @property
     def area(self) -> Array:
         """Area of each link, shape (links,), in [m²]."""
-        return self._each(lambda link: link.area)
+        return np.array([link.area for link in self.links], dtype=np.float64)
 
     @property
     def centroid(self) -> Array:
         """Centroid of each link in its joint's axes, shape (links, 3), in [m]."""
-        return self._each(lambda link: link.centroid)
+        return np.array([link.centroid for link in self.links])
 
     @property
     def lever(self) -> Array:
@@ -80,17 +571,17 @@ class Surface:
 
         It is 0 where the joint slides and nan for a floating base, which turns about any axis.
         """
-        return self._each(lambda link: link.lever)
+        return np.array([link.lever for link in self.links], dtype=np.float64)
 
     @property
     def mean_square(self) -> Array:
         """Mean-square speed under a twist nu is nu' M nu, shape (links, 6, 6)."""
-        return self._each(lambda link: link.mean_square)
+        return np.array([link.mean_square for link in self.links])
 
     @property
     def mean_square_normal(self) -> Array:
         """Mean-square normal speed under a twist nu is nu' M nu, shape (links, 6, 6)."""
-        return self._each(lambda link: link.mean_square_normal)
+        return np.array([link.mean_square_normal for link in self.links])
 
     @property
     def without_geometry(self) -> tuple[str, ...]:
@@ -104,16 +595,9 @@ class Surface:
             lines.append(f"{name:28} {link.area:9.4f} {link.lever:9.4f}")
         return "\n".join([*lines, f"{'all':28} {self.area.sum():9.4f}"])
 
-    def _each(self, fact: Callable[[LinkSurface], Array | float]) -> Array:
-        return np.array([fact(link) for link in self.links], dtype=np.float64)
-
 
 def check_surface(surface: Surface, robot: Robot) -> None:
-    """Refuse a robot that a surface does not belong to.
-
-    Raises:
-        GeometryError: If the robot has another number of links.
-    """
+    """Refuse a surface of another robot, by its number of links."""
     if len(surface.names) != len(robot.joints):
         raise GeometryError(
             f"a surface of {len(surface.names)} links for {robot.name!r}, which has"

@@ -13,7 +13,7 @@ import noisemodel
 from inspector.cli import app
 from inspector.commands.compare import GEOMETRIES
 from inspector.commands.options import KINDS
-from noisemodel import geometry
+from noisemodel import surface
 
 
 def test_the_version_is_that_of_the_distribution(monkeypatch):
@@ -33,7 +33,7 @@ def test_the_version_option_states_that_a_source_tree_is_not_installed(monkeypat
 
 def test_kinds_and_geometries_are_those_of_the_noise_model():
     assert set(KINDS) == set(noisemodel.KINDS)
-    assert set(GEOMETRIES) == set(geometry.GEOMETRIES)
+    assert set(GEOMETRIES) == set(surface.GEOMETRIES)
 
 
 @pytest.mark.parametrize("command", [["view"], ["shot", "run.npz", "-o", "shot.png"]])

@@ -10,9 +10,9 @@ import pytest
 import noisemodel as nm
 from noisemodel import MissingMeshError, Robot, RobotError, Run, UnknownRobotError, mjcf
 from noisemodel.excitation import excitation, limits
-from noisemodel.geometry import triangles
 from noisemodel.links import link_noise
 from noisemodel.shapes import capsule
+from noisemodel.surface import triangles
 from noisemodel.urdf import Mimic
 
 BALL = '<geom type="sphere" size="0.1"/>'

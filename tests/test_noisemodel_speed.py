@@ -15,7 +15,6 @@ from noisemodel import (
     speed,
     surface_speed,
 )
-from noisemodel.moments import cross_matrix
 
 EVERY = ("revolute", "continuous", "prismatic", "planar", "floating", "revolute")
 
@@ -148,7 +147,7 @@ def test_mean_squares_are_the_kinetic_energy_of_bodies_with_the_surfaces_for_mas
     model = robot.model.copy()
     for index, link in zip(surface.joint, surface.links, strict=True):
         about_origin = link.mean_square[3:, 3:]
-        cross = cross_matrix(link.centroid)
+        cross = pin.skew(link.centroid)
         inertia = link.area * (about_origin + cross @ cross)  # of the covariance, by Steiner
         model.inertias[int(index)] = pin.Inertia(link.area, link.centroid, inertia)
     data = model.createData()

@@ -17,7 +17,7 @@ from inspector.recording import robot as scene
 from inspector.recording.camera import FIELD_OF_VIEW, fitted
 from inspector.recording.recording import write
 from noisemodel import Robot, Run
-from noisemodel.geometry import pieces
+from noisemodel.surface import pieces
 
 
 def run_of(robot, name, seconds=1.0):

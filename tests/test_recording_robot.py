@@ -6,7 +6,7 @@ import pytest
 
 from inspector.recording import robot as scene
 from inspector.recording.robot import FACET, MeshError, drawable
-from noisemodel import meshfile
+from noisemodel import meshes
 
 TRIANGLE = b"\0" * 80 + (1).to_bytes(4, "little") + b"\0" * 50
 
@@ -107,7 +107,7 @@ def test_collada_that_rerun_cannot_draw_is_drawn_by_our_own_triangles(
     tree = ET.fromstring(drawable(robot(tmp_path, "package://part.dae"), (tmp_path,), written))
     drawn = Path(tree.find(".//mesh").get("filename").removeprefix("file://"))
     assert (drawn == part) is kept
-    np.testing.assert_allclose(meshfile.read(drawn), meshfile.read(part))
+    np.testing.assert_allclose(meshes.read(drawn), meshes.read(part))
     if not kept:
         facets = np.frombuffer(drawn.read_bytes()[84:], FACET)
         np.testing.assert_allclose(facets["normal"], [[0, 0, 1], [0, 0, 1]])

@@ -11,10 +11,9 @@ from inspector.assets import model_files
 from inspector.errors import LogError
 from inspector.library import load_library
 from inspector.logs.reading import read_log
-from noisemodel import Robot, RobotError, Run, RunFileError, meshfile
+from noisemodel import Robot, RobotError, Run, RunFileError, meshes
 from noisemodel.errors import MeshError
-from noisemodel.linksurface import LinkSurface
-from noisemodel.quadrature import fine
+from noisemodel.surface import LinkSurface, fine
 
 LAUGHS = "".join(f'<!ENTITY l{n + 1} "{f"&l{n};" * 10}">' for n in range(9))
 
@@ -34,7 +33,7 @@ def test_an_stl_of_newlines_is_read_at_once(tmp_path):
     path = tmp_path / "a.stl"
     path.write_bytes(b"solid a\n" + b"\n" * 1_000_000 + b"endsolid a\n")
     with pytest.raises(MeshError, match="has no triangles"):
-        meshfile.read(path)
+        meshes.read(path)
 
 
 def test_a_scene_whose_instances_double_is_refused(tmp_path):
@@ -49,7 +48,7 @@ def test_a_scene_whose_instances_double_is_refused(tmp_path):
         '</library_visual_scenes><scene><instance_visual_scene url="#s"/></scene></COLLADA>'
     )
     with pytest.raises(MeshError, match="more than 10000 nodes with their instances"):
-        meshfile.read(path)
+        meshes.read(path)
 
 
 def test_a_mesh_of_more_triangles_than_are_read_is_refused(tmp_path, monkeypatch):
@@ -59,7 +58,7 @@ def test_a_mesh_of_more_triangles_than_are_read_is_refused(tmp_path, monkeypatch
     with pytest.raises(
         MeshError, match="has 118 triangles, the limit is 100 .--limit triangles=N raises it.; simp"
     ):
-        meshfile.read(path)
+        meshes.read(path)
 
 
 def test_a_polygon_of_many_slender_triangles_has_no_more_fine_points_than_others(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from noisemodel import NoiseModelError, Robot, RobotError, Run, bounds, meshfile
+from noisemodel import NoiseModelError, Robot, RobotError, Run, bounds, meshes
 from noisemodel.errors import MeshError
 
 TIME = np.arange(40) / 100
@@ -52,7 +52,7 @@ def test_limits_of_robots_and_meshes_can_be_raised_and_lowered(tmp_path, monkeyp
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\n" + "f 1 2 3\n" * 5)
     monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", "4")
     with pytest.raises(MeshError, match="5 triangles, the limit is 4 .--limit triangles=N"):
-        meshfile.read(tmp_path / "a.obj")
+        meshes.read(tmp_path / "a.obj")
 
 
 @pytest.mark.parametrize("given", ["joint=5", "joints", "joints=", "joints=-5", "joints=1e5"])

@@ -11,7 +11,7 @@ import pytest
 
 from noisemodel import Robot, RobotError, robot
 from noisemodel.errors import MeshError
-from noisemodel.geometry import triangles
+from noisemodel.surface import triangles
 
 OBJ = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 URDF = """<robot name="r"><link name="base"/><link name="arm"><visual><geometry>

@@ -14,7 +14,7 @@ from inspector import read_log
 from inspector.analysis.level import Estimate, noise_level
 from inspector.errors import InspectorError, LogError
 from inspector.logs.options import ReadOptions
-from noisemodel import MeshError, Robot, RobotError, Run, RunError, cache, meshfile
+from noisemodel import MeshError, Robot, RobotError, Run, RunError, cache, meshes
 from noisemodel.cache import cached
 
 TIME = np.arange(40) / 1000
@@ -249,4 +249,4 @@ def test_a_point_of_a_mesh_has_three_numbers(tmp_path, point):
     path = tmp_path / "a.obj"
     path.write_text(f"{point}\n" * 6 + "f 1 2 3\n")
     with pytest.raises(MeshError, match="is no point"):
-        meshfile.read(path)
+        meshes.read(path)

@@ -39,8 +39,8 @@ from noiseclassifier.scenarios.sample import RECIPE, Sample
 from noiseclassifier.scenarios.signals import WHOLE
 from noiseclassifier.scenarios.simulation import SHORTEST
 from noiseclassifier.scenarios.tasks import Task
-from noisemodel import meshfile, runfile
-from noisemodel.geometry import triangles
+from noisemodel import meshes, runfile
+from noisemodel.surface import triangles
 
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
@@ -356,9 +356,9 @@ def _read_robot(path: Path) -> None:
 
 
 def _read_mesh(path: Path) -> None:
-    meshfile.read(path)
+    meshes.read(path)
     with suppress(nm.MeshError):
-        meshfile.hull(path)
+        meshes.hull(path)
 
 
 def _read_rows(path: Path) -> None:

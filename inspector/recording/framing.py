@@ -15,7 +15,7 @@ from rerun.urdf import UrdfJoint, UrdfTree
 
 from inspector.recording import robot, series
 from inspector.recording.camera import Camera, fitted
-from noisemodel import linkshapes, meshfile
+from noisemodel import linkshapes, meshes
 from noisemodel.errors import MeshError
 from noisemodel.run import Run
 from noisemodel.types import Array
@@ -163,7 +163,7 @@ def outermost(urdf: Path) -> dict[str, Array]:
         body = shape.body
         if isinstance(body, str):
             try:
-                body = meshfile.read(Path(body.removeprefix("file://")))
+                body = meshes.read(Path(body.removeprefix("file://")))
             except MeshError:
                 body = np.zeros((1, 3))
         corners = body.reshape(-1, 3)

@@ -14,12 +14,12 @@ from rerun.urdf import UrdfJoint, UrdfTree
 import noisemodel
 from inspector.errors import InspectorError
 from inspector.recording import series, unstable
-from noisemodel import meshfile, meshpath, robot, urdf
+from noisemodel import meshes, meshpath, robot, urdf
 from noisemodel.errors import UnknownJointError
-from noisemodel.geometry import link_names, pieces
 from noisemodel.mjcf import is_mjcf
 from noisemodel.robot import Robot
 from noisemodel.run import Run
+from noisemodel.surface import link_names, pieces
 from noisemodel.types import Array
 
 FRAMES_PER_SECOND = 50.0
@@ -426,7 +426,7 @@ def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> P
         if path.suffix.lower() not in DRAWN:
             known = ", ".join(sorted(DRAWN))
             raise MeshError(address, f"of kind {path.suffix!r}, expected {known}")
-        meshfile.check_whole(path)  # the viewer draws nothing of others, without a warning
+        meshes.check_whole(path)  # the viewer draws nothing of others, without a warning
         if path.suffix.lower() == ".dae" and not _read_by_rerun(path):
             return _as_stl(path, folder)
     except noisemodel.MeshError as error:
@@ -448,7 +448,7 @@ def _read_by_rerun(path: Path) -> bool:
 def _as_stl(path: Path, folder: Path) -> Path:
     """Write the triangles of a mesh, as the noise model reads them, as an STL file."""
     copy = folder / f"{hashlib.sha256(bytes(path)).hexdigest()[:16]}.stl"
-    return copy if copy.exists() else _write_stl(meshfile.read(path), copy)
+    return copy if copy.exists() else _write_stl(meshes.read(path), copy)
 
 
 def _write_stl(triangles: Array, file: Path) -> Path:

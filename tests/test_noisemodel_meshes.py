@@ -5,7 +5,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from noisemodel import MeshError, catalog, collada, meshfile, shapes
+from noisemodel import MeshError, catalog, meshes, shapes
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
 BRICK = shapes.box(1, 2, 3)
@@ -70,7 +70,7 @@ def dae(geometries, nodes, asset="", extra=""):
 
 def read(folder, name, content):
     (folder / name).write_bytes(content)
-    return meshfile.read(folder / name)
+    return meshes.read(folder / name)
 
 
 NODE = '<node id="n"><instance_geometry url="#g"/></node>'
@@ -95,7 +95,7 @@ def test_one_brick_is_the_same_in_every_kind_of_file(tmp_path, name, content):
     assert triangles.dtype == np.float64
     assert np.array_equal(triangles, BRICK)
     assert area(triangles) == 22.0
-    assert np.array_equal(meshfile.read(tmp_path / name), BRICK)  # now from the cache
+    assert np.array_equal(meshes.read(tmp_path / name), BRICK)  # now from the cache
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def test_digits_beyond_single_precision_are_kept(tmp_path):
     fine = BRICK * 0.1234567890123
     for name, content in (("a.obj", obj(fine)), ("a.dae", dae(geometry(fine), NODE))):
         assert np.array_equal(read(tmp_path, name, content), fine)
-        assert np.array_equal(meshfile.read(tmp_path / name), fine)
+        assert np.array_equal(meshes.read(tmp_path / name), fine)
 
 
 def test_what_is_cached_belongs_to_the_content_not_to_the_name(tmp_path, cache):
@@ -208,8 +208,8 @@ def test_a_pentagon_has_the_same_area_however_it_is_cut(tmp_path, part):
 def test_the_hull_of_a_dented_brick_is_the_brick(tmp_path):
     dent = np.array([[[-0.5, 0, 1.5], [0.5, 0, 1.5], [0, 0, 0]]])
     (tmp_path / "dented.stl").write_bytes(stl(np.concatenate((BRICK, dent))))
-    hull = meshfile.hull(tmp_path / "dented.stl")
-    assert area(meshfile.read(tmp_path / "dented.stl")) == 22.75
+    hull = meshes.hull(tmp_path / "dented.stl")
+    assert area(meshes.read(tmp_path / "dented.stl")) == 22.75
     assert np.isclose(area(hull), 22.0, rtol=1e-12)
 
 
@@ -281,13 +281,13 @@ def test_a_file_that_is_no_mesh_is_named_in_one_line(tmp_path, cache, name, cont
 
 def test_a_file_that_cannot_be_opened_is_named(tmp_path):
     with pytest.raises(MeshError, match=r"gone.stl: cannot be read \(No such file or directory\)"):
-        meshfile.read(tmp_path / "gone.stl")
+        meshes.read(tmp_path / "gone.stl")
 
 
 def test_a_flat_mesh_has_no_hull(tmp_path):
     (tmp_path / "flat.stl").write_bytes(stl(BRICK[:2]))
     with pytest.raises(MeshError, match="flat.stl: is flat, it has no convex hull"):
-        meshfile.hull(tmp_path / "flat.stl")
+        meshes.hull(tmp_path / "flat.stl")
 
 
 def test_a_dae_is_turned_as_scipy_turns_it(tmp_path):
@@ -342,7 +342,7 @@ def test_parts_of_a_dae_without_polygons_add_nothing(tmp_path):
 
 
 def test_the_limit_of_a_scene_counts_its_nodes(tmp_path, monkeypatch):
-    monkeypatch.setattr(collada, "MAX_NODES", 5)
+    monkeypatch.setattr(meshes, "MAX_NODES", 5)
     assert len(read(tmp_path, "a.dae", dae(geometry(TRIANGLE), NODE + "<node/>" * 3))) == 1
     with pytest.raises(MeshError, match="more than 5 nodes with their instances"):
         read(tmp_path, "b.dae", dae(geometry(TRIANGLE), NODE + "<node/>" * 4))
@@ -354,10 +354,10 @@ def test_the_limit_of_triangles_counts_points_and_instances(monkeypatch):
     lots = dae(geometry(TRIANGLE, part=f"{part}</triangles>"), NODE * 2)  # 6 and 8
     for content, count, most in ((few, 2, 6), (lots, 8, 8)):
         monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most))
-        assert len(collada.read(content)[1]) == count
+        assert len(meshes.READERS[".dae"](content)[1]) == count
         monkeypatch.setenv("NOISE_LIMIT_TRIANGLES", str(most - 1))
         with pytest.raises(ValueError, match=f"triangles or points, the limit is {most - 1}"):
-            collada.read(content)
+            meshes.READERS[".dae"](content)
 
 
 def test_faces_of_an_obj_that_name_nothing_are_passed_over(tmp_path):
@@ -423,7 +423,7 @@ def test_every_stl_and_obj_of_the_listed_robots_is_as_trimesh_reads_it():
     for file in files:
         if file.suffix.lower() in (".stl", ".obj"):
             mesh = trimesh.load_mesh(file, process=False)
-            ours = meshfile.read(file)
+            ours = meshes.read(file)
             assert len(ours) == len(mesh.faces), file
             assert np.isclose(area(ours), mesh.area, rtol=1e-12), file
             bounds = (ours.min(axis=(0, 1)), ours.max(axis=(0, 1)))
@@ -441,7 +441,7 @@ def test_every_dae_of_the_listed_robots_fills_the_box_that_pinocchio_finds():
         mesh = coal.MeshLoader().load(str(file), np.ones(3))
         mesh.computeLocalAABB()
         low, high = np.ravel(mesh.aabb_local.min_), np.ravel(mesh.aabb_local.max_)
-        points = meshfile.read(file).reshape(-1, 3)
+        points = meshes.read(file).reshape(-1, 3)
         size = np.abs(high - low).max()
         assert np.abs(points.min(axis=0) - low).max() < 1e-6 * size, file
         assert np.abs(points.max(axis=0) - high).max() < 1e-6 * size, file
