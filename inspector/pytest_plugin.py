@@ -105,7 +105,7 @@ class Noise:
         events = [event for event in found.findings if not _allows(allowed, event)]
         if not events:
             return found
-        from inspector.recording.recording import write
+        from inspector.recording.run import write
 
         write(found, recording, overwrite=True)
         if picture:

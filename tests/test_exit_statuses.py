@@ -55,7 +55,7 @@ COMMANDS = {
 """A call of each command that prints something."""
 
 SILENT_BUGS = {
-    "live": "inspector.live.feeding.reader_of",
+    "live": "inspector.live.input.reader_of",
     "robots": "noisemodel.catalog.menagerie_names",
 }
 """Where a bug is put into commands that read no run."""

@@ -10,9 +10,8 @@ from recordings import read
 from rerun.chunk import RrdReader
 
 from inspector.cli import main
-from inspector.comparison import picture
-from inspector.comparison.output import write_csv
-from inspector.comparison.recording import cells, levels, shades, write
+from inspector.compare import picture
+from inspector.compare.models import cells, levels, shades, write, write_csv
 from noisemodel import ROBOTS, Comparisons, compare
 from noisemodel.excitation import excitation
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from inspector.live.findings import Findings, News
+from inspector.live.labels import Findings, News
 from noiseclassifier import Labels
 
 NAMES = {".": "ok", "i": "impact", "o": "oscillations", "u": "unknown"}

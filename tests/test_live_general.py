@@ -5,7 +5,7 @@ import pytest
 from generalmodel import run_at, trained
 
 from inspector.library import label_run
-from inspector.live.labeller import Labeller
+from inspector.live.labels import Labeller
 
 LIBRARY = {"general": trained()}
 

@@ -8,14 +8,10 @@ from hypothesis import strategies as st
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.levels import SPECTRUM
-from inspector.live.clock import Clock
-from inspector.live.decimator import Decimator
-from inspector.live.labeller import NOISY, Labeller, NoiseSignals
-from inspector.live.lane import Lane
-from inspector.live.links import LinkLevels
-from inspector.live.robot import LiveRobot
-from inspector.live.spectrogram import SpectrogramStream
-from inspector.live.warnings import Warnings
+from inspector.live.drawing import Lane, SpectrogramStream
+from inspector.live.labels import NOISY, Decimator, Labeller, NoiseSignals
+from inspector.live.robot import LinkLevels, LiveRobot
+from inspector.live.samples import Clock, Warnings
 from inspector.recording import robot as scene
 from inspector.recording.camera import FIELD_OF_VIEW, sight
 from noisemodel.links import link_noise

@@ -11,7 +11,7 @@ import pytest
 
 from inspector.live import LiveError
 from inspector.live.csvrows import CsvReader
-from inspector.live.feeding import follow, reader_of
+from inspector.live.input import follow, reader_of
 from inspector.live.jsonrows import JsonReader
 from inspector.live.rows import CHUNK_BYTES, MAX_LINE_BYTES, SMALL_CHUNK_BYTES, chunks, widen
 

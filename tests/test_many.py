@@ -6,9 +6,8 @@ import rerun as rr
 from commandline import call
 from recordings import entities, read
 
+from inspector.compare.many import Several, lay, report, shortened, write
 from inspector.logs.opening import open_run
-from inspector.many.many import Several, lay
-from inspector.many.recording import report, shortened, write
 from inspector.recording.axes import TOP
 from noiseclassifier import Event
 from noisemodel import Block, Run

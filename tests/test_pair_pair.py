@@ -4,22 +4,24 @@ import numpy as np
 import pytest
 
 from inspector.assets import demo_run, model_files
-from inspector.library import load_library
-from inspector.pair import Align, PairError, changes, compare, report, summary
-from inspector.pair.alignment import align
-from inspector.pair.changes import largest_change
-from inspector.pair.common import alike, part
-from inspector.pair.levels import (
+from inspector.compare.changes import (
     by_band,
     by_class,
     by_link,
+    changes,
+    largest_change,
     link_steps,
+    report,
     shared_links,
     spectra,
     steps,
+    summary,
     whole,
 )
-from inspector.pair.recording import write
+from inspector.compare.pair import PairError, alike, compare, part
+from inspector.compare.recording import write
+from inspector.library import load_library
+from inspector.pair.alignment import Align, align
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 

@@ -10,7 +10,7 @@ from inspector import colors
 from inspector.analysis.analyse import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
-from inspector.recording.recording import write
+from inspector.recording.run import write
 from inspector.report import html
 from inspector.report.markdown import LOCALISATION, finding_of
 

@@ -18,7 +18,7 @@ def test_a_label_stands_where_its_place_is_in_the_plot():
 
 def test_rows_and_their_names_are_at_the_same_heights():
     names = ["a", "b", "c"]
-    places = [label.place for label in axes.rows(names)]
+    places = [label.place for label in axes.row_labels(names)]
     np.testing.assert_allclose(np.array(axes.middles(3)) / axes.TOP, places)
     assert places == sorted(places, reverse=True)  # the first at the top
 

@@ -15,7 +15,7 @@ from inspector.analysis.analyse import analyse_file
 from inspector.recording import framing
 from inspector.recording import robot as scene
 from inspector.recording.camera import FIELD_OF_VIEW, fitted
-from inspector.recording.recording import write
+from inspector.recording.run import write
 from noisemodel import Robot, Run
 from noisemodel.surface import pieces
 

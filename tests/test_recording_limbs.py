@@ -1,7 +1,7 @@
 from types import SimpleNamespace
 
 from inspector.recording import robot
-from inspector.recording.limbs import limbs
+from inspector.recording.panels import limbs
 from noisemodel import Robot
 
 

@@ -5,7 +5,7 @@ import pytest
 from inspector.analysis.analyse import analyse_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
-from inspector.recording.recording import write
+from inspector.recording.run import write
 
 picture = pytest.importorskip("picture")
 pytestmark = pytest.mark.skipif(not picture.DRIVERS, reason=picture.MISSING)

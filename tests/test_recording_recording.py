@@ -23,12 +23,10 @@ from inspector import colors
 from inspector.analysis.analyse import Analysis, Status, analyse_file
 from inspector.errors import InspectorError
 from inspector.levels import velocity_levels
-from inspector.recording import axes, blueprint
-from inspector.recording.blueprint import height
-from inspector.recording.noise import POINTS as NOISE_POINTS
-from inspector.recording.noise import scaled
-from inspector.recording.recording import linked, write
-from inspector.recording.spectrogram import HEIGHT
+from inspector.recording import axes, layout
+from inspector.recording.layout import height
+from inspector.recording.panels import HEIGHT, NOISE_POINTS, scaled
+from inspector.recording.run import linked, write
 from noiseclassifier import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
 
@@ -184,8 +182,8 @@ def test_no_two_classes_share_a_row_or_a_marker(whole):
 def views(path):
     """Origin and contents of the plots over time of a layout, and their other settings."""
     reader, found = RrdReader(path), {}
-    (blueprint,) = reader.blueprints()
-    for chunk in reader.store(store=blueprint).stream():
+    (layout,) = reader.blueprints()
+    for chunk in reader.store(store=layout).stream():
         batch = chunk.to_record_batch()
         parts = str(chunk.entity_path).split("/")
         if parts[1] == "view":
@@ -415,8 +413,8 @@ def test_a_run_without_failures_selects_nothing(tmp_path):
 def panel(path, part):
     """Settings of the time panel in the layout."""
     reader = RrdReader(path)
-    (blueprint,) = reader.blueprints()
-    for chunk in reader.store(store=blueprint).stream():
+    (layout,) = reader.blueprints()
+    for chunk in reader.store(store=layout).stream():
         batch, name = chunk.to_record_batch(), f"TimePanelBlueprint:{part}"
         if chunk.entity_path == "/time_panel" and name in batch.schema.names:
             return batch.column(name).to_pylist()[0]
@@ -705,7 +703,7 @@ def test_a_recording_that_fails_halfway_leaves_nothing(tmp_path, monkeypatch):
         raise InspectorError("broken off")
 
     found = inspected(panda_run(robot=None), tmp_path)
-    monkeypatch.setattr("inspector.recording.recording._log_text", break_off)
+    monkeypatch.setattr("inspector.recording.run._log_text", break_off)
     with pytest.raises(InspectorError, match="broken off"):
         write(found, tmp_path / "out.rrd")
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz"}
@@ -728,8 +726,8 @@ def test_names_elsewhere_are_left_alone():
 def test_the_text_is_as_high_as_the_paragraphs_that_fit():
     title, short = "### ok\n\n", "x" * 70
     one, two = height(title + short), height(f"{title}{short}\n\n{short}")
-    assert two - one == blueprint.PARAGRAPH
-    assert height(f"{title}{short}\n{short}") - one == blueprint.LINE
-    assert height(title + 2 * short) - one == blueprint.LINE
+    assert two - one == layout.PARAGRAPH
+    assert height(f"{title}{short}\n{short}") - one == layout.LINE
+    assert height(title + 2 * short) - one == layout.LINE
     assert height(f"{title}{short}\n\n{short * 30}") == one  # whose end would be below the edge
-    assert height(title + f"{short}\n\n" * 20) <= blueprint.TALLEST
+    assert height(title + f"{short}\n\n" * 20) <= layout.TALLEST

@@ -9,8 +9,8 @@ from inspector.analysis.analyse import analyse_file
 from inspector.assets import demo_run
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.recording import screenshot
-from inspector.recording.recording import write
+from inspector.recording import picture
+from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError
 from noisemodel import OutputError, Run
 
@@ -25,10 +25,10 @@ def recording(folder: Path) -> Path:
 
 @pytest.mark.slow  # test_recording_picture takes one of the demo
 def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp_path):
-    if screenshot.missing_packages():
-        pytest.skip(f"needs {' and '.join(screenshot.missing_packages())}")
+    if picture.missing_packages():
+        pytest.skip(f"needs {' and '.join(picture.missing_packages())}")
     output = tmp_path / "out.png"
-    assert screenshot.shoot(recording(tmp_path), output, 2.0, size=(800, 500)) == ()
+    assert picture.shoot(recording(tmp_path), output, 2.0, size=(800, 500)) == ()
     png = output.read_bytes()
     assert png.startswith(b"\x89PNG")
     assert struct.unpack(">II", png[16:24]) == (800, 500)
@@ -36,42 +36,42 @@ def test_a_picture_is_taken_without_a_display_and_the_viewer_reports_nothing(tmp
 
 
 def test_system_packages_that_are_missing_are_named(monkeypatch, tmp_path):
-    monkeypatch.setattr(screenshot, "find_library", lambda _: None)
-    monkeypatch.setattr(screenshot, "DRIVER_FOLDERS", (tmp_path,))
-    monkeypatch.setattr(screenshot.sys, "platform", "linux")
+    monkeypatch.setattr(picture, "find_library", lambda _: None)
+    monkeypatch.setattr(picture, "DRIVER_FOLDERS", (tmp_path,))
+    monkeypatch.setattr(picture.sys, "platform", "linux")
     with pytest.raises(ViewerError, match="`apt-get install libvulkan1 mesa-vulkan-drivers`"):
-        screenshot.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
-    monkeypatch.setattr(screenshot, "find_library", lambda _: "libvulkan.so.1")
+        picture.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
+    monkeypatch.setattr(picture, "find_library", lambda _: "libvulkan.so.1")
     with pytest.raises(ViewerError, match="`apt-get install mesa-vulkan-drivers`"):
-        screenshot.require()
+        picture.require()
 
 
 def test_a_picture_that_exists_is_kept(tmp_path, monkeypatch):
-    monkeypatch.setattr(screenshot, "require", lambda: None)
-    (tmp_path / "run.rrd").write_bytes(screenshot.MAGIC)
+    monkeypatch.setattr(picture, "require", lambda: None)
+    (tmp_path / "run.rrd").write_bytes(picture.MAGIC)
     (tmp_path / "out.png").write_text("precious")
     with pytest.raises(OutputError, match="exists already"):
-        screenshot.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
+        picture.shoot(tmp_path / "run.rrd", tmp_path / "out.png", 0.0)
 
 
 def test_a_viewer_that_ends_is_one_line(monkeypatch):
     monkeypatch.setattr(
-        screenshot.viewer,
+        picture.viewer,
         "command",
         lambda *_: ["/bin/sh", "-c", "echo Error: no luck >&2; exit 7"],
     )
     with (
         pytest.raises(ViewerError, match=r"ended with status 7 \(no luck\)"),
-        screenshot.headless_viewer(),
+        picture.headless_viewer(),
     ):
         pass
 
 
 def test_a_size_is_width_and_height():
-    assert screenshot.parse_size("1920x1080") == (1920, 1080)
+    assert picture.parse_size("1920x1080") == (1920, 1080)
     for wrong in ("1920", "12x12", "ax900", "99999x900"):
         with pytest.raises(InspectorError, match=f"a size of '{wrong}', expected"):
-            screenshot.parse_size(wrong)
+            picture.parse_size(wrong)
 
 
 @pytest.mark.parametrize(
@@ -83,7 +83,7 @@ def test_a_size_is_width_and_height():
     ],
 )
 def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(screenshot, "require", lambda: None)
+    monkeypatch.setattr(picture, "require", lambda: None)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("sys.argv", ["inspector", "shot", *arguments, "-o", "out.png"])
     with pytest.raises(SystemExit) as end:
@@ -104,7 +104,7 @@ def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monk
     ],
 )
 def test_a_wrong_suffix_or_time_is_wrong_usage(arguments, text, tmp_path, monkeypatch):
-    monkeypatch.setattr(screenshot, "require", lambda: None)
+    monkeypatch.setattr(picture, "require", lambda: None)
     monkeypatch.chdir(tmp_path)
     status, _, err = call(*arguments)
     assert status == 2

@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 
 from inspector.analysis.analyse import analyse_file
-from inspector.recording import unstable, viewer, web
-from inspector.recording.recording import write
+from inspector.recording import unstable, viewer
+from inspector.recording.run import write
 from inspector.recording.viewer import ViewerError
 from noisemodel import Run
 
@@ -135,7 +135,7 @@ def test_a_viewer_collects_usage_data_only_if_it_is_forced_to(
     for name in ("HOME", "XDG_DATA_HOME", "XDG_CONFIG_HOME"):
         monkeypatch.setenv(name, str(tmp_path))
     monkeypatch.setenv("FORCE_RERUN_ANALYTICS", forced)
-    with web.serving(recording):
+    with viewer.serving(recording):
         pass
     assert bool(list(tmp_path.glob("**/rerun/analytics"))) == collects
 
@@ -152,7 +152,7 @@ def listening_on(pid):
 
 
 def test_a_recording_is_served_on_loopback_only_and_no_longer_than_requested(recording):
-    with web.serving(recording) as served:
+    with viewer.serving(recording) as served:
         page, data = served.url.split("/?url=")
         assert page.startswith("http://127.0.0.1:")
         assert data.startswith("rerun%2Bhttp%3A%2F%2F127.0.0.1%3A")
@@ -163,7 +163,7 @@ def test_a_recording_is_served_on_loopback_only_and_no_longer_than_requested(rec
             assert len(addresses) == 2
             assert all(address.startswith("127.0.0.1:") for address in addresses)
     port = int(page.rpartition(":")[2])
-    assert web.free_port(port) == port
+    assert viewer.free_port(port) == port
 
 
 def test_a_port_that_is_taken_is_one_line(recording):
@@ -173,7 +173,7 @@ def test_a_port_that_is_taken_is_one_line(recording):
         port = other.getsockname()[1]
         with (
             pytest.raises(ViewerError, match=f"port {port} cannot be had .*name another, or none"),
-            web.serving(recording, port=port),
+            viewer.serving(recording, port=port),
         ):
             pass
 
@@ -182,13 +182,13 @@ def test_a_server_that_ends_at_once_is_an_error_with_the_reason(monkeypatch, rec
     fake_viewer(monkeypatch, "echo Error: no memory >&2; exit 3")
     with (
         pytest.raises(ViewerError, match=r"ended with status 3 \(no memory\)"),
-        web.serving(recording),
+        viewer.serving(recording),
     ):
         pass
 
 
 def test_a_server_that_ends_later_is_an_error(recording):
-    with web.serving(recording) as served:
+    with viewer.serving(recording) as served:
         os.killpg(served.server.process.pid, signal.SIGKILL)
         with pytest.raises(ViewerError, match="the viewer ended with status -9"):
             served.wait()
@@ -214,12 +214,12 @@ def test_serving_ends_with_the_program_and_leaves_no_server(recording, stop):
             assert program.wait(timeout=20) == 0
         finally:
             program.kill()
-    assert web.free_port(port) == port
+    assert viewer.free_port(port) == port
 
 
 @pytest.mark.slow
 def test_a_browser_draws_the_recording(recording, tmp_path):
-    with browser.page() as page, web.serving(recording) as served:
+    with browser.page() as page, viewer.serving(recording) as served:
         page.goto(f"{served.url}&renderer=webgl")
         until = time.monotonic() + 240
         sizes = [0]

@@ -14,7 +14,7 @@ from inspector.errors import InspectorError
 from inspector.expectations import expectations
 from inspector.labels import read_labels
 from inspector.live import LiveError, LiveSession
-from inspector.live.feeding import reader_of
+from inspector.live.input import reader_of
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import read_log
 from inspector.logs.signals import column_signal, time_column

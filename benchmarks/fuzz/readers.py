@@ -27,7 +27,7 @@ from inspector.errors import InspectorError
 from inspector.expectations import expectations
 from inspector.labels import read_labels
 from inspector.library import load_library
-from inspector.live import feeding
+from inspector.live import input as feeding
 from inspector.logs.options import ReadOptions, parse_mapping
 from inspector.logs.reading import listing, read_logs
 from inspector.training import tuningfile
@@ -365,7 +365,7 @@ def _read_rows(path: Path) -> None:
     """Read rows as `inspector live` does, without a viewer."""
     head, _, rest = path.read_bytes().partition(b"\n")
     reader, is_header = feeding.reader_of(head, ())
-    for chunk, number, _ in feeding.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
+    for chunk, number, _ in input.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
         for _ in reader.read(chunk, number, lambda kind, line, count=1: None):
             pass
 

@@ -41,7 +41,7 @@ def compare(
     The exit status is 3 if nothing could be compared.
     """
     import noisemodel as nm
-    from inspector.comparison.output import Outputs
+    from inspector.compare.models import Outputs
     from inspector.progress import progress
 
     del package_root, limit  # have been set

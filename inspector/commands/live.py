@@ -80,7 +80,7 @@ def live(
     from inspector import assets
     from inspector.library import load_library
     from inspector.live import LiveError, LiveSession
-    from inspector.live.feeding import follow
+    from inspector.live.input import follow
 
     del package_root, limit  # have been set
     if sys.stdin.isatty():

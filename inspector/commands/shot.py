@@ -49,8 +49,8 @@ def shot(
     from inspector import assets
     from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library
-    from inspector.recording import screenshot as shooting
-    from inspector.recording.recording import write
+    from inspector.recording import picture as shooting
+    from inspector.recording.run import write
     from inspector.sound.clip import worst_time
     from noisemodel.atomic import refuse_existing
 

@@ -94,7 +94,7 @@ def view(
     if floor is not None and len(paths) > 1:
         raise typer.BadParameter("--floor takes one run")
     if port:
-        from inspector.recording import web as browser
+        from inspector.recording import viewer as browser
 
         browser.free_port(port)
     if save:
@@ -128,7 +128,7 @@ def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: b
     from inspector.recording import viewer
 
     if web:
-        from inspector.recording import web as browser
+        from inspector.recording import viewer as browser
 
         browser.serve(target, lambda url: typer.echo(f"open {url}"), port=port)
         return
@@ -171,8 +171,7 @@ def _read(paths: list[Path], reading: "Reading") -> tuple[list["Opened"], bool]:
 def _several(
     runs: list["Opened"], target: Path, library: "Library", *, from_start: bool, overwrite: bool
 ) -> None:
-    from inspector.many.many import lay
-    from inspector.many.recording import write
+    from inspector.compare.many import lay, write
 
     several = lay(runs, library, from_start=from_start)
     write(several, target, overwrite=overwrite)
@@ -193,7 +192,7 @@ def _one(
 ) -> float:
     """Write the recording of a run; returns the time of its worst moment, in [s]."""
     from inspector.analysis.analyse import analyse_file
-    from inspector.recording.recording import write
+    from inspector.recording.run import write
     from inspector.report.markdown import sentence
     from inspector.sound.clip import of_recording, worst_time
 
@@ -217,8 +216,10 @@ def _two(
     kind: str,
     overwrite: bool,
 ) -> None:
-    from inspector.pair import Align, changes, compare, summary
-    from inspector.pair.recording import write
+    from inspector.compare.changes import changes, summary
+    from inspector.compare.pair import compare
+    from inspector.compare.recording import write
+    from inspector.pair.alignment import Align
 
     pair = compare(*runs, library, how=Align(how), robot=robot, kind=kind)
     write(pair, target, overwrite=overwrite)

@@ -8,7 +8,7 @@ what is drawn comes in columns. Nothing is dropped silently: what cannot be show
 warned of once per kind.
 """
 
-from inspector.live.errors import LiveError, SinkError
+from inspector.live.samples import LiveError, SinkError
 from inspector.live.session import LiveSession, Summary
 
 __all__ = ["LiveError", "LiveSession", "SinkError", "Summary"]

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from inspector.live.buffer import SIGNALS
-from inspector.live.errors import LiveError
 from inspector.live.rows import Note, Rows
+from inspector.live.samples import SIGNALS, LiveError
 from inspector.logs.signals import (
     TIME_UNITS,
     Naming,

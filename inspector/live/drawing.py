@@ -1,28 +1,175 @@
-"""What a live session draws: lines, spectrogram, lanes, events; in columns, thinned."""
+"""What a live session draws and how it is laid out; in columns, thinned."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
+from rerun.blueprint import Blueprint
 
 from inspector import colors
 from inspector.levels import SPECTRUM
-from inspector.live.lane import Change
-from inspector.live.spectrogram import Columns
+from inspector.live.robot import KEY
 from inspector.recording import axes, unstable
-from inspector.recording.axes import Label, Panel
-from inspector.recording.classes import FOUND, ROW, readable
-from inspector.recording.joints import UNITS
-from inspector.recording.limbs import JOINTS_PER_PLOT
-from inspector.recording.series import TIMELINE, at, log_events, scalars, style_lines
-from inspector.recording.spectrogram import log_axis, style_bands
+from inspector.recording.axes import TIMELINE, Label, Panel, at, log_events, scalars, style_lines
+from inspector.recording.camera import Camera
+from inspector.recording.panels import (
+    BANDS,
+    FOUND,
+    JOINTS_PER_PLOT,
+    ROW,
+    UNITS,
+    log_axis,
+    readable,
+    style_bands,
+)
+from inspector.recording.unstable import Part
 from inspector.report.markdown import spoken
+from inspector.spectrogram import amplitudes, in_bands, window_length
 from inspector.thinning import extremes
 from noiseclassifier import UNKNOWN, Event, Labels
 from noiseclassifier.labels import interval
-from noisemodel.types import Array
+from noisemodel.noise import decibel
+from noisemodel.types import Array, Mask
+
+
+class Change(NamedTuple):
+    """A class that begins, or lasts."""
+
+    time: float
+    """When, in [s]."""
+    state: str
+    """The class; empty where nothing is known."""
+
+
+class Lane:
+    """Gives each frame the time around its centre, as the recording of a whole run does.
+
+    Args:
+        hop: Time from one frame to the next, in [s].
+        length: Duration of a frame, in [s].
+    """
+
+    def __init__(self, hop: float, length: float) -> None:
+        self._hop, self._length = hop, length
+        self._state, self._end = "", 0.0
+
+    def take(self, labels: Labels) -> list[Change]:
+        """Where the class changes, and the end of the last frame."""
+        changes = []
+        for index, label in enumerate(labels.label.tolist()):
+            begin = float(labels.start[index] + labels.stop[index]) / 2 - self._hop / 2
+            if begin > self._end + self._hop / 2:
+                changes += self.end()
+            if label != self._state:
+                changes.append(Change(begin, label))
+            self._state, self._end = label, begin + self._hop
+        return [*changes, Change(self._end, self._state)] if len(labels) else changes
+
+    def expire(self, now: float) -> list[Change]:
+        """End the lane if its next frame is overdue.
+
+        Args:
+            now: Time of the latest sample, in [s].
+        """
+        return self.end() if now > self._end + self._length + self._hop else []
+
+    def end(self) -> list[Change]:
+        """End what the lane shows."""
+        changes = [Change(self._end, "")] if self._state else []
+        self._state = ""
+        return changes
+
+
+COLUMNS_AT_ONCE = 4
+"""Columns that are handed out at once, every tenth of a second."""
+
+
+class Columns(NamedTuple):
+    """Columns of a spectrogram."""
+
+    time: Array
+    """Centres of the windows, shape (columns,), in [s]."""
+    level: Array
+    """From 0 to 1, shape (bands, columns)."""
+
+
+class SpectrogramStream:
+    """Levels of frequency bands on a logarithmic axis, on the scale of whole runs.
+
+    Args:
+        rate: Samples per second, in [Hz].
+
+    Attributes:
+        edges: Of the bands, shape (bands + 1,), in [Hz].
+        centres: Of the bands, shape (bands,), in [Hz].
+    """
+
+    def __init__(self, rate: float) -> None:
+        self._rate = rate
+        self._length = window_length(rate)
+        self._hop = max(1, self._length // 4)
+        self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
+        self.edges = np.geomspace(self._frequency[0], self._frequency[-1], BANDS + 1)
+        self.centres = np.sqrt(self.edges[:-1] * self.edges[1:])
+        self._samples = np.empty(0)
+        self._valid = np.empty(0, dtype=bool)
+        self._gap = False
+        self._waiting: list[Columns] = []
+
+    def push(self, noise: Array, valid: Mask, end: float) -> Columns | None:
+        """Take samples.
+
+        Args:
+            noise: Shape (samples,), in [rad/s].
+            valid: False in gaps, shape (samples,); windows that touch one are dark.
+            end: Time after the last sample, in [s].
+
+        Returns:
+            Columns, once there are some.
+        """
+        samples = np.concatenate((self._samples, noise))
+        valid = np.concatenate((self._valid, valid))
+        count = max(0, (len(samples) - self._length) // self._hop + 1)
+        used = count * self._hop
+        if count:
+            if self._gap:
+                before = end - (len(samples) - self._length / 2 + self._hop) / self._rate
+                dark = np.zeros((len(self.centres), 1))
+                self._waiting.append(Columns(np.array([before]), dark))
+                self._gap = False
+            starts = self._hop * np.arange(count)
+            times = np.asarray(end - (len(samples) - starts - self._length / 2) / self._rate)
+            self._waiting.append(Columns(times, self._levels(samples, valid, count)))
+        self._samples, self._valid = samples[used:], valid[used:]
+        if sum(len(columns.time) for columns in self._waiting) < COLUMNS_AT_ONCE:
+            return None
+        return self.flush()
+
+    def skip(self) -> None:
+        """Begin anew after a gap, and leave it dark."""
+        self._samples, self._valid = self._samples[:0], self._valid[:0]
+        self._gap = True
+
+    def flush(self) -> Columns | None:
+        """Hand out what waits."""
+        if not self._waiting:
+            return None
+        time = np.concatenate([columns.time for columns in self._waiting])
+        level = np.concatenate([columns.level for columns in self._waiting], axis=1)
+        self._waiting = []
+        return Columns(time, level)
+
+    def _levels(self, samples: Array, valid: Mask, count: int) -> Array:
+        view = np.lib.stride_tricks.sliding_window_view
+        windows = view(samples, self._length)[:: self._hop][:count]
+        whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
+        amplitude = amplitudes(windows).T * whole
+        level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
+        return np.clip(SPECTRUM.place(level), 0.0, 1.0)
+
 
 JOINT_POINTS = 400.0
 """Points of a joint's line in a second, as a recording of ten seconds has."""
@@ -43,12 +190,8 @@ class Drawing:
     """Draws into a recording.
 
     Args:
-        recording: Where to.
-        joint_names: Names of the joints.
-        signals: Which of velocity, velocity_desired and position there are.
         classes: What can be predicted; empty without a model. `Drawing.classes` is their panel.
         edges: Of the spectrogram's bands, shape (bands + 1,), in [Hz].
-        watched: Whether a viewer shows the recording meanwhile; in a file, messages can be larger.
     """
 
     def __init__(
@@ -219,8 +362,6 @@ class Drawing:
 
         Args:
             time: Of the latest sample, in [s].
-            found: All findings so far, in order of time.
-            lasting: Those that have not ended.
         """
         lines = [_line(event, lasts=event in lasting) for event in reversed(found)]
         count = Counter(spoken(event.label) for event in found)
@@ -256,7 +397,7 @@ class Drawing:
         copies = [name for name in map(spoken, self._rows) for _ in range(unstable.COPIES)]
         every = [shade for shade in shades for _ in range(unstable.COPIES)]
         unstable.style_bands(self._recording, FOUND_PATH, copies, every)
-        rows = axes.rows([spoken(name) for name in self._rows])
+        rows = axes.row_labels([spoken(name) for name in self._rows])
         named = [replace(at, color=readable(c)) for at, c in zip(rows, shades, strict=True)]
         axes.log_left(self._recording, panel, named)
 
@@ -276,3 +417,101 @@ def _line(event: Event, *, lasts: bool) -> str:
 def _joints(kind: str, plot: int) -> str:
     end = "_desired" if kind.endswith("_desired") else ""
     return f"/joints/{kind.removesuffix('_desired')}/{plot}{end}"
+
+
+SHOWN = 10.0
+"""Time that plots reach back, in [s]."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What there is to show.
+
+    Attributes:
+        joints: Title and entity paths of each plot of joint signals.
+        camera: From where the robot is seen; None without one.
+        classes: Where the classes are drawn; None without any.
+        links: Whether the links are coloured.
+        rate: Samples per second, in [Hz].
+        start: Time of the first sample, in [s].
+        full: Whether the last ten seconds are all after that.
+    """
+
+    joints: Sequence[tuple[str, Sequence[str]]]
+    camera: Camera | None
+    classes: Panel | None
+    links: bool
+    rate: float
+    start: float
+    full: bool
+
+
+def layout(contents: Contents) -> Blueprint:
+    """Lay a live recording out; every plot shows ten seconds: the first, and then the last."""
+    noise = _plot(contents, "/noise", "Noise", titled=False)
+    bands = _plot(contents, "/spectrogram", "Spectrum", between=(0.0, axes.TOP), titled=False)
+    over_time = [
+        (axes.part(NOISE_PANEL, noise), NOISE_PANEL.height),
+        (axes.part(SPECTROGRAM_PANEL, bands), SPECTROGRAM_PANEL.height),
+        (_signals(contents), SIGNALS_PANEL.height),
+    ]
+    if contents.classes is not None:
+        rows = _plot(contents, "/class", "Classes", between=(0.0, axes.TOP), titled=False)
+        over_time.insert(0, (axes.part(contents.classes, rows), contents.classes.height))
+    findings = unstable.text("Findings", "/report", titled=False)
+    left = [(findings, 2.0), (unstable.events("Events", "/events"), 1.4)]
+    if contents.camera is not None:
+        title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
+        robot = unstable.robot(title, "/robot", contents.camera)
+        if contents.links:
+            key = unstable.drawing(f"/axis/{KEY.name}/right")
+            robot = unstable.beside((robot, 88.0), (key, 12.0))
+        left.insert(1, (robot, 3.4))
+    whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*over_time), 64.0))
+    return unstable.blueprint(whole, TIMELINE, following=True)
+
+
+def _shown(contents: Contents) -> tuple[tuple[float, float] | None, float | None]:
+    """What plots show: a stretch of time at first, so that it begins with the samples, or a last.
+
+    Before ten seconds are over, the last ten begin before the first sample.
+    """
+    if contents.full:
+        return None, SHOWN
+    return (contents.start, contents.start + SHOWN), None
+
+
+def _plot(
+    contents: Contents,
+    origin: str,
+    name: str,
+    paths: Sequence[str] = ("$origin/**",),
+    *,
+    legend: bool = False,
+    between: tuple[float, float] | None = None,
+    titled: bool = True,
+) -> Part:
+    during, last = _shown(contents)
+    return unstable.plot(
+        name,
+        origin,
+        paths,
+        legend=legend,
+        between=between,
+        fixed=True,
+        during=during,
+        last=last,
+        titled=titled,
+    )
+
+
+def _signals(contents: Contents) -> Part:
+    plots = {
+        title: _plot(contents, "/joints", title, paths, legend=True, titled=False)
+        for title, paths in contents.joints
+    }
+    if contents.classes is not None:
+        plots["Scores"] = _plot(contents, "/score", "Scores", legend=True, titled=False)
+    return unstable.tabs(
+        *(axes.part(SIGNALS_PANEL, plot, name=name) for name, plot in plots.items())
+    )

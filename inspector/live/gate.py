@@ -25,10 +25,7 @@ class Gate:
     """Applies expectations to findings while they come, and prints them.
 
     Args:
-        tell: Prints a line.
         expectations: What is expected, nothing unless given.
-        as_json: Whether lines are JSON, ``noise-live/1``.
-        today: The day on which waivers are still valid or not.
 
     Attributes:
         failed: Whether a finding counts so far.
@@ -79,14 +76,7 @@ class Gate:
             self._tell(f"{event.label} from {event.start:.2f} s{event.novelty}{became}")
 
     def end(self, summary: Summary) -> int:
-        """Print what became of the stream.
-
-        Args:
-            summary: Of the session.
-
-        Returns:
-            The exit status, as of `inspector classify`.
-        """
+        """Print what became of the stream."""
         events, duration = tuple(summary.findings), summary.samples / summary.rate
         verdict = Verdict(NAME, summary.status, summary.model, events, duration=duration)
         verdict = self._judged(verdict, summary.frame)

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from inspector.live.buffer import SIGNALS
 from inspector.live.rows import Note, Rows
+from inspector.live.samples import SIGNALS
 
 
 class JsonReader:

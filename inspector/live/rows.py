@@ -5,7 +5,7 @@ from contextlib import suppress
 from time import perf_counter, sleep
 from typing import BinaryIO, NamedTuple, Protocol
 
-from inspector.live.errors import LiveError
+from inspector.live.samples import LiveError
 from noisemodel.types import Array
 
 CHUNK_BYTES = 1 << 18
@@ -53,15 +53,7 @@ def chunks(stream: BinaryIO, *, gather: float = 0.0) -> Iterator[tuple[bytes, in
     """Whole lines of a stream as they come.
 
     Args:
-        stream: Text in lines.
         gather: How long a small chunk waits for more, in [s]: to read row by row costs most.
-
-    Yields:
-        Whole lines that are not blank at their beginning, the number of the first, and the reading
-        of ``time.perf_counter()`` when they were received, at the earliest.
-
-    Raises:
-        LiveError: If a line does not end.
     """
     read: Callable[[int], bytes] = getattr(stream, "read1", stream.read)
     rest, number, waited = b"", 1, 0.0

@@ -11,11 +11,10 @@ from threading import Thread
 
 import rerun as rr
 
-from inspector.live.errors import SinkError
+from inspector.live.samples import SinkError
 from inspector.recording import viewer
-from inspector.recording.stream import require_whole
-from inspector.recording.viewer import HOST
-from inspector.recording.web import free_port
+from inspector.recording.run import require_whole
+from inspector.recording.viewer import HOST, free_port
 from noisemodel.atomic import replacing
 
 APPLICATION = "inspector-live"
@@ -40,18 +39,11 @@ class Sink:
 
     Args:
         save: File to write, whole when it is closed; None writes none.
-        connect: Address of a viewer: ``9876``, ``host:9876`` or a URL. Unless given, and without a
-            file, a viewer on this machine is used, and one is opened if none runs.
-        overwrite: Whether a file that exists may be replaced.
 
     Attributes:
         recording: What to log into.
         where: Its sinks, in words.
         gone: Whether there was a viewer that is there no more.
-
-    Raises:
-        SinkError: If there is no viewer and none can be opened.
-        OutputError: If the file exists or cannot be written.
     """
 
     def __init__(
@@ -88,11 +80,7 @@ class Sink:
         return self._address is not None
 
     def check_viewer(self) -> bool:
-        """Check once in a second that the viewer is there.
-
-        Returns:
-            Whether it responded now.
-        """
+        """Check once in a second that the viewer is there."""
         if self._address is None or self.gone or time.monotonic() - self._checked < CHECK_INTERVAL:
             return False
         self._checked = time.monotonic()
@@ -106,14 +94,7 @@ class Sink:
             raise _Discarded
 
     def close(self) -> bool:
-        """Send what waits, and put the file in its place if it is whole.
-
-        Returns:
-            Whether the viewer, if there is one, took everything.
-
-        Raises:
-            OutputError: If the file could not be written.
-        """
+        """Send what waits, and put the file in its place if it is whole."""
         taken = not self.gone
         with self._stack:
             try:

@@ -1,9 +1,10 @@
-"""Panels over time that share their edges, and what stands beside them: names, ticks, scales.
+"""Lines, rows of colours and labels over time, in panels that share their edges.
 
 Rerun 0.41 labels a plot's axis with plain numbers, and makes room for the widest of them, so that
-plots of other numbers have other edges. It has no colour bar and no names of rows. Here, every
-panel has an axis on which rerun writes one digit if anything: rows lie between 0 and `TOP`, and
-curves are scaled by powers of ten. Everything else is drawn in a narrow view at either side.
+plots of other numbers have other edges. It has no colour bar, no names of rows and no heat map over
+time. Here, every panel has an axis on which rerun writes one digit if anything: rows lie between 0
+and `TOP`, and curves are scaled by powers of ten. A line whose colour changes is a row of a heat
+map. Everything else is drawn in a narrow view at either side.
 """
 
 from collections.abc import Sequence
@@ -12,11 +13,85 @@ from itertools import pairwise
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 
 from inspector import colors
+from inspector.colors import Color
 from inspector.levels import Scale
 from inspector.recording import unstable
 from inspector.recording.unstable import Part
+from noisemodel.types import Array, Mask, Real
+
+TIMELINE = "time"
+
+
+def at(time: Array) -> rr.TimeColumn:
+    """Index columns by seconds from the start of the run."""
+    return rr.TimeColumn(TIMELINE, duration=np.round(time * 1e9).astype("timedelta64[ns]"))
+
+
+def scalars(values: Real) -> list[rr.ComponentColumn]:
+    """Make columns as ``rr.Scalars.columns`` does, at a third of its cost."""
+    width = values[:1].size
+    batch = rr.components.ScalarBatch(np.ascontiguousarray(values).ravel())
+    edges = np.arange(len(values) + 1, dtype=np.int32) * np.int32(width)
+    return [rr.ComponentColumn(rr.Scalars.descriptor_scalars(), batch, offsets=edges)]
+
+
+def log_lines(
+    recording: rr.RecordingStream,
+    path: str,
+    time: Array,
+    values: Real,
+    *,
+    names: Sequence[str],
+    colours: Sequence[Color],
+) -> None:
+    """Log one line or several that share their times.
+
+    Args:
+        time: Shape (samples,), in [s].
+    """
+    style_lines(recording, path, names=names, colours=colours)
+    recording.send_columns(path, indexes=[at(time)], columns=scalars(values))
+
+
+def style_lines(
+    recording: rr.RecordingStream, path: str, *, names: Sequence[str], colours: Sequence[Color]
+) -> None:
+    """Log how the lines of one entity are drawn; see `log_lines`."""
+    # Rerun's default aggregation draws the mean of a pixel's extremes, which hides vibration.
+    style = rr.SeriesLines(
+        names=list(names),
+        colors=list(colours),
+        widths=[1.0] * len(names),
+        aggregation_policy="MinMax",
+    )
+    recording.log(path, style, static=True)
+
+
+def log_events(
+    recording: rr.RecordingStream,
+    time: Sequence[float],
+    text: Sequence[str],
+    colours: Sequence[Color],
+    *,
+    warnings: Sequence[bool] | None = None,
+) -> None:
+    """List events, a line of text each.
+
+    Args:
+        time: When, in [s].
+    """
+    level = None if warnings is None else ["WARN" if each else "INFO" for each in warnings]
+    recording.send_columns(
+        "/events",
+        indexes=[at(np.array(time))],
+        columns=rr.TextLog.columns(
+            text=text, level=level, color=np.array([(*color, 255) for color in colours], np.uint8)
+        ),
+    )
+
 
 TOP = 9.99
 """Upper end of the axis of rows."""
@@ -87,14 +162,7 @@ def log_right(recording: rr.RecordingStream, panel: Panel, labels: Sequence[Labe
 
 
 def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: str = "") -> None:
-    """Log a scale of colours at the right of a panel, with its ticks in decibels.
-
-    Args:
-        recording: Where to.
-        panel: The panel.
-        scale: The scale.
-        title: Above it; "dB" without one.
-    """
+    """Log a scale of colours at the right of a panel, with its ticks in decibels."""
     title = title or "dB"
     path, shift = f"/axis/{panel.name}/right", -22.0 / panel.height
     below = 2.0 * HALF + LINE * title.count("\n") + HALF  # the title ends, the highest tick begins
@@ -119,7 +187,7 @@ def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:
     return unstable.beside((left, LEFT), (plot, MIDDLE), (right, RIGHT), name=name)
 
 
-def rows(names: Sequence[str]) -> list[Label]:
+def row_labels(names: Sequence[str]) -> list[Label]:
     """Names of rows, the first at the top."""
     return [Label(1.0 - (row + 0.5) / len(names), name) for row, name in enumerate(names)]
 
@@ -135,13 +203,7 @@ def written(level: float) -> str:
 
 
 def ticks(low: float, high: float, panel: Panel) -> list[float]:
-    """Round values on a logarithmic axis, as close as their labels allow: 1, 2, 5, 10, ...
-
-    Args:
-        low: Lower end, positive.
-        high: Upper end.
-        panel: The panel.
-    """
+    """Round values on a logarithmic axis, as close as their labels allow: 1, 2, 5, 10, ..."""
     decade = (panel.height - AXIS) / np.log10(high / low)
     powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
     for factors in ((1, 2, 5), (1, 3), (1,)):
@@ -169,3 +231,51 @@ def _log_labels(
         show_labels=True,
     )
     recording.log(path, points, static=True)
+
+
+EMPTY = (*colors.BACKGROUNDS[0], 255)
+"""Of a row where nothing is known: that of the viewer."""
+SHADES = 32
+"""Colours of a row: few change rarely."""
+
+
+def log_rows(
+    recording: rr.RecordingStream,
+    path: str,
+    edges: Array,
+    rgba: NDArray[np.uint8],
+    *,
+    names: Sequence[str],
+    width: float,
+    lines: int = 1,
+) -> None:
+    """Log rows of colours, the first at the top.
+
+    Args:
+        edges: Starts of the columns and the end of the last one, shape (columns + 1,), in [s].
+    """
+    apart = (np.arange(lines) - (lines - 1) / 2) * TOP / len(names) / (lines + 1)
+    for row, (name, place) in enumerate(zip(names, middles(len(names)), strict=True)):
+        entity, own = f"{path}/{row:02d}", rgba[row]
+        style = rr.SeriesLines(
+            names=[name] * lines, widths=[width] * lines, aggregation_policy="Off"
+        )
+        recording.log(entity, style, static=True)
+        # A segment takes the colour of its end.
+        kept = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1), [True]))
+        shown = np.concatenate((own[:1], own))[kept]
+        recording.send_columns(
+            entity,
+            indexes=[at(edges[kept])],
+            columns=[
+                *scalars(np.tile(place + apart, (len(shown), 1))),
+                *rr.SeriesLines.columns(colors=shown.repeat(lines, axis=0)).partition(
+                    np.full(len(shown), lines)
+                ),
+            ],
+        )
+
+
+def blanked(rgba: NDArray[np.uint8], known: Mask) -> NDArray[np.uint8]:
+    """Colours without those of columns of which nothing is known, shape (rows, columns, 4)."""
+    return np.where(known[None, :, None], rgba, np.array(EMPTY, dtype=np.uint8))

@@ -43,11 +43,6 @@ def fitted(parts: Iterable[Array], *, aspect: float = 1.0, room: float = 1.0) ->
 
     Args:
         parts: Points, each of shape (points, 3), in [m].
-        aspect: Least width of the view by its height.
-        room: By what factor what is seen is larger than what the points take.
-
-    Returns:
-        The camera; the floor is as low as the lowest point.
     """
     axes = sight()
     slopes = (1.0 - 2.0 * MARGIN) * np.tan(FIELD_OF_VIEW / 2) * np.array([aspect, 1.0])

@@ -13,7 +13,7 @@ import numpy as np
 import rerun as rr
 from rerun.urdf import UrdfJoint, UrdfTree
 
-from inspector.recording import robot, series
+from inspector.recording import axes, robot
 from inspector.recording.camera import Camera, fitted
 from noisemodel import linkshapes, meshes
 from noisemodel.errors import MeshError
@@ -32,24 +32,14 @@ DIRECTIONS = np.array([each for each in product((-1.0, 0.0, 1.0), repeat=3) if a
 """Along each of these, a mesh is taken by its outermost point; it reaches beyond by a tenth."""
 
 
-def log(
+def log_cameras(
     recording: rr.RecordingStream,
     robots: Sequence[tuple[UrdfTree, Run]],
     urdf: Path,
     *,
     aspect: float = 1.0,
 ) -> list[Camera]:
-    """Place the cameras for runs of a robot, and log how they move with a base, over its floor.
-
-    Args:
-        recording: Where to.
-        robots: The robot in each run, and the run, which has positions.
-        urdf: The file that the trees were read from.
-        aspect: Least width of a view by its height.
-
-    Returns:
-        A camera for each, all as far away.
-    """
+    """Place the cameras for runs of a robot, and log how they move with a base, over its floor."""
     drawn = outermost(urdf)
     parts: list[Iterator[Array]] = []
     for tree, run in robots:
@@ -78,8 +68,6 @@ def reached(
     """The points of a robot in a motion, from the place on the floor below its base.
 
     Args:
-        tree: The robot.
-        drawn: Points of its links, see `outermost`.
         angles: Of joints that move, each of shape (frames,), in [rad] or [m].
         pose: x, y, z and quaternion x, y, z, w of a base that moves, shape (frames, 7).
 
@@ -93,13 +81,7 @@ def reached(
 
 
 def standing(camera: Camera, tree: UrdfTree, *, moves: bool) -> Camera:
-    """A camera in the frame of transforms that it stands in.
-
-    Args:
-        camera: As it was placed.
-        tree: The robot.
-        moves: Whether its base does; the camera moves with it then.
-    """
+    """A camera in the frame of transforms that it stands in."""
     frame = robot.frame(tree, VIEW) if moves else robot.root(tree, floating=False)
     return replace(camera, frame=frame, moves=moves)
 
@@ -108,8 +90,6 @@ def follow(recording: rr.RecordingStream, tree: UrdfTree, time: Array, pose: Arr
     """Log the frame that a camera moves with: on the floor below the base, without its turns.
 
     Args:
-        recording: Where to.
-        tree: The robot.
         time: Shape (steps,), in [s].
         pose: Of the base, shape (steps, 3 or more), in [m].
     """
@@ -119,16 +99,13 @@ def follow(recording: rr.RecordingStream, tree: UrdfTree, time: Array, pose: Arr
         child_frame=[robot.frame(tree, VIEW)] * len(pose),
     )
     path = f"{robot.origin(tree)}/motion/view"
-    recording.send_columns(path, indexes=[series.at(time)], columns=columns)
+    recording.send_columns(path, indexes=[axes.at(time)], columns=columns)
 
 
 def log_floor(recording: rr.RecordingStream, tree: UrdfTree, camera: Camera, pose: Array) -> None:
     """Log the lines of a floor that stays where it is while the camera moves over it.
 
     Args:
-        recording: Where to.
-        tree: The robot.
-        camera: Above it.
         pose: Where the base will be, shape (steps, 2 or more), in [m].
     """
     reach = 4.0 * float(np.linalg.norm(camera.eye - camera.target))
@@ -150,9 +127,6 @@ def log_floor(recording: rr.RecordingStream, tree: UrdfTree, camera: Camera, pos
 
 def outermost(urdf: Path) -> dict[str, Array]:
     """The outermost points of the links that are drawn.
-
-    Args:
-        urdf: What is drawn, with the absolute addresses of its meshes.
 
     Returns:
         By link, in its axes, shape (points, 3), in [m]. Of a mesh that only the viewer can read,
@@ -182,8 +156,6 @@ def points(
     """Where the points of each link are in all frames.
 
     Args:
-        tree: The robot.
-        drawn: Points of its links, see `outermost`; without any, the links' origins are taken.
         angles: Of joints that move, each of shape (frames,), in [rad] or [m].
         turn: Rotation of the root, shape (frames, 3, 3); none unless given.
         shift: Its place, shape (frames, 3), in [m]; the origin unless given.

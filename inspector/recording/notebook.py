@@ -85,12 +85,7 @@ def in_notebook() -> bool:
 
 
 def show_recording(recording: Path, size: tuple[int | str, int]) -> None:
-    """Show a recording below the cell that runs.
-
-    Args:
-        recording: A ``*.rrd`` file.
-        size: Width, or ``"auto"`` for that of the cell, and height, in pixels.
-    """
+    """Show a recording below the cell that runs."""
     width, height = size
     widget = widget_class()(width=width, height=height)
     import_module("IPython.display").display(widget)
@@ -98,11 +93,7 @@ def show_recording(recording: Path, size: tuple[int | str, int]) -> None:
 
 
 def widget_class() -> Any:
-    """The class of a widget whose data all come from this machine.
-
-    Returns:
-        ``rerun_notebook.Viewer``, or a subclass of it if the viewer's code is sent along.
-    """
+    """The class of a widget whose data all come from this machine."""
     # Otherwise the widget fetches its code from app.rerun.io.
     os.environ.setdefault("RERUN_NOTEBOOK_ASSET", "inline")
     with redirect_stdout(StringIO()):  # it prints that it does so
@@ -117,7 +108,7 @@ def widget_class() -> Any:
 def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: str) -> Path:
     from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library
-    from inspector.recording.recording import write
+    from inspector.recording.run import write
     from inspector.sound.clip import of_recording
 
     library = load_library()

@@ -13,7 +13,7 @@ from rerun.urdf import UrdfJoint, UrdfTree
 
 import noisemodel
 from inspector.errors import InspectorError
-from inspector.recording import series, unstable
+from inspector.recording import axes, unstable
 from noisemodel import meshes, meshpath, robot, urdf
 from noisemodel.errors import UnknownJointError
 from noisemodel.mjcf import is_mjcf
@@ -39,19 +39,7 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = (), *, side: str 
     """Read the robot that a run names, for drawing.
 
     Args:
-        name: A robot's name, or the path of a URDF or an MJCF.
-        folder: Takes what rerun reads in place of the robot's own files, as late as when the tree
-            is logged: it has to stay until then.
-        joint_names: Joints that the robot has to have.
         side: Which of several robots in a recording this is; empty if there is one.
-
-    Returns:
-        Rerun's tree of its links and joints.
-
-    Raises:
-        RobotError: If there is no such robot, or it cannot be read.
-        MeshError: If one of its meshes cannot be read.
-        UnknownJointError: If the robot lacks one of the joints, naming the first.
     """
     path, copy = robot.locate(name), drawn_file(name, folder)
     place = f"robot_{side}" if side else "robot"
@@ -149,9 +137,6 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
     """Log a robot and its motion.
 
     Args:
-        recording: Where to.
-        tree: The robot.
-        run: A run with positions; joints that it does not name rest.
         coloured: Whether colours over time will follow, see `log_shapes`.
     """
     log_shapes(recording, tree, coloured=coloured)
@@ -161,7 +146,7 @@ def log(recording: rr.RecordingStream, tree: UrdfTree, run: Run, *, coloured: bo
         if joint.name in moved:
             recording.send_columns(
                 f"{origin(tree)}/motion/{joint.name}",
-                indexes=[series.at(run.time[frames])],
+                indexes=[axes.at(run.time[frames])],
                 columns=joint.compute_transform_columns(moved[joint.name].tolist(), clamp=False),
             )
     if run.base_pose is not None:
@@ -177,11 +162,6 @@ def shown(run: Run) -> NDArray[np.intp]:
 
 def angles(tree: UrdfTree, run: Run, frames: NDArray[np.intp]) -> dict[str, Array]:
     """Positions of all joints that move, those that mimic another one included.
-
-    Args:
-        tree: The robot.
-        run: A run with positions.
-        frames: Samples of it.
 
     Returns:
         By joint, shape (frames,), in [rad] or [m].
@@ -199,14 +179,7 @@ def angles(tree: UrdfTree, run: Run, frames: NDArray[np.intp]) -> dict[str, Arra
 
 
 def log_shapes(recording: rr.RecordingStream, tree: UrdfTree, *, coloured: bool) -> None:
-    """Log a robot at rest.
-
-    Args:
-        recording: Where to.
-        tree: The robot.
-        coloured: Whether colours over time will follow: the URDF's own, which are static and
-            would hide them, are left out then.
-    """
+    """Log a robot at rest."""
     unstable.log_up(recording)
     drawn = tree.stream()
     if coloured:
@@ -225,8 +198,6 @@ def log_colours(
     """Log the colours of links over time.
 
     Args:
-        recording: Where to.
-        tree: The robot.
         time: Shape (steps,), in [s].
         colours: Of each link that moves, shape (steps, 4).
         rest: Colour of the others, such as the base of an arm, shape (1, 4).
@@ -243,7 +214,7 @@ def log_colours(
         changed = np.concatenate(([True], (own[1:] != own[:-1]).any(axis=1)))
         for path in paths:
             columns = getattr(rr, kinds[path]).columns(**{COLOURED[kinds[path]]: own[changed]})
-            recording.send_columns(path, indexes=[series.at(time[changed])], columns=columns)
+            recording.send_columns(path, indexes=[axes.at(time[changed])], columns=columns)
 
 
 def _log_base(
@@ -253,7 +224,7 @@ def _log_base(
     pose = run.base_pose[shown]
     recording.send_columns(
         f"{origin(tree)}/motion/base",
-        indexes=[series.at(run.time[shown])],
+        indexes=[axes.at(run.time[shown])],
         columns=rr.Transform3D.columns(
             translation=pose[:, :3],
             quaternion=pose[:, 3:],
@@ -283,17 +254,6 @@ def drawable(urdf: Path, roots: Sequence[Path], folder: Path) -> str:
     Textures and simulator extensions are left out, addresses of meshes become absolute: rerun
     refuses empty textures and needs an environment variable for ``package://``. Of a link without
     visual shapes the collision shapes are drawn; a robot without any shape is drawn as sticks.
-
-    Args:
-        urdf: A URDF that has been checked.
-        roots: Folders in which ``package://`` addresses are searched for and meshes may lie.
-        folder: Takes the meshes that rerun cannot read, written anew as STL.
-
-    Returns:
-        The rewritten URDF.
-
-    Raises:
-        MeshError: If a mesh is missing, lies elsewhere, or is empty or cut off.
     """
     tree = ET.parse(urdf).getroot()  # noqa: S314
     for link in tree.iter("link"):
@@ -351,14 +311,7 @@ def drawable_mjcf(moved: Robot, folder: Path) -> str:
     root; where the base floats, the base is, and the rest of the world is left out.
 
     Args:
-        moved: The robot.
         folder: Takes the links' shapes as STL files, one for each colour.
-
-    Returns:
-        The URDF.
-
-    Raises:
-        MeshError: If a mesh is missing, lies elsewhere, or cannot be read.
     """
     assert moved.mjcf is not None
     names = [_unlike(link_names(moved), "base"), *link_names(moved)]

@@ -64,15 +64,9 @@ def plot(
     """Plot scalars over time.
 
     Args:
-        name: Title, with the unit.
-        origin: Entity path that the lines lie under.
-        paths: Which of them are drawn.
-        legend: Whether lines are named.
         between: Range of values that is shown; that of the lines unless given.
-        fixed: Whether zooming leaves that range alone.
         during: Stretch of time that is shown, in [s]; unless given, that of all other views.
         last: Time up to the cursor that is shown in place of that, in [s].
-        titled: Whether the title is shown, above the plot.
     """
     corner = (
         rrb.Corner2D.RightTop if last is None else rrb.Corner2D.LeftTop
@@ -114,24 +108,8 @@ def bars(name: str, origin: str) -> Part:
     return rrb.BarChartView(origin=origin, name=name, plot_legend=rrb.PlotLegend(visible=False))
 
 
-def tensor(name: str, origin: str) -> Part:
-    """Draw a tensor as an image that fills its view."""
-    return rrb.TensorView(
-        origin=origin,
-        name=name,
-        scalar_mapping=rrb.TensorScalarMapping(colormap="inferno", mag_filter="Linear"),
-        view_fit="fill",
-    )
-
-
 def robot(name: str, origin: str, camera: Camera) -> Part:
-    """Draw what moves, on its floor, from where a camera stands.
-
-    Args:
-        name: Title.
-        origin: Entity path that all of it lies under.
-        camera: From where, and in which frame of transforms.
-    """
+    """Draw what moves, on its floor, from where a camera stands."""
     return rrb.Spatial3DView(
         origin="/",
         contents=[f"{origin}/**"],
@@ -195,10 +173,7 @@ def blueprint(
     """Fill the window with a part; panels stay closed.
 
     Args:
-        content: What to show.
-        timeline: Along which time runs.
         loop: Stretch of time that is selected, and that playing repeats, in [s].
-        following: Whether the time cursor follows the latest data.
     """
     playing: Literal["following", "paused"] = "following" if following else "paused"
     time = rrb.TimePanel(state="collapsed", timeline=timeline, play_state=playing)
@@ -226,10 +201,6 @@ def log_audio(
     """Log a sound that is played from a time on.
 
     Args:
-        recording: Where to.
-        path: Entity path.
-        sound: A whole WAV file.
-        timeline: Along which time runs.
         start: When the sound starts, in [s].
     """
     instant = np.array([_nanoseconds(start)], dtype="timedelta64[ns]")
@@ -252,12 +223,8 @@ def log_bars(
     """Log a bar chart for each of several times.
 
     Args:
-        recording: Where to.
-        path: Entity path.
-        index: The times.
         bars: Heights, shape (times, bars).
         places: Where the bars stand, shape (bars,).
-        color: Of all bars.
     """
     widths = np.diff(places, prepend=0.0)
     heights, stands = _tensors(bars), _tensors(places[None])
@@ -290,14 +257,7 @@ def log_stretches(
     a thick line has round ends. It is translucent, and several of them are opaque.
 
     Args:
-        recording: Where to.
-        path: Entity path.
-        timeline: Along which time runs.
         stretches: Start and stop of each, in [s].
-        between: Lower and upper end on the axis of the plot.
-        name: What they are.
-        color: Of all.
-        opaque: Whether nothing shines through.
     """
     copies = COPIES if opaque else 1
     middle, half = (between[0] + between[1]) / 2, (between[1] - between[0]) / 2
@@ -337,33 +297,14 @@ def send_bands(
     """Draw bands along a plot, which end where there is no value.
 
     Args:
-        recording: Where to.
-        path: Entity path.
-        timeline: Along which time runs.
         times: Shape (points,), in [ns].
         values: Middle of each band, shape (points, bands); NaN draws nothing.
-        half: Half of their widths.
     """
     recording.send_columns(
         path,
         indexes=[rr.TimeColumn(timeline, duration=times.astype("timedelta64[ns]"))],
         columns=rr.Measurements.columns(values=values, variances=np.full_like(values, half**2)),
     )
-
-
-def log_tensor(
-    recording: rr.RecordingStream, path: str, values: Real, names: Sequence[str]
-) -> None:
-    """Log one tensor for all times.
-
-    Args:
-        recording: Where to.
-        path: Entity path.
-        values: Of 32 or 64 bits.
-        names: Of its axes.
-    """
-    data = _tensors(values[None], names)
-    recording.log(path, rr.Tensor.from_fields(data=data), static=True)
 
 
 def log_up(recording: rr.RecordingStream) -> None:
@@ -405,13 +346,6 @@ def _tensors(values: Real, names: Sequence[str] | None = None) -> Any:
 
     Rerun makes tensors one by one, by casts for which Arrow loads its functions for computing: a
     tenth of a second, for what is a few offsets.
-
-    Args:
-        values: Shape (tensors, ...), of 32 or 64 bits.
-        names: Of the axes of each tensor.
-
-    Returns:
-        The array, which rerun takes as it is.
     """
     import pyarrow as pa
 

@@ -1,4 +1,4 @@
-"""Rerun's viewer: start it, open a recording in it, or explain how to."""
+"""Rerun's viewer: open a recording in it or in a browser, or explain how to."""
 
 import hashlib
 import os
@@ -10,12 +10,14 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping, Sequence
+import webbrowser
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
+from urllib.parse import quote
 
 from inspector.errors import InspectorError
 
@@ -109,9 +111,6 @@ def scratch_path(run: Path) -> Path:
     """The file for a recording without a name: the same run replaces its own.
 
     The oldest of such files are deleted where there are too many.
-
-    Args:
-        run: The run file that is viewed.
     """
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = cache / "noise-inspector" / "recordings"
@@ -137,14 +136,7 @@ def _make_room(folder: Path) -> None:
 
 
 def command(*arguments: str) -> list[str]:
-    """The command line of rerun's viewer; it listens on loopback only.
-
-    Args:
-        arguments: Options beyond that.
-
-    Raises:
-        ViewerError: If the viewer is not installed.
-    """
+    """The command line of rerun's viewer; it listens on loopback only."""
     if find_spec("rerun_cli") is None:
         raise ViewerError("rerun's viewer is missing; `pip install rerun-sdk` brings it")
     return [sys.executable, "-m", "rerun", "--bind", HOST, *arguments]
@@ -194,16 +186,6 @@ def started(*arguments: str, env: Mapping[str, str] | None = None) -> Iterator[P
     """Start a viewer, whose stderr can be read for as long as the block lasts.
 
     It does not end with the block, nor by Ctrl-C, and it sends no usage data.
-
-    Args:
-        arguments: Options.
-        env: Environment; by default that of this process.
-
-    Yields:
-        The viewer.
-
-    Raises:
-        ViewerError: If the viewer is not installed.
     """
     given = NO_ANALYTICS | dict(os.environ if env is None else env)
     if _wayland_problem() and _x_problem() == "":
@@ -224,15 +206,11 @@ def open_window(recording: Path, seconds: float | None = None) -> str:
     """Show a recording in the viewer that runs, or start one and do not wait for it to end.
 
     Args:
-        recording: A ``*.rrd`` file.
         seconds: Where the time cursor is put, in [s], if nothing else takes the viewer's port; a
             layout cannot say that.
 
     Returns:
         Why no window opened, in a line; empty if one did.
-
-    Raises:
-        ViewerError: If the viewer is not installed.
     """
     if problem := display_problem():
         return problem
@@ -281,4 +259,85 @@ def how_to_open(recording: Path) -> str:
     return (
         f"open it in the viewer:  {rerun} {path}\n"
         f"or in a browser:        {rerun} --serve-web --bind {HOST} {path}"
+    )
+
+
+SERVE_TIMEOUT = 30.0
+"""Time within which a server has to respond, in [s]."""
+
+
+@dataclass(frozen=True)
+class Served:
+    """A recording that browsers on this machine can open.
+
+    Attributes:
+        url: Its address.
+        server: The viewer that serves it.
+    """
+
+    url: str
+    server: Process
+
+    def wait(self) -> None:
+        """Wait until the server ends, which it does not do by itself."""
+        self.server.process.wait()
+        raise ViewerError(self.server.ended())
+
+
+def serve(recording: Path, announce: Callable[[str], None], *, port: int = 0) -> None:
+    """Serve a recording on loopback, and open it, until the program is stopped."""
+    for stop in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(stop, signal.default_int_handler)  # else the server would outlive us
+    with suppress(KeyboardInterrupt), serving(recording, port=port) as served:
+        announce(served.url)
+        if has_display():
+            webbrowser.open(served.url)
+        served.wait()
+
+
+@contextmanager
+def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
+    """Serve a recording on loopback, for as long as the block lasts."""
+    data_port = free_port()
+    page_port = free_port(port, other=data_port)
+    ports = ("--port", str(data_port), "--web-viewer-port", str(page_port))
+    with started("--serve-web", *ports, str(recording)) as server:
+        try:
+            for needed in (data_port, page_port):
+                _wait_for(needed, server)
+            data = quote(f"rerun+http://{HOST}:{data_port}/proxy", safe="")
+            yield Served(f"http://{HOST}:{page_port}/?url={data}", server)
+        finally:
+            server.kill()
+
+
+def free_port(wanted: int = 0, *, other: int = 0) -> int:
+    """A port of loopback that no program listens on."""
+    with socket.socket() as probe:
+        # What a server that has ended leaves behind for a minute does not count.
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((HOST, wanted))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise ViewerError(
+                f"port {wanted} cannot be had ({reason}); name another, or none to take a free one"
+            ) from error
+        found: int = probe.getsockname()[1]
+    return free_port(other=other) if found == other and not wanted else found
+
+
+def _wait_for(port: int, server: Process) -> None:
+    until = time.monotonic() + SERVE_TIMEOUT
+    while time.monotonic() < until:
+        if problem := server.ended():
+            raise ViewerError(problem)
+        try:
+            socket.create_connection((HOST, port), 0.2).close()
+        except OSError:
+            time.sleep(0.05)
+        else:
+            return
+    raise ViewerError(
+        f"the viewer does not respond on port {port}, {SERVE_TIMEOUT:g} s after its start"
     )

@@ -11,7 +11,7 @@ import numpy as np
 
 from inspector.analysis.status import EXIT, Status
 from inspector.analysis.status import worst as worst_code
-from inspector.pair.changes import NEW
+from inspector.compare.changes import NEW
 from inspector.regression.findings import (
     LOUDER,
     ChangedFinding,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
+from inspector.compare.changes import NEW, RESOLVED
+from inspector.compare.pair import SAME_RATE
 from inspector.pair.alignment import Alignment, align
-from inspector.pair.changes import NEW, RESOLVED
-from inspector.pair.common import SAME_RATE
 from inspector.regression.measure import Finding, Measured
 from noisemodel import decimated
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from inspector.analysis.status import EXIT, Status
-from inspector.pair.changes import NEW, RESOLVED
+from inspector.compare.changes import NEW, RESOLVED
 from inspector.regression.difference import (
     Change,
     Compared,

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from inspector.compare.changes import steps
+from inspector.compare.pair import Pair
 from inspector.errors import InspectorError
-from inspector.pair.levels import steps
-from inspector.pair.pair import Pair
 from inspector.regression.difference import CELL, Compared
 from inspector.regression.statistic import ALPHA
 

@@ -2,9 +2,10 @@
 
 from pathlib import Path
 
+from inspector.compare.pair import compare
 from inspector.errors import InspectorError
 from inspector.library import Library
-from inspector.pair import Align, compare
+from inspector.pair.alignment import Align
 from inspector.regression import picture
 from inspector.regression.difference import Compared, Difference, worst, worst_runs
 from inspector.regression.findings import lag
@@ -87,7 +88,7 @@ def write_pair(
     Raises:
         OutputError: If a file exists or cannot be written.
     """
-    from inspector.pair.recording import write as write_recording
+    from inspector.compare.recording import write as write_recording
 
     before, after = worst_runs(row)
     # Runs of different motion begin together: nothing is cut off to lay one beside the other.

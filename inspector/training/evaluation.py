@@ -12,7 +12,7 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.analyse import extents
 from inspector.colors import SERIES, Color, of_classes
-from inspector.comparison import picture
+from inspector.compare import picture
 from inspector.progress import progress
 from inspector.text import counted
 from inspector.training.part import Part

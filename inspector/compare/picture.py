@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+
 TERM_COLORS = ("#3b3b6d", "#d98c4a", "#f2e3c4")
 """Of A, B and C: dark, middle and light, so that they differ in grey too."""
 COLORS = ("#d55e00", "#0072b2", "#000000", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
@@ -34,27 +35,13 @@ DPI = 100
 
 
 def require() -> None:
-    """Refuse a picture before long work is done for it.
-
-    Raises:
-        InspectorError: If matplotlib is not installed.
-    """
+    """Refuse a picture before long work is done for it."""
     if find_spec("matplotlib") is None:
         raise InspectorError('a picture needs matplotlib; `pip install "noise-inspector[report]"`')
 
 
 def draw(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
-    """Draw what was found as a PNG file.
-
-    Args:
-        found: One comparison or more.
-        path: The file to write.
-        overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        InspectorError: If matplotlib is not installed.
-        OutputError: If the file exists or cannot be written.
-    """
+    """Draw what was found as a PNG file."""
     require()
     from matplotlib.figure import Figure
 

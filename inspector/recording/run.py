@@ -1,10 +1,12 @@
-"""A run as a rerun recording: what goes into it, in order."""
+"""A run as a rerun recording: what goes into it, in order, whole or not at all."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import rerun as rr
 from rerun.urdf import UrdfTree
@@ -12,16 +14,63 @@ from rerun.urdf import UrdfTree
 from inspector import levels
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
-from inspector.recording import classes, details, framing, joints, noise, robot, series, unstable
-from inspector.recording import links as strip_rows
-from inspector.recording import spectrogram as spectrograms
-from inspector.recording.blueprint import Contents, layout
-from inspector.recording.limbs import limbs
-from inspector.recording.spectrogram import log_bars
-from inspector.recording.stream import log_report, writing
+from inspector.recording import axes, framing, panels, robot, unstable
+from inspector.recording import panels as spectrograms
+from inspector.recording import panels as strip_rows
+from inspector.recording.layout import Contents, layout
+from inspector.recording.panels import limbs, log_bars
 from inspector.report.markdown import report
 from inspector.spectrogram import spectrogram
+from noisemodel.atomic import replacing
 from noisemodel.links import vibrating
+
+APPLICATION = "inspector"
+PATIENCE = 3.0
+"""How long a file may stay as it is while it is written, in [s]."""
+
+
+@contextmanager
+def writing(path: Path, identity: str, *, overwrite: bool = False) -> Iterator[rr.RecordingStream]:
+    """Write a recording for as long as the block lasts."""
+    with replacing(path, overwrite=overwrite) as temporary:
+        recording = rr.RecordingStream(APPLICATION, recording_id=identity[:32])
+        recording.save(temporary)
+        yield recording
+        if _flushed(recording, temporary):
+            recording.disconnect()
+        else:
+            unstable.abandon(recording)
+        require_whole(temporary)
+
+
+def _flushed(recording: rr.RecordingStream, path: Path) -> bool:
+    """Write what waits, as long as the file grows: of a full disk rerun waits without end."""
+    size = -1
+    while path.stat().st_size != size:
+        size = path.stat().st_size
+        with suppress(RuntimeError):  # not done within `PATIENCE`, or it cannot be written
+            recording.flush(timeout_sec=PATIENCE)
+            return True
+    return False
+
+
+def require_whole(recording: Path) -> None:
+    """Refuse a recording that rerun could not write to its end; it tells that to its log only."""
+    if unstable.has_end(recording):
+        return
+    with recording.open("ab") as file:
+        file.write(bytes(1 << 16))  # fails as rerun did
+    raise OSError("the recording is incomplete")
+
+
+def log_report(
+    recording: rr.RecordingStream, name: str, markdown: str, properties: dict[str, Any]
+) -> None:
+    """Log what a recording is called, its report and its properties."""
+    recording.log("/report", rr.TextDocument(markdown, media_type="text/markdown"), static=True)
+    recording.send_recording_name(name)
+    recording.send_property("inspector", rr.AnyValues(**properties))
+
 
 ASPECT = 1.3
 """Least width of the robot's view by its height."""
@@ -40,16 +89,8 @@ def write(
     The same input makes a recording of the same id: opened again, it replaces itself.
 
     Args:
-        analysis: A run with its noise and labels.
-        path: The file to write, by convention ``*.rrd``.
-        overwrite: Whether a file that exists may be replaced.
         sound: The run made audible, a WAV file that starts with the run; none if empty.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; -70 unless given.
-
-    Raises:
-        OutputError: If the file exists or cannot be written.
-        RobotError: If the run's URDF cannot be read, or lacks one of the run's joints.
-        MeshError: If one of the robot's meshes cannot be read.
     """
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
@@ -67,26 +108,26 @@ def _log(
     floor: float | None,
 ) -> Contents:
     run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
-    noise.log_span(recording, run)
+    panels.log_span(recording, run)
     strips = []
-    if (panel := strip_rows.log_joints(recording, analysis)) is not None:
+    if (panel := strip_rows.log_joint_levels(recording, analysis)) is not None:
         strips.append(("Joints above 10 Hz", panel))
     if tree is not None and links is not None:
         assert run.robot is not None
         robot.log(recording, tree, run, coloured=True)
         urdf = robot.drawn_file(run.robot, folder)
-        (seen,) = framing.log(recording, [(tree, run)], urdf, aspect=ASPECT)
-        strips.append(("Links above 10 Hz", strip_rows.log(recording, tree, analysis, links)))
-    shown_classes = classes.log(recording, analysis)
-    curves = noise.log(recording, analysis)
+        (seen,) = framing.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
+        strips.append(("Links above 10 Hz", strip_rows.log_links(recording, tree, analysis, links)))
+    shown_classes = panels.log_classes(recording, analysis)
+    curves = panels.log_curves(recording, analysis)
     scale = levels.SPECTRUM if floor is None else replace(levels.SPECTRUM, low=floor)
     fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
     log_bars(recording, "/spectrum/now", spectrum)
     if sound:
-        unstable.log_audio(recording, "/sound", sound, series.TIMELINE, start=float(run.time[0]))
-    limb_plots = joints.log(recording, run, limbs(run.joint_names, tree))
-    shown = details.log(recording, analysis, moments)
+        unstable.log_audio(recording, "/sound", sound, axes.TIMELINE, start=float(run.time[0]))
+    limb_plots = panels.log_joints(recording, run, limbs(run.joint_names, tree))
+    shown = panels.log_details(recording, analysis, moments)
     text = report(analysis)
     _log_text(recording, analysis, text, {} if tree is None else robot.entities(tree))
     failures = [moment for moment in moments if moment.failure]
@@ -94,7 +135,7 @@ def _log(
         text=text,
         classes=shown_classes,
         curves=curves,
-        spectrogram=spectrograms.log(recording, analysis, spectrum, scale),
+        spectrogram=spectrograms.log_spectrogram(recording, analysis, spectrum, scale),
         orders=spectrograms.log_orders(recording, analysis, scale),
         strips=strips,
         joints=limb_plots,
@@ -102,7 +143,7 @@ def _log(
         camera=seen,
         links=links is not None,
         terms=links is not None and bool(links.terms),
-        events=len(classes.events(analysis)),
+        events=len(panels.listed_events(analysis)),
         scores=analysis.labels is not None,
         sound=bool(sound),
         rate=run.rate,
@@ -129,15 +170,7 @@ def _log_text(
 
 
 def linked(markdown: str, entities: Mapping[str, str]) -> str:
-    """Let the names of links that stand before a share point to their entities.
-
-    Args:
-        markdown: A report.
-        entities: Entity path by name of the link.
-
-    Returns:
-        The report with its names as Markdown links.
-    """
+    """Let the names of links that stand before a share point to their entities."""
 
     def address(found: re.Match[str]) -> str:
         entity = entities.get(found[1], "").lstrip("/")

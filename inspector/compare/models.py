@@ -1,6 +1,8 @@
-"""Comparisons of noise models as a rerun recording: heat maps, a table, each robot's curves."""
+"""Comparisons of noise models: CSV, and a recording of heat maps, a table and curves."""
 
+import csv
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +11,18 @@ from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
 from inspector import colors
+from inspector.compare import picture
+from inspector.errors import InspectorError
 from inspector.levels import Scale
-from inspector.recording import axes, series, unstable
+from inspector.recording import axes, unstable
 from inspector.recording.axes import Label, Panel
-from inspector.recording.spectrogram import HEIGHT, log_panel
-from inspector.recording.stream import writing
+from inspector.recording.panels import HEIGHT, log_panel
+from inspector.recording.run import writing
 from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
+from inspector.text import cell
 from noisemodel import Comparisons, RobotComparison
+from noisemodel.atomic import refuse_existing, replacing
 from noisemodel.links import vibrating
 from noisemodel.noise import decibel
 from noisemodel.types import Array
@@ -48,16 +54,7 @@ SPAN = "/span"
 
 
 def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
-    """Write comparisons as one recording, whole or not at all.
-
-    Args:
-        found: One comparison or more.
-        path: The file to write, by convention ``*.rrd``.
-        overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        OutputError: If the file exists or cannot be written.
-    """
+    """Write comparisons as one recording, whole or not at all."""
     text = str(found)
     # The same comparison has the same id: opened again, it replaces itself in the viewer.
     identity = hashlib.sha256("\n".join([text, *(one.name for one in found)]).encode())
@@ -67,7 +64,7 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
             _log_map(recording, found, name)
         ends = np.array([min(one.time[0] for one in found), max(one.time[-1] for one in found)])
         nothing = np.full((2, 1), np.nan)
-        series.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
+        axes.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
         for one in found:
             _log(recording, one)
         document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
@@ -79,7 +76,6 @@ def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
     """Level of each estimate every 10 ms, relative to its own root mean square.
 
     Args:
-        one: The comparison.
         pressure: Its pressures, or a part of them, shape (kinds, samples).
 
     Returns:
@@ -95,14 +91,7 @@ def levels(one: RobotComparison, pressure: Array) -> tuple[Array, Array]:
 
 
 def layout(found: Comparisons) -> Blueprint:
-    """Lay out a recording: heat maps and table first, then one tab per robot.
-
-    Args:
-        found: The comparisons.
-
-    Returns:
-        The blueprint; all time axes are linked.
-    """
+    """Lay out a recording: heat maps and table first, then one tab per robot."""
     reference = found[0].kinds[found[0].comparison.reference]
     columns, rows = len(found[0].kinds), len(found)
     across, down = (-NAMED[0], CELL[0] * columns), (-NAMED[1], CELL[1] * rows)
@@ -122,28 +111,20 @@ def layout(found: Comparisons) -> Blueprint:
     overview = unstable.above(
         (unstable.beside(*maps), share), (table, WHOLE - share), name="Robots"
     )
-    return unstable.blueprint(unstable.tabs(overview, *map(_robot, found)), series.TIMELINE)
+    return unstable.blueprint(unstable.tabs(overview, *map(_robot, found)), axes.TIMELINE)
 
 
 def cells(found: Comparisons, name: str) -> Array:
     """The numbers of a heat map.
 
     Args:
-        found: The comparisons.
         name: "correlation" of the envelopes or "distance" of the spectra in [dB], to the reference.
-
-    Returns:
-        Shape (robots, kinds); NaN where there is none.
     """
     return np.stack([getattr(one.comparison, name)[:, one.comparison.reference] for one in found])
 
 
 def shades(numbers: Array, name: str) -> NDArray[np.uint8]:
     """Colour the numbers of a heat map: the farther from the reference, the lighter.
-
-    Args:
-        numbers: See `cells`.
-        name: Of the heat map.
 
     Returns:
         Red, green and blue, shape (robots, kinds, 3); of NaN that of the background.
@@ -202,9 +183,7 @@ def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
         time, level = levels(one, pressure)
         for index, (kind, color) in enumerate(shown.items()):
             path = f"{_root(one)}/{part}/{kind}"
-            series.log_lines(
-                recording, path, time, level[:, [index]], names=[kind], colours=[color]
-            )
+            axes.log_lines(recording, path, time, level[:, [index]], names=[kind], colours=[color])
         panel = _panel(one, part)
         axes.log_left(recording, panel, [Label(0.5, f"{PARTS[part]}\n[dB re its rms]")])
         named = [
@@ -224,14 +203,14 @@ def _log(recording: rr.RecordingStream, one: RobotComparison) -> None:
         unstable.log_stretches(
             recording,
             f"{_root(one)}/events/{label}",
-            series.TIMELINE,
+            axes.TIMELINE,
             own,
             between=(lower, upper),
             name=label,
             color=states[label],
             opaque=True,
         )
-    axes.log_left(recording, panel, axes.rows(labels) or [Label(0.5, "no events")])
+    axes.log_left(recording, panel, axes.row_labels(labels) or [Label(0.5, "no events")])
     axes.log_right(recording, panel, [Label(0.5, "events")])
 
 
@@ -268,3 +247,67 @@ def _spectrogram(one: RobotComparison, kind: str) -> Part:
 
 def _root(one: RobotComparison) -> str:
     return f"/{rr.escape_entity_path_part(one.name)}"
+
+
+MOST = 8
+"""Robots that a recording may hold; more make the viewer too slow."""
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What to write; None is not written.
+
+    Attributes:
+        csv: All numbers.
+        recording: For the viewer.
+        picture: A PNG file.
+        overwrite: Whether files that exist may be replaced.
+    """
+
+    csv: Path | None = None
+    recording: Path | None = None
+    picture: Path | None = None
+    overwrite: bool = False
+
+    def check(self, count: int) -> None:
+        """Refuse what cannot be written before long work is done for it."""
+        for path in filter(None, (self.csv, self.recording, self.picture)):
+            refuse_existing(path, overwrite=self.overwrite)
+        if self.recording and count > MOST:
+            raise InspectorError(
+                f"{self.recording}: a recording holds {MOST} robots and runs at most, not {count};"
+                " name some of them, or write --csv and --picture alone"
+            )
+        if self.picture:
+            picture.require()
+
+    def write(self, found: Comparisons) -> None:
+        """Write the files."""
+        if self.csv:
+            write_csv(found, self.csv, overwrite=self.overwrite)
+        if self.recording:
+            write(found, self.recording, overwrite=self.overwrite)
+        if self.picture:
+            picture.draw(found, self.picture, overwrite=self.overwrite)
+
+
+def write_csv(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
+    """Write a row for each robot and kind, with the columns of ``Comparisons.to_arrow``."""
+    table = found.to_arrow()
+    with (
+        replacing(path, overwrite=overwrite) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
+        writer = csv.DictWriter(file, table.column_names, lineterminator="\n")
+        writer.writeheader()
+        for row in table.to_pylist():
+            writer.writerow({name: _cell(name, value) for name, value in row.items()})
+
+
+def _cell(name: str, value: str | bool | int | float) -> str | int:
+    """Print a number as the CSV of earlier versions did."""
+    if isinstance(value, float):
+        return f"{value:g}" if name == "rate_hz" else f"{value:.4f}"
+    if isinstance(value, str):
+        return cell(value)
+    return int(value) if isinstance(value, bool) else value

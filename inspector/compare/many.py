@@ -3,6 +3,8 @@
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import takewhile
 from pathlib import Path
 
@@ -12,15 +14,90 @@ from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 
 from inspector import colors, levels
-from inspector.many.many import Several
-from inspector.recording import axes, classes, rows, series, unstable
-from inspector.recording.axes import Label, Panel
-from inspector.recording.noise import HIGH_DB, LOW_DB
-from inspector.recording.series import TIMELINE
-from inspector.recording.stream import log_report, writing
+from inspector.analysis.analyse import Analysis, analyse
+from inspector.levels import FLOOR_DB, velocity_levels
+from inspector.library import Library
+from inspector.logs.opening import Opened
+from inspector.recording import axes, panels, unstable
+from inspector.recording.axes import TIMELINE, Label, Panel
+from inspector.recording.panels import HIGH_DB, LOW_DB
+from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import spoken
+from noisemodel import Block, Run
 from noisemodel.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Several:
+    """Runs that are laid side by side.
+
+    Attributes:
+        names: What each is called; no two are alike.
+        sides: Each with what was found in it, in the order in which they were given.
+    """
+
+    names: tuple[str, ...]
+    sides: tuple[Analysis, ...]
+
+    @cached_property
+    def levels(self) -> tuple[tuple[Array, Array], ...]:
+        """Of each run, starts of steps of 50 ms in [s], and levels above 10 Hz there.
+
+        In [dB re 1 rad/s], each of shape (steps,); NaN in gaps.
+        """
+        found = []
+        for side in self.sides:
+            run, noise = side.run, side.noise[:, None]
+            time, level = velocity_levels(noise, run.mask, run.rate, start=float(run.time[0]))
+            found.append((time, level[:, 0]))
+        return tuple(found)
+
+    @cached_property
+    def peaks(self) -> tuple[float, ...]:
+        """Highest level of each run, in [dB re 1 rad/s]."""
+        return tuple(float(np.nanmax(level, initial=FLOOR_DB)) for _, level in self.levels)
+
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """Indices of the runs, the worst first.
+
+        The worst has findings for the longest time; among runs alike in that, the loudest counts.
+        """
+        return tuple(sorted(range(len(self.sides)), key=lambda i: (-self.found(i), -self.peaks[i])))
+
+    def found(self, index: int) -> float:
+        """How long a run has findings, in [s]."""
+        return sum(event.stop - event.start for event in self.sides[index].findings)
+
+    @property
+    def worst(self) -> int | None:
+        """Index of the run that is worst; None if none has a finding."""
+        return self.order[0] if self.found(self.order[0]) > 0.0 else None
+
+
+def lay(runs: Sequence[Opened], library: Library, *, from_start: bool = True) -> Several:
+    """Lay runs side by side, and analyse each."""
+    shown = [opened.source.shown for opened in runs]
+    unique = len({path.stem for path in shown}) == len(shown)
+    names = [path.stem if unique else str(path) for path in shown]
+    seen: dict[str, int] = {}
+    for place, name in enumerate(names):
+        seen[name] = seen.get(name, 0) + 1
+        names[place] = name if seen[name] == 1 else f"{name} ({seen[name]})"
+    sides = []
+    for opened, name in zip(runs, names, strict=True):
+        run = _from_start(opened.run) if from_start else opened.run
+        found = analyse(run, library, name=name, sha256=opened.sha256)
+        sides.append(replace(found, assumed=opened.assumed))
+    return Several(tuple(names), tuple(sides))
+
+
+def _from_start(run: Run) -> Run:
+    start = float(run.time[0])
+    blocks = tuple(Block(b.start - start, b.stop - start, b.label) for b in run.blocks)
+    return replace(run, time=run.time - start, blocks=blocks)
+
 
 CURVES = 8
 """Runs whose level is drawn as a curve, the worst; more lines cannot be told apart."""
@@ -50,23 +127,14 @@ ALL = ("$origin/**", SPAN)
 
 
 def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
-    """Write the recording of several runs, whole or not at all.
-
-    Args:
-        several: The runs.
-        path: The file to write, by convention ``*.rrd``.
-        overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        OutputError: If the file exists or cannot be written.
-    """
+    """Write the recording of several runs, whole or not at all."""
     identity = " ".join(f"{side.name} {side.sha256}" for side in several.sides)
     key = hashlib.sha256(identity.encode()).hexdigest()
     with writing(path, key, overwrite=overwrite) as recording:
         begin = min(float(side.run.time[0]) for side in several.sides)
         end = max(float(side.run.time[-1]) for side in several.sides)
         ends, nothing = np.array([begin, end]), np.full((2, 1), np.nan)
-        series.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
+        axes.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
         height = _height(len(several.names))
         panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
         panels["curves"] = Panel("curves", CURVE)
@@ -80,15 +148,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
 
 
 def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
-    """Lay several runs out: a table above or at the left, everything over time below or beside.
-
-    Args:
-        several: The runs.
-        panels: Of classes and levels.
-
-    Returns:
-        The blueprint; all time axes are linked.
-    """
+    """Lay several runs out: a table above or at the left, everything over time below or beside."""
     plots = {
         name: axes.part(
             panels[name],
@@ -195,29 +255,29 @@ def _log_rows(
     lines = max(1, int(height / LINE))
     width = 0.8 * height if lines == 1 else height / (lines + 1) + 1.0
     path = "/class/found" if panel.name == "class" else f"/{panel.name}"
-    rows.log(recording, path, edges, rgba, names=names, width=width, lines=lines)
+    axes.log_rows(recording, path, edges, rgba, names=names, width=width, lines=lines)
 
 
 def _names(several: Several, panel: Panel) -> list[Label]:
     """Names of the rows, as many as there is room for; the worst is marked."""
     step = int(np.ceil(NAMED * len(several.names) / (panel.height - axes.AXIS)))
     labels = []
-    for index, label in enumerate(axes.rows(shortened(several.names))):
+    for index, label in enumerate(axes.row_labels(shortened(several.names))):
         worst = index == several.worst
         if index % step == 0 or worst:
             text = f"{label.text}\nworst" if worst and step == 1 else label.text
-            color = classes.readable(colors.CLASSES["impact"]) if worst else axes.INK
+            color = panels.readable(colors.CLASSES["impact"]) if worst else axes.INK
             labels.append(Label(label.place, text, color=color))
     return labels
 
 
 def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) -> None:
-    colours = classes.colours_of(*several.sides)
+    colours = panels.colours_of(*several.sides)
     lanes = [[each for each in side.lane if each[2]] for side in several.sides]
     edges = np.unique([0.0, *(time for lane in lanes for each in lane for time in each[:2])])
     if len(edges) < 2:
         edges = np.array([0.0, 1.0])
-    rgba = np.tile(np.array(rows.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
+    rgba = np.tile(np.array(axes.EMPTY, dtype=np.uint8), (len(lanes), len(edges) - 1, 1))
     for row, lane in enumerate(lanes):
         for start, stop, name in lane:
             first, last = np.searchsorted(edges, (start, stop))
@@ -232,14 +292,14 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
             for event in side.findings
             if event.label == name
         ]
-        shape = classes.MARKERS[number % len(classes.MARKERS)]
+        shape = panels.MARKERS[number % len(panels.MARKERS)]
         style = rr.SeriesPoints(
             names=[spoken(name)], colors=[axes.INK], markers=[shape], marker_sizes=[4.0]
         )
         time, place = np.array(sorted(marks)).T
         recording.log(f"/class/mark/{name}", style, static=True)
         recording.send_columns(
-            f"/class/mark/{name}", indexes=[series.at(time)], columns=series.scalars(place)
+            f"/class/mark/{name}", indexes=[axes.at(time)], columns=axes.scalars(place)
         )
     axes.log_left(recording, panel, _names(several, panel))
     shown = [*failing, "ok"]
@@ -249,7 +309,7 @@ def _log_classes(recording: rr.RecordingStream, several: Several, panel: Panel) 
             spoken(name)
             if name == "ok"
             else f"{SIGNS[row % len(SIGNS)]} {spoken(name)}".replace("high ", "high\n"),
-            color=classes.readable(colours.get(name, colors.CLASSES["ok"])),
+            color=panels.readable(colours.get(name, colors.CLASSES["ok"])),
         )
         for row, name in enumerate(shown)
     ]
@@ -265,8 +325,8 @@ def _log_levels(
     if len(edges) < 2:
         edges = np.array([span[0], span[0] + step])
     found = np.stack([_columns(time, level, edges) for time, level in several.levels])
-    rgba = levels.JOINTS.colours(np.nan_to_num(found, nan=-np.inf), shades=rows.SHADES)
-    rgba[np.isnan(found)] = rows.EMPTY
+    rgba = levels.JOINTS.colours(np.nan_to_num(found, nan=-np.inf), shades=axes.SHADES)
+    rgba[np.isnan(found)] = axes.EMPTY
     called = [f"{name} [{levels.JOINTS.unit}]" for name in several.names]
     _log_rows(recording, several, panel, edges, rgba, called)
     axes.log_left(recording, panel, _names(several, panel))
@@ -286,7 +346,7 @@ def _log_curves(recording: rr.RecordingStream, several: Several, panel: Panel) -
     for index, color in zip(chosen, colors.of_series(len(chosen)), strict=True):
         time, level = several.levels[index]
         path, name = f"/curves/{index:03d}", several.names[index]
-        series.log_lines(recording, path, time, level[:, None], names=[name], colours=[color])
+        axes.log_lines(recording, path, time, level[:, None], names=[name], colours=[color])
     span = HIGH_DB - LOW_DB
     marks = [
         Label((mark - LOW_DB) / span, axes.written(mark), 44.0)

@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from inspector.errors import InspectorError, OptionError
 from inspector.recording import viewer
-from inspector.recording.viewer import HOST, ViewerError
-from inspector.recording.web import free_port
+from inspector.recording.viewer import HOST, ViewerError, free_port
 from noisemodel.atomic import refuse_existing, replacing
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
+
 
 DRIVER_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 SIZE = (1440, 900)
@@ -40,11 +40,7 @@ def missing_packages() -> tuple[str, ...]:
 
 
 def require() -> None:
-    """Refuse a picture before long work is done for it.
-
-    Raises:
-        ViewerError: If a system package is missing.
-    """
+    """Refuse a picture before long work is done for it."""
     missing = missing_packages()
     if missing:
         raise ViewerError(
@@ -64,19 +60,7 @@ def shoot(
     """Take a picture of a recording.
 
     Args:
-        recording: A ``*.rrd`` file.
-        output: The PNG file to write.
         seconds: Where the time cursor stands, in [s].
-        size: Width and height, in points.
-        overwrite: Whether a file that exists may be replaced.
-
-    Returns:
-        What the views report, a line each.
-
-    Raises:
-        InspectorError: If the recording cannot be read.
-        ViewerError: If a system package is missing, or the viewer ends or does not respond.
-        OutputError: If the file exists or cannot be written.
     """
     require()
     check_recording(recording)
@@ -90,11 +74,7 @@ def shoot(
 
 
 def check_recording(path: Path) -> None:
-    """Refuse a file that is no recording: the viewer would draw a picture of its welcome.
-
-    Raises:
-        InspectorError: If it is none, or cannot be read.
-    """
+    """Refuse a file that is no recording: the viewer would draw a picture of its welcome."""
     try:
         with path.open("rb") as file:
             head = file.read(len(MAGIC))
@@ -105,14 +85,7 @@ def check_recording(path: Path) -> None:
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """Read the size of a picture.
-
-    Args:
-        text: Width and height, such as "1440x900".
-
-    Raises:
-        OptionError: If it is none.
-    """
+    """Read the size of a picture."""
     numbers = re.fullmatch(r"(\d{3,4})x(\d{3,4})", text)
     if numbers is None:
         raise OptionError(f"a size of {text!r}, expected width and height such as 1440x900")
@@ -121,17 +94,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 @contextmanager
 def headless_viewer(size: tuple[int, int] = SIZE) -> "Iterator[ViewerClient]":
-    """Run rerun's viewer without a window, on loopback, and end it with all its children.
-
-    Args:
-        size: Width and height, in points.
-
-    Yields:
-        A client of the viewer.
-
-    Raises:
-        ViewerError: If the viewer is not installed, ends, or does not respond.
-    """
+    """Run rerun's viewer without a window, on loopback, and end it with all its children."""
     from inspector.recording import unstable
 
     port = free_port()
@@ -163,15 +126,7 @@ def picture(client: "ViewerClient", recording: Path, seconds: float) -> bytes:
     """Open a recording at a time and wait until nothing moves any more.
 
     Args:
-        client: A viewer without a window.
-        recording: A ``*.rrd`` file.
         seconds: Where the time cursor stands, in [s].
-
-    Returns:
-        A PNG file.
-
-    Raises:
-        ViewerError: If the viewer draws nothing.
     """
     client.open(str(recording.resolve()))
     until = time.monotonic() + TIMEOUT

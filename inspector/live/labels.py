@@ -1,6 +1,7 @@
-"""Labels of motion while it arrives, by the model that fits its rate."""
+"""Labels while samples arrive, and the findings that they make, as those of a whole run."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from math import ceil
 
 import numpy as np
@@ -8,11 +9,54 @@ import numpy as np
 import noiseclassifier as nc
 import noisemodel as nm
 from inspector.library import Library
-from inspector.live.decimator import Decimator
+from noiseclassifier import Event, Labels
 from noiseclassifier.profile import NOMINAL, TOLERANCE
 from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE
 from noisemodel.decimation import EDGE
 from noisemodel.types import Array, Mask
+
+BETA = 5.0
+"""Of the Kaiser window, as that of SciPy's polyphase resampling."""
+
+
+class Decimator:
+    """Low-passes and decimates signals, and marks the samples for which it cannot.
+
+    In the middle of a signal it returns what `noisemodel.decimated` does. That one extrapolates
+    beyond the ends, which is impossible while samples come in: here the first ten samples are not
+    valid, and the last ten are missing.
+    """
+
+    def __init__(self, ratio: int, columns: int) -> None:
+        self._ratio, self.columns = ratio, columns
+        reach = EDGE * ratio
+        cutoff = np.sinc(np.arange(-reach, reach + 1) / ratio)
+        taps = cutoff * np.kaiser(2 * reach + 1, BETA)
+        self._taps = taps / taps.sum()  # a constant stays what it is
+        self._samples = np.zeros((reach, columns))
+        self._valid = np.zeros(reach, dtype=bool)
+
+    def push(self, samples: Array, valid: Mask) -> tuple[Array, Mask]:
+        """Take samples.
+
+        Args:
+            valid: False in gaps, shape (samples,).
+
+        Returns:
+            What is complete now, shape (lower, columns), and which of it touches no gap.
+        """
+        samples = np.concatenate((self._samples, samples))
+        valid = np.concatenate((self._valid, valid))
+        length = len(self._taps)
+        count = max(0, (len(samples) - length) // self._ratio + 1)
+        used = count * self._ratio
+        self._samples, self._valid = samples[used:], valid[used:]
+        if not count:
+            return samples[:0], valid[:0]
+        view = np.lib.stride_tricks.sliding_window_view
+        lower: Array = view(samples, length, axis=0)[:: self._ratio][:count] @ self._taps
+        return lower, np.asarray(view(valid, length)[:: self._ratio][:count].all(axis=1))
+
 
 NOISY = ("base_velocity", "velocity", "velocity_desired", "effort")
 """The signals that models take: where one of them is unknown there is no label."""
@@ -20,9 +64,6 @@ NOISY = ("base_velocity", "velocity", "velocity_desired", "effort")
 
 class NoiseSignals:
     """Noise signals of motion in columns: `noisemodel.norms` and `by_joint`, without a run.
-
-    Args:
-        widths: Columns of each signal that arrives.
 
     Attributes:
         columns: How many columns make noise: those of ``NOISY``, in that order.
@@ -60,7 +101,6 @@ class NoiseSignals:
 
         Args:
             motion: Velocities, shape (samples, columns), in [rad/s] and [m/s].
-            names: Which.
 
         Returns:
             Signals by name, norms of shape (samples,), joints of (joints, samples), in [rad/s].
@@ -72,9 +112,7 @@ class Labeller:
     """Labels frames as they become complete, or gives the reason why it does not.
 
     Args:
-        library: Models to choose from.
         rate: Samples per second, in [Hz].
-        widths: Columns of each signal that arrives.
 
     Attributes:
         model: Name of the model that labels; empty without one.
@@ -164,3 +202,107 @@ class Labeller:
             np.zeros((rest, self._decimator.columns)), np.zeros(rest, dtype=bool)
         )
         self._stream.push(self._signals.of(lower, self._names), valid)
+
+
+SETTLED = 3
+"""Hops after the start of an event by which its class is told from that of its edge."""
+
+
+class Findings:
+    """Collects labels, and keeps of them what may still become part of an event.
+
+    A finding is decided when a frame begins after it. Memory grows with events and
+    with the stretch that lasts, not with time.
+
+    Attributes:
+        frames: Frames that were added.
+    """
+
+    def __init__(self) -> None:
+        self.frames = 0
+        self._closed: list[Event] = []
+        self._open: Labels | None = None
+
+    def add(self, labels: Labels) -> None:
+        """Take the labels of the next frames."""
+        self.frames += len(labels)
+        waiting = labels if self._open is None else Labels.concatenated((self._open, labels))
+        quiet = waiting.label == "ok"
+        # How far the frames reach that are not `ok`; those that it touches join them.
+        reached = np.maximum.accumulate(np.where(quiet, -np.inf, waiting.stop))
+        apart = np.flatnonzero(quiet & (waiting.start > np.append(-np.inf, reached[:-1])))
+        if not len(apart):
+            self._open = waiting
+            return
+        # The frame that is `ok` belongs to both parts: neither ends where the signal goes on.
+        last = int(apart[-1])
+        if not quiet[:last].all():  # most often all of it is `ok`, and a label must not wait
+            self._closed += waiting.part(slice(last + 1)).events()
+        self._open = waiting.part(slice(last, None))
+
+    @property
+    def decided(self) -> float:
+        """Time at which the earliest frame starts whose event may still change, in [s]."""
+        return -float("inf") if self._open is None else float(self._open.start[0])
+
+    @property
+    def confirmed(self) -> tuple[Event, ...]:
+        """The events that will not vanish, whatever comes: as if an `ok` frame came next."""
+        if self._open is None:
+            return tuple(self._closed)
+        last = self._open.part(slice(-1, None))
+        quiet = replace(
+            last,
+            label=np.full_like(last.label, "ok"),
+            above_threshold=None if last.above_threshold is None else np.zeros(1, dtype=bool),
+            novel=None if last.novel is None else np.zeros(1, dtype=bool),
+        )
+        return (*self._closed, *Labels.concatenated((self._open, quiet)).events())
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events so far, as if the signal ended here."""
+        return (*self._closed, *(() if self._open is None else self._open.events()))
+
+
+class News:
+    """Tells of each event twice: when it is there, and when it is over.
+
+    The frames at the edges of a failure often look like another one: an event is told of when there
+    are frames that begin `SETTLED` hops after it. What it is called may still change: `unknown`
+    frames take the class of a failure that follows. Such an event is told of again under its new
+    name, and only that ends.
+
+    Args:
+        wait: Time from the start of an event to the stop of the frames that it waits for, in [s].
+    """
+
+    def __init__(self, tell: Callable[[Event, bool], None], wait: float = 0.0) -> None:
+        self._tell, self._wait = tell, wait
+        self._begun: dict[str, float] = {}
+        self._ended: dict[str, float] = {}
+
+    def update(self, events: Sequence[Event], decided: float, now: float = float("inf")) -> None:
+        """Tell of what is new.
+
+        Args:
+            now: Stop of the latest frame, in [s].
+            decided: Time up to which nothing changes any more, in [s]: an event that stops earlier
+                is over, since what continues it would begin before its end.
+        """
+        never = -float("inf")
+        for event in events:
+            if event.stop <= self._ended.get(event.label, never):
+                continue
+            if event.start + self._wait > now and event.stop >= decided:
+                continue
+            if event.stop > self._begun.get(event.label, never) and not self._lasts(event):
+                self._tell(event, False)
+            self._begun[event.label] = max(event.stop, self._begun.get(event.label, never))
+            if event.stop < decided:
+                self._ended[event.label] = event.stop
+                self._tell(event, True)
+
+    def _lasts(self, event: Event) -> bool:
+        """Whether an event has been told of before: it continues one of its class."""
+        return self._begun.get(event.label, -float("inf")) >= event.start

@@ -8,13 +8,9 @@ from math import ceil
 from rerun.blueprint import Blueprint
 
 from inspector.recording import axes, unstable
-from inspector.recording.axes import Panel
+from inspector.recording.axes import TIMELINE, Panel
 from inspector.recording.camera import Camera
-from inspector.recording.details import Detail
-from inspector.recording.joints import Plot
-from inspector.recording.noise import Curve
-from inspector.recording.series import TIMELINE
-from inspector.recording.spectrogram import TOP_HZ
+from inspector.recording.panels import TOP_HZ, Curve, Detail, Plot
 from inspector.recording.unstable import Part
 
 HEAD, PARAGRAPH, LINE, FOOT = 36.0, 31.0, 15.5, 28.0
@@ -73,14 +69,7 @@ class Contents:
 
 
 def layout(contents: Contents) -> Blueprint:
-    """Lay out a recording.
-
-    Args:
-        contents: What there is to show.
-
-    Returns:
-        The blueprint; all time axes are linked but those of the details.
-    """
+    """Lay out a recording."""
     over_time: list[tuple[Part, float]] = []
     if contents.classes is not None:
         over_time.append((_rows(contents.classes, "/class"), contents.classes.height))
@@ -111,12 +100,7 @@ def _left(contents: Contents) -> Part:
 
 
 def height(markdown: str) -> float:
-    """Height of a text as far as its parts fit, in points: none is cut through by the edge.
-
-    Args:
-        markdown: A title, then paragraphs and lists with a blank line between them. A list belongs
-            to what is above it.
-    """
+    """Height of a text as far as its parts fit, in points: none is cut through by the edge."""
     found = HEAD - PARAGRAPH
     for part in re.split(r"\n\n(?!- )", markdown.strip()):
         below = found
@@ -171,11 +155,11 @@ def _strips(contents: Contents) -> Part:
         parts.append(
             unstable.plot("Power of links [dB re 1 pW]", "/power/links", paths, legend=True)
         )
-    parts += limbs(contents.joints)
+    parts += limb_tabs(contents.joints)
     return unstable.tabs(*parts)
 
 
-def limbs(plots: Sequence[Plot]) -> list[Part]:
+def limb_tabs(plots: Sequence[Plot]) -> list[Part]:
     """A part for each limb, with its plots behind each other."""
     return [
         unstable.tabs(

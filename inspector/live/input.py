@@ -7,9 +7,9 @@ from types import FrameType
 from typing import Any, BinaryIO, Self, TypeVar
 
 from inspector.live.csvrows import CsvReader
-from inspector.live.errors import LiveError
 from inspector.live.jsonrows import JsonReader
 from inspector.live.rows import Reader, chunks, widen
+from inspector.live.samples import LiveError
 from inspector.live.session import LiveSession, Summary
 
 GATHER = 0.02
@@ -24,20 +24,7 @@ def follow(
     *,
     enough: Callable[[], bool] = lambda: False,
 ) -> Summary:
-    """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough.
-
-    Args:
-        stream: The rows, such as standard input.
-        names: Names of the joints, as the user gave them.
-        session_of: Begins a session, given the names of the joints.
-        enough: Whether to end, asked after each batch of rows.
-
-    Returns:
-        What became of the samples.
-
-    Raises:
-        LiveError: If there are no rows, or the first line cannot be understood.
-    """
+    """Show rows as they arrive, until they end, Ctrl-C is pressed, or there are enough."""
     widen(stream)
     with Interrupt() as interrupt:
         incoming = interrupt.until(chunks(stream, gather=GATHER))
@@ -79,14 +66,7 @@ class Interrupt:
         signal.signal(signal.SIGINT, self._before)
 
     def until(self, items: Iterator[Item]) -> Iterator[Item]:
-        """Pass items on until Ctrl-C is pressed.
-
-        Args:
-            items: What may have to be waited for.
-
-        Yields:
-            The items.
-        """
+        """Pass items on until Ctrl-C is pressed."""
         while not self._pressed:
             self._waits = True
             try:
@@ -104,18 +84,7 @@ class Interrupt:
 
 
 def reader_of(head: bytes, names: tuple[str, ...]) -> tuple[Reader, bool]:
-    """Choose a format by the first line.
-
-    Args:
-        head: The line.
-        names: Names of the joints, as the user gave them.
-
-    Returns:
-        The reader, and whether the line was a header and no sample.
-
-    Raises:
-        LiveError: If the line is neither a JSON object nor a header that names velocities.
-    """
+    """Choose a format by the first line."""
     if head.lstrip().startswith(b"{"):
         return JsonReader(names), False
     return CsvReader(head, names), True

@@ -1,0 +1,622 @@
+"""Two runs as one rerun recording: both over each other, and what differs below."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import rerun as rr
+from numpy.typing import NDArray
+from rerun.blueprint import Blueprint
+from rerun.urdf import UrdfTree
+
+from inspector import colors
+from inspector.analysis.analyse import Analysis
+from inspector.colors import Color
+from inspector.compare.changes import (
+    NEW,
+    Change,
+    Spectra,
+    by_link,
+    changes,
+    largest_change,
+    link_steps,
+    report,
+    spectra,
+    steps,
+    whole,
+)
+from inspector.compare.pair import Pair
+from inspector.errors import InspectorError
+from inspector.levels import LINKS, SPECTRUM, Scale, link_levels
+from inspector.recording import axes, robot, unstable
+from inspector.recording.axes import TIMELINE, Label, Panel
+from inspector.recording.camera import Camera
+from inspector.recording.framing import log_cameras
+from inspector.recording.layout import limb_tabs
+from inspector.recording.panels import (
+    HIGH_DB,
+    LOW_DB,
+    Plot,
+    Signal,
+    found_stretches,
+    limbs,
+    log_signal,
+    log_span,
+    scaled,
+    signals,
+)
+from inspector.recording.run import log_report, writing
+from inspector.recording.unstable import Part
+from inspector.report.markdown import classes_of, spoken
+from inspector.sound.sonification import Settings, common_gain, sound_of
+from inspector.sound.sound import SMALL_RATE
+from inspector.spectrogram import in_bands
+from inspector.thinning import extremes
+from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.run import part
+from noisemodel.types import Array
+
+BEFORE: Color = (86, 180, 233)
+AFTER: Color = (240, 160, 30)
+SAME: Color = (62, 68, 80)
+SIDE_COLORS = {"before": BEFORE, "after": AFTER}
+SHADES = 25
+"""An odd number, so that no change has a shade of its own."""
+
+
+def diverging(place: Array) -> NDArray[np.uint8]:
+    """Colour changes: blue at 0, grey at 0.5, orange at 1.
+
+    Args:
+        place: Any shape.
+
+    Returns:
+        Red, green, blue and opacity, shape (…, 4).
+    """
+    scale = np.array([BEFORE, SAME, AFTER], dtype=np.float64)
+    channels = [np.interp(place, (0.0, 0.5, 1.0), scale[:, channel]) for channel in range(3)]
+    return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
+
+
+CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
+"""Of levels; what is beyond is as blue or as orange as can be."""
+
+
+NOISE_POINTS = 60_000
+"""Of each run's noise."""
+LOWEST_POWER_DB = -20.0
+"""Sound power below this is drawn at it, in [dB re 1 pW]."""
+DETAILS = 184.0
+"""Height of the panels that lie behind each other."""
+LEVEL, CHANGED, NOISE_PANEL = Panel("level", 118.0), Panel("change", 84.0), Panel("noise", DETAILS)
+BANDS, WIDTH = 48, 5.0
+"""Of a spectrogram, and the height of one in points."""
+SPAN_DB = 24.0
+"""Change of level at the upper end of its axis, in [dB], or a multiple where it is larger."""
+
+
+@dataclass(frozen=True)
+class Ends:
+    """Lower and upper ends of axes.
+
+    Attributes:
+        noise: Of the noise.
+        change: Of the change of level, in [dB].
+    """
+
+    noise: tuple[float, float]
+    change: tuple[float, float]
+
+
+def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Ends:
+    """Log noises and their levels every 50 ms, with what changed shaded."""
+    between = _log_noise(recording, pair)
+    time, level = steps(pair)
+    log_shades(recording, "/level/change", found, (LOW_DB, HIGH_DB))
+    for place, (name, _) in enumerate(pair.sides):
+        _log_line(recording, f"/level/{name}", time, level[:, place], SIDE_COLORS[name])
+    span = HIGH_DB - LOW_DB
+    marks = [(mark, (mark - LOW_DB) / span) for mark in (-60.0, -40.0, -20.0, 0.0)]
+    title = Label(0.62, "above 10 Hz\n[dB re\n1 rad/s]", -22.0)
+    axes.log_left(recording, LEVEL, [title, *_written(marks, 44.0)])
+    axes.log_right(recording, LEVEL, _sides())
+    change = level[:, 1] - level[:, 0]
+    peak = float(change[np.abs(change).argmax()])
+    reach = SPAN_DB * max(float(np.ceil(abs(peak) / SPAN_DB)), 1.0)
+    _log_line(recording, "/change/noise", time, change, axes.INK)
+    _log_line(recording, "/change/none", time[[0, -1]], np.zeros(2), colors.CLASSES["unknown"])
+    log_shades(recording, "/change/finding", found, (-reach, reach))
+    marks = [(mark, 0.5 + mark / reach / 2) for mark in (-reach / 2, 0.0, reach / 2)]
+    axes.log_left(recording, CHANGED, [Label(0.6, "change\n[dB]", -22.0), *_written(marks, 44.0)])
+    axes.log_right(recording, CHANGED, [Label(0.5, f"largest\n{_signed(peak)}")])
+    return Ends(between, (-reach, reach))
+
+
+def log_spectra(recording: rr.RecordingStream, pair: Pair) -> dict[str, Panel]:
+    """Log both spectrograms and their difference, as rows of colours on a logarithmic axis."""
+    found = spectra(pair)
+    if not len(found.time):
+        return {}
+    low, high = float(found.frequency[0]), float(found.frequency[-1])
+    edges = np.geomspace(low, max(high, 1.01 * low), BANDS + 1)
+    level = [_level(found, side, edges) for side in (0, 1)]
+    shown: dict[str, tuple[Array, Scale]] = {
+        "change": (level[1] - level[0], CHANGE),
+        "before": (level[0], SPECTRUM),
+        "after": (level[1], SPECTRUM),
+    }
+    gap = np.diff(found.time)
+    half = (float(gap.min()) if len(gap) else 0.05) / 2
+    times = np.append(found.time - half, found.time[-1] + half)
+    names = [f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1]]
+    panels = {}
+    for what, (values, scale) in shown.items():
+        panel = panels[what] = Panel(f"spectrum_{what}", DETAILS)
+        shades = SHADES if what == "change" else axes.SHADES
+        rgba = scale.colours(values[::-1], shades=shades)
+        axes.log_rows(recording, f"/spectrogram/{what}", times, rgba, names=names, width=WIDTH)
+        marks = [
+            Label(float(np.log(tick / low) / np.log(edges[-1] / low)), axes.hertz(tick), 40.0)
+            for tick in axes.ticks(low, float(edges[-1]), panel)
+        ]
+        axes.log_left(recording, panel, [Label(0.5, f"spectrum\n{what}", -22.0), *marks])
+        axes.log_scale(recording, panel, scale)
+    return panels
+
+
+def _level(found: Spectra, side: int, edges: Array) -> Array:
+    """Level of each band of a side, at least the lowest of the scale, shape (bands, columns)."""
+    amplitude = in_bands(found.frequency, found.amplitude[side], edges)
+    return np.asarray(np.maximum(2 * decibel(amplitude), SPECTRUM.low))
+
+
+def _log_noise(recording: rr.RecordingStream, pair: Pair) -> tuple[float, float]:
+    loudest = np.concatenate([side.noise[side.run.mask] for _, side in pair.sides])
+    scale, unit = scaled(loudest)
+    for name, side in pair.sides:
+        mask = side.run.mask
+        time, values = extremes(
+            pair.time[mask], side.noise[mask, None] / scale, points=NOISE_POINTS
+        )
+        _log_line(recording, f"/noise/{name}", time, values[:, 0], SIDE_COLORS[name])
+        if side.links is not None:
+            level = np.maximum(decibel(side.links.total / REFERENCE_POWER), LOWEST_POWER_DB)
+            _log_line(recording, f"/power/{name}", side.links.time, level, SIDE_COLORS[name])
+    axes.log_left(recording, NOISE_PANEL, [Label(0.5, f"noise p\u0302\n[{unit}]")])
+    axes.log_right(recording, NOISE_PANEL, _sides())
+    return 0.0, 1.08 * max(float(loudest.max(initial=0.0)) / scale, 0.01)
+
+
+def _sides() -> list[Label]:
+    return [
+        Label(place, name, color=SIDE_COLORS[name])
+        for place, name in ((0.75, "before"), (0.4, "after"))
+    ]
+
+
+def _written(marks: Sequence[tuple[float, float]], shift: float) -> list[Label]:
+    return [Label(place, _signed(mark).lstrip("+"), shift) for mark, place in marks]
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.0f}".replace("-", "\u2212").replace("+0", "0")
+
+
+def _log_line(
+    recording: rr.RecordingStream, path: str, time: Array, values: Array, color: colors.Color
+) -> None:
+    name = path.rpartition("/")[2]
+    axes.log_lines(recording, path, time, values[:, None], names=[name], colours=[color])
+
+
+ROW, LEAST = 26.0, 50.0
+"""Height of a class, and of all of them at least, in points."""
+FOUND = {"before": (0.06, 0.34), "after": (0.52, 0.80)}
+ANNOTATED = {"before": (0.37, 0.45), "after": (0.83, 0.91)}
+"""From where to where in its row each side is drawn, from above."""
+
+
+def log_changes(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change]) -> Panel:
+    """Log found and annotated classes, and the changes."""
+    names = [name for name in dict.fromkeys(_every(pair)) if name != "ok"]
+    panel = Panel("class", max(ROW * len(names), LEAST) + axes.AXIS)
+    for row, name in enumerate(names):
+        for side, analysis in pair.sides:
+            place, stretches = (row, len(names)), found_stretches(analysis, name)
+            _log_class_row(recording, f"{side}/found", name, stretches, place, FOUND[side])
+            blocks = [(b.start, b.stop) for b in analysis.run.blocks if b.label == name]
+            _log_class_row(recording, f"{side}/annotated", name, blocks, place, ANNOTATED[side])
+    titles = [Label(label.place, spoken(label.text)) for label in axes.row_labels(names)]
+    axes.log_left(recording, panel, titles or [Label(0.5, "no failure\nin either run")])
+    told = [
+        Label(0.8, "before", color=SIDE_COLORS["before"]),
+        Label(0.45, "after", color=SIDE_COLORS["after"]),
+    ]
+    if any(side.run.blocks for _, side in pair.sides):
+        told.append(Label(0.1, "thin: annotated"))
+    axes.log_right(recording, panel, told)
+    if found:
+        axes.log_events(
+            recording,
+            [change.start for change in found],
+            [str(change) for change in found],
+            [_shade(change) for change in found],
+            warnings=[change.kind == NEW for change in found],
+        )
+    return panel
+
+
+def log_shades(
+    recording: rr.RecordingStream,
+    path: str,
+    found: Sequence[Change],
+    between: tuple[float, float],
+) -> None:
+    """Shade the changes in a plot, in the colour of the run that has them."""
+    for kind in dict.fromkeys(change.kind for change in found):
+        own = [change for change in found if change.kind == kind]
+        unstable.log_stretches(
+            recording,
+            f"{path}/{kind}",
+            axes.TIMELINE,
+            [(change.start, change.stop) for change in own],
+            between=between,
+            name=kind,
+            color=_shade(own[0]),
+        )
+
+
+def _shade(change: Change) -> colors.Color:
+    shades = {"new": "after", "louder": "after", "resolved": "before", "quieter": "before"}
+    return SIDE_COLORS[shades[change.kind]] if change.kind in shades else axes.INK
+
+
+def _every(pair: Pair) -> list[str]:
+    known = [name for _, side in pair.sides for name in classes_of(side)]
+    return [name for name in known if any(_occurs(side, name) for _, side in pair.sides)]
+
+
+def _occurs(side: Analysis, name: str) -> bool:
+    return bool(found_stretches(side, name)) or any(
+        block.label == name for block in side.run.blocks
+    )
+
+
+def _log_class_row(
+    recording: rr.RecordingStream,
+    how: str,
+    name: str,
+    stretches: Sequence[tuple[float, float]],
+    place: tuple[int, int],
+    between: tuple[float, float],
+) -> None:
+    if not stretches:
+        return
+    row, count = place
+    upper, lower = (axes.TOP * (1.0 - (row + share) / count) for share in between)
+    side = how.partition("/")[0]
+    unstable.log_stretches(
+        recording,
+        f"/class/{how}/{name}",
+        axes.TIMELINE,
+        stretches,
+        between=(lower, upper),
+        name=f"{how.replace('/', ', ')}: {spoken(name)}",
+        color=SIDE_COLORS[side],
+        opaque=True,
+    )
+
+
+JOINT_POINTS = 2000
+"""Of a line: there are three for each signal of a joint."""
+
+
+def log_joints(
+    recording: rr.RecordingStream, pair: Pair, limbs: Mapping[str, tuple[str, ...]]
+) -> list[Plot]:
+    """Log the joints' signals of both runs, paler before, and after less before."""
+    before, after = (
+        {_signal_name(signal): signal for signal in signals(side.run)} for _, side in pair.sides
+    )
+    found = []
+    for name in dict.fromkeys([*after, *before]):
+        shown = {"before": before.get(name), "after": after.get(name)}
+        shown["change"] = _difference(shown["before"], shown["after"])
+        masks = (pair.before.run.mask, pair.after.run.mask, pair.valid)
+        paths = {
+            what: log_signal(
+                recording,
+                f"/joints/{name.replace(' ', '_')}/{what}",
+                replace(signal, values=signal.values[mask]),
+                pair.time[mask],
+                limbs,
+                suffix="" if what == "change" else f" {what}",
+                dim=what == "before",
+                points=JOINT_POINTS,
+            )
+            for (what, signal), mask in zip(shown.items(), masks, strict=True)
+            if signal is not None and mask.any()
+        }
+        unit = next(signal.unit for signal in shown.values() if signal is not None)
+        for limb in limbs:
+            both = [paths[what].get(limb) for what in ("before", "after") if what in paths]
+            change = paths.get("change", {}).get(limb)
+            if over := tuple(path for path in both if path):
+                found.append(Plot(limb, f"{name} [{unit}]", over))
+            if change:
+                found.append(Plot(limb, f"change of {name} [{unit}]", (change,)))
+    return found
+
+
+def _signal_name(signal: Signal) -> str:
+    return f"desired {signal.kind}" if signal.desired else signal.kind
+
+
+def _difference(before: Signal | None, after: Signal | None) -> Signal | None:
+    """A signal after less before, of the joints that are in both."""
+    if before is None or after is None:
+        return None
+    joints = tuple(name for name in after.joints if name in before.joints)
+    was, now = (
+        np.asarray(each.values[:, [each.joints.index(name) for name in joints]], dtype=np.float64)
+        for each in (before, after)
+    )
+    return replace(after, values=now - was, joints=joints)
+
+
+SHOWN_LINKS = 8
+"""Links that have a row, those that changed most."""
+LINK_LINES = 3
+"""Lines of a row, since thick ones have round ends."""
+BOTH = 4
+"""Links whose power before and after is shown."""
+KEY = Panel("key", 260.0)
+"""The scale beside the robots."""
+ROBOT_SHADES = 16
+
+
+def log_links(
+    recording: rr.RecordingStream, trees: Mapping[str, UrdfTree], pair: Pair
+) -> tuple[Panel, list[str]]:
+    """Log the noise of links: colour both robots by it, and rows by how it changed."""
+    assert pair.links is not None
+    for tree, noise in zip(trees.values(), pair.links, strict=True):
+        time, level = link_levels(noise)
+        rgba = LINKS.colours(level, shades=ROBOT_SHADES)
+        colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
+        quiet = LINKS.colours(np.array([-np.inf]))
+        robot.log_colours(recording, tree, time, colours, rest=quiet)
+    axes.log_scale(recording, KEY, LINKS, "dB re\n1 pW")
+    names = [level.name for level in by_link(pair)]
+    for (side, _), noise in zip(pair.sides, pair.links, strict=True):
+        for name in names[:BOTH]:
+            power = noise.vibration[:, [noise.links.index(name)]]
+            level = np.maximum(decibel(power / REFERENCE_POWER), LOWEST_POWER_DB)
+            path = f"/links/{name}/{side}"
+            shade = [SIDE_COLORS[side]]
+            axes.log_lines(recording, path, noise.time, level, names=[side], colours=shade)
+    own = names[:SHOWN_LINKS]
+    time, change = link_steps(pair, own)
+    panel = Panel("links", DETAILS)
+    if own:
+        end = float(pair.time[-1]) + 1.0 / pair.rate
+        rgba = CHANGE.colours(change.T, shades=SHADES)
+        called = [f"{name}, change [dB]" for name in own]
+        width = (DETAILS - axes.AXIS) / len(own) / (LINK_LINES + 1) + 2.0
+        edges = np.append(time, max(end, float(time[-1])))
+        axes.log_rows(
+            recording, "/change/links", edges, rgba, names=called, width=width, lines=LINK_LINES
+        )
+    axes.log_left(recording, panel, axes.row_labels(own) or [Label(0.5, "no links")])
+    axes.log_scale(recording, panel, CHANGE)
+    return panel, names[:BOTH]
+
+
+WHOLE = 832.0
+"""Height of all parts, in points, in a window of 1440 x 900."""
+ABOVE = 240.0
+"""Least height of the report and the robots."""
+SPAN = "/span"
+"""What makes every plot reach from the start of the runs to their end."""
+ALL = ("$origin/**", SPAN)
+CHANGE_PATHS = ("/change/noise", "/change/none", "/change/finding/**", SPAN)
+TITLES = 28.0
+"""Height of a row of tabs."""
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a recording of two runs holds, that the layout depends on.
+
+    Attributes:
+        joints: Plots of joint signals.
+        classes: Panel of the classes.
+        spectra: Panels of the spectrograms, by what they show.
+        changes: Panel of the links' changes; None without links.
+        links: Links whose power before and after is shown.
+        cameras: From where each robot is seen; empty without one.
+        events: Whether any change is listed.
+        ends: Lower and upper ends of the axes of the noise and of the change.
+        sounds: Names of the sounds.
+        loop: Stretch of time that playing repeats, in [s].
+    """
+
+    joints: Sequence[Plot]
+    classes: Panel
+    spectra: Mapping[str, Panel]
+    changes: Panel | None
+    links: Sequence[str]
+    cameras: Mapping[str, Camera]
+    events: bool
+    ends: Ends
+    sounds: Sequence[str]
+    loop: tuple[float, float] | None
+
+
+def layout(contents: Contents) -> Blueprint:
+    """Lay a comparison out."""
+    report = unstable.text("Before \u2192 after", "/report")
+    events = unstable.events("Changes", "/events")
+    text = unstable.tabs(report, events) if contents.events else report
+    head: list[tuple[Part, float]] = [(text, 34.0)]
+    for side, camera in contents.cameras.items():
+        head.append((unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0))
+    if contents.cameras:
+        head.append((unstable.drawing(f"/axis/{KEY.name}/right"), 8.0))
+    over_time = [
+        (
+            contents.classes,
+            _row_plot("/class"),
+        ),
+        (
+            LEVEL,
+            unstable.plot(
+                "Level", "/level", ALL, between=(LOW_DB, HIGH_DB), fixed=True, titled=False
+            ),
+        ),
+        (
+            CHANGED,
+            unstable.plot(
+                "Change",
+                "/change",
+                CHANGE_PATHS,
+                between=contents.ends.change,
+                fixed=True,
+                titled=False,
+            ),
+        ),
+    ]
+    parts = [(axes.part(panel, plot), panel.height) for panel, plot in over_time]
+    whole = unstable.above(
+        (unstable.beside(*head), ABOVE), *parts, (_details(contents), DETAILS + TITLES)
+    )
+    return unstable.blueprint(whole, TIMELINE, contents.loop)
+
+
+def _details(contents: Contents) -> Part:
+    parts: list[Part] = []
+    if contents.changes is not None:
+        plot = unstable.plot(
+            "Links", "/change/links", between=(0.0, axes.TOP), fixed=True, titled=False
+        )
+        parts.append(axes.part(contents.changes, plot, name="Links, change"))
+    for what, panel in contents.spectra.items():
+        plot = _row_plot(f"/spectrogram/{what}")
+        comma = ", " if what == "change" else " "
+        parts.append(axes.part(panel, plot, name=f"Spectrum{comma}{what}"))
+    plot = unstable.plot(
+        "Noise", "/noise", ALL, between=contents.ends.noise, fixed=True, titled=False
+    )
+    parts.append(axes.part(NOISE_PANEL, plot, name="Noise"))
+    if contents.cameras:
+        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", ALL, legend=True))
+    if contents.links:
+        both = [
+            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", ALL, legend=True)
+            for name in contents.links
+        ]
+        parts.append(unstable.tabs(*both, name="Links, before and after"))
+    parts += [unstable.audio(f"Listen {name}", f"/sound/{name}") for name in contents.sounds]
+    return unstable.tabs(*parts, *limb_tabs(contents.joints))
+
+
+def _row_plot(path: str) -> Part:
+    """A plot of rows."""
+    return unstable.plot("", path, ALL, between=(0.0, axes.TOP), fixed=True, titled=False)
+
+
+ASPECT = 1.35
+"""Least width of a robot's view by its height."""
+MAX_VALUES = 8_000_000
+"""Velocities of a run that are mixed into a sound: a second of work."""
+
+
+def write(pair: Pair, path: Path, *, overwrite: bool = False) -> None:
+    """Write the recording of two runs, whole or not at all.
+
+    The same input makes a recording of the same id: opened again, it replaces itself.
+    """
+    parts = (pair.before.sha256, pair.after.sha256, str(pair.alignment.lag))
+    identity = hashlib.sha256(" ".join(parts).encode()).hexdigest()
+    with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
+        trees = {} if pair.links is None else _robots(pair, Path(folder))
+        contents = _log(recording, pair, trees, Path(folder))
+        recording.send_blueprint(layout(contents))  # takes the place of an older layout
+
+
+def _robots(pair: Pair, folder: Path) -> dict[str, UrdfTree]:
+    """The robot before and after, as two robots."""
+    return {side: robot.of_run(each.run, folder, side=side) for side, each in pair.sides}
+
+
+def _log(
+    recording: rr.RecordingStream, pair: Pair, trees: Mapping[str, UrdfTree], folder: Path
+) -> Contents:
+    run, found = pair.after.run, changes(pair)
+    panel, shown, cameras = None, list[str](), dict[str, Camera]()
+    log_span(recording, run)
+    if trees:
+        assert run.robot is not None
+        pairs = [(trees[side], each.run) for side, each in pair.sides]
+        for tree, own in pairs:
+            robot.log(recording, tree, own, coloured=True)
+        urdf = robot.drawn_file(run.robot, folder)
+        cameras = dict(zip(trees, log_cameras(recording, pairs, urdf, aspect=ASPECT), strict=True))
+        panel, shown = log_links(recording, trees, pair)
+    names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
+    limb_plots = log_joints(recording, pair, limbs(tuple(names), trees.get("after")))
+    loop = largest_change(pair, found)
+    audible = _sounds(pair, loop[0])
+    start = float(pair.time[0])
+    for name, sound in audible.items():
+        unstable.log_audio(recording, f"/sound/{name}", sound, TIMELINE, start=start)
+    _log_text(recording, pair)
+    return Contents(
+        joints=limb_plots,
+        classes=log_changes(recording, pair, found),
+        ends=log_levels(recording, pair, found),
+        spectra=log_spectra(recording, pair),
+        changes=panel,
+        links=shown,
+        cameras=cameras,
+        events=bool(found),
+        sounds=tuple(audible),
+        loop=loop,
+    )
+
+
+def _sounds(pair: Pair, around: float) -> dict[str, bytes]:
+    """A WAV file of the simplified noise of each run, both at one gain; none if all is silent.
+
+    Of runs that are too long, only a part around a time in [s] is audible.
+    """
+    widest = max(2 * side.run.motion.shape[1] for _, side in pair.sides)
+    count = min(max(2, MAX_VALUES // widest), len(pair.time))
+    middle = int(np.searchsorted(pair.time, around))
+    first = min(max(middle - count // 2, 0), len(pair.time) - count)
+    try:
+        made = {
+            name: sound_of(part(side.run, first, first + count), Settings())
+            for name, side in pair.sides
+        }
+    except InspectorError:
+        return {}
+    gain = common_gain(list(made.values()))
+    lead = first / pair.rate
+    return {name: s.file(gain, rate=SMALL_RATE, lead=lead) for name, s in made.items()}
+
+
+def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:
+    properties = {
+        "before_sha256": pair.before.sha256,
+        "after_sha256": pair.after.sha256,
+        "aligned": str(pair.alignment.how),
+        "lag_s": pair.alignment.seconds,
+        "rate_hz": pair.rate,
+        "duration_s": pair.before.run.duration,
+        "vibration_change_db": whole(pair).change,
+    }
+    log_report(recording, f"{pair.before.name} → {pair.after.name}", report(pair), properties)

@@ -1,1 +1,0 @@
-"""Comparisons of noise models as tables, pictures and recordings."""

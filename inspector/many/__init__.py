@@ -1,1 +1,0 @@
-"""Several runs on one time axis: status, classes and level of each, the worst marked."""

@@ -1,0 +1,774 @@
+"""The panels of a recording: classes, noise, level, spectrogram, joints, links, details.
+
+One run, two, many and a stream draw the same panels; each only chooses which.
+"""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import groupby, takewhile
+from typing import TypeAlias
+
+import numpy as np
+import rerun as rr
+from rerun.components import MarkerShapeLike
+from rerun.urdf import UrdfTree
+
+from inspector import colors, levels
+from inspector.analysis.analyse import Analysis
+from inspector.analysis.loudest import chosen
+from inspector.analysis.moments import Moment, gaps
+from inspector.levels import Scale
+from inspector.orders import orders
+from inspector.recording import axes, robot, unstable
+from inspector.recording.axes import Label, Panel, at
+from inspector.report.markdown import brief, classes_of, finding_of, spoken
+from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands
+from inspector.thinning import extremes
+from noiseclassifier import Event, Labels
+from noisemodel import Block, Run
+from noisemodel.links import LinkNoise, vibrating
+from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.types import Array, Real
+
+HATCHES = 6
+"""Strokes of a gap."""
+
+
+def log_gaps(
+    recording: rr.RecordingStream, path: str, run: Run, between: tuple[float, float]
+) -> None:
+    """Hatch the gaps of a run in a plot, by a line that goes up and down."""
+    found = gaps(run)
+    if found:
+        times = [np.append(np.linspace(*gap, HATCHES + 1), gap[1]) for gap in found]
+        stroke = np.append(np.resize(between, HATCHES + 1), np.nan)
+        line = np.tile(stroke, len(found))[:, None]
+        shade, names = [colors.CLASSES["unknown"]], ["gap: no samples"]
+        path = f"{path}/gap"
+        axes.log_lines(recording, path, np.concatenate(times), line, names=names, colours=shade)
+
+
+MAX_JOINTS = 10
+"""Joints that one plot can hold."""
+JOINTS_PER_PLOT = 8
+"""Joints in each plot if there are more than that."""
+
+
+def limbs(names: Sequence[str], tree: UrdfTree | None) -> dict[str, tuple[str, ...]]:
+    """Divide joints into limbs."""
+    if not names:
+        return {}
+    groups = [tuple(names)] if tree is None else _chains(names, tree)
+    parts = []
+    for group in groups:
+        size = len(group) if len(group) <= MAX_JOINTS else JOINTS_PER_PLOT
+        parts += [group[first : first + size] for first in range(0, len(group), size)]
+    titles = [_limb_title(part) for part in parts] if len(parts) > 1 else ["joints"]
+    count = Counter(titles)
+    return {
+        title if count[title] == 1 else f"{part[0]} … {part[-1]}": part
+        for title, part in zip(titles, parts, strict=True)
+    }
+
+
+def _chains(names: Sequence[str], tree: UrdfTree) -> list[tuple[str, ...]]:
+    """Follow the robot outwards: a limb begins where it branches, and has two joints or more."""
+    carrier = _carriers(names, tree)
+    branches = Counter(carrier.values())
+    limb: dict[str, str] = {}
+    waiting = list(names)
+    while waiting:
+        name = next(name for name in waiting if carrier[name] not in waiting)
+        above = carrier[name]
+        alone = not branches[name]  # a finger, a wheel
+        goes_on = above in limb and (alone or branches[above] == 1)
+        limb[name] = limb[above] if goes_on else "" if alone and not above else name
+        waiting.remove(name)
+    return [
+        tuple(name for name in names if limb[name] == first)
+        for first in dict.fromkeys(limb[name] for name in names)
+    ]
+
+
+def _carriers(names: Sequence[str], tree: UrdfTree) -> dict[str, str]:
+    """Name, for each joint, the next of them towards the root; nothing if there is none."""
+    moved_by = {joint.child_link: joint for joint in tree.joints()}
+    carrier = {}
+    for joint in tree.joints():
+        link, found = joint.parent_link, ""
+        while not found and link in moved_by:
+            above = moved_by[link]
+            found = above.name if above.name in names else ""
+            link = above.parent_link
+        carrier[joint.name] = found
+    return {name: carrier[name] for name in names}
+
+
+def _limb_title(joints: Sequence[str]) -> str:
+    """Name a limb by what its first two joints' names share."""
+    pairs = zip(*joints[:2], strict=False)
+    same = "".join(pair[0] for pair in takewhile(lambda pair: len(set(pair)) == 1, pairs))
+    shared = same.rstrip("_-0123456789") if len(joints) > 1 else ""
+    return shared if len(shared) > 1 else f"{joints[0]} … {joints[-1]}"
+
+
+Lane: TypeAlias = Sequence[tuple[float, float, str]]
+"""Start and stop in [s] and class of stretches in order of time."""
+ROW = 20.0
+"""Height of a class, in points."""
+FOUND, ANNOTATED = (0.10, 0.62), (0.68, 0.88)
+"""From where to where in its row each is drawn, from above."""
+MARKERS: tuple[MarkerShapeLike, ...] = (
+    "Diamond",
+    "Square",
+    "Up",
+    "Circle",
+    "Cross",
+    "Plus",
+    "Down",
+    "Asterisk",
+)
+"""Of the classes, so that a finding shorter than a pixel is seen."""
+
+
+def log_classes(recording: rr.RecordingStream, analysis: Analysis) -> Panel | None:
+    """Log the classes that a model found, and those that are annotated.
+
+    Returns:
+        The panel of the rows; None if nothing was found or annotated.
+    """
+    run, labels = analysis.run, analysis.labels
+    colours = colours_of(analysis)
+    if labels is not None:
+        _log_scores(recording, labels, colours)
+    _log_events(recording, analysis, colours)
+    names = classes_of(analysis)
+    if not names:
+        return None
+    lost = gaps(run)
+    count = len(names) + bool(lost)
+    panel = Panel("class", ROW * count + axes.AXIS)
+    for row, name in enumerate(names):
+        found = found_stretches(analysis, name)
+        blocks = [(block.start, block.stop) for block in run.blocks if block.label == name]
+        _log_row(recording, "found", name, found, colours[name], (row, count), FOUND)
+        _log_row(recording, "annotated", name, blocks, axes.INK, (row, count), ANNOTATED)
+    _log_marks(recording, analysis, names, colours, count)
+    if lost:
+        log_gaps(recording, "/class", run, (0.1 * axes.TOP / count, 0.9 * axes.TOP / count))
+    shown = [(spoken(name), readable(colours[name])) for name in names]
+    shown += [("gap: no samples", axes.INK)] * bool(lost)
+    places = axes.row_labels([name for name, _ in shown])
+    named = [replace(at, color=shade) for at, (_, shade) in zip(places, shown, strict=True)]
+    axes.log_left(recording, panel, named)
+    both = labels is not None and bool(run.blocks)
+    told = [Label(0.8, "thick:\nfound"), Label(0.3, "thin:\nannotated")] if both else []
+    only = "found" if labels is not None else "annotated"
+    axes.log_right(recording, panel, told or [Label(0.5, only)])
+    return panel
+
+
+def colours_of(*sides: Analysis) -> dict[str, colors.Color]:
+    """The colours of all classes of runs, found or annotated, those of their models first."""
+    known = dict.fromkeys(name for side in sides if side.labels for name in side.labels.classes)
+    others = {name for side in sides for *_, name in (*side.lane, *annotated(side.run))}
+    others |= {event.label for side in sides for event in side.findings}
+    return colors.of_classes((*known, *sorted(others - set(known))))
+
+
+def annotated(run: Run) -> Lane:
+    """The annotated blocks of a run."""
+    return [(block.start, block.stop, block.label) for block in run.blocks]
+
+
+def readable(color: colors.Color) -> colors.Color:
+    """A colour that text is legible in on a dark background: half as far from white."""
+    red, green, blue = (round((channel + 255) / 2) for channel in color)
+    return red, green, blue
+
+
+def log_shades(
+    recording: rr.RecordingStream, path: str, analysis: Analysis, between: tuple[float, float]
+) -> None:
+    """Shade the findings in a plot, each in the colour of its class."""
+    colours = colours_of(analysis)
+    for name in dict.fromkeys(event.label for event in analysis.findings):
+        unstable.log_stretches(
+            recording,
+            f"{path}/{name}",
+            axes.TIMELINE,
+            [(event.start, event.stop) for event in analysis.findings if event.label == name],
+            between=between,
+            name=f"found: {spoken(name)}",
+            color=colours[name],
+        )
+
+
+def found_stretches(analysis: Analysis, name: str) -> list[tuple[float, float]]:
+    """When a class was found: findings as they are reported, and what else frames cover."""
+    found = [(event.start, event.stop) for event in analysis.findings if event.label == name]
+    return found + [(start, stop) for start, stop, label in analysis.lane if label == name]
+
+
+def _log_row(
+    recording: rr.RecordingStream,
+    how: str,
+    name: str,
+    stretches: Sequence[tuple[float, float]],
+    color: colors.Color,
+    place: tuple[int, int],
+    between: tuple[float, float],
+) -> None:
+    if stretches:
+        row, count = place
+        upper, lower = (axes.TOP * (1.0 - (row + share) / count) for share in between)
+        unstable.log_stretches(
+            recording,
+            f"/class/{how}/{name}",
+            axes.TIMELINE,
+            stretches,
+            between=(lower, upper),
+            name=f"{how}: {spoken(name)}",
+            color=color,
+            opaque=True,
+        )
+
+
+def _log_marks(
+    recording: rr.RecordingStream,
+    analysis: Analysis,
+    names: Sequence[str],
+    colours: Mapping[str, colors.Color],
+    count: int,
+) -> None:
+    for row, name in enumerate(names):
+        listed_events = [event for event in analysis.findings if event.label == name]
+        if listed_events:
+            place = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
+            points = rr.SeriesPoints(
+                names=[spoken(name)],
+                colors=[colours[name]],
+                markers=[MARKERS[row % len(MARKERS)]],
+                marker_sizes=[4.0],
+            )
+            recording.log(f"/class/mark/{name}", points, static=True)
+            recording.send_columns(
+                f"/class/mark/{name}",
+                indexes=[axes.at(np.array([event.start for event in listed_events]))],
+                columns=axes.scalars(np.full(len(listed_events), place)),
+            )
+
+
+def _log_scores(
+    recording: rr.RecordingStream, labels: Labels, colours: dict[str, colors.Color]
+) -> None:
+    centres = (labels.start + labels.stop) / 2
+    for index, name in enumerate(labels.classes):
+        score = labels.scores[:, index : index + 1]
+        names, shade = [spoken(name)], [colours[name]]
+        axes.log_lines(recording, f"/score/{name}", centres, score, names=names, colours=shade)
+
+
+def listed_events(analysis: Analysis) -> list[tuple[str, Event | Block]]:
+    """List findings, and annotated failures that were not found, by time."""
+    rows: list[tuple[str, Event | Block]] = [("found", event) for event in analysis.findings]
+    missed = "annotated" if analysis.labels is None else "not found"
+    rows += [
+        (missed, block)
+        for block in analysis.run.blocks
+        if block.label != "ok" and finding_of(analysis, block) is None
+    ]
+    return sorted(rows, key=lambda row: row[1].start)
+
+
+def _log_events(
+    recording: rr.RecordingStream, analysis: Analysis, colours: dict[str, colors.Color]
+) -> None:
+    """List events: findings are warnings."""
+    rows = listed_events(analysis)
+    if rows:
+        axes.log_events(
+            recording,
+            [event.start for _, event in rows],
+            [f"{how}: {brief(analysis, event)}" for how, event in rows],
+            [colours[event.label] for _, event in rows],  # legible in light themes, too
+            warnings=[how == "found" for how, _ in rows],
+        )
+
+
+NOISE_POINTS = 100_000
+NOISE, LEVEL = Panel("noise", 128.0), Panel("level", 120.0)
+PROBABILITY = Panel("probability", 92.0)
+LOW_DB, HIGH_DB = -80.0, 30.0
+"""Ends of the level's axis, in [dB re 1 rad/s]."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A panel of a curve.
+
+    Attributes:
+        panel: The panel.
+        path: Entity path below which its lines lie.
+        between: Lower and upper end of its axis.
+    """
+
+    panel: Panel
+    path: str
+    between: tuple[float, float]
+
+
+def log_curves(recording: rr.RecordingStream, analysis: Analysis) -> list[Curve]:
+    """Log the noise, its level above 10 Hz, and the probability of a failure if there is one."""
+    curves = [_log_noise(recording, analysis), _log_level(recording, analysis)]
+    if analysis.labels is not None and analysis.alarm is not None:
+        curves.append(_log_probability(recording, analysis, analysis.alarm))
+    for curve in curves:
+        log_gaps(recording, curve.path, analysis.run, curve.between)
+    return curves
+
+
+def log_span(recording: rr.RecordingStream, run: Run) -> None:
+    """Log that plots reach from the start of the run to its end, whatever they show."""
+    ends = np.array([run.time[0], run.time[-1]])
+    nothing = np.full((2, 1), np.nan)
+    axes.log_lines(recording, "/span", ends, nothing, names=[""], colours=[colors.THRESHOLD])
+
+
+def scaled(values: Array) -> tuple[float, str]:
+    """A power of ten by which the largest of some values has one digit, and the unit then.
+
+    Args:
+        values: In [rad/s].
+    """
+    largest = float(np.nanmax(values, initial=0.0))
+    power = int(np.floor(np.log10(largest))) if largest > 0.0 else 0
+    return 10.0**power, "rad/s" if power == 0 else f"{10.0**power:g} rad/s"
+
+
+def _log_noise(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
+    run, noise = analysis.run, analysis.noise
+    scale, unit = scaled(noise[run.mask])
+    time, values = extremes(run.time[run.mask], noise[run.mask, None] / scale, points=NOISE_POINTS)
+    between = (0.0, 1.08 * max(float(values.max(initial=0.0)), 0.01))
+    log_shades(recording, "/noise/finding", analysis, between)
+    names = [f"noise p\u0302 [{unit}]"]
+    path = "/noise/simplified"
+    axes.log_lines(recording, path, time, values, names=names, colours=[colors.NOISE])
+    axes.log_left(recording, NOISE, [Label(0.5, f"noise p\u0302\n[{unit}]")])
+    peak = float(values.max(initial=0.0))
+    axes.log_right(
+        recording, NOISE, [Label(min(peak / between[1], 0.9), f"max\n{peak * scale:.3g}")]
+    )
+    return Curve(NOISE, "/noise", between)
+
+
+def _log_level(recording: rr.RecordingStream, analysis: Analysis) -> Curve:
+    between = (LOW_DB, HIGH_DB)
+    time, level = analysis.noise_level
+    log_shades(recording, "/level/finding", analysis, between)
+    names = ["noise above 10 Hz [dB re 1 rad/s]"]
+    path = "/level/noise"
+    axes.log_lines(recording, path, time, level, names=names, colours=[colors.LEVEL])
+    span = HIGH_DB - LOW_DB
+    marks = [
+        Label((mark - LOW_DB) / span, axes.written(mark), 44.0)
+        for mark in (-60.0, -40.0, -20.0, 0.0)
+    ]
+    title = Label(0.62, "level above\n10 Hz [dB re\n1 rad/s]", -20.0)
+    axes.log_left(recording, LEVEL, [title, *marks])
+    peak = float(np.nanmax(level, initial=LOW_DB))
+    place = min(max((peak - LOW_DB) / span, 0.05), 0.85)
+    axes.log_right(recording, LEVEL, [Label(place, f"max\n{axes.written(peak)}")])
+    return Curve(LEVEL, "/level", between)
+
+
+def _log_probability(recording: rr.RecordingStream, analysis: Analysis, alarm: float) -> Curve:
+    labels, run = analysis.labels, analysis.run
+    assert labels is not None
+    middles = (labels.start + labels.stop) / 2
+    failure = 1.0 - labels.scores[:, :1]
+    between = (0.0, 1.05)
+    log_shades(recording, "/probability/finding", analysis, between)
+    # Between frames that a gap parts there is no line.
+    apart = np.flatnonzero(labels.start[1:] > labels.stop[:-1] + 1.0 / run.rate) + 1
+    middles = np.insert(middles, apart, labels.start[apart])
+    failure = np.insert(failure, apart, np.nan, axis=0)
+    path, shade = "/probability/failure", [colors.LEVEL]
+    names = ["probability of a failure"]
+    axes.log_lines(recording, path, middles, failure, names=names, colours=shade)
+    ends, path = np.array([run.time[0], run.time[-1]]), "/probability/alarm"
+    names, shade = [f"alarm threshold {alarm:g}"], [colors.THRESHOLD]
+    axes.log_lines(recording, path, ends, np.full((2, 1), alarm), names=names, colours=shade)
+    axes.log_left(recording, PROBABILITY, [Label(0.5, "probability\nof a failure")])
+    axes.log_right(recording, PROBABILITY, [Label(alarm, f"alarm {alarm:g}")])
+    return Curve(PROBABILITY, "/probability", between)
+
+
+JOINT_POINTS = 4000
+"""Of a line, so that a long run has no more than a short one."""
+UNITS = {"velocity": "rad/s", "position": "rad", "effort": "N m"}
+
+
+@dataclass(frozen=True)
+class Plot:
+    """Lines that share a plot.
+
+    Attributes:
+        limb: Whose joints they are of.
+        title: What they are, with the unit.
+        paths: Their entities.
+    """
+
+    limb: str
+    title: str
+    paths: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A signal of joints.
+
+    Attributes:
+        kind: Such as "velocity" or "stage planned".
+        desired: Whether it is the desired one.
+        values: Shape (samples, joints), in the unit of its kind.
+        joints: Names of its joints.
+    """
+
+    kind: str
+    desired: bool
+    values: Real
+    joints: tuple[str, ...]
+
+    @property
+    def unit(self) -> str:
+        """Of its values; stages are velocities."""
+        return UNITS.get(self.kind, UNITS["velocity"])
+
+
+def signals(run: Run) -> list[Signal]:
+    """The signals of a run's joints: velocity, position, effort, stages; desired after measured."""
+    names, desired = run.joint_names, run.desired_joint_names
+    every: list[tuple[str, bool, Real | None, tuple[str, ...]]] = [
+        ("velocity", False, run.velocity, names),
+        ("velocity", True, run.velocity_desired, desired),
+        ("position", False, run.position, names),
+        ("position", True, run.position_desired, desired),
+        ("effort", False, run.effort, names),
+        *((f"stage {name}", False, stage, names) for name, stage in run.stages.items()),
+    ]
+    return [
+        Signal(kind, wanted, values, joints)
+        for kind, wanted, values, joints in every
+        if values is not None
+    ]
+
+
+def log_joints(
+    recording: rr.RecordingStream, run: Run, limbs: Mapping[str, tuple[str, ...]]
+) -> list[Plot]:
+    """Log the joints' signals, at most 4000 points each."""
+    found: list[Plot] = []
+    whole = bool(run.mask.all())  # then a signal can stay in its file
+    for kind, group in groupby(signals(run), key=lambda signal: signal.kind):
+        both = list(group)[::-1]  # the first is drawn below the other
+        paths = [
+            log_signal(
+                recording,
+                f"/joints/{kind.replace(' ', '_')}{'_desired' * signal.desired}",
+                signal if whole else replace(signal, values=signal.values[run.mask]),
+                run.time[run.mask],
+                limbs,
+                suffix=" desired" * signal.desired,
+                dim=signal.desired,
+                points=JOINT_POINTS,
+            )
+            for signal in both
+        ]
+        found += [
+            Plot(limb, f"{kind} [{both[0].unit}]", tuple(p[limb] for p in paths if limb in p))
+            for limb in limbs
+        ]
+    return found
+
+
+def log_signal(
+    recording: rr.RecordingStream,
+    path: str,
+    signal: Signal,
+    time: Array,
+    limbs: Mapping[str, tuple[str, ...]],
+    *,
+    suffix: str,
+    dim: bool,
+    points: int,
+) -> dict[str, str]:
+    """Log a signal, each limb as one entity.
+
+    Args:
+        time: Shape (samples,), in [s].
+    """
+    shown, values = extremes(time, signal.values, points=points)
+    paths = {}
+    for number, (limb, joints) in enumerate(limbs.items()):
+        colours = dict(zip(joints, colors.of_series(len(joints), dim=dim), strict=True))
+        own = [name for name in joints if name in signal.joints]
+        if own:
+            paths[limb] = f"{path}/{number}"
+            axes.log_lines(
+                recording,
+                paths[limb],
+                shown,
+                np.ascontiguousarray(values[:, [signal.joints.index(name) for name in own]]),
+                names=[name + suffix for name in own],
+                colours=[colours[name] for name in own],
+            )
+    return paths
+
+
+STRIP_ROW = 18.0
+"""Height of a row, in points; what is drawn is lower, so that rows are told apart."""
+STRIP_WIDTH, STROKES = 7.0, 3
+"""Of the lines of a row, in points, and how many there are."""
+ROBOT_SHADES = 16
+"""Colours of the robot."""
+POWER_LINES = 8
+POWER_FLOOR_DB = -20.0
+"""Sound power below this is drawn at it, in [dB re 1 pW]."""
+KEY = Panel("key", 285.0)
+"""The scale beside the robot."""
+
+
+def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> Panel | None:
+    """Log the levels of the joints that vibrate most.
+
+    Returns:
+        Their panel; None without joints.
+    """
+    run = analysis.run
+    if not run.joint_names:
+        return None
+    time, level = analysis.joint_levels
+    stop = float(run.time[-1]) + 1.0 / run.rate
+    return _log_strips(
+        recording, "joints", analysis, np.append(time, stop), level, run.joint_names, levels.JOINTS
+    )
+
+
+def log_links(
+    recording: rr.RecordingStream, tree: UrdfTree, analysis: Analysis, noise: LinkNoise
+) -> Panel:
+    """Log the noise of a robot's links: levels of those that vibrate most, power, colours."""
+    time, level = levels.link_levels(noise)
+    _log_power(recording, "/power/total", noise, noise.total, colors.NOISE)
+    for place, index in enumerate(noise.loudest[:POWER_LINES]):
+        color = colors.of_series(POWER_LINES)[place]
+        path = f"/power/links/{noise.links[index]}"
+        _log_power(recording, path, noise, noise.power[:, index], color)
+    for place, (term, power) in enumerate(noise.terms.items()):
+        _log_power(recording, f"/power/terms/{term}", noise, power, colors.of_series(3)[place])
+    rgba = levels.LINKS.colours(level, shades=ROBOT_SHADES)
+    colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
+    quiet = levels.LINKS.colours(np.array([-np.inf]))
+    robot.log_colours(recording, tree, time, colours, rest=quiet)
+    axes.log_scale(recording, KEY, levels.LINKS, "dB re\n1 pW")
+    width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
+    edges = np.append(time, noise.time[-1] + width / 2)
+    return _log_strips(recording, "links", analysis, edges, level, noise.links, levels.LINKS)
+
+
+def _log_strips(
+    recording: rr.RecordingStream,
+    name: str,
+    analysis: Analysis,
+    edges: Array,
+    level: Array,
+    names: Sequence[str],
+    scale: Scale,
+) -> Panel:
+    which = chosen(analysis, edges[:-1], level)
+    own = [names[index] for index in which]
+    panel = Panel(name, STRIP_ROW * len(own) + axes.AXIS)
+    shown = level[:, which].T
+    rgba = scale.colours(np.nan_to_num(shown, nan=-np.inf), shades=axes.SHADES)
+    rgba = axes.blanked(rgba, np.asarray(~np.isnan(shown).all(axis=0)))
+    called = [f"{each} [{scale.unit}]" for each in own]
+    axes.log_rows(
+        recording, f"/strips/{name}", edges, rgba, names=called, width=STRIP_WIDTH, lines=STROKES
+    )
+    axes.log_left(recording, panel, axes.row_labels(own))
+    axes.log_scale(recording, panel, scale)
+    return panel
+
+
+def _log_power(
+    recording: rr.RecordingStream, path: str, noise: LinkNoise, power: Array, color: colors.Color
+) -> None:
+    with np.errstate(divide="ignore"):
+        level = np.maximum(10 * np.log10(power / REFERENCE_POWER), POWER_FLOOR_DB)
+    name = path.rpartition("/")[2]
+    axes.log_lines(recording, path, noise.time, level[:, None], names=[name], colours=[color])
+
+
+TOP_HZ = 2000.0
+"""Highest frequency that is shown, in [Hz]."""
+BANDS = 48
+BARS = 60
+LINE_WIDTH = 5.0
+HEIGHT = 160.0
+"""Of a spectrogram, in points."""
+
+
+def log_spectrogram(
+    recording: rr.RecordingStream, analysis: Analysis, spectrum: Spectrogram, scale: Scale
+) -> Panel:
+    """Log a spectrogram on a logarithmic axis, as rows of colours."""
+    panel = Panel("spectrogram", HEIGHT)
+    log_panel(recording, panel, spectrum, scale, "noise\nspectrum")
+    log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
+    return panel
+
+
+def log_panel(
+    recording: rr.RecordingStream, panel: Panel, spectrum: Spectrogram, scale: Scale, title: str
+) -> None:
+    """Log a spectrogram with its axis in Hz and its scale."""
+    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
+    log_axis(recording, panel, low, high, Label(0.5, title, -22.0), axes.hertz)
+    _log_bands(recording, panel, spectrum, (low, high), scale, "Hz")
+
+
+def log_orders(
+    recording: rr.RecordingStream, analysis: Analysis, scale: Scale
+) -> tuple[str, Panel] | None:
+    """Log an order spectrogram: what goes with the speed of a joint is level in it.
+
+    Returns:
+        The joint and the panel; None where no joint moves for long enough.
+    """
+    found = orders(analysis)
+    if found is None:
+        return None
+    joint, spectrum = found
+    panel = Panel("orders", HEIGHT)
+    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
+    title = Label(0.5, "periods\nper turn", -22.0)
+    log_axis(recording, panel, low, high, title, "{:g}".format)
+    _log_bands(recording, panel, spectrum, (low, high), scale, "periods per turn")
+    log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
+    return joint, panel
+
+
+def log_axis(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    low: float,
+    high: float,
+    title: Label,
+    written: Callable[[float], str],
+) -> None:
+    """Log a title and ticks at the left of a panel whose axis is logarithmic."""
+    span = np.log(max(high / low, 1.01))
+    marks = [
+        Label(float(np.log(tick / low) / span), written(tick), 40.0)
+        for tick in axes.ticks(low, max(high, 1.01 * low), panel)
+    ]
+    axes.log_left(recording, panel, [title, *marks])
+
+
+def _log_bands(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    spectrum: Spectrogram,
+    ends: tuple[float, float],
+    scale: Scale,
+    unit: str,
+) -> None:
+    edges = np.geomspace(ends[0], max(ends[1], 1.01 * ends[0]), BANDS + 1)
+    level = 2 * decibel(in_bands(spectrum.frequency, spectrum.amplitude, edges))[::-1]
+    rgba = axes.blanked(scale.colours(level, shades=axes.SHADES), spectrum.valid)
+    half = np.diff(spectrum.time).min(initial=WINDOW) / 2
+    times = np.append(spectrum.time - half, spectrum.time[-1] + half)
+    names = [f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1]]
+    path = f"/{panel.name}/bands"
+    axes.log_rows(recording, path, times, rgba, names=names, width=LINE_WIDTH)
+    axes.log_scale(recording, panel, scale)
+
+
+def style_bands(recording: rr.RecordingStream, path: str, centres: Sequence[float]) -> None:
+    """Log how the bands of one entity are drawn.
+
+    Args:
+        centres: Of its bands, in [Hz].
+    """
+    style = rr.SeriesLines(
+        names=[f"{centre:.0f} Hz" for centre in centres],
+        widths=[LINE_WIDTH] * len(centres),
+        aggregation_policy="Off",
+        interpolation_mode="StepAfter",
+    )
+    recording.log(path, style, static=True)
+
+
+def log_bars(recording: rr.RecordingStream, path: str, spectrum: Spectrogram) -> None:
+    """Log the spectrum of each moment as bars."""
+    shown = spectrum.frequency <= max(TOP_HZ, spectrum.frequency[0])
+    step = -(-len(spectrum.time) // BARS)
+    bars = spectrum.level[shown, ::step].T + RANGE_DB  # bars grow from the floor
+    unstable.log_bars(
+        recording,
+        path,
+        at(spectrum.time[::step]),
+        bars.astype(np.float32),
+        places=spectrum.frequency[shown],
+        color=colors.NOISE,
+    )
+
+
+DETAIL = 0.5
+"""Duration of a detail, in [s]."""
+DETAIL_JOINTS = 5
+DETAIL_POINTS = 10_000
+"""Samples of a line; a run at 20 kHz or less is shown whole."""
+
+
+@dataclass(frozen=True)
+class Detail:
+    """A moment as it was logged.
+
+    Attributes:
+        title: What it is, and when.
+        path: Entity path under which ``noise`` and ``velocity`` lie.
+        during: Start and stop, in [s].
+    """
+
+    title: str
+    path: str
+    during: tuple[float, float]
+
+
+def log_details(
+    recording: rr.RecordingStream, analysis: Analysis, moments: Sequence[Moment]
+) -> list[Detail]:
+    """Log noise, and the velocities of the joints that vibrate most, sample by sample."""
+    run, found = analysis.run, []
+    for number, moment in enumerate(moments):
+        edges = (moment.peak - DETAIL / 2, moment.peak + DETAIL / 2)
+        first, last = np.searchsorted(run.time, edges)
+        part = slice(int(first), int(last))
+        valid = run.mask[part]
+        velocity = run.velocity[part].astype(np.float64)
+        energy = (vibrating(velocity, valid, run.rate) ** 2).sum(axis=0)
+        joints = np.sort(np.argsort(-energy, kind="stable")[:DETAIL_JOINTS])
+        path = f"/detail/{number}"
+        time = run.time[part][valid]
+        names = {"noise": ["simplified"], "velocity": [run.joint_names[i] for i in joints]}
+        values = {"noise": analysis.noise[part, None], "velocity": velocity[:, joints]}
+        for kind, lines in names.items():
+            one = [colors.NOISE] if kind == "noise" else colors.of_series(len(lines))
+            thin = extremes(time, values[kind][valid], points=DETAIL_POINTS)
+            axes.log_lines(recording, f"{path}/{kind}", *thin, names=lines, colours=one)
+        found.append(Detail(f"{spoken(moment.label)} at {moment.peak:.2f} s", path, edges))
+    return found
