@@ -22,7 +22,7 @@ from scipy.signal import butter, sosfilt, welch
 
 from benchmarks.orders import ORDERS, order_spectra
 from inspector import read_log
-from inspector.sound.sonification import common_gain, save, sonify
+from inspector.sound import common_gain, save, sonify
 from noiseclassifier.scenarios.domains import GOOD
 from noiseclassifier.scenarios.domains.drives import ORDERS as GEAR_ORDERS
 from noiseclassifier.scenarios.domains.logs import HARMONICS

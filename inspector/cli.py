@@ -22,7 +22,6 @@ from inspector.commands.evaluate import evaluate
 from inspector.commands.expect import expect
 from inspector.commands.export import export
 from inspector.commands.import_ import import_
-from inspector.commands.labels import labels
 from inspector.commands.listen import listen
 from inspector.commands.live import live
 from inspector.commands.noise import noise
@@ -36,9 +35,18 @@ from inspector.commands.tune import tune
 from inspector.commands.view import view
 from inspector.text import printable
 
+RENAMED = {"labels": "export (--labels findings, --labels annotated, --annotate FILE)"}
+"""Commands of the version before, and what does their work now."""
+
 
 class _Group(TyperGroup):
     """Commands; what they say of a wrong value begins with the value."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and args[0] in RENAMED:
+            typer.echo(f"inspector: `{args[0]}` is now `{RENAMED[args[0]]}`", err=True)
+            raise typer.Exit(2)
+        return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -99,7 +107,6 @@ _add("Judge", diff, "inspector diff reference/ candidate/ --report changes/")
 _add("Judge", audit, "inspector audit run.npz")
 _add("Judge", smoothness, "inspector smoothness episodes/ --picture smoothness.png")
 _add("Import and export", import_, "inspector import log.csv -o run.npz", name="import")
-_add("Import and export", labels, "inspector labels run.npz --to labels.txt")
 _add("Import and export", export, "inspector export run.npz -o run.mcap")
 _add("Train", train, "inspector train data/ --part training --rate 1000 -o model.npz")
 _add("Train", adapt, "inspector adapt good1.npz good2.npz -o robot.npz --alarms 1")

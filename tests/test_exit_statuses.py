@@ -33,7 +33,6 @@ COMMANDS = {
     "audit": ("run.npz",),
     "smoothness": ("good",),
     "import": ("log.csv", "-o", "out/run.npz"),
-    "labels": ("run.npz",),
     "export": ("run.npz", "-o", "out/run.csv"),
     "train": ("annotated", "-o", "out/model.npz"),
     "adapt": ("good", "-o", "out/adapted.npz"),

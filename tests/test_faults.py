@@ -37,7 +37,7 @@ FILES = {
     "compare recording": ("compare", "run.npz", "--save", "out/compare.rrd"),
     "compare picture": ("compare", "run.npz", "--picture", "out/compare.png"),
     "listen": ("listen", "run.npz", "-o", "out/run.wav"),
-    "labels": ("labels", "run.npz", "--to", "out/labels.txt"),
+    "labels": ("export", "run.npz", "--labels", "annotated", "-o", "out/labels.txt"),
     "baseline": ("baseline", "good", "-o", "out/baseline.npz"),
     "adapt": ("adapt", "good", "-o", "out/adapted.npz"),
     "classify": ("classify", "good", "--write", "json=out/verdicts.json"),

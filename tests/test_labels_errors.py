@@ -6,7 +6,7 @@ from commandline import call
 
 from inspector.assets import demo_run
 from inspector.errors import InspectorError
-from inspector.labels import LabelFileError, read_labels, write_labels
+from inspector.labelfiles import read_labels, write_labels
 from noisemodel import Block, OutputError, Run
 
 TIME = np.arange(1000) / 100
@@ -72,14 +72,14 @@ def reading(tmp_path, name, content):
     ],
 )
 def test_damaged_labels_are_refused_with_their_place(tmp_path, name, content, message):
-    with pytest.raises(LabelFileError, match=message) as caught:
+    with pytest.raises(InspectorError, match=message) as caught:
         reading(tmp_path, name, content)
     assert "\n" not in str(caught.value)
     assert str(caught.value).startswith(str(tmp_path / name))
 
 
 def test_a_missing_file_is_reported(tmp_path):
-    with pytest.raises(LabelFileError, match="cannot be read .No such file"):
+    with pytest.raises(InspectorError, match="cannot be read .No such file"):
         read_labels(tmp_path / "none.csv", RUN)
 
 
@@ -99,7 +99,7 @@ def test_nothing_is_overwritten_or_written_in_part(tmp_path):
     with pytest.raises(OutputError, match="exists already"):
         write_labels([Block(0.0, 1.0, "ok")], path)
     assert path.read_text() == "mine"
-    with pytest.raises(LabelFileError, match="the end of the recording in NoisyTest"):
+    with pytest.raises(InspectorError, match="the end of the recording in NoisyTest"):
         write_labels([Block(-2.0, -1.0, "ok")], tmp_path / "labels.toml")
     assert list(tmp_path.iterdir()) == [path]
     write_labels([Block(0.0, 1.0, "ok")], path, overwrite=True)
@@ -109,8 +109,9 @@ def test_nothing_is_overwritten_or_written_in_part(tmp_path):
 # --- the commands
 
 
-def test_labels_are_written_and_read_by_the_command(tmp_path):
-    status, out, err = call("labels", demo_run(), "--to", tmp_path / "labels.txt")
+def test_annotated_blocks_are_written_and_read_by_the_command(tmp_path):
+    labels = tmp_path / "labels.txt"
+    status, out, err = call("export", demo_run(), "--labels", "annotated", "-o", labels)
     assert (status, err) == (0, "")
     assert "labels.txt: 4 labels" in out
     bare = Run.load(demo_run())
@@ -118,36 +119,34 @@ def test_labels_are_written_and_read_by_the_command(tmp_path):
         tmp_path / "bare.npz"
     )
     status, _, err = call(
-        "labels", tmp_path / "bare.npz", "--from", tmp_path / "labels.txt", "-o", tmp_path / "n.npz"
+        "export", tmp_path / "bare.npz", "--annotate", labels, "-o", tmp_path / "n.npz"
     )
     assert (status, err) == (0, "")
     assert Run.load(tmp_path / "n.npz").blocks == bare.blocks
-    status, out, _ = call("labels", tmp_path / "n.npz")
+
+
+def test_findings_are_written_by_the_command(tmp_path):
+    labels = tmp_path / "labels.csv"
+    status, out, _ = call("export", demo_run(), "--labels", "findings", "-o", labels)
     assert status == 0
-    assert len(out.splitlines()) == 4
+    assert labels.read_text().startswith("start,stop,label,score\n")
+    assert len(labels.read_text().splitlines()) == len(out.splitlines())
 
 
-def test_bad_input_is_an_error_of_one_line_and_exit_3(tmp_path):
+def test_labels_outside_of_the_run_are_one_line_and_exit_3(tmp_path):
     RUN.save(tmp_path / "run.npz")
     (tmp_path / "late.csv").write_text("start,stop,label\n9,11,ok\n")
-    for arguments, text in [
-        (["run.npz"], "has no labels"),
-        (["run.npz", "--to", tmp_path / "x.csv"], "has no labels"),
-        (["run.npz", "--from", tmp_path / "late.csv", "-o", tmp_path / "x.npz"], "outside of the"),
-        (["none.npz"], "cannot be read"),
-    ]:
-        status, out, err = call("labels", tmp_path / arguments[0], *arguments[1:])
-        assert (status, out) == (3, "")
-        assert text in err
-        assert len(err.splitlines()) == 1
+    arguments = ("--annotate", tmp_path / "late.csv", "-o", tmp_path / "x.npz")
+    status, out, err = call("export", tmp_path / "run.npz", *arguments)
+    assert (status, out, err.count("\n")) == (3, "", 1)
+    assert "outside of the" in err
     assert {path.name for path in tmp_path.iterdir()} == {"run.npz", "late.csv"}
 
 
-def test_wrong_usage_is_exit_2(tmp_path):
-    run = demo_run()
-    assert call("labels", run, "--from", "a.csv")[0] == 2
-    assert call("labels", run, "-o", "a.npz")[0] == 2
-    assert call("labels", run, "--to", "a.csv", "--from", "b.csv", "-o", "c.npz")[0] == 2
+def test_the_command_of_old_names_the_new_one():
+    status, out, err = call("labels", demo_run())
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "`labels` is now `export (--labels" in err
 
 
 def test_findings_are_written_beside_the_verdicts(tmp_path):

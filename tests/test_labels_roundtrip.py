@@ -3,8 +3,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from inspector.labels import LabelFileError, read_labels, write_labels
-from inspector.labels.files import FORMATS
+from inspector.errors import InspectorError
+from inspector.labelfiles import FORMATS, read_labels, write_labels
 from noiseclassifier import Event, noisytest
 from noisemodel import Block, Run, RunError
 
@@ -56,7 +56,7 @@ def test_labels_written_and_read_again_are_equal(folder, suffix, run):
 @example(run=run_with(Block(0.5, 1.0, 'say "\\u0041" \\')))
 def test_labels_written_and_read_by_noisytest_are_equal(folder, run):
     if any(block.stop == -1.0 for block in run.blocks):
-        with pytest.raises(LabelFileError, match="stops at -1 s, which is the recording's end"):
+        with pytest.raises(InspectorError, match="stops at -1 s, the end of the recording"):
             there_and_back(folder, run, ".toml")
     else:
         assert there_and_back(folder, run, ".toml") == run.blocks

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,7 @@ from hypothesis import strategies as st
 from samplelogs import JOINTS, write_lerobot
 
 from inspector.commands.smoothness import By
-from inspector.smoothness.ranking import as_text, default_order, ranked
-from inspector.smoothness.scores import SCORES, scored
+from inspector.smoothness import SCORES, as_text, default_order, ranked, scored
 from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]
@@ -135,10 +135,35 @@ def test_the_order_is_by_actions_only_where_all_episodes_have_them_of_one_quanti
     positions = scored(rollout(), "positions")
     none = scored(rollout(position_desired=None), "none")
     velocities = scored(rollout(position_desired=None, velocity_desired=rollout().velocity), "v")
-    assert default_order([positions]) == "action_curvature"
+    of_set = replace(positions, episode="0")
+    assert default_order([of_set]) == "action_curvature"
     assert default_order([positions, none]) == "level"
-    assert default_order([positions, velocities]) == "level"
-    assert ranked([scored(rollout(samples=2), "")]).by == "action_rate"
+    assert default_order([of_set, replace(velocities, episode="1")]) == "level"
+    assert ranked([scored(rollout(samples=2), "", episode="0")]).by == "action_rate"
+
+
+def test_logs_are_ordered_by_their_measured_velocities_although_they_have_actions():
+    assert default_order([scored(rollout(), "run")]) == "level"
+
+
+def test_episodes_with_the_same_actions_are_ordered_by_what_tells_them_apart():
+    rough = rollout(0.05)
+    same = [
+        scored(replace(rough, position_desired=rollout().position_desired), "rough", episode="1"),
+        scored(rollout(), "clean", episode="0"),
+    ]
+    order = ranked(same)
+    assert order.by == "level"
+    assert [episode.log for episode in order.episodes] == ["clean", "rough"]
+
+
+def test_equal_episodes_are_called_equal_and_none_the_roughest():
+    rough = replace(rollout(0.05), position_desired=rollout().position_desired)
+    text = as_text(ranked([scored(rollout(), "a"), scored(rough, "b")], by="action_curvature"))
+    assert text.count("1 equal") == 2
+    assert (
+        text.splitlines()[-1] == "All are equal by 2nd diff.: `--by` orders them by another score."
+    )
 
 
 def test_an_episode_without_the_score_has_no_rank_and_comes_last():
@@ -164,10 +189,10 @@ def test_a_folder_is_ranked_in_one_table(folder):
     status, out, err = call("smoothness", folder)
     assert (status, err) == (0, "")
     lines = out.splitlines()
-    assert lines[0] == "3 episodes, the smoothest first by mean square second difference of actions"
+    assert lines[0] == "3 episodes, the smoothest first by level of the velocities above 10 Hz"
     assert [line.split()[1] for line in lines[4:7]] == ["smooth.npz", "middle.npz", "rough.npz"]
     assert "flagged: empty, rate of 50 Hz" in out
-    assert lines[-1] == f"The roughest: inspector view {folder / 'rough.npz'}"
+    assert lines[-1] == f"The roughest by >10 Hz: inspector view {folder / 'rough.npz'}"
     assert out.count("empty") == 1
 
 
@@ -215,7 +240,10 @@ def test_a_lerobot_data_set_is_ranked_by_episode(tmp_path):
         ["set", "episode", "1"],
         ["set", "episode", "0"],
     ]
-    assert lines[-1] == f"The roughest: inspector import {data} --episode 0 -o roughest.npz"
+    assert (
+        lines[-1]
+        == f"The roughest by 2nd diff.: inspector import {data} --episode 0 -o roughest.npz"
+    )
 
 
 def test_a_run_at_a_higher_rate_has_a_share_of_time_flagged():

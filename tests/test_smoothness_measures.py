@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from inspector.smoothness.measures import (
+from inspector.smoothness import (
     level_above,
     log_dimensionless_jerk,
     sparc,

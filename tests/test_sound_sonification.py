@@ -12,10 +12,7 @@ import noisemodel as nm
 from inspector.analysis.level import estimate
 from inspector.cli import main
 from inspector.errors import InspectorError
-from inspector.sound import sonification
-from inspector.sound.clip import clip
-from inspector.sound.mixing import mix
-from inspector.sound.sonification import Settings, common_gain, description, save, sonify
+from inspector.sound import Settings, clip, common_gain, mix, output_paths, save, sonify
 from noisemodel import OutputError, Run
 
 RATE = 10_000.0
@@ -115,7 +112,7 @@ def test_standstill_is_silent_and_reported_so():
     assert sound.silent
     assert common_gain([sound]) == 0.0
     assert not read(sound.file(60.0))[0].any()
-    assert "silent: nothing reaches 1e-06 rad/s" in description(sound, 0.0)
+    assert "silent: nothing reaches 1e-06 rad/s" in sound.description(0.0)
     assert str(sound).startswith("simplified noise: silent")
 
 
@@ -128,14 +125,14 @@ def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
     sound = sonify(run_of(0.01 * tone(440)))
     gain = common_gain([sound])
     assert sound.clipped(gain) == 0.0
-    assert "clipped" not in description(sound, gain)
+    assert "clipped" not in sound.description(gain)
     assert 0.85 < np.abs(read(sound.file(gain))[0]).max() < 0.9  # 1 dB of headroom
 
 
 def test_clipping_is_reported():
     sound = sonify(run_of(0.01 * tone(440)))
     assert np.abs(read(sound.file(46.0))[0]).max() == 1.0
-    assert "% of it exceeds full scale, by 6.1 dB at most" in description(sound, 46.0)
+    assert "% of it exceeds full scale, by 6.1 dB at most" in sound.description(46.0)
 
 
 def test_a_sound_file_states_its_contents_and_gain():
@@ -250,7 +247,7 @@ def test_a_link_needs_a_robot():
 
 
 def test_two_runs_become_two_files_at_one_gain(tmp_path):
-    paths = sonification.output_paths(tmp_path / "ab.wav", 2)
+    paths = output_paths(tmp_path / "ab.wav", 2)
     assert [path.name for path in paths] == ["ab.a.wav", "ab.b.wav"]
     sounds = [sonify(run_of(size * tone(440))) for size in (0.01, 0.05)]
     save(dict(zip(paths, sounds, strict=True)), common_gain(sounds))
@@ -267,7 +264,7 @@ def test_sounds_of_different_units_have_no_gain_in_common(arm, tmp_path):
 def test_a_sound_file_that_exists_is_kept(tmp_path):
     (tmp_path / "run.b.wav").write_text("precious")
     with pytest.raises(OutputError, match=r"run.b.wav: exists already"):
-        sonification.output_paths(tmp_path / "run.wav", 2)
+        output_paths(tmp_path / "run.wav", 2)
 
 
 @pytest.fixture
@@ -319,7 +316,7 @@ def test_a_clip_has_the_whole_run_or_the_part_around_its_worst_moment(monkeypatc
     run = run_of(0.01 * tone(440), 0.01 * tone(300))
     whole = clip(run)
     assert (whole.start, whole.stop) == (0.0, 2.0)
-    monkeypatch.setattr("inspector.sound.clip.MOST_VELOCITIES", 10_000)
+    monkeypatch.setattr("inspector.sound.MOST_VELOCITIES", 10_000)
     part = clip(run, around=1.5)
     assert (part.start, part.stop) == (1.25, 1.75)
     samples, rate = read(part.data)
@@ -334,7 +331,7 @@ def test_a_run_without_audible_frequencies_has_no_clip():
 
 
 def test_sounds_need_no_library_that_is_slow_to_import():
-    code = "import sys, inspector.sound.clip; print('scipy.signal' in sys.modules)"
+    code = "import sys, inspector.sound; print('scipy.signal' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 

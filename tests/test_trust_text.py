@@ -12,7 +12,7 @@ from inspector.analysis.status import Status
 from inspector.analysis.verdict import classify_file
 from inspector.errors import InspectorError
 from inspector.expectations import expectations
-from inspector.labels import read_labels
+from inspector.labelfiles import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.input import reader_of
 from inspector.logs.options import ReadOptions

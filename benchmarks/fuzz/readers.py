@@ -25,7 +25,7 @@ from inspector.analysis.analyse import analyse
 from inspector.assets import model_files
 from inspector.errors import InspectorError
 from inspector.expectations import expectations
-from inspector.labels import read_labels
+from inspector.labelfiles import read_labels
 from inspector.library import load_library
 from inspector.live import input as feeding
 from inspector.logs.options import ReadOptions, parse_mapping
@@ -394,7 +394,7 @@ def _labels(name: str, content: str) -> Reader:
         "text",
         _written(name, content),
         lambda path: read_labels(path, run()),
-        ("labels", "{folder}/run.npz", "--from", "{}", "-o", "{folder}/out.npz"),
+        ("export", "{folder}/run.npz", "--annotate", "{}", "-o", "{folder}/out.npz"),
     )
 
 

@@ -166,7 +166,7 @@ def classify(
     today = date.today()
     targets = {}
     if labels_to:
-        from inspector.labels.findings import label_paths
+        from inspector.labelfiles import label_paths
 
         targets = label_paths(shown, labels_to, format_name=labels_format, overwrite=overwrite)
     draw = None
@@ -217,7 +217,7 @@ def classify(
     lost = [line for verdict in verdicts for line in verdict.lost]
     lost += written(verdicts, FORMATS, format, files, overwrite=overwrite)
     if targets:
-        from inspector.labels.findings import write_findings
+        from inspector.labelfiles import write_findings
 
         save = partial(
             write_findings,

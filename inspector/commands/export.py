@@ -1,22 +1,46 @@
-"""`inspector export`: noise, labels and scores for other tools."""
+"""`inspector export`: noise, labels and scores for other tools; label files, and runs with them."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inspector.commands.options import ModelFiles, Overwrite, RunFile, opened, reads_logs
+from inspector.text import counted
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
+    from noisemodel import Run
+
+
+class Labels(StrEnum):
+    """What a label file holds."""
+
+    FINDINGS = "findings"
+    ANNOTATED = "annotated"
 
 
 @reads_logs
 def export(
     run: RunFile,
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="The file to write: .mcap, .csv or .parquet.")
+        Path,
+        typer.Option(
+            "--output",
+            "-o",
+            help="The file to write: .mcap, .csv or .parquet; labels as .toml (NoisyTest), .csv or"
+            " .txt (Audacity); a run as .npz.",
+        ),
     ],
+    labels: Annotated[
+        Labels | None,
+        typer.Option("--labels", help="Write a label file of the findings or annotated blocks."),
+    ] = None,
+    annotate: Annotated[
+        Path | None,
+        typer.Option("--annotate", help="Write the run with the labels of this file instead."),
+    ] = None,
     kind: Annotated[
         str, typer.Option("--kind", help="Extended noise: normal, rms, mean, paper, A, B or C.")
     ] = "normal",
@@ -29,10 +53,10 @@ def export(
     *,
     reading: "Reading",
 ) -> None:
-    """Write noise, labels and scores as MCAP, CSV or Parquet.
+    """Write noise, labels and scores for other tools.
 
     Foxglove and PlotJuggler read MCAP, which holds the joints' motion as well; data frames read
-    CSV and Parquet.
+    CSV and Parquet; annotation tools and spreadsheets read label files.
     """
     from inspector import assets
     from inspector.export import LAYOUTS
@@ -40,19 +64,40 @@ def export(
     from inspector.library import load_library
     from noisemodel.atomic import refuse_existing
 
+    if labels and annotate:
+        raise typer.BadParameter("name one of --labels and --annotate")
     refuse_existing(output, overwrite=overwrite, read=[run])
+    if annotate:
+        _annotated(opened(run, reading).run, annotate, output, overwrite=overwrite)
+        return
     library = load_library(assets.model_files(model))
-    found = write(
-        opened(run, reading).run,
-        output,
-        library,
-        kind=kind,
-        overwrite=overwrite,
-        layouts=layouts,
-    )
+    recorded = opened(run, reading).run
+    if labels:
+        from inspector.analysis.analyse import analyse
+        from inspector.labelfiles import write_labels
+
+        findings = labels is Labels.FINDINGS
+        spans = analyse(recorded, library).findings if findings else recorded.blocks
+        write_labels(spans, output, overwrite=overwrite)
+        for each in spans:
+            typer.echo(f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s")
+        typer.echo(f"{output}: {counted(len(spans), 'label')}")
+        return
+    found = write(recorded, output, library, kind=kind, overwrite=overwrite, layouts=layouts)
     typer.echo(f"{run}: {found.analysis.headline}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")
     typer.echo(f"{output}: {found}")
     if layouts:
         typer.echo(f"  layouts: {', '.join(str(output.with_suffix(each)) for each in LAYOUTS)}")
+
+
+def _annotated(run: "Run", labels: Path, output: Path, *, overwrite: bool) -> None:
+    """Write a run whose annotated blocks are the labels of a file."""
+    from dataclasses import replace
+
+    from inspector.labelfiles import read_labels
+
+    blocks = read_labels(labels, run)
+    replace(run, blocks=blocks).save(output, overwrite=overwrite)
+    typer.echo(f"{output}: {counted(len(blocks), 'label')}")

@@ -42,7 +42,7 @@ def listen(
     reading: "Reading",
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
-    from inspector.sound import sonification
+    from inspector import sound as sonification
 
     one_at_a_time(reading, len(runs))
     settings = sonification.Settings(kind, joint, link, speed)
@@ -55,4 +55,4 @@ def listen(
     sonification.save(dict(zip(paths, sounds, strict=True)), level, overwrite=overwrite)
     for run, path, sound in zip(runs, paths, sounds, strict=True):
         typer.echo(f"{run}: {sound}")
-        typer.echo(f"{path}: {sonification.description(sound, level)}")
+        typer.echo(f"{path}: {sound.description(level)}")

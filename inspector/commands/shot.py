@@ -51,7 +51,7 @@ def shot(
     from inspector.library import load_library
     from inspector.recording import picture as shooting
     from inspector.recording.run import write
-    from inspector.sound.clip import worst_time
+    from inspector.sound import worst_time
     from noisemodel.atomic import refuse_existing
 
     check_suffix(output, ".png")

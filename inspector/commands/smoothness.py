@@ -24,7 +24,7 @@ class Format(StrEnum):
 
 
 class By(StrEnum):
-    """The scores, by their names in ``inspector.smoothness.scores``, too slow to import here."""
+    """The scores, by their names in ``inspector.smoothness``, too slow to import here."""
 
     LEVEL = "level"
     SPARC = "sparc"
@@ -46,7 +46,7 @@ def smoothness(
     by: Annotated[
         By | None,
         typer.Option(
-            help="The score to order by; by default action_curvature, or level without actions."
+            help="The score to order by; by default level, action_curvature for data sets."
         ),
     ] = None,
     format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
@@ -81,27 +81,25 @@ def smoothness(
     The exit status is 3 if a log cannot be read; the others are ranked.
     """
     from inspector import assets
+    from inspector import smoothness as ranking
     from inspector.library import load_library
     from inspector.logs.reading import read_options
     from inspector.progress import progress
-    from inspector.smoothness import picture as histograms
-    from inspector.smoothness import ranking
-    from inspector.smoothness.episodes import episodes_of, scored_episodes
     from noisemodel.atomic import refuse_existing
 
     if picture:
         refuse_existing(picture, overwrite=overwrite)
-        histograms.require()
+        ranking.require_matplotlib()
     del package_root, max_unpacked, limit  # have been set
     options = read_options(map_ or (), robot=robot, rate=rate, units=units)
     library = load_library(assets.model_files(model)) if labels else None
-    episodes, failed = episodes_of(logs, options)
-    found = progress(scored_episodes(episodes, library), "score", total=len(episodes))
+    episodes, failed = ranking.episodes_of(logs, options)
+    found = progress(ranking.scored_episodes(episodes, library), "score", total=len(episodes))
     order = ranking.ranked([*found, *failed], by=by or "")
     write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
     typer.echo(write[format](order))
     if picture and order.episodes:
-        histograms.draw(order.episodes, picture, overwrite=overwrite)
+        ranking.draw(order.episodes, picture, overwrite=overwrite)
         typer.echo(f"{picture}", err=True)
     for each in order.failed:
         typer.echo(f"inspector: {each.name}: {each.problem}", err=True)

@@ -194,7 +194,7 @@ def _one(
     from inspector.analysis.analyse import analyse_file
     from inspector.recording.run import write
     from inspector.report.markdown import sentence
-    from inspector.sound.clip import of_recording, worst_time
+    from inspector.sound import of_recording, worst_time
 
     found = analyse_file(run, library, links=bool(kind), kind=kind, terms=terms)
     write(found, target, overwrite=overwrite, sound=of_recording(found), floor=floor)

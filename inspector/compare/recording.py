@@ -51,8 +51,7 @@ from inspector.recording.panels import (
 from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import classes_of, spoken
-from inspector.sound.sonification import Settings, common_gain, sound_of
-from inspector.sound.sound import SMALL_RATE
+from inspector.sound import SMALL_RATE, common_gain, sound_of
 from inspector.spectrogram import in_bands
 from inspector.thinning import extremes
 from noisemodel.noise import REFERENCE_POWER, decibel
@@ -599,14 +598,14 @@ def _sounds(pair: Pair, around: float) -> dict[str, bytes]:
     first = min(max(middle - count // 2, 0), len(pair.time) - count)
     try:
         made = {
-            name: sound_of(part(side.run, first, first + count), Settings())
+            name: sound_of(part(side.run, first, first + count), playing=SMALL_RATE)
             for name, side in pair.sides
         }
     except InspectorError:
         return {}
     gain = common_gain(list(made.values()))
     lead = first / pair.rate
-    return {name: s.file(gain, rate=SMALL_RATE, lead=lead) for name, s in made.items()}
+    return {name: s.file(gain, lead=lead) for name, s in made.items()}
 
 
 def _log_text(recording: rr.RecordingStream, pair: Pair) -> None:

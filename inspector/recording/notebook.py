@@ -109,7 +109,7 @@ def _recorded(run: nm.Run | str | Path, recording: Path, *, robot: bool, kind: s
     from inspector.analysis.analyse import analyse_file
     from inspector.library import load_library
     from inspector.recording.run import write
-    from inspector.sound.clip import of_recording
+    from inspector.sound import of_recording
 
     library = load_library()
     with tempfile.TemporaryDirectory() as folder:

@@ -13,7 +13,7 @@ import numpy as np
 from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
-from inspector.sound.clip import clip, worst_time
+from inspector.sound import clip, worst_time
 from noisemodel.atomic import replacing
 from noisemodel.links import vibrating_pieces
 from noisemodel.noise import REFERENCE_POWER, decibel

@@ -1,0 +1,590 @@
+"""Export of a run's noise, labels and scores: MCAP with layouts, CSV and Parquet.
+
+/joint_states and /joint_states/desired of an MCAP are ROS 2 JointStates, a message for each sample,
+which `inspector import` reads as well. The other topics are JSON: /noise for each sample, /level
+each 50 ms, /labels at the middle of each frame, /class where the class changes, /findings and
+/annotations at their start, and /log with a line for each finding. Times are those of the run,
+added to the first stamp in its ``meta``. MCAP has no negative times: a run that starts before 0 is
+shifted.
+
+The layouts for Foxglove and PlotJuggler show, from top to bottom: the class (in Foxglove), the
+noise, its level above 10 Hz, the probability of a failure with the alarm threshold, and the
+velocities of the joints; in Foxglove the findings are listed at the left.
+"""
+
+import csv
+import heapq
+import json
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+import noiseclassifier as nc
+import noisemodel as nm
+from inspector import colors
+from inspector.analysis.analyse import Analysis, analyse, robot_known
+from inspector.analysis.level import estimate
+from inspector.audit import summary
+from inspector.errors import InspectorError, OptionError
+from inspector.library import Library
+from inspector.text import cell, counted
+from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.types import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """The noise and the analysis of a run; gaps are left out.
+
+    Attributes:
+        analysis: The run with what was found in it.
+        time: Of each sample, shape (samples,), in [s].
+        simplified: Simplified noise, shape (samples,), in [rad/s].
+        extended: Sound power of all links, shape (samples,), in [W]; None without a robot.
+        kind: Kind of the extended noise.
+        remarks: What is missing and why, a sentence each.
+    """
+
+    analysis: Analysis
+    time: Array
+    simplified: Array
+    extended: Array | None
+    kind: str
+    remarks: tuple[str, ...]
+
+    def __str__(self) -> str:
+        """The content in a line."""
+        labels = self.analysis.labels
+        parts = [
+            f"{len(self.time)} samples of noise{'' if self.extended is None else ' of two kinds'}",
+            counted(0 if labels is None else len(labels), "frame"),
+            counted(len(self.analysis.findings), "finding"),
+            counted(len(self.analysis.run.blocks), "annotated block"),
+        ]
+        return ", ".join(parts)
+
+
+def collect(run: nm.Run, library: Library, *, kind: str = "normal") -> Content:
+    """Analyse a run and compute its noise."""
+    if kind not in nm.KINDS:
+        raise nm.UnknownKindError(kind, tuple(nm.KINDS))
+    analysis = analyse(run, library)
+    run, missing, extended = analysis.run, list(analysis.notes), None
+    if analysis.audit is not None:
+        missing += summary(analysis.audit, classes=False)
+    if analysis.labels is None:
+        missing.append(f"No labels: {analysis.reason}.")
+    if not robot_known(run) or run.position is None:
+        missing.append("No extended noise: that takes a robot and positions.")
+    else:
+        try:
+            extended = estimate(run, kind).power.sum(axis=1)[run.mask]
+        except nm.GeometryError as error:
+            missing.append(f"No extended noise: {error}.")
+    return Content(
+        analysis=analysis,
+        time=run.time[run.mask],
+        simplified=analysis.noise[run.mask],
+        extended=extended,
+        kind=kind,
+        remarks=tuple(missing),
+    )
+
+
+UNITS = {
+    name: {"unit": unit}
+    for name, unit in (
+        ("time", "s"),
+        ("simplified", "rad/s"),
+        ("extended", "W"),
+        ("frame_start", "s"),
+        ("frame_stop", "s"),
+    )
+}
+"""Units of the columns that have one."""
+
+
+def arrow_table(content: Content) -> Any:
+    """Exported data as an Arrow table.
+
+    Columns are time, simplified, extended (with a robot), annotated (with blocks), and with labels
+    frame_start, frame_stop, label and a score_<class> each: those of the frame whose middle is
+    nearest, and null before the first and after the last frame's share.
+    """
+    import pyarrow as pa
+
+    columns = dict(_table_columns(content))
+    fields = [
+        pa.field(name, pa.array(values).type, metadata=UNITS.get(name))
+        for name, values in columns.items()
+    ]
+    about = {"format": "noise-export/1", "model": content.analysis.model, "extended": content.kind}
+    return pa.table(
+        [pa.array(values) for values in columns.values()], pa.schema(fields, metadata=about)
+    )
+
+
+def write_parquet(content: Content, path: Path) -> None:
+    """Write the table as Parquet."""
+    from pyarrow import parquet
+
+    with path.open("wb") as file:  # its own errors lack the number
+        parquet.write_table(arrow_table(content), file, compression="zstd")
+
+
+def write_csv(content: Content, path: Path) -> None:
+    """Write the table as CSV, numbers with all digits."""
+    import pyarrow.csv
+
+    table = arrow_table(content)
+    for place, name in enumerate(table.column_names):
+        if name in ("label", "annotated"):
+            cells = [None if each is None else cell(each) for each in table[name].to_pylist()]
+            table = table.set_column(place, name, [cells])
+    with path.open("w", newline="", encoding="utf-8") as file:
+        # Arrow would quote all names, which not every reader of CSV accepts.
+        csv.writer(file, lineterminator="\n").writerow(table.column_names)
+    with path.open("ab") as stream:
+        pyarrow.csv.write_csv(table, stream, pyarrow.csv.WriteOptions(include_header=False))
+
+
+def _table_columns(content: Content) -> Iterator[tuple[str, Any]]:
+    yield "time", content.time
+    yield "simplified", content.simplified
+    if content.extended is not None:
+        yield "extended", content.extended
+    if content.analysis.run.blocks:
+        yield "annotated", _annotated(content)
+    if content.analysis.labels is not None:
+        yield from _framed(content.time, content.analysis.labels)
+
+
+def _annotated(content: Content) -> list[str | None]:
+    labels: list[str | None] = [None] * len(content.time)
+    for block in content.analysis.run.blocks:
+        first, last = np.searchsorted(content.time, (block.start, block.stop))
+        labels[first:last] = [block.label] * int(last - first)
+    return labels
+
+
+def _framed(time: Array, labels: nc.Labels) -> Iterator[tuple[str, Any]]:
+    """Columns of the frame whose middle is nearest to each sample, null outside of all shares."""
+    import pyarrow as pa
+
+    middles = (labels.start + labels.stop) / 2
+    share = np.median(np.diff(middles)) if len(middles) > 1 else labels.stop[0] - labels.start[0]
+    nearest = np.searchsorted((middles[1:] + middles[:-1]) / 2, time)
+    outside = np.abs(time - middles[nearest]) > share / 2
+
+    def column(values: Any) -> Any:
+        return pa.array(values[nearest], mask=outside)
+
+    yield "frame_start", column(labels.start)
+    yield "frame_stop", column(labels.stop)
+    yield "label", column(labels.debounced.astype(object))
+    for place, name in enumerate(labels.classes):
+        yield f"score_{name}", column(labels.scores[:, place])
+
+
+JOINT_STATE = "sensor_msgs/msg/JointState"
+MEASURED, DESIRED = "/joint_states", "/joint_states/desired"
+LOG_WARNING = 3
+"""Level of a ``foxglove.Log``."""
+
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+STAMP = {"type": "object", "properties": {"sec": {"type": "integer"}, "nsec": {"type": "integer"}}}
+SPAN = {"label": TEXT, "start": NUMBER, "stop": NUMBER}
+NANOSECONDS = 10**9
+LATEST = 2**63
+"""Stamps from here on are not valid, in [ns]."""
+
+Message = tuple[int, str, bytes]
+"""Stamp in [ns], topic and serialised content."""
+
+
+def write_mcap(content: Content, path: Path) -> None:
+    """Write noise, labels, findings and annotations."""
+    try:
+        from mcap.writer import Writer
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise InspectorError(
+            f"MCAP needs the extra `mcap` ({error}); pip install 'noise-inspector[mcap]'"
+        ) from error
+    ros = get_typestore(Stores.ROS2_HUMBLE)
+    joints = joint_signals(content)
+    with path.open("wb") as stream:
+        writer: Any = Writer(stream)
+        writer.start(profile="ros2", library="noise-inspector")
+        channels = {}
+        if joints:
+            definition, _ = ros.generate_msgdef(JOINT_STATE, ros_version=2)
+            schema = writer.register_schema(JOINT_STATE, "ros2msg", definition.encode())
+            channels = {topic: writer.register_channel(topic, "cdr", schema) for topic in joints}
+        for topic, fields in _topics(content).items():
+            data = json.dumps({"type": "object", "properties": fields}).encode()
+            name = "foxglove.Log" if topic == "/log" else f"noise.{topic[1:]}"
+            schema = writer.register_schema(name, "jsonschema", data)
+            channels[topic] = writer.register_channel(topic, "json", schema)
+        messages = _messages(content) + [
+            _states(content, topic, *each, ros) for topic, each in joints.items()
+        ]
+        for stamp, topic, data in heapq.merge(*messages, key=lambda each: each[0]):
+            writer.add_message(channels[topic], log_time=stamp, data=data, publish_time=stamp)
+        writer.add_metadata(
+            "noise-inspector",
+            {"model": content.analysis.model, "extended": content.kind, "time": "s"},
+        )
+        writer.finish()
+
+
+def joint_signals(content: Content) -> dict[str, tuple[tuple[str, ...], dict[str, Array]]]:
+    """What the JointStates hold: by topic the joints, and by field an array (samples, joints)."""
+    run = content.analysis.run
+    if content.analysis.audit is None:  # a scalar noise has no joints
+        return {}
+    measured = {"position": run.position, "velocity": run.velocity, "effort": run.effort}
+    desired = {"position": run.position_desired, "velocity": run.velocity_desired}
+    signals = {MEASURED: (run.joint_names, measured), DESIRED: (run.desired_joint_names, desired)}
+    known = {}
+    for topic, (names, parts) in signals.items():
+        there = {
+            name: np.ascontiguousarray(each[run.mask], float)
+            for name, each in parts.items()
+            if each is not None
+        }
+        if there:
+            known[topic] = names, there
+    return known
+
+
+def start_stamp(content: Content) -> int:
+    """Time in the MCAP file of the run's time 0, in [ns]."""
+    try:
+        start = int(Decimal(str(content.analysis.run.meta.get("start", 0))) * NANOSECONDS)
+    except (InvalidOperation, ValueError, OverflowError):
+        start = 0
+    first = round(float(content.analysis.run.time[0]) * NANOSECONDS)
+    return max(start if start < LATEST else 0, -first)
+
+
+def _topics(content: Content) -> dict[str, dict[str, Any]]:
+    """JSON properties of the messages of each topic."""
+    noise = {"time": NUMBER, "simplified": NUMBER}
+    topics: dict[str, dict[str, Any]] = {
+        "/noise": noise if content.extended is None else noise | {"extended": NUMBER},
+        "/level": {"level": NUMBER},
+    }
+    if content.analysis.labels is not None:
+        scores = dict.fromkeys(content.analysis.labels.classes, NUMBER)
+        parts = {"failure": NUMBER, "scores": {"type": "object", "properties": scores}}
+        if content.analysis.alarm is not None:
+            parts["alarm"] = NUMBER
+        topics |= {"/labels": SPAN | parts, "/class": {"label": TEXT}}
+    if content.analysis.findings:
+        numbers = {"level": {"type": "integer"}, "line": {"type": "integer"}}
+        texts = dict.fromkeys(("message", "name", "file"), TEXT)
+        topics["/findings"] = SPAN | {"score": NUMBER}
+        topics["/log"] = {"timestamp": STAMP} | numbers | texts
+    if content.analysis.run.blocks:
+        topics["/annotations"] = SPAN
+    return topics
+
+
+Row = tuple[float, dict[str, Any]]
+"""Time in [s], and a message."""
+
+
+def _stamp(zero: int, time: float) -> int:
+    return max(0, zero + round(time * NANOSECONDS))
+
+
+def _messages(content: Content) -> list[Iterator[Message]]:
+    """JSON messages of each topic in order of time."""
+    analysis, zero = content.analysis, start_stamp(content)
+
+    def serialised(topic: str, rows: Iterator[Row]) -> Iterator[Message]:
+        for time, message in rows:
+            yield _stamp(zero, time), topic, json.dumps(message, allow_nan=False).encode()
+
+    parts = {
+        "/noise": _noise(content),
+        "/level": _levels(content),
+        "/labels": _frames(content),
+        "/class": _classes(content),
+        "/findings": _spans(analysis.findings, "score"),
+        "/annotations": _spans(analysis.run.blocks),
+        "/log": _lines(content, zero),
+    }
+    return [serialised(topic, rows) for topic, rows in parts.items()]
+
+
+def _noise(content: Content) -> Iterator[Row]:
+    columns = {"time": content.time, "simplified": content.simplified}
+    if content.extended is not None:
+        columns["extended"] = content.extended
+    for row in zip(*(each.tolist() for each in columns.values()), strict=True):
+        yield row[0], dict(zip(columns, row, strict=True))
+
+
+def _levels(content: Content) -> Iterator[Row]:
+    """The level of the noise above 10 Hz, where it is known."""
+    start, level = content.analysis.noise_level
+    for time, each in zip(start.tolist(), level[:, 0].tolist(), strict=True):
+        if not math.isnan(each):
+            yield time, {"level": each}
+
+
+def _frames(content: Content) -> Iterator[Row]:
+    labels, alarm = content.analysis.labels, content.analysis.alarm
+    if labels is None:
+        return
+    rows = zip(labels.start.tolist(), labels.stop.tolist(), labels.debounced.tolist(), strict=True)
+    for (start, stop, label), scores in zip(rows, labels.scores.tolist(), strict=True):
+        message = {"label": label, "start": start, "stop": stop}
+        message |= {} if alarm is None else {"alarm": alarm}
+        each = dict(zip(labels.classes, scores, strict=True))
+        failure = 1.0 - each["ok"]
+        yield (start + stop) / 2, message | {"failure": failure, "scores": each}
+
+
+def _classes(content: Content) -> Iterator[Row]:
+    """The class where it changes, and none where frames end."""
+    lane, end = content.analysis.lane, None
+    for start, stop, label in lane:
+        if end is not None and start > end:
+            yield end, {"label": ""}
+        yield start, {"label": label}
+        end = stop
+    if end is not None:
+        yield end, {"label": ""}
+
+
+def _spans(spans: Any, *more: str) -> Iterator[Row]:
+    for each in spans:
+        yield each.start, {name: getattr(each, name) for name in ("label", "start", "stop", *more)}
+
+
+def _lines(content: Content, zero: int) -> Iterator[Row]:
+    """A ``foxglove.Log`` for each finding."""
+    for each in content.analysis.findings:
+        sec, nsec = divmod(_stamp(zero, each.start), NANOSECONDS)
+        message = f"{each.label} from {each.start:.2f} s to {each.stop:.2f} s"
+        log = {"timestamp": {"sec": sec, "nsec": nsec}, "level": LOG_WARNING, "line": 0}
+        yield each.start, log | {"message": message, "name": "noise-inspector", "file": ""}
+
+
+def _states(
+    content: Content, topic: str, names: tuple[str, ...], parts: dict[str, Array], ros: Any
+) -> Iterator[Message]:
+    """A JointState for each sample."""
+    state, header, time = (
+        ros.types[kind]
+        for kind in (JOINT_STATE, "std_msgs/msg/Header", "builtin_interfaces/msg/Time")
+    )
+    columns = {name: parts.get(name) for name in ("position", "velocity", "effort")}
+    zero, none = start_stamp(content), np.zeros(0)
+    for sample, at in enumerate(content.time.tolist()):
+        stamp = _stamp(zero, at)
+        sec, nanosec = divmod(stamp, NANOSECONDS)
+        message = state(
+            header=header(stamp=time(sec=sec, nanosec=nanosec), frame_id=""),
+            name=list(names),
+            **{name: none if rows is None else rows[sample] for name, rows in columns.items()},
+        )
+        yield stamp, topic, ros.serialize_cdr(message, JOINT_STATE)
+
+
+LEVEL_TITLE = "level above 10 Hz [dB re 1 rad/s]"
+LISTED = 12
+"""A legend with more lines would cover the plot."""
+
+
+def foxglove(content: Content) -> str:
+    """A layout of Foxglove, to be imported there, as JSON."""
+    over_time: dict[str, tuple[dict[str, Any], float]] = {}
+    if content.analysis.labels is not None:
+        state = {"value": "/class.label", "label": "class", "timestampMethod": "receiveTime"}
+        over_time["StateTransitions!class"] = ({"paths": [state], "isSynced": True}, 1.0)
+    noise = {"/noise.simplified": ("noise, simplified [rad/s]", colors.NOISE)}
+    over_time["Plot!noise"] = (_foxglove_plot("Noise", noise), 2.0)
+    level = {"/level.level": (LEVEL_TITLE, colors.NOISE)}
+    over_time["Plot!level"] = (_foxglove_plot(LEVEL_TITLE, level), 1.5)
+    if content.analysis.labels is not None:
+        failure = {"/labels.failure": ("probability of a failure", colors.CLASSES["impact"])}
+        if content.analysis.alarm is not None:
+            failure["/labels.alarm"] = ("alarm threshold", colors.THRESHOLD)
+        plot = _foxglove_plot("Probability of a failure", failure)
+        over_time["Plot!failure"] = (plot | {"minYValue": 0, "maxYValue": 1}, 1.5)
+    for topic, title, names in _velocities(content):
+        lines = {
+            f"{topic}.velocity[{place}]": (name, color)
+            for place, (name, color) in enumerate(
+                zip(names, colors.of_series(len(names)), strict=True)
+            )
+        }
+        over_time[f"Plot!{title}"] = (_foxglove_plot(f"Velocities, {title} [rad/s]", lines), 2.0)
+    panels = {name: config for name, (config, _) in over_time.items()}
+    layout: Any = _stacked([(name, share) for name, (_, share) in over_time.items()])
+    if content.analysis.findings:
+        panels["RosOut!findings"] = {"topicToRender": "/log", "minLogLevel": 1}
+        parts = {"first": "RosOut!findings", "second": layout, "splitPercentage": 25}
+        layout = {"direction": "row", **parts}
+    whole = {
+        "configById": panels,
+        "globalVariables": {},
+        "userNodes": {},
+        "playbackConfig": {"speed": 1},
+        "layout": layout,
+    }
+    return json.dumps(whole, indent=1) + "\n"
+
+
+def plotjuggler(content: Content) -> str:
+    """A layout of PlotJuggler, to be loaded there after the MCAP, as XML."""
+    plots = {
+        "noise": {"/noise/simplified": colors.NOISE},
+        "level": {"/level/level": colors.NOISE},
+    }
+    if content.analysis.labels is not None:
+        plots["failure"] = {"/labels/failure": colors.CLASSES["impact"]}
+        if content.analysis.alarm is not None:
+            plots["failure"]["/labels/alarm"] = colors.THRESHOLD
+    for topic, title, names in _velocities(content):
+        hues = colors.of_series(len(names))
+        curves = (f"{topic}/{name}/velocity" for name in names)
+        plots[f"velocities, {title}"] = dict(zip(curves, hues, strict=True))
+    element = ElementTree.SubElement
+    root = ElementTree.Element("root")
+    window = element(root, "tabbed_widget", {"parent": "main_window", "name": "Main Window"})
+    tab = element(window, "Tab", containers="1", tab_name="noise-inspector")
+    splitter = element(element(tab, "Container"), "DockSplitter", orientation="-")
+    splitter.set("count", str(len(plots)))
+    splitter.set("sizes", ";".join([f"{1 / len(plots):.6f}"] * len(plots)))
+    for name, curves_of in plots.items():
+        area = element(splitter, "DockArea", name=name)
+        plot = element(area, "plot", mode="TimeSeries", style="Lines", flip_x="false")
+        plot.set("flip_y", "false")
+        for curve, color in curves_of.items():
+            element(plot, "curve", name=curve, color=_hex(color))
+    element(window, "currentTabIndex", index="0")
+    element(root, "use_relative_time_offset", enabled="1")
+    ElementTree.indent(root, " ")
+    return ElementTree.tostring(root, encoding="unicode", xml_declaration=True) + "\n"
+
+
+def _velocities(content: Content) -> list[tuple[str, str, tuple[str, ...]]]:
+    """Topics with velocities, what they are, and their joints."""
+    joints = joint_signals(content)
+    return [
+        (topic, title, joints[topic][0])
+        for topic, title in ((MEASURED, "measured"), (DESIRED, "desired"))
+        if topic in joints and "velocity" in joints[topic][1]
+    ]
+
+
+def _foxglove_plot(title: str, lines: dict[str, tuple[str, colors.Color]]) -> dict[str, Any]:
+    paths = [
+        {
+            "value": value,
+            "label": label,
+            "color": _hex(color),
+            "enabled": True,
+            "showLine": True,
+            "timestampMethod": "receiveTime",
+        }
+        for value, (label, color) in lines.items()
+    ]
+    return {
+        "title": title,
+        "foxglovePanelTitle": title,
+        "paths": paths,
+        "isSynced": True,
+        "showLegend": 1 < len(paths) <= LISTED,
+        "legendDisplay": "floating",
+        "showXAxisLabels": True,
+        "showYAxisLabels": True,
+        "xAxisVal": "timestamp",
+    }
+
+
+def _stacked(panels: list[tuple[str, float]]) -> Any:
+    """Panels above each other, by share of the height."""
+    (first, share), *rest = panels
+    if not rest:
+        return first
+    percent = 100 * share / sum(each for _, each in panels)
+    return {
+        "direction": "column",
+        "first": first,
+        "second": _stacked(rest),
+        "splitPercentage": round(percent, 1),
+    }
+
+
+def _hex(color: colors.Color) -> str:
+    return "#{:02x}{:02x}{:02x}".format(*color)
+
+
+WRITERS: dict[str, Callable[[Content, Path], None]] = {
+    ".mcap": write_mcap,
+    ".csv": write_csv,
+    ".parquet": write_parquet,
+}
+"""Writers by suffix."""
+
+LAYOUTS: dict[str, Callable[[Content], str]] = {
+    ".foxglove.json": foxglove,
+    ".plotjuggler.xml": plotjuggler,
+}
+"""Layouts by the suffix that takes the place of ``.mcap``."""
+
+
+def export(
+    run: nm.Run,
+    path: Path,
+    library: Library,
+    *,
+    kind: str = "normal",
+    overwrite: bool = False,
+    layouts: bool = False,
+) -> Content:
+    """Write noise, labels and scores of a run.
+
+    Args:
+        run: The run.
+        path: The file to write, ``.mcap``, ``.csv`` or ``.parquet``.
+        library: Models to choose from by rate.
+        kind: Kind of the extended noise, see ``noisemodel.extended``.
+        overwrite: Whether a file that exists may be replaced.
+        layouts: Whether to write layouts for Foxglove and PlotJuggler beside it, see `LAYOUTS`.
+
+    Raises:
+        OptionError: If there is no such format, or layouts for another than MCAP.
+        InspectorError: If the format needs an extra that is not installed.
+        OutputError: If the file exists or cannot be written.
+        NoiseModelError: If there is no such kind of noise, or the robot cannot be read.
+    """
+    write = WRITERS.get(path.suffix.lower())
+    if write is None:
+        raise OptionError(
+            f"{path}: no format of exports has this suffix; there are {', '.join(WRITERS)}"
+        )
+    if layouts and write is not write_mcap:
+        raise OptionError(f"{path}: layouts are for .mcap")
+    others = {path.with_suffix(suffix): make for suffix, make in LAYOUTS.items() if layouts}
+    for each in (path, *others):
+        refuse_existing(each, overwrite=overwrite)
+    content = collect(run, library, kind=kind)
+    with replacing(path, overwrite=overwrite) as temporary:
+        write(content, temporary)
+    for each, make in others.items():
+        with replacing(each, overwrite=overwrite) as temporary:
+            temporary.write_text(make(content), encoding="utf-8")
+    return content

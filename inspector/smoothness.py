@@ -1,0 +1,721 @@
+"""How smooth the motion of episodes is: measures, scores, ranking, table and histograms.
+
+Conventions: `sparc` and `log_dimensionless_jerk` are dimensionless, at most 0, and higher the
+smoother, as their authors have them; all others are 0 for the smoothest motion, and higher the
+rougher. A measure that a signal does not define (it is too short, stands still, or its rate is too
+low) is None.
+
+Sources:
+    Hogan and Sternad, "Sensitivity of smoothness measures to movement duration, amplitude, and
+    arrests", Journal of Motor Behavior 41, 2009.
+    Balasubramanian, Melendez-Calderon and Burdet, "A robust and sensitive metric for quantifying
+    movement smoothness", IEEE Transactions on Biomedical Engineering 59, 2012.
+    Balasubramanian, Melendez-Calderon, Roby-Brami and Burdet, "On the analysis of movement
+    smoothness", Journal of NeuroEngineering and Rehabilitation 12, 2015.
+"""
+
+import csv
+import io
+import json
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from inspector.analysis.analyse import analyse
+from inspector.analysis.status import Status
+from inspector.analysis.verdict import EXPECTED
+from inspector.audit.placeholder import without_placeholder
+from inspector.errors import InspectorError, without_path
+from inspector.hold import hold_length, without_hold
+from inspector.library import Library
+from inspector.logs.importing import Imported
+from inspector.logs.options import ReadOptions
+from inspector.logs.reading import jobs_of
+from inspector.text import cell, counted
+from noisemodel import Run
+from noisemodel.atomic import replacing
+from noisemodel.differentiate import stretches
+from noisemodel.types import Array, Real
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+FORMAT = "noise-smoothness/1"
+SUFFIXES = (".npz", ".csv", ".tsv", ".parquet", ".h5", ".hdf5", ".bag", ".mcap", ".db3")
+"""Of the files of a folder that are taken as logs."""
+FAST, TRACKED = 10.0, 4.0
+"""Lowest frequencies of the level and of the tracking error, in [Hz]."""
+STANDING = 0.01
+"""Highest speed of an episode without motion: half a degree a second, in [rad/s]."""
+CUTOFF, THRESHOLD, PADDING = 10.0, 0.05, 4
+"""Of SPARC: highest frequency in [Hz], least amplitude, powers of two of zero padding (2015)."""
+ORDER, PERIODS, BAND = 4, 3, 1.2
+"""Of the high-pass, applied forward and backward: its order, the least duration of a signal in
+periods of its frequency, the least ratio of the Nyquist frequency to its frequency."""
+
+
+# --- measures
+
+
+def level_above(signal: Real, rate: float, frequency: float) -> float | None:
+    """Root mean square of a signal above a frequency, summed over joints.
+
+    Of velocities above 10 Hz it is our own measure, the noise of the joints where motion is over.
+    The high-pass has the gain 1/2 at its frequency.
+
+    Args:
+        signal: Shape (samples, joints), in any unit.
+        rate: Sample rate, in [Hz].
+        frequency: Lowest frequency, in [Hz].
+
+    Returns:
+        Root of the sum over joints of mean squares, in the unit of the signal; None if the rate is
+        below 2.4 times the frequency, or the signal shorter than three of its periods.
+    """
+    padding = round(PERIODS * rate / frequency)
+    if rate < 2 * BAND * frequency or len(signal) <= padding:
+        return None
+    from scipy.signal import butter, sosfiltfilt
+
+    sections = butter(ORDER, frequency, "highpass", fs=rate, output="sos")
+    fast = sosfiltfilt(sections, np.asarray(signal, dtype=np.float64), axis=0, padlen=padding)
+    return float(np.sqrt(np.square(fast).sum(axis=1).mean()))
+
+
+def sparc(speed: Real, rate: float, *, cutoff: float = CUTOFF) -> float | None:
+    """Spectral arc length of a speed profile (Balasubramanian et al., 2015).
+
+    The negative length of the curve that the amplitude spectrum of the speed makes, from 0 to the
+    last frequency below the cut-off at which it is 5 % of its largest value. Frequencies are
+    divided by that last one, amplitudes by the largest one, so that neither the amplitude nor the
+    duration of the motion counts. It is blind above the cut-off, and made for movements of a few
+    seconds: a longer episode has a more negative one, however smooth it is.
+
+    Args:
+        speed: Not negative, shape (samples,), in any unit: the norm of a velocity.
+        rate: Sample rate, in [Hz].
+        cutoff: Highest frequency, in [Hz].
+
+    Returns:
+        The negative arc length; None if there are fewer than two samples, or no motion.
+    """
+    if len(speed) < 2 or not np.any(speed):
+        return None
+    size = 2 ** (int(np.ceil(np.log2(len(speed)))) + PADDING)
+    amplitude = np.abs(np.fft.rfft(speed, size))
+    frequency = np.fft.rfftfreq(size, 1.0 / rate)
+    inside = frequency <= cutoff
+    amplitude, frequency = amplitude[inside] / amplitude.max(), frequency[inside]
+    last = int(np.flatnonzero(amplitude >= THRESHOLD)[-1])
+    if last == 0:
+        return None
+    # omega_c = min(cutoff, min(omega: V(r) < threshold for all r > omega)), Eq. 8 of 2015.
+    steps = np.diff(frequency[: last + 1]) / frequency[last]
+    return -float(np.sqrt(steps**2 + np.diff(amplitude[: last + 1]) ** 2).sum())
+
+
+def log_dimensionless_jerk(velocity: Real, rate: float) -> float | None:
+    """Log dimensionless jerk of a motion (Hogan and Sternad, 2009; Balasubramanian et al., 2015).
+
+    -ln(T³ / v_peak² ∫ |d²v/dt²|² dt), with the norms over joints. A minimum-jerk movement from rest
+    to rest has -ln(204.8) = -5.32. Jerk grows with the third power of frequency: noise counts as
+    far up as the rate goes, so only logs of one rate and one kind of sensor can be compared.
+
+    Args:
+        velocity: Shape (samples, joints), in any unit.
+        rate: Sample rate, in [Hz].
+
+    Returns:
+        The negative logarithm; None if there are fewer than three samples, no motion, or no jerk.
+    """
+    if len(velocity) < 3:
+        return None
+    peak = np.square(velocity).sum(axis=1).max()
+    jerk = np.diff(np.asarray(velocity, dtype=np.float64), n=2, axis=0) * rate**2
+    mean = np.square(jerk).sum(axis=1).mean()  # times T: the integral
+    if not peak or not mean:
+        return None
+    duration = (len(velocity) - 1) / rate
+    return -float(np.log(duration**4 / peak * mean))
+
+
+def squared_difference(action: Real, *, order: int = 1) -> float | None:
+    """Mean square of the differences of successive actions, summed over joints.
+
+    The first difference is the "action rate" that policies are penalised by in reinforcement
+    learning; the second one passes constant rates. Both are per action, not per second.
+
+    Args:
+        action: Shape (actions, joints), in any unit.
+        order: Of the difference.
+
+    Returns:
+        In the square of the unit; None if there are no more than ``order`` actions.
+    """
+    if len(action) <= order:
+        return None
+    differences = np.diff(np.asarray(action, dtype=np.float64), n=order, axis=0)
+    return float(np.square(differences).sum(axis=1).mean())
+
+
+def speed_of(velocity: Real) -> Array:
+    """Norm of a velocity over joints, shape (samples,), of one of shape (samples, joints)."""
+    return np.asarray(np.linalg.norm(np.asarray(velocity, dtype=np.float64), axis=1))
+
+
+# --- scores of an episode
+
+
+@dataclass(frozen=True)
+class Score:
+    """A column of the table.
+
+    Attributes:
+        name: Its name in CSV, JSON and ``--by``.
+        title: Head of its column.
+        unit: Empty without one.
+        meaning: What it is, in a few words.
+        smooth: 1 if higher is smoother, -1 if higher is rougher.
+    """
+
+    name: str
+    title: str
+    unit: str
+    meaning: str
+    smooth: int = -1
+
+
+_SCORES = (
+    Score("level", f">{FAST:g} Hz", "rad/s", f"level of the velocities above {FAST:g} Hz"),
+    Score("sparc", "SPARC", "", f"spectral arc length of the speed up to {CUTOFF:g} Hz", 1),
+    Score("ldlj", "LDLJ", "", "log dimensionless jerk", 1),
+    Score("action_rate", "action rate", "rad²", "mean square difference of successive actions"),
+    Score("action_curvature", "2nd diff.", "rad²", "mean square second difference of actions"),
+    Score("flagged", "flagged", "", "share of time with a finding of the classifier"),
+    Score("tracking", f"error >{TRACKED:g} Hz", "rad", f"tracking error above {TRACKED:g} Hz"),
+)
+SCORES: Mapping[str, Score] = {score.name: score for score in _SCORES}
+"""All scores by name, in the order of the columns."""
+ORDERS = ("action_curvature", "level", "ldlj", "tracking", "action_rate", "sparc")
+"""Scores by how well they separate chattering from clean rollouts (docs/smoothness.md)."""
+
+
+@dataclass(frozen=True)
+class Episode:
+    """An episode and its scores.
+
+    Attributes:
+        log: Path of its log.
+        episode: Its name within a data set, empty in a log of its own.
+        source: The argument of the command that it came from.
+        duration: Of what was scored, in [s].
+        rate: Of what was scored, in [Hz].
+        scores: By name, in the order of ``SCORES``; None where there is none.
+        reasons: Why a score is missing, by its name.
+        quantities: What the scores of actions and of tracking are of, positions or velocities, by
+            their names.
+        remarks: What was decided, a sentence each.
+    """
+
+    log: str
+    episode: str
+    source: str
+    duration: float
+    rate: float
+    scores: Mapping[str, float | None]
+    reasons: Mapping[str, str] = field(default_factory=dict)
+    quantities: Mapping[str, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """The log, and the episode within it."""
+        return f"{self.log} episode {self.episode}" if self.episode else self.log
+
+
+def scored(
+    run: Run, log: str, *, episode: str = "", source: str = "", library: Library | None = None
+) -> Episode:
+    """Scores of a run; one that it does not define is None, with the reason.
+
+    The longest stretch without a gap is scored, of a log with held values at the rate of its
+    values. Velocities that were differentiated and smoothed during the import are replaced by first
+    differences of the positions: the smoothing would take the chatter away.
+
+    Args:
+        run: The run.
+        log: Path of its log.
+        episode: Its name within a data set, empty in a log of its own.
+        source: The argument of the command that it came from.
+        library: Models to choose from; None for no labels.
+    """
+    flagged = (None, "not classified (--no-labels)") if library is None else _flagged(run, library)
+    run, left_out = without_placeholder(run)
+    remarks = [left_out] if left_out else []
+    slower = without_hold(run)
+    if slower is not run:
+        remarks.append(f"Values are held: scored at {slower.rate:g} Hz, their rate.")
+    run = slower
+    part = max(stretches(run.mask, len(run.time)), key=_length, default=slice(0, 1))
+    if _length(part) < run.mask.sum():
+        remarks.append("The longest stretch without a gap was scored.")
+    if "velocity" in run.meta.get("differentiated", {}) and run.position is not None:
+        velocity = np.diff(_angles(run.position[part]), axis=0) * run.rate
+        remarks.append("Velocities are first differences of positions.")
+    else:
+        velocity = np.asarray(run.velocity[part], dtype=np.float64)
+    rate, duration = run.rate, _length(part) / run.rate
+    found: dict[str, tuple[float | None, str]] = {"flagged": flagged}
+    found["level"] = level_above(velocity, rate, FAST), _too_little(rate, duration, FAST)
+    if len(velocity) and float(speed_of(velocity).max()) >= STANDING:
+        reason = "the motion is too short, or has no jerk"
+        found["sparc"] = sparc(speed_of(velocity), rate), reason
+        found["ldlj"] = log_dimensionless_jerk(velocity, rate), reason
+    else:
+        found["sparc"] = found["ldlj"] = None, f"no joint is faster than {STANDING:g} rad/s"
+    quantities: dict[str, str] = {}
+    if (commanded := _action(run, part)) is None:
+        found["action_rate"] = found["action_curvature"] = None, "the log has no desired motion"
+    else:
+        action, quantity = commanded
+        found["action_rate"] = squared_difference(action), "too few actions"
+        found["action_curvature"] = squared_difference(action, order=2), "too few actions"
+        quantities |= {"action_rate": quantity, "action_curvature": quantity}
+    if (tracked := _error(run, part)) is None:
+        found["tracking"] = None, "the log has no desired motion of its joints"
+    else:
+        error, quantities["tracking"] = tracked
+        reason = _too_little(rate, duration, TRACKED)
+        found["tracking"] = level_above(error, rate, TRACKED), reason
+    scores = {name: found[name][0] for name in SCORES}
+    missing = {name: found[name][1] for name, score in scores.items() if score is None}
+    return Episode(
+        log, episode, source, duration, rate, scores, missing, quantities, tuple(remarks)
+    )
+
+
+def _length(part: slice) -> int:
+    return int(part.stop - part.start)
+
+
+def _action(run: Run, part: slice) -> tuple[Array, str] | None:
+    """What was commanded, once for each action, shape (actions, joints), and of what it is."""
+    if run.position_desired is not None:
+        action, quantity = _angles(run.position_desired[part]), "positions"
+    elif run.velocity_desired is not None:
+        action = np.asarray(run.velocity_desired[part], dtype=np.float64)
+        quantity = "velocities"
+    else:
+        return None
+    held = round(hold_length(action, np.ones(len(action), dtype=bool)))
+    if held < 2:
+        return action, quantity
+    changes = np.flatnonzero((action[1:] != action[:-1]).any(axis=1)) + 1
+    return action[changes[0] % held :: held], quantity
+
+
+def _error(run: Run, part: slice) -> tuple[Array, str] | None:
+    """Tracking error of the joints that have a desired motion, and of what it is."""
+    joints = [name for name in run.joint_names if name in run.desired_joint_names]
+    measured = [run.joint_names.index(name) for name in joints]
+    desired = [run.desired_joint_names.index(name) for name in joints]
+    pairs = {
+        "positions": (run.position, run.position_desired),
+        "velocities": (run.velocity, run.velocity_desired),
+    }
+    for quantity, (actual, wanted) in pairs.items():
+        if actual is not None and wanted is not None and joints:
+            error = np.asarray(actual[part][:, measured] - wanted[part][:, desired], np.float64)
+            return (_angles(error) if quantity == "positions" else error), quantity
+    return None
+
+
+def _angles(position: Real) -> Array:
+    """Positions without the jumps of angles that wrap, shape (samples, joints)."""
+    return np.unwrap(np.asarray(position, dtype=np.float64), axis=0)
+
+
+def _flagged(run: Run, library: Library) -> tuple[float | None, str]:
+    """Share of the labelled time with a finding, and why there is none."""
+    found = analyse(run, library)
+    if found.status is Status.CANNOT_TELL or found.labels is None:
+        return None, found.reason.rstrip(".")
+    covered = sum(stop - start for start, stop, _ in found.lane)
+    total, end = 0.0, -np.inf
+    for event in sorted(found.findings, key=lambda event: event.start):
+        total += max(0.0, event.stop - max(event.start, end))
+        end = max(end, event.stop)
+    return (float(min(total / covered, 1.0)), "") if covered else (None, "no frame has a label")
+
+
+def _too_little(rate: float, duration: float, frequency: float) -> str:
+    """Why a log has no level above a frequency."""
+    if rate < 2 * BAND * frequency:
+        return f"a log of {rate:g} Hz has too little above {frequency:g} Hz"
+    return f"{duration:.3g} s are too short for {frequency:g} Hz"
+
+
+# --- episodes of logs, folders of logs and data sets
+
+
+@dataclass(frozen=True)
+class Unread:
+    """An episode that is not read yet: its log, its name within it, and where it was named."""
+
+    log: str
+    episode: str
+    source: str
+    read: Callable[[], Imported]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """A log or an episode that cannot be read, and why, in one line."""
+
+    name: str
+    problem: str
+
+
+def episodes_of(
+    paths: Sequence[Path], options: ReadOptions
+) -> tuple[tuple[Unread, ...], tuple[Failed, ...]]:
+    """List the episodes of logs and of folders of them, and the logs that cannot be read."""
+    found: list[Unread] = []
+    failed: list[Failed] = []
+    for source in paths:
+        logs = tuple(_logs_in(source))
+        if not logs:
+            failed.append(Failed(str(source), f"holds no log ({', '.join(SUFFIXES)})"))
+        for log in logs:
+            try:
+                jobs = jobs_of(log, options)
+            except EXPECTED as error:
+                failed.append(Failed(str(log), without_path(error, Path(log))))
+                continue
+            found += [Unread(str(log), job.episode, str(source), job.read) for job in jobs]
+    return tuple(found), tuple(failed)
+
+
+def scored_episodes(
+    episodes: Sequence[Unread], library: Library | None
+) -> Iterator[Episode | Failed]:
+    """Read and score episodes; one that cannot be read never stops the rest."""
+    for each in episodes:
+        try:
+            run = each.read().run
+            yield scored(run, each.log, episode=each.episode, source=each.source, library=library)
+        except EXPECTED as error:
+            name = f"{each.log} episode {each.episode}" if each.episode else each.log
+            yield Failed(name, without_path(error, Path(each.log)))
+
+
+def _logs_in(path: Path) -> Iterator[Path]:
+    """Take a log as it is, and a folder that is none as the logs in it."""
+    # A LeRobot data set or a ROS 2 bag is a folder.
+    log = any((path / name).is_file() for name in ("meta/info.json", "metadata.yaml"))
+    if not path.is_dir() or log:
+        yield path
+        return
+    for child in sorted(path.iterdir()):
+        hidden = child.name.startswith(".")
+        if not hidden and (child.is_dir() or child.suffix.lower() in SUFFIXES):
+            yield from _logs_in(child)
+
+
+# --- ranking
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """Episodes in order.
+
+    Attributes:
+        by: The score that they are ordered by.
+        episodes: The smoothest first; those without this score last.
+        failed: What could not be read.
+    """
+
+    by: str
+    episodes: tuple[Episode, ...]
+    failed: tuple[Failed, ...] = ()
+
+    @property
+    def ranks(self) -> tuple[int | None, ...]:
+        """Rank of each episode, from 1; equal scores have equal ranks, None without a score."""
+        values = [episode.scores[self.by] for episode in self.episodes]
+        return tuple(None if value is None else values.index(value) + 1 for value in values)
+
+
+def default_order(episodes: Sequence[Episode]) -> str:
+    """Name of the score that episodes are ordered by.
+
+    Episodes of data sets, which are demonstrations and rollouts of policies, are ordered by their
+    actions; logs by their measured velocities, since several often share one desired motion. A
+    score is skipped if an episode lacks it, if it is of two quantities, or if all have it equal.
+    """
+    actions = all(episode.episode for episode in episodes)
+    names = ORDERS if actions else sorted(ORDERS, key=lambda name: name.startswith("action"))
+
+    def values(name: str) -> set[float | None]:
+        return {episode.scores[name] for episode in episodes}
+
+    def comparable(name: str) -> bool:
+        kinds = {episode.quantities.get(name) for episode in episodes}
+        return len(kinds) == 1 and None not in values(name)
+
+    names = [name for name in names if comparable(name)] or ["level"]
+    return next((name for name in names if len(values(name)) > 1), names[0])
+
+
+def ranked(found: Iterable[Episode | Failed], *, by: str = "") -> Ranking:
+    """Order episodes from the smoothest to the roughest.
+
+    Args:
+        found: Episodes, and what could not be read.
+        by: One of ``SCORES``; by default as `default_order` has it.
+    """
+    each = tuple(found)
+    episodes = [one for one in each if isinstance(one, Episode)]
+    by = by or default_order(episodes)
+
+    def roughness(episode: Episode) -> tuple[bool, float]:
+        value = episode.scores[by]
+        return value is None, 0.0 if value is None else -SCORES[by].smooth * value
+
+    failed = tuple(one for one in each if isinstance(one, Failed))
+    return Ranking(by, tuple(sorted(episodes, key=roughness)), failed)
+
+
+def as_text(ranking: Ranking) -> str:
+    """Write a ranking as a table, with what is missing and why below it."""
+    episodes = ranking.episodes
+    if not episodes:
+        return "0 episodes"
+    heads = [("rank", ""), ("episode", ""), ("duration", "s"), ("rate", "Hz")]
+    heads += [(score.title, score.unit) for score in SCORES.values()]
+    names = _short([episode.name for episode in episodes])
+    shared = Counter(ranking.ranks)
+    rows = [
+        [
+            "" if rank is None else f"{rank}{' equal' if shared[rank] > 1 else ''}",
+            name,
+            f"{episode.duration:.2f}",
+            f"{episode.rate:g}",
+            *(_cell(score, value) for score, value in episode.scores.items()),
+        ]
+        for rank, name, episode in zip(ranking.ranks, names, episodes, strict=True)
+    ]
+    columns = list(zip(*([list(head) for head in zip(*heads, strict=True)] + rows), strict=True))
+    widths = [max(len(cell) for cell in column) for column in columns]
+    lines = [
+        "  ".join(
+            cell.ljust(width) if place == 1 else cell.rjust(width)
+            for place, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in zip(*columns, strict=True)
+    ]
+    meaning = SCORES[ranking.by].meaning
+    head = f"{counted(len(episodes), 'episode')}, the smoothest first by {meaning}"
+    return "\n".join([head, "", *lines, "", *_notes(ranking)])
+
+
+def as_csv(ranking: Ranking) -> str:
+    """Write a ranking as CSV; a score that is missing is an empty cell."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(["rank", "log", "episode", "duration", "rate", *SCORES])
+    for rank, each in zip(ranking.ranks, ranking.episodes, strict=True):
+        values = [each.duration, each.rate, *each.scores.values()]
+        numbers = ["" if value is None else f"{value:.6g}" for value in values]
+        writer.writerow([rank, cell(each.log), cell(each.episode), *numbers])
+    return out.getvalue().removesuffix("\n")
+
+
+def as_json(ranking: Ranking) -> str:
+    """Write a ranking as JSON; a score that is missing is null, with its reason."""
+    return json.dumps(
+        {
+            "format": FORMAT,
+            "by": ranking.by,
+            "scores": {
+                score.name: {
+                    "meaning": score.meaning,
+                    "unit": score.unit,
+                    "smoother": "higher" if score.smooth > 0 else "lower",
+                }
+                for score in SCORES.values()
+            },
+            "settings": {
+                "level_above_hz": FAST,
+                "tracking_above_hz": TRACKED,
+                "sparc_cutoff_hz": CUTOFF,
+                "sparc_threshold": THRESHOLD,
+                "sparc_padding": PADDING,
+            },
+            "episodes": [
+                {
+                    "rank": rank,
+                    "log": episode.log,
+                    "episode": episode.episode,
+                    "duration": episode.duration,
+                    "rate": episode.rate,
+                    **episode.scores,
+                    "of": dict(episode.quantities),
+                    "missing": dict(episode.reasons),
+                    "remarks": list(episode.remarks),
+                }
+                for rank, episode in zip(ranking.ranks, ranking.episodes, strict=True)
+            ],
+            "failed": {failed.name: failed.problem for failed in ranking.failed},
+        },
+        indent=2,
+        ensure_ascii=False,
+    )
+
+
+def _notes(ranking: Ranking) -> Iterator[str]:
+    """Say what is missing, what was decided, and what to look at, each once."""
+    episodes = ranking.episodes
+
+    def where(count: int) -> str:
+        return "" if count == len(episodes) else f" for {count} of {len(episodes)}"
+
+    missing: dict[str, list[str]] = {}
+    for score in SCORES.values():
+        reasons = Counter(
+            each.reasons[score.name] for each in episodes if score.name in each.reasons
+        )
+        if reasons:
+            (reason, _), others = reasons.most_common(1)[0], len(reasons) - 1
+            more = f" (and {others} other reasons: --format json)" if others else ""
+            text = f"empty{where(reasons.total())}, {reason}{more}"
+            missing.setdefault(text, []).append(score.title)
+    yield from (f"{', '.join(titles)}: {text}" for text, titles in missing.items())
+    for name, titles in (("action_curvature", "action rate and 2nd diff."), ("tracking", "error")):
+        kinds = Counter(each.quantities[name] for each in episodes if name in each.quantities)
+        for kind, count in kinds.items():
+            unit = ", rad/s in place of rad" if kind == "velocities" else ""
+            yield f"{titles}: of {kind}{unit}{where(count)}"
+    remarks = Counter(remark for episode in episodes for remark in episode.remarks)
+    for remark, count in remarks.items():
+        yield remark if count == len(episodes) else f"{count} of {len(episodes)}: {remark}"
+    rates = sorted({episode.rate for episode in episodes})
+    if len(rates) > 1:
+        yield (
+            f"Rates differ ({rates[0]:g} to {rates[-1]:g} Hz): compare scores of one rate only;"
+            " they count all up to half of it."
+        )
+    yield f"SPARC: cut-off {CUTOFF:g} Hz. SPARC and LDLJ: higher is smoother; others: lower."
+    yield from _roughest(ranking)
+
+
+def _roughest(ranking: Ranking) -> Iterator[str]:
+    """What to look at: the roughest episode by the score of the order, or that all are equal."""
+    ordered = [each for each in ranking.episodes if each.scores[ranking.by] is not None]
+    if len(ordered) < 2:
+        return
+    title, last = SCORES[ranking.by].title, ordered[-1]
+    worst = [each for each in ordered if each.scores[ranking.by] == last.scores[ranking.by]]
+    if len(worst) == len(ordered):
+        yield f"All are equal by {title}: `--by` orders them by another score."
+        return
+    command = f"inspector import {last.log} --episode {last.episode} -o roughest.npz"
+    equal = f" ({len(worst)} are equal)" if len(worst) > 1 else ""
+    command = command if last.episode else f"inspector view {last.log}"
+    yield f"The roughest by {title}{equal}: {command}"
+
+
+def _short(names: Sequence[str]) -> list[str]:
+    """Names without the folders that all share."""
+    parts = [Path(name).parts for name in names]
+    shared = 0
+    while all(len(each) > shared + 1 and each[shared] == parts[0][shared] for each in parts):
+        shared += 1
+    return [str(Path(*each[shared:])) for each in parts]
+
+
+def _cell(name: str, value: float | None) -> str:
+    if value is None:
+        return ""
+    if name == "flagged":
+        return f"{100 * value:.0f} %"
+    return f"{value:.2f}" if name in ("sparc", "ldlj") else f"{value:.3g}"
+
+
+# --- histograms
+
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+PER_ROW, BINS, DPI = 3, 20, 100
+WIDTH, HEIGHT = 3.6, 2.4
+"""Of one histogram, in [inch]."""
+SPREAD = 20.0
+"""Ratio of the largest to the median of positive values beyond which the axis is logarithmic."""
+
+
+def require_matplotlib() -> None:
+    """Refuse a picture before long work is done for it."""
+    if find_spec("matplotlib") is None:
+        raise InspectorError('a picture needs matplotlib; `pip install "noise-inspector[report]"`')
+
+
+def draw(episodes: Sequence[Episode], path: Path, *, overwrite: bool = False) -> None:
+    """Draw a histogram of each score that an episode has, as a PNG file, a colour for each input.
+
+    Raises:
+        InspectorError: If matplotlib is not installed, or no episode has a score.
+        OutputError: If the file exists or cannot be written.
+    """
+    require_matplotlib()
+    from matplotlib.figure import Figure
+
+    shown = [
+        score
+        for score in SCORES.values()
+        if any(episode.scores[score.name] is not None for episode in episodes)
+    ]
+    if not shown:
+        raise InspectorError(f"{path}: there are no scores to draw")
+    rows = -(-len(shown) // PER_ROW)
+    figure = Figure(figsize=(PER_ROW * WIDTH, rows * HEIGHT + 0.4), dpi=DPI, layout="constrained")
+    axes = figure.subplots(rows, PER_ROW, squeeze=False).ravel()
+    for one, score in zip(axes, shown, strict=False):
+        _histogram(one, episodes, score)
+    for one in axes[len(shown) :]:
+        one.set_axis_off()
+    handles, labels = axes[0].get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(handles, labels, loc="outside upper left", ncols=PER_ROW, frameon=False)
+    with replacing(path, overwrite=overwrite) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _histogram(axes: "Axes", episodes: Sequence[Episode], score: Score) -> None:
+    sources = sorted({episode.source for episode in episodes})
+    together = len(sources) > len(COLORS)
+    groups: dict[str, list[float]] = {source: [] for source in ([""] if together else sources)}
+    for episode in episodes:
+        value = episode.scores[score.name]
+        if value is not None:
+            groups["" if together else episode.source].append(value)
+    values = np.concatenate([np.array(group) for group in groups.values()])
+    low, high = float(values.min()), float(values.max())
+    logarithmic = low > 0 and high > max(low, SPREAD * float(np.median(values)))
+    if low == high:
+        low, high = low - 0.5 * (abs(low) or 1.0), high + 0.5 * (abs(high) or 1.0)
+    edges = np.geomspace(low, high, BINS + 1) if logarithmic else np.linspace(low, high, BINS + 1)
+    for (name, group), color in zip(groups.items(), COLORS, strict=False):
+        axes.hist(group, edges.tolist(), color=color, alpha=0.6, label=name)
+    if logarithmic:
+        axes.set_xscale("log")
+    better = "right" if score.smooth > 0 else "left"
+    unit = f" [{score.unit}]" if score.unit else ""
+    axes.set_title(score.meaning, fontsize=8)
+    axes.set_xlabel(f"{score.title}{unit}; smoother to the {better}", fontsize=8)
+    axes.set_ylabel("episodes", fontsize=8)
+    axes.locator_params(axis="y", integer=True)
+    axes.tick_params(labelsize=7)

@@ -1,0 +1,473 @@
+"""Runs as sound: signed signals whose powers add up to the noise, mixed to one, as WAV files.
+
+The noise itself cannot be played. It is a norm, p_hat = sqrt(sum of v²), and always positive: a
+joint that oscillates about zero at 100 Hz would sound at 200 Hz, and one that oscillates about a
+steady motion at 100 Hz. The signals under the root are played instead, with their signs:
+
+- *simplified*: the velocities of the joints, measured and desired, and of a floating base;
+- *rms*, *normal*: a link's power is a quadratic form of its twist, P = rho c S nu' M nu. With
+  M = W' W the six signals sqrt(rho c S) W nu have squares that add up to it.
+
+The other kinds of the extended noise are sums of norms and have no such signals.
+
+In a plain sum two joints that oscillate in antiphase would cancel, but not in the noise. So the
+powers of the signals are added in every window and frequency bin, with the phase of the loudest
+signal there. A single signal is not changed.
+"""
+
+import struct
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from string import ascii_lowercase
+
+import numpy as np
+from numpy import fft
+
+import noisemodel as nm
+from inspector.analysis.analyse import Analysis, robot_known
+from inspector.analysis.moments import worst
+from inspector.errors import InspectorError, OptionError
+from inspector.text import plain
+from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.differentiate import stretches
+from noisemodel.noise import DENSITY, SOUND_SPEED
+from noisemodel.run import part
+from noisemodel.types import Array, Mask
+
+PLAYABLE = ("simplified", "normal", "rms")
+"""Kinds of noise that have signed signals."""
+RATE, SMALL_RATE = 48_000, 16_000
+"""Sampling rates of a sound file and of an embedded sound, enough for a log of 10 kHz, in [Hz]."""
+SILENCE = 1e-6
+"""Peak below which a sound is silent, in [rad/s] or [√W]: quantisation noise is larger."""
+FULL_SCALE = 32767
+"""Full scale of 16 bits."""
+HEADROOM_DB = 1.0
+OSCILLATIONS = 1000.0
+"""Highest frequency of the paper's oscillations, in [Hz]."""
+LOWEST_AUDIBLE = 20.0
+"""Lowest audible frequency, in [Hz]."""
+WINDOW = 0.0256
+"""Length of a window, in [s]: short enough to keep the time of an impact."""
+FADE = 0.05
+"""Fade at both ends of a stretch without gaps, in [s]: the motion beyond is unknown."""
+ORDER = 4
+"""Order of the high-pass filter."""
+CHUNK = 65_536
+"""Number of samples whose twists are computed at once."""
+LINKS_AT_ONCE = 4
+"""Number of links whose signals are in memory at once: all of 60 links would not fit."""
+MOST_VELOCITIES = 4_000_000
+"""Largest number of velocities in a clip: 6 s of 32 joints at 10 kHz, within 0.25 s."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is made audible.
+
+    Attributes:
+        kind: "simplified", "normal" or "rms"; empty takes "normal" with a link, else "simplified".
+        joint: One joint, of the simplified noise; all if empty.
+        link: One link, of the extended noise; all if empty.
+        speed: Factor of the playing speed, and of all frequencies.
+    """
+
+    kind: str = ""
+    joint: str = ""
+    link: str = ""
+    speed: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sound:
+    """A signed noise signal that can be played.
+
+    Attributes:
+        what: Short description.
+        signal: Shape (samples,), in [unit].
+        rate: Sampling rate of the signal, in [Hz].
+        start: Time of its first sample in the run, in [s].
+        speed: Factor of the playing speed.
+        unit: "rad/s" or "√W".
+        remarks: What is inaudible and why, a sentence each.
+        playing: Sampling rate of the file, in [Hz].
+    """
+
+    what: str
+    signal: Array
+    rate: float
+    start: float
+    speed: float
+    unit: str
+    remarks: tuple[str, ...] = ()
+    playing: int = RATE
+
+    @cached_property
+    def played(self) -> Array:
+        """The signal at playing speed, band-limited and resampled to ``playing``, in [unit]."""
+        size = max(1, round(len(self.signal) * self.playing / (self.rate * self.speed)))
+        shared = min(size, len(self.signal)) // 2 + 1  # bins of both; the others are 0
+        spectrum = np.zeros(size // 2 + 1, dtype=np.complex128)
+        spectrum[:shared] = fft.rfft(self.signal)[:shared]
+        return np.asarray(fft.irfft(spectrum, size) * (size / len(self.signal)))
+
+    @property
+    def peak(self) -> float:
+        """Largest value, in [unit]."""
+        return float(np.abs(self.played).max(initial=0.0))
+
+    @property
+    def silent(self) -> bool:
+        """Whether its peak is below ``SILENCE``."""
+        return self.peak < SILENCE
+
+    def clipped(self, gain: float) -> float:
+        """Share of the samples that exceed full scale at a gain in [dB]."""
+        return float(np.mean(np.abs(self.played) * _factor(gain) > 1.0))
+
+    def scale(self, gain: float) -> str:
+        """A gain in [dB] as text, with the value of full scale."""
+        return f"gain {gain:+.1f} dB: full scale is {1.0 / _factor(gain):.3g} {self.unit}"
+
+    def description(self, gain: float) -> str:
+        """Duration and gain of the sound, and whether it is silent or clipped."""
+        text = f"{len(self.signal) / self.rate / self.speed:.2f} s, {self.scale(gain)}"
+        if self.silent:
+            return f"{text}; silent: nothing reaches {SILENCE:g} {self.unit}"
+        if clipped := self.clipped(gain):
+            over = 20.0 * np.log10(self.peak) + gain
+            return (
+                f"{text}; clipped: {clipped:.2%} of it exceeds full scale, by {over:.1f} dB at most"
+            )
+        return text
+
+    def file(self, gain: float, *, lead: float = 0.0) -> bytes:
+        """WAV file whose metadata state the gain.
+
+        Args:
+            gain: At 0 dB, full scale is 1 of the unit, in [dB].
+            lead: Duration of silence before it, in [s].
+        """
+        comment = f"{self.what}, {self.scale(gain)}"
+        if self.speed != 1.0:
+            comment += f", played {self.speed:g} times as fast"
+        notes = {"INAM": self.what, "ISFT": "noise-inspector", "ICMT": comment}
+        silence = np.zeros(round(lead * self.playing))
+        return _wav(np.concatenate((silence, self.played * _factor(gain))), self.playing, notes)
+
+    def __str__(self) -> str:
+        rms = float(np.sqrt(np.mean(np.square(self.signal))))
+        level = f"peak {self.peak:.3g} {self.unit}, rms {rms:.3g} {self.unit}"
+        lines = [f"{self.what}: {'silent' if self.silent else level}"]
+        return "\n".join([*lines, *(f"  {remark}" for remark in self.remarks)])
+
+
+@dataclass(frozen=True)
+class Clip:
+    """A sound of 16 kHz to be embedded in a recording or a page.
+
+    Attributes:
+        data: WAV file.
+        start: Start in the run, in [s].
+        stop: End in the run, in [s].
+        description: What it is, at which gain.
+    """
+
+    data: bytes
+    start: float
+    stop: float
+    description: str
+
+
+def sonify(run: nm.Run, settings: Settings | None = None) -> Sound:
+    """Noise of a run as a sound, with remarks on what is inaudible.
+
+    Raises:
+        InspectorError: If the settings do not fit the run, or nothing is audible.
+        NoiseModelError: If the extended noise cannot be computed.
+    """
+    settings = settings or Settings()
+    return replace(sound_of(run, settings), remarks=tuple(_remarks(run, settings.speed)))
+
+
+def sound_of(run: nm.Run, settings: Settings | None = None, *, playing: int = RATE) -> Sound:
+    """Noise of a run as a sound without remarks; see `sonify`."""
+    settings = settings or Settings()
+    if not 0.01 <= settings.speed <= 1000.0:
+        raise OptionError(f"a speed of {settings.speed:g}, expected 0.01 to 1000")
+    what, unit, signals = _components(run, settings)
+    lowest = LOWEST_AUDIBLE / settings.speed
+    signal = mix(signals, valid=run.mask, rate=run.rate, lowest=lowest)
+    start = float(run.time[0])
+    return Sound(what, signal, run.rate, start, settings.speed, unit, playing=playing)
+
+
+def common_gain(sounds: Sequence[Sound]) -> float:
+    """Gain at which the loudest of several sounds does not clip, in [dB]; 0 if all are silent."""
+    peak = max(sound.peak for sound in sounds)
+    if peak < SILENCE:
+        return 0.0
+    return float(np.floor(10.0 * (-20.0 * np.log10(peak) - HEADROOM_DB)) / 10.0)
+
+
+def output_paths(path: Path, count: int, *, overwrite: bool = False) -> tuple[Path, ...]:
+    """Paths of the files of sounds, checked before these are computed; several get a letter each.
+
+    Raises:
+        OutputError: If a file exists and may not be replaced, or cannot be written.
+        InspectorError: If there are more sounds than letters.
+    """
+    if count > len(ascii_lowercase):
+        raise InspectorError(f"{count} runs at once, expected {len(ascii_lowercase)} at most")
+    letters = [f".{letter}" for letter in ascii_lowercase[:count]] if count > 1 else [""]
+    paths = tuple(path.with_name(f"{path.stem}{letter}{path.suffix}") for letter in letters)
+    for each in paths:
+        refuse_existing(each, overwrite=overwrite)
+    return paths
+
+
+def save(sounds: Mapping[Path, Sound], gain: float, *, overwrite: bool = False) -> None:
+    """Write sounds as WAV files, all at the same gain in [dB].
+
+    Raises:
+        OutputError: If a file exists or cannot be written.
+        InspectorError: If the sounds are not in one unit.
+    """
+    units = {sound.unit for sound in sounds.values()}
+    if len(units) > 1:
+        raise InspectorError(f"sounds in {' and '.join(sorted(units))} have no gain in common")
+    for path, sound in sounds.items():
+        with replacing(path, overwrite=overwrite) as temporary:
+            temporary.write_bytes(sound.file(gain))
+
+
+def of_recording(analysis: Analysis) -> bytes:
+    """Sound for a recording, that starts with the run; empty if nothing is audible."""
+    found = clip(analysis.run, around=worst_time(analysis), lead=True)
+    return b"" if found is None else found.data
+
+
+def worst_time(analysis: Analysis) -> float:
+    """Time of the worst moment of a run, in [s]; 0 if the run has no valid samples."""
+    moments = worst(analysis)
+    return moments[0].peak if moments else 0.0
+
+
+def clip(run: nm.Run, *, around: float = 0.0, lead: bool = False) -> Clip | None:
+    """Sound of a run's simplified noise; None if nothing in the run is audible.
+
+    Args:
+        run: The run.
+        around: Middle of the part that is used if the run is too long, in [s].
+        lead: Whether silence replaces what is left out before.
+    """
+    width = run.motion.shape[1]
+    width += 0 if run.velocity_desired is None else run.velocity_desired.shape[1]
+    count = min(max(2, MOST_VELOCITIES // width), len(run.time))
+    middle = int(np.searchsorted(run.time, around))
+    first = min(max(middle - count // 2, 0), len(run.time) - count)
+    try:
+        sound = sound_of(part(run, first, first + count), playing=SMALL_RATE)
+    except InspectorError:
+        return None
+    gain = common_gain([sound])
+    return Clip(
+        data=sound.file(gain, lead=first / run.rate if lead else 0.0),
+        start=sound.start,
+        stop=sound.start + len(sound.signal) / sound.rate,
+        description=f"{sound.what}, {sound.description(gain)}",
+    )
+
+
+def mix(
+    signals: Iterable[Array], *, valid: Mask, rate: float, lowest: float = LOWEST_AUDIBLE
+) -> Array:
+    """Audible part of several signals, mixed to one so that their powers add.
+
+    Args:
+        signals: Each of shape (samples,), taken one by one.
+        valid: False in gaps, which are silent, shape (samples,).
+        rate: Sampling rate, in [Hz].
+        lowest: Cutoff of the high-pass filter, in [Hz].
+
+    Returns:
+        Shape (samples,), in the unit of the signals.
+
+    Raises:
+        InspectorError: If the Nyquist frequency is not well above ``lowest``.
+    """
+    if rate <= 2.5 * lowest:
+        speed = int(np.ceil(8 * lowest / rate))  # two octaves of the log are audible
+        raise InspectorError(
+            f"a log of {rate:g} Hz has no content above {rate / 2:g} Hz, and frequencies below"
+            f" {lowest:g} Hz are inaudible; play it faster (`--speed {speed}`)"
+        )
+    hop = max(4, round(WINDOW * rate / 2))
+    length, samples = 2 * hop, len(valid)
+    count = -(-samples // hop) + 1
+    # The squares of half sines that overlap by half sum to 1: perfect reconstruction.
+    weights = np.sin(np.pi * (np.arange(length) + 0.5) / length)
+    power, largest = np.zeros((count, hop + 1)), np.zeros((count, hop + 1))
+    loudest = np.zeros((count, hop + 1), dtype=np.complex128)
+    for signal in signals:
+        padded = np.zeros((count + 1) * hop)
+        padded[hop : hop + samples] = _audible(signal, valid, rate, lowest)
+        cut = np.lib.stride_tricks.sliding_window_view(padded, length)[::hop]
+        spectra = fft.rfft(cut * weights, axis=1)
+        each = np.square(spectra.real) + np.square(spectra.imag)
+        power += each  # p_hat² = sum of v², Sygulla & Rixen, Sec. II-A, band by band
+        np.copyto(loudest, spectra, where=each > largest)
+        np.maximum(largest, each, out=largest)
+    gain = np.sqrt(np.divide(power, largest, out=np.zeros_like(power), where=largest > 0.0))
+    windows = fft.irfft(gain * loudest, length, axis=1) * weights
+    whole = np.zeros((count + 1, hop))
+    whole[:-1] += windows[:, :hop]
+    whole[1:] += windows[:, hop:]
+    return np.asarray(whole.ravel()[hop : hop + samples] * valid)
+
+
+def _audible(signal: Array, valid: Mask, rate: float, lowest: float) -> Array:
+    """Signal without inaudible frequencies, faded in and out in each stretch without gaps."""
+    filtered = np.zeros(len(signal))
+    for stretch in stretches(valid, len(signal)):
+        piece = _high_passed(signal[stretch], rate, lowest)
+        faded = min(round(FADE * rate), len(piece) // 2)
+        rise = np.square(np.sin(0.5 * np.pi * np.arange(faded) / max(faded, 1)))
+        piece[:faded] *= rise
+        piece[len(piece) - faded :] *= rise[::-1]
+        filtered[stretch] = piece
+    return filtered
+
+
+def _high_passed(signal: Array, rate: float, lowest: float) -> Array:
+    """Signal after a Butterworth high-pass filter forwards and backwards, with zero phase.
+
+    By its spectrum rather than `scipy.signal`, which takes a fifth of a second to import.
+    """
+    reach = min(round(3 * rate / lowest), len(signal) - 1)
+    # odd reflection at both ends, without a step
+    before = 2 * signal[0] - signal[reach:0:-1]
+    after = 2 * signal[-1] - signal[-2 : -reach - 2 : -1]
+    extended = np.concatenate((before, signal, after))
+    extended -= np.linspace(extended[0], extended[-1], len(extended))
+    size = _fast_length(len(extended))
+    high_passed: Array = fft.irfft(fft.rfft(extended, size) * _gain(size, rate, lowest), size)
+    return high_passed[reach : reach + len(signal)]
+
+
+@lru_cache(maxsize=1)
+def _gain(size: int, rate: float, lowest: float) -> Array:
+    frequency = fft.rfftfreq(size, 1 / rate)
+    gain: Array = 1 / (1 + (lowest / np.maximum(frequency, lowest / 100)) ** (2 * ORDER))
+    return gain
+
+
+@lru_cache(maxsize=1)
+def _fast_length(least: int) -> int:
+    """The next length that is a product of 2, 3 and 5, for a fast transform."""
+    odd: list[int] = [3**threes * 5**fives for threes in range(20) for fives in range(14)]
+    return min(each << (-(-least // each) - 1).bit_length() for each in odd)
+
+
+def _components(run: nm.Run, settings: Settings) -> tuple[str, str, Iterator[Array]]:
+    """What is played, its unit, and the signals, each of shape (samples,), one by one."""
+    joint, link = settings.joint, settings.link
+    kind = settings.kind or ("normal" if link else "simplified")
+    if kind not in PLAYABLE:
+        raise OptionError(
+            f"kind {kind!r} has no signed signals to play; there are {', '.join(PLAYABLE)}"
+        )
+    if link and (joint or kind == "simplified"):
+        raise OptionError(f"link {link!r} is of the kinds normal and rms; name no joint with it")
+    if joint and kind != "simplified":
+        raise OptionError(f"kind {kind!r} is of links, not of joints; name a link")
+    if kind == "simplified":
+        what = f"simplified noise of {joint}" if joint else "simplified noise"
+        return what, "rad/s", _velocities(run, joint)
+    return f"{kind} noise of {link or 'all links'}", "√W", _weighted_twists(run, kind, link)
+
+
+def _velocities(run: nm.Run, joint: str) -> Iterator[Array]:
+    sides = [(run.joint_names, run.velocity)]
+    if run.velocity_desired is not None:
+        sides.append((run.desired_joint_names, run.velocity_desired))
+    named = [(name, signal[:, at]) for names, signal in sides for at, name in enumerate(names)]
+    known = dict.fromkeys(name for name, _ in named)
+    if joint and joint not in known:
+        raise InspectorError(f"no joint {joint!r} in the run; it has {', '.join(known)}")
+    base = () if joint or run.base_velocity is None else run.base_velocity.T
+    chosen = [signal for name, signal in named if joint in ("", name)]
+    return (np.asarray(signal, dtype=np.float64) for signal in (*chosen, *base))
+
+
+def _weighted_twists(run: nm.Run, kind: str, link: str) -> Iterator[Array]:
+    """Twists of links, weighted so that their squares are powers."""
+    if run.robot is None or not robot_known(run):
+        raise nm.RobotError(f"kind {kind!r} needs a robot, the run names {run.robot!r}")
+    robot = nm.Robot.load(run.robot, floating_base=True if run.base_pose is not None else None)
+    surface = nm.Surface.of(robot, "auto")
+    noisy = [name for name in surface.names if name not in surface.without_geometry]
+    if link and link not in noisy:
+        raise InspectorError(f"no link {link!r} that makes noise; there are {', '.join(noisy)}")
+    links = [surface.names.index(name) for name in ([link] if link else noisy)]
+    motions = [robot.configuration(run)]
+    if (desired := robot.desired(run)) is not None:
+        motions.append(desired)
+    forms = surface.mean_square if kind == "rms" else surface.mean_square_normal
+    for first in range(0, len(links), LINKS_AT_ONCE):
+        group = links[first : first + LINKS_AT_ONCE]
+        for q, v in motions:
+            chunks = [slice(start, start + CHUNK) for start in range(0, len(q), CHUNK)]
+            twists = np.concatenate(
+                [nm.link_twists(robot, q[at], v[at])[:, surface.joint[group]] for at in chunks]
+            )
+            for place, each in enumerate(group):
+                # W with W' W = M, also of a form M that is singular
+                values, vectors = np.linalg.eigh(forms[each])
+                root = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+                weights = root * np.sqrt(DENSITY * SOUND_SPEED * surface.area[each])
+                yield from weights @ twists[:, place].T
+
+
+def _remarks(run: nm.Run, speed: float) -> Iterator[str]:
+    from inspector.audit.bandwidth import bandwidth
+
+    reach = bandwidth(run)
+    span = f"{plain(LOWEST_AUDIBLE / speed)} Hz to {plain(reach.usable, 4)} Hz"
+    yield f"Audible: {span} of the motion ({reach.limit})."
+    if speed != 1.0:
+        yield f"Played {speed:g} times as fast: frequencies are {speed:g} times as high."
+    if reach.usable < OSCILLATIONS / 2:
+        yield (
+            f"The log has no content above {plain(reach.usable, 4)} Hz: silence there does not mean"
+            " that there is no noise."
+        )
+    if run.velocity_desired is None:
+        yield "The run has no desired velocities: the sound is of the measured motion only."
+    if not run.mask.all():
+        yield "Gaps are silent."
+
+
+def _factor(gain: float) -> float:
+    return float(10.0 ** (gain / 20.0))
+
+
+def _wav(signal: Array, rate: int, notes: Mapping[str, str]) -> bytes:
+    """One channel of 16 bits as RIFF WAVE (IBM and Microsoft, 1991).
+
+    Args:
+        signal: Shape (samples,); 1 is full scale, above which it is clipped.
+        rate: Sampling rate, in [Hz].
+        notes: Texts by their RIFF names: INAM a title, ISFT the software, ICMT a comment.
+    """
+
+    def chunk(name: bytes, content: bytes) -> bytes:
+        return name + struct.pack("<I", len(content)) + content + b"\0" * (len(content) % 2)
+
+    samples = np.round(np.clip(signal, -1.0, 1.0) * FULL_SCALE).astype("<i2").tobytes()
+    form = struct.pack("<HHIIHH", 1, 1, rate, 2 * rate, 2, 16)  # PCM, one channel, 2 bytes each
+    texts = (chunk(name.encode(), text.encode() + b"\0") for name, text in notes.items())
+    info = chunk(b"LIST", b"INFO" + b"".join(texts))
+    return chunk(b"RIFF", b"WAVE" + chunk(b"fmt ", form) + info + chunk(b"data", samples))
