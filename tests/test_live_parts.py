@@ -27,43 +27,90 @@ def warnings():
 # The clock.
 
 
+def taken(stamps, rate=1000.0, size=50):
+    """Which stamps a clock keeps, and when they are, in batches; how many are lost; warnings."""
+    counted, lines = warnings()
+    clock, stamps = Clock(rate, counted), np.asarray(stamps, dtype=np.float64)
+    kept, times, lost, held = [], [], 0, stamps[:0]
+    for first in range(0, len(stamps), size):
+        held = np.append(held, stamps[first : first + size])
+        mask, missing, time, waiting = clock.take(held, ended=first + size >= len(stamps))
+        kept, times, lost = [*kept, *mask], [*times, *time], lost + int(missing.sum())
+        held = held[len(held) - waiting :]
+    assert not len(held)
+    assert (np.diff(times) > 0).all()
+    return np.array(kept), np.array(times), lost, counted.counts, lines
+
+
 def test_even_stamps_lose_nothing_and_jitter_is_no_gap():
-    counted, lines = warnings()
-    clock, random = Clock(1000.0, counted), np.random.default_rng(0)
-    stamps = np.arange(500) / 1000 + random.uniform(-2e-4, 2e-4, 500)
-    for block in np.split(stamps, 10):
-        kept, lost = clock.take(block)
-        assert kept.all()
-        assert not lost.any()
-    assert lines == []
-
-
-def test_missing_samples_are_counted_where_they_are_missing():
-    counted, lines = warnings()
-    clock = Clock(1000.0, counted)
-    clock.take(np.array([5.0, 5.001]))
-    kept, lost = clock.take(np.array([5.012, 5.013, 5.016]))
+    random = np.random.default_rng(0)
+    kept, _, lost, _, lines = taken(np.arange(500) / 1000 + random.uniform(-2e-4, 2e-4, 500))
     assert kept.all()
-    assert lost.tolist() == [10, 0, 2]
-    assert lines == ["gap at 5.012 s: 10 samples are missing"]
-    assert counted.counts == {"missing samples": 12}
+    assert (lost, lines) == (0, [])
+
+
+@pytest.mark.parametrize("gap", [2, 10, 500, 60_000])
+def test_missing_samples_are_counted_where_they_are_missing(gap):
+    whole = np.arange(100_000) / 1000
+    kept, times, lost, counts, lines = taken(np.delete(whole, slice(70, 70 + gap))[:200])
+    assert kept.all()
+    assert lost == gap
+    assert lines == [f"gap at {times[70]:.3f} s: {gap} samples are missing"]
+    assert counts == {"missing samples": gap}
 
 
 def test_times_that_do_not_increase_or_are_unknown_are_left_out():
-    counted, lines = warnings()
-    clock = Clock(1000.0, counted)
-    stamps = np.array([1.0, 1.001, 1.001, 0.5, np.nan, 1.002])
-    kept, lost = clock.take(stamps)
-    assert kept.tolist() == [True, True, False, False, False, True]
-    assert not lost.any()
-    assert clock.take(np.array([0.7]))[0].tolist() == [False]
-    assert counted.counts == {"samples out of order": 3, "samples without time": 1}
+    stamps = [1.0, 1.001, 1.001, 0.5, np.nan, 1.002, 1.003, 1.004]
+    kept, _, lost, counts, lines = taken(stamps, size=8)
+    assert kept.tolist() == [True, True, False, False, False, True, True, True]
+    assert lost == 0
+    assert counts == {"samples out of order": 2, "samples without time": 1}
     assert lines[0] == "time stands still or runs backwards at 1.001 s: left out"
 
 
+@pytest.mark.parametrize("wrong", [-1e9, -3.0, 100.0, 1e9, 1e300, np.inf])
+@pytest.mark.parametrize("place", [7, 49, 50, 99])
+def test_a_single_stamp_that_disagrees_is_left_out_and_no_other(wrong, place):
+    stamps = np.arange(200) / 1000
+    stamps[place] = wrong
+    kept, times, lost, counts, _ = taken(stamps)
+    assert np.flatnonzero(~kept).tolist() == [place]
+    assert lost == 1
+    assert sum(counts.values()) == 2
+    np.testing.assert_allclose(times, np.delete(np.arange(200) / 1000, place))
+
+
+@pytest.mark.parametrize("jump", [-1.0, -0.07, -1e9, 1e9, 1.7e9])
+@pytest.mark.parametrize("size", [50, 7, 1])
+def test_after_the_clock_jumped_times_go_on_from_there(jump, size):
+    stamps = np.arange(300) / 1000
+    stamps[120:] += jump
+    kept, times, lost, counts, lines = taken(stamps, size=size)
+    assert kept.all()
+    assert counts["clock jumps"] == 1
+    assert lines[0].startswith(f"the clock jumps by {jump + 0.001:+.6g} s at 0.119 s")
+    assert times[-1] == pytest.approx(0.3, abs=2e-3)
+    assert lost <= 1
+
+
+def test_a_clock_that_stands_still_is_left_out_and_does_not_wait():
+    kept, _, _, counts, _ = taken([0.0, 0.001, 0.002, 0.003, 0.004] + 995 * [0.004])
+    assert kept.sum() == 5
+    assert counts == {"samples out of order": 995}
+
+
+@pytest.mark.parametrize("unit", [1e3, 1e6, 1e9])
+@pytest.mark.parametrize(("rate", "start"), [(1000.0, 0.0), (100.0, 1.7e9), (1.0, 5.0)])
+def test_the_unit_of_stamps_is_that_of_the_rate(unit, rate, start):
+    stamps = unit * (start + np.arange(30) / rate)
+    _, times, lost, counts, lines = taken(stamps, rate, size=max(1, round(rate / 20)))
+    np.testing.assert_allclose(times, start + np.arange(30) / rate, rtol=1e-9)
+    assert (lost, counts) == (0, {})
+    assert lines[0].endswith(f"at {rate:g} Hz: read as such")
+
+
 def test_another_rate_than_the_nominal_one_is_a_warning():
-    counted, lines = warnings()
-    Clock(1000.0, counted).take(np.arange(50) / 800)
+    *_, lines = taken(np.arange(50) / 800)
     assert lines == [
         "timestamps have 800 Hz, the nominal rate is 1000 Hz: labels and spectrogram are wrong,"
         " set --rate"

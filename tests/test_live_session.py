@@ -287,6 +287,36 @@ def test_missing_samples_end_the_lane_and_labels_resume_after_them(tmp_path, lib
     np.testing.assert_allclose(scores, batch.scores, atol=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("stamps", "seconds"),
+    [
+        (lambda time: np.where(np.arange(len(time)) == 700, time + 100.0, time), 4.0),
+        (lambda time: np.where(time < 2.0, time, time - 1.0), 4.0),
+        (lambda time: np.where(time < 2.0, time, time - 2.0), 4.0),
+        (lambda time: np.where(time < 2.0, time, time + 1e9), 4.0),
+        (lambda time: np.where(time < 2.0, time, time + 3000.0), 3004.0),
+        (lambda time: 1e9 * (time + 1.7e9), 1.7e9 + 4.0),
+    ],
+    ids=["an outlier", "a second back", "from 0 anew", "set by NTP", "a gap", "nanoseconds"],
+)
+def test_a_hum_after_the_clock_jumped_is_found_as_before(tmp_path, library, stamps, seconds):
+    signals = motion(4.0, hum=(2.6, 3.4))
+    signals["time"] = stamps(signals["time"])
+    _, _, summary = shown(tmp_path, signals, range(70, 4000, 70), library=library)
+    (event,) = summary.findings
+    assert (event.label, summary.status) == ("oscillations", "findings")
+    assert event.stop - event.start == pytest.approx(0.8, abs=0.65)  # by frames
+    assert event.stop == pytest.approx(seconds - 0.6, abs=0.35)
+
+
+def test_samples_that_are_left_out_leave_no_verdict_of_ok(tmp_path, library):
+    signals = motion(3.0, hum=(9.0, 9.0))
+    signals["time"][2000:] = 2.0  # the clock stands still
+    _, _, summary = shown(tmp_path, signals, library=library)
+    assert summary.status == "cannot-tell"
+    assert summary.reason.startswith("more than 5% of the samples were left out (999 samples out")
+
+
 def test_unknown_values_make_no_noise_and_no_label(tmp_path, library):
     signals = motion(2.0, hum=(9.0, 9.0))
     signals["velocity"][1000:1003, 1] = np.nan
@@ -467,7 +497,7 @@ def test_an_existing_recording_is_not_overwritten_unasked(tmp_path, library):
     (tmp_path / "live.rrd").write_text("precious")
     with pytest.raises(OutputError, match="exists already"):
         inspector.LiveSession(RATE, save=tmp_path / "live.rrd", library=library)
-    with pytest.raises(LiveError, match="a rate of 0 Hz; expected 1 or more"):
+    with pytest.raises(LiveError, match="a rate of 0 Hz; expected 1 to 1000000"):
         inspector.LiveSession(0.0, save=tmp_path / "other.rrd", library=library)
 
 

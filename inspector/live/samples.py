@@ -46,18 +46,24 @@ SIGNALS = ("velocity", "velocity_desired", "position", "base_velocity", "base_po
 
 
 class SampleBuffer:
-    """Room for some samples."""
+    """Room for a batch of samples, and for some that wait for those that follow."""
 
     def __init__(self, size: int, widths: Mapping[str, int], warnings: Warnings) -> None:
         self._size, self._warnings = size, warnings
-        self.signals = {name: np.empty((size, width)) for name, width in widths.items()}
-        self.time, self.received = np.empty(size), np.empty(size)
-        self.held = 0
+        room = size + 2 * AGREE
+        self._signals = {name: np.empty((room, width)) for name, width in widths.items()}
+        self._time, self._received = np.empty(room), np.empty(room)
+        self.held = self._waiting = 0
 
     @property
     def full(self) -> bool:
-        """Whether no sample fits in."""
-        return self.held == self._size
+        """Whether there is a batch beside the samples that wait."""
+        return self.held >= self._size + self._waiting
+
+    @property
+    def stamps(self) -> Array:
+        """Timestamps of all samples that are held, shape (held,)."""
+        return self._time[: self.held]
 
     def put(self, rows: Mapping[str, Array], time: Array, received: float) -> int:
         """Take as many samples as fit in.
@@ -65,32 +71,41 @@ class SampleBuffer:
         Args:
             rows: Signals, each of shape (samples, columns); those that are missing or of another
                 width are unknown in these samples.
-            time: Shape (samples,), in [s].
+            time: Timestamps, shape (samples,).
             received: When they were, in [s] on the clock that delays are measured by.
         """
-        count = min(len(time), self._size - self.held)
+        count = min(len(time), self._size + self._waiting - self.held)
         place = slice(self.held, self.held + count)
-        self.time[place], self.received[place] = time[:count], received
-        for name, values in self.signals.items():
+        self._time[place], self._received[place] = time[:count], received
+        for name, values in self._signals.items():
             given = rows.get(name)
             fits = given is not None and given.shape[1] == values.shape[1]
             values[place] = given[:count] if given is not None and fits else np.nan
             if not fits:
                 self._note(name, given, values.shape[1], time[0], count)
         for name in rows:
-            if name not in self.signals:
+            if name not in self._signals:
                 line = f"{name} from {time[0]:.3f} s on was not there at first: not shown"
                 self._warnings.note(f"samples with a new {name}", line, count)
         self.held += count
         return count
 
-    def take(self) -> tuple[Array, Array, dict[str, Array]]:
-        """Take all samples out."""
-        held, self.held = self.held, 0
-        signals = {name: values[:held] for name, values in self.signals.items()}
+    def take(self, kept: Mask, waiting: int) -> tuple[Array, dict[str, Array]]:
+        """Take samples out: when they were received, and the signals.
+
+        Args:
+            kept: Which of those that do not wait, shape (held - waiting,).
+            waiting: How many stay, the latest.
+        """
+        decided, rest = len(kept), slice(len(kept), len(kept) + waiting)
+        received = self._received[:decided][kept]
+        signals = {name: values[:decided][kept] for name, values in self._signals.items()}
         for values in signals.values():
-            values[~(np.abs(values) < LARGEST)] = np.nan
-        return self.time[:held], self.received[:held], signals
+            values[~(np.abs(values) < LARGEST)] = np.nan  # the square of others would overflow
+        for held in (self._time, self._received, *self._signals.values()):
+            held[:waiting] = held[rest].copy()
+        self.held = self._waiting = waiting
+        return received, signals
 
     def _note(self, name: str, given: Array | None, width: int, time: float, count: int) -> None:
         if given is None:
@@ -151,25 +166,46 @@ def widths_of(rows: Mapping[str, Array], joint_names: Sequence[str]) -> dict[str
 
 GAP_STEPS = 1.5
 """Steps after which a sample is taken to be missing; timestamps may jitter by less."""
+JUMP_STEPS = 20.0
+"""Steps beyond which a timestamp is believed only once others agree with it."""
+AGREE = 5
+"""Timestamps in a row that make a jump a new segment, and no outlier."""
+LONGEST = 3600.0
+"""Jump ahead up to which samples are missing, in [s]; beyond, the clock was set."""
+FARTHEST = 9e9
+"""Rerun counts nanoseconds in 64 bits: 292 years, in [s]."""
 RATE_TOLERANCE = 0.05
 """Share by which the rate of the timestamps may differ from the nominal one."""
-LATEST = 1e19
-"""Larger stamps are no times, not even in nanoseconds."""
 RATE_STEPS = 20
 """Steps from which a rate is estimated."""
+UNITS = {3: "milliseconds", 6: "microseconds", 9: "nanoseconds"}
+"""Of timestamps, by the power of ten by which their steps are larger than those of the rate."""
+BACKWARDS, TIMELESS = "samples out of order", "samples without time"
+OUTLYING = "outlying timestamps"
+DROPPED = (BACKWARDS, TIMELESS, OUTLYING, "malformed rows")
+"""Kinds of warnings of samples that are left out."""
 
 
 class Taken(NamedTuple):
     """Which samples a clock takes."""
 
     kept: Mask
-    """False where time stands still or runs backwards, shape (samples,)."""
+    """False where a sample is left out, shape (decided,)."""
     lost: Array
     """Samples that are missing before each of those that are kept, shape (kept,)."""
+    time: Array
+    """When those are that are kept, always increasing, shape (kept,), in [s]."""
+    waiting: int
+    """Samples at the end about which only those that follow can decide."""
 
 
 class Clock:
-    """Finds gaps in timestamps.
+    """Decides by its timestamp what becomes of each sample.
+
+    A sample that follows the one before within 20 steps is taken. A timestamp that lies elsewhere
+    is an outlier, unless the next ones agree with it: then the clock has jumped. Up to an hour
+    ahead that is a gap; anything else is a new segment, whose times go on from the last one. The
+    cost does not depend on how far the clock jumps.
 
     Args:
         rate: Nominal samples per second, in [Hz].
@@ -177,37 +213,129 @@ class Clock:
 
     def __init__(self, rate: float, warnings: Warnings) -> None:
         self._rate, self._warnings = rate, warnings
-        self._last: float | None = None
+        self._unit = 0.0  # until it is known
+        self._last = self._shift = 0.0  # timestamp of the last sample taken; from there to its time
+        self._before: float | None = None  # its time
         self._checked = False
 
-    def take(self, stamps: Array) -> Taken:
-        """Check the timestamps of some samples.
+    def take(self, stamps: Array, *, ended: bool = False) -> Taken:
+        """Decide about samples, those that waited before first.
 
         Args:
-            stamps: Timestamps, shape (samples,), in [s].
+            stamps: Timestamps, shape (samples,), in [s], or in the unit that the rate tells.
+            ended: Whether none will follow, so that none has to wait.
         """
-        finite = np.abs(stamps) < LATEST
-        before = -np.inf if self._last is None else self._last
-        latest = np.maximum.accumulate(np.where(finite, stamps, -np.inf))
-        kept = finite & (stamps > np.maximum(before, np.append(-np.inf, latest[:-1])))
-        self._note_dropped(stamps[finite & ~kept], int((~finite).sum()))
-        times = stamps[kept]
-        steps = self._rate * np.diff(times, prepend=times[:1] if self._last is None else before)
+        if not self._unit and not self._begin(stamps, ended=ended):
+            return Taken(np.zeros(0, dtype=bool), np.empty(0), np.empty(0), len(stamps))
+        known = stamps * self._unit
+        kept, time = np.zeros(len(known), dtype=bool), np.empty(len(known))
+        place, waiting = 0, 0
+        while place < len(known):
+            run = self._run(known[place:])
+            part = slice(place, place + run)
+            kept[part], time[part] = True, known[part] + self._shift
+            place += run
+            if run:
+                self._last = float(known[place - 1])
+            if place < len(known):
+                stop, found = self._ahead(known, place)
+                stop = len(known) if ended and found == "open" else stop
+                self._note_dropped(known[place:stop])
+                if found == "jump":
+                    self._jump(float(known[stop]))
+                place = stop
+                if found == "open":
+                    waiting = len(known) - stop
+                    break
+        decided = len(known) - waiting
+        kept, time = kept[:decided], time[:decided][kept[:decided]]
+        return Taken(kept, self._lost(time), time, waiting)
+
+    def _begin(self, stamps: Array, *, ended: bool) -> bool:
+        """Take the unit of timestamps from the first ones, if there are enough."""
+        finite = stamps[np.isfinite(stamps)]
+        if len(finite) < AGREE and len(stamps) < 2 * AGREE and not ended:
+            return False
+        steps = np.diff(finite[:RATE_STEPS])
+        step = float(np.median(steps[steps > 0.0] if (steps > 0.0).any() else 1.0 / self._rate))
+        power = 3 * round(np.log10(step * self._rate) / 3)
+        unit = UNITS.get(power, "") if 0.5 < step * self._rate / 10.0**power < 2.0 else ""
+        self._unit = 10.0**-power if unit else 1.0
+        if unit:
+            self._warnings.emit(f"timestamps count {unit} at {self._rate:g} Hz: read as such")
+        first = float(finite[0]) * self._unit if len(finite) else 0.0
+        self._last = first - 1.0 / self._rate
+        self._shift = -first if abs(first) > FARTHEST else 0.0
+        return True
+
+    def _follows(self, before: Array | float, after: Array | float) -> Mask:
+        steps = self._rate * (np.asarray(after) - np.asarray(before))
+        return np.asarray((steps > 0.0) & (steps <= JUMP_STEPS))
+
+    def _run(self, stamps: Array) -> int:
+        """How many samples follow the last one and each other."""
+        follows = self._follows(np.append(self._last, stamps[:-1]), stamps)
+        return len(stamps) if follows.all() else int(follows.argmin())
+
+    def _ahead(self, stamps: Array, place: int) -> tuple[int, str]:
+        """Where to go on after a sample that does not follow the last one, and why.
+
+        "old": that sample follows; "jump": from there on enough follow each other; "open": those
+        from there on do, but are too few yet.
+        """
+        first, agree, before = len(stamps), 0, 0.0
+        for index in range(place, len(stamps)):
+            stamp = float(stamps[index])
+            if not np.isfinite(stamp):
+                continue
+            if self._follows(self._last, stamp):
+                return index, "old"
+            if agree and self._follows(before, stamp):
+                agree += 1
+            else:
+                first, agree = index, 1
+            before = stamp
+            if agree == AGREE:
+                return first, "jump"
+        return first, "open"
+
+    def _jump(self, stamp: float) -> None:
+        """Go on at a timestamp that lies elsewhere."""
+        ahead = stamp - self._last
+        if not 0.0 < ahead <= LONGEST:
+            now = self._last + self._shift
+            line = f"the clock jumps by {ahead:+.6g} s at {now:.3f} s: times go on from there"
+            self._warnings.note("clock jumps", line)
+            self._shift = now + 2.0 / self._rate - stamp  # one sample, at least, is missing
+        self._last = stamp - 1.0 / self._rate
+
+    def _lost(self, time: Array) -> Array:
+        """Samples that are missing before each time."""
+        if not len(time):
+            return np.empty(0)
+        steps = self._rate * np.diff(
+            time, prepend=time[0] if self._before is None else self._before
+        )
+        self._before = float(time[-1])
         lost = np.where(steps >= GAP_STEPS, np.round(steps) - 1.0, 0.0)
         if lost.any():
             first = int(np.argmax(lost > 0))
-            line = f"gap at {times[first]:.3f} s: {lost[first]:.0f} samples are missing"
+            line = f"gap at {time[first]:.3f} s: {lost[first]:.0f} samples are missing"
             self._warnings.note("missing samples", line, int(lost.sum()))
         self._check_rate(steps)
-        if len(times):
-            self._last = float(times[-1])
-        return Taken(kept, lost)
+        return lost
 
-    def _note_dropped(self, backwards: Array, unknown: int) -> None:
-        if len(backwards):
-            line = f"time stands still or runs backwards at {backwards[0]:.6g} s: left out"
-            self._warnings.note("samples out of order", line, len(backwards))
-        self._warnings.note("samples without time", "a time is no number: left out", unknown)
+    def _note_dropped(self, stamps: Array) -> None:
+        finite = stamps[np.isfinite(stamps)]
+        before, after = finite[finite <= self._last], finite[finite > self._last]
+        if len(before):
+            line = f"time stands still or runs backwards at {before[0]:.6g} s: left out"
+            self._warnings.note(BACKWARDS, line, len(before))
+        if len(after):
+            line = f"a timestamp of {after[0]:.6g} s after {self._last:.6g} s: left out"
+            self._warnings.note(OUTLYING, line, len(after))
+        unknown = len(stamps) - len(finite)
+        self._warnings.note(TIMELESS, "a time is no number: left out", unknown)
 
     def _check_rate(self, steps: Array) -> None:
         if self._checked or len(steps) <= RATE_STEPS:

@@ -19,7 +19,15 @@ from inspector.library import Library, for_robot, load_library
 from inspector.live.drawing import SHOWN, Contents, Drawing, Lane, SpectrogramStream, layout
 from inspector.live.labels import NOISY, SETTLED, Findings, Labeller, News
 from inspector.live.robot import LinkLevels, LiveRobot
-from inspector.live.samples import Clock, LiveError, SampleBuffer, Warnings, rows_of, widths_of
+from inspector.live.samples import (
+    DROPPED,
+    Clock,
+    LiveError,
+    SampleBuffer,
+    Warnings,
+    rows_of,
+    widths_of,
+)
 from inspector.live.sink import Sink
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
 from noiseclassifier import Event
@@ -127,17 +135,13 @@ class Worker:
         """How many frames were labelled."""
         return self._findings.frames
 
-    def work(self, buffer: SampleBuffer) -> None:
-        """Show the samples that a buffer holds, and empty it."""
-        time, received, signals = buffer.take()
+    def work(self, buffer: SampleBuffer, *, ended: bool = False) -> None:
+        """Show the samples that a buffer holds, and empty it; few may have to wait for others."""
+        kept, lost, time, waiting = self._clock.take(buffer.stamps, ended=ended)
+        received, signals = buffer.take(kept, waiting)
+        self.samples += len(kept)
         if not len(time):
             return
-        self.samples += len(time)
-        kept, lost = self._clock.take(time)
-        if not kept.any():
-            return
-        if not kept.all():
-            time, received, signals = time[kept], received[kept], _rows(signals, kept)
         self._now = float(time[-1])
         self._lay_out(float(time[0]), signals)
         motion = np.hstack([signals[name] for name in self._noisy])
@@ -310,6 +314,10 @@ def _rows(signals: Mapping[str, Array], chosen: Mask) -> dict[str, Array]:
 
 BATCH = 0.05
 """Samples are worked on in batches of this duration, in [s]."""
+FASTEST = 1e6
+"""Highest rate, in [Hz]."""
+MOST_DROPPED = 0.05
+"""Share of the samples that may be left out for a verdict of `ok`."""
 
 
 @dataclass(frozen=True)
@@ -401,8 +409,8 @@ class LiveSession:
         on_warning: Callable[[str], None] = lambda line: None,
         on_finding: Callable[[Event, bool], None] | None = None,
     ) -> None:
-        if not 1.0 <= rate < np.inf:
-            raise LiveError(f"a rate of {rate:g} Hz; expected 1 or more")
+        if not 1.0 <= rate <= FASTEST:
+            raise LiveError(f"a rate of {rate:g} Hz; expected 1 to {FASTEST:.0f}")
         self._rate, self._robot, self._names = rate, robot, tuple(joint_names)
         self._library = load_library() if library is None else library
         self._on_warning, self._warnings = on_warning, Warnings(self._emit)
@@ -476,18 +484,26 @@ class LiveSession:
         """What became of the samples so far."""
         worker, buffer = self._worker, self._buffer
         findings = worker.findings if worker else ()
-        frames = worker.frames if worker else 0
+        samples = worker.samples + buffer.held if worker and buffer else 0
+        status = status_of(worker.frames if worker else 0, findings)
+        reason = (worker.reason if worker else "") or "no frame was labelled"
+        counts = self._warnings.counts
+        dropped = {kind: counts[kind] for kind in DROPPED if kind in counts}
+        if status is Status.OK and sum(dropped.values()) > MOST_DROPPED * max(samples, 1):
+            status = Status.CANNOT_TELL
+            told = ", ".join(f"{count} {kind}" for kind, count in dropped.items())
+            reason = f"more than {MOST_DROPPED:.0%} of the samples were left out ({told})"
         return Summary(
-            samples=worker.samples + buffer.held if worker and buffer else 0,
+            samples=samples,
             rate=self._rate,
             model=worker.model if worker else "",
             labels=worker.labels if worker else {},
-            warnings=self._warnings.counts,
+            warnings=counts,
             delays=worker.delays if worker else (),
             where=self._sink.where,
-            status=status_of(frames, findings),
+            status=status,
             findings=findings,
-            reason=(worker.reason if worker else "") or "no frame was labelled",
+            reason=reason,
             frame=worker.frame if worker else 0.0,
         )
 
@@ -500,7 +516,7 @@ class LiveSession:
             self._sink.discard()
             return self.summary
         try:
-            self._worker.work(self._buffer)
+            self._worker.work(self._buffer, ended=True)
             self._worker.finish()
         finally:
             if not self._sink.close():
