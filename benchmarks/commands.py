@@ -35,7 +35,7 @@ def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:
         "classify 10 s of noise, 10 kHz": (["classify", str(folder / "noise.log")], 10.0, 1.5),
         "view of 10 s, 10 kHz, 32 joints": (["view", short, *save], 10.0, 3.0),
         "view of 150 s, 1 kHz, 60 joints": (["view", long, *save], 150.0, 5.0),
-        "report of 10 s, 10 kHz, 32 joints": (["report", short, *page], 10.0, None),
+        "report of 10 s, 10 kHz, 32 joints": (["view", short, *page], 10.0, None),
     }
 
 

@@ -81,9 +81,8 @@ def commands(run: Path) -> dict[str, list[str]]:
     folder, file = run.parent, str(run)
     return {
         "classify": ["classify", "--no-expect", file],
-        "localise": ["classify", "--no-expect", "--format", "json", "--localise", file],
         "audit": ["audit", file],
-        "report": ["report", file, "-o", str(folder / "run.html"), "--overwrite"],
+        "report": ["view", file, "-o", str(folder / "run.html"), "--overwrite"],
         "view": ["view", file, "--save", str(folder / "run.rrd"), "--overwrite"],
         "noise": ["noise", file],
         "diff": ["diff", file, file],

@@ -152,7 +152,7 @@ class Ours:
 
     def _label_all(self, library: dict[str, Any]) -> int:
         """What `inspector classify` does: findings with onset and end."""
-        from inspector.analysis.verdict import classify_files
+        from inspector.verdict import classify_files
 
         verdicts = list(classify_files(files(self._folder), library))
         assert all(verdict.model for verdict in verdicts)

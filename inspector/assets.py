@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from inspector.errors import InspectorError
+from noisemodel.atomic import also_reading
 
 HERE = Path(__file__).parent
 FOLDERS = (HERE / "assets", HERE.parent / "assets", HERE.parent)
@@ -48,4 +49,5 @@ def model_files(chosen: Sequence[Path] | None = None) -> tuple[Path, ...]:
                 f"{path}: no such model; name a file, or one that ships: {', '.join(shipped)}"
             )
         found.append(path if path.exists() else shipped[str(path)])
+    also_reading(found)
     return tuple(found)

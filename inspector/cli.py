@@ -1,54 +1,265 @@
-"""The command line: the commands in panels, and expected errors as one line."""
+"""The command line: the commands in panels, each imported when used; errors as one line."""
 
 import io
 import os
 import sys
-import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from typing import Annotated, Any
+from functools import cache, wraps
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any, NamedTuple
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from inspector.analysis.status import EXIT, OUTPUT_LOST, Status
-from inspector.commands.adapt import adapt
-from inspector.commands.audit import audit
-from inspector.commands.baseline import baseline
-from inspector.commands.classify import classify
-from inspector.commands.compare import compare
-from inspector.commands.diff import diff
-from inspector.commands.evaluate import evaluate
-from inspector.commands.expect import expect
-from inspector.commands.export import export
-from inspector.commands.import_ import import_
-from inspector.commands.listen import listen
-from inspector.commands.live import live
-from inspector.commands.noise import noise
-from inspector.commands.report import report
-from inspector.commands.robots import robots
-from inspector.commands.shot import shot
-from inspector.commands.simulate import app as simulate
-from inspector.commands.smoothness import smoothness
-from inspector.commands.train import train
-from inspector.commands.tune import tune
-from inspector.commands.view import view
+from inspector.errors import OptionError
 from inspector.text import printable
 
-RENAMED = {"labels": "export (--labels findings, --labels annotated, --annotate FILE)"}
-"""Commands of the version before, and what does their work now."""
+
+class Entry(NamedTuple):
+    """A command of `inspector`: what its help says first, what it says last, and what it reads."""
+
+    panel: str
+    summary: str
+    example: str
+    reads_logs: bool = True
+
+
+COMMANDS = {
+    "view": Entry("Inspect", "Show a run, or several side by side.", "view run.npz -o run.png"),
+    "noise": Entry("Inspect", "Print noise levels by joint and link.", "noise run.npz --csv n.csv"),
+    "listen": Entry("Inspect", "Write the noise of runs as sound.", "listen a.npz b.npz -o n.wav"),
+    "live": Entry(
+        "Inspect",
+        "Show samples from standard input as they arrive.",
+        "live --rate 1000 --robot panda < samples.csv",
+        reads_logs=False,
+    ),
+    "robots": Entry(
+        "Inspect", "List the robots that are available by name.", "robots", reads_logs=False
+    ),
+    "classify": Entry(
+        "Check", "Classify runs and print verdicts.", "classify run.npz --format junit"
+    ),
+    "diff": Entry(
+        "Check",
+        "Compare runs with a reference: better, same or worse.",
+        "diff reference/ candidate/ --report changes/",
+        reads_logs=False,
+    ),
+    "expect": Entry(
+        "Check", "Write a first expect.toml, which allows what is found in runs.", "expect runs/"
+    ),
+    "audit": Entry(
+        "Check", "Print what logs can show: rates, quantisation, failure classes.", "audit run.npz"
+    ),
+    "smoothness": Entry(
+        "Check",
+        "Rank episodes of policies and demonstrations by smoothness.",
+        "smoothness episodes/ --picture smoothness.png",
+        reads_logs=False,
+    ),
+    "import": Entry(
+        "Import and export", "Convert logs of robots to run files.", "import log.csv -o run.npz"
+    ),
+    "export": Entry(
+        "Import and export",
+        "Write noise, labels and scores for other tools.",
+        "export run.npz -o run.mcap",
+    ),
+    "train": Entry(
+        "Train",
+        "Train a model on annotated runs.",
+        "train data/ --part training --rate 1000 -o model.npz",
+        reads_logs=False,
+    ),
+    "adapt": Entry(
+        "Train",
+        "Adapt the shipped model to your robot, using fault-free runs.",
+        "adapt good1.npz good2.npz -o robot.npz --alarms 1",
+    ),
+    "baseline": Entry(
+        "Train",
+        "Train a baseline on fault-free runs only, to find anomalies.",
+        "baseline good1.npz good2.npz -o baseline.npz --alarms 1",
+    ),
+    "tune": Entry(
+        "Train",
+        "Tune a profile's settings by grid search; resumes if killed.",
+        "tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl",
+        reads_logs=False,
+    ),
+    "evaluate": Entry(
+        "Train",
+        "Evaluate a model on annotated runs that it was not trained on.",
+        "evaluate model.npz data/ --part test",
+        reads_logs=False,
+    ),
+    "simulate": Entry(
+        "Simulate",
+        "Simulate runs with annotated failures.",
+        "simulate run talos --scenario 7",
+        reads_logs=False,
+    ),
+    "help": Entry(
+        "Help", "Print the help of a command or a topic: logs.", "help logs", reads_logs=False
+    ),
+}
+RENAMED = {
+    "shot": "view RUN -o FILE.png",
+    "report": "view RUN -o FILE.html",
+    "compare": "noise --compare",
+    "labels": "export (--labels findings, --labels annotated, --annotate FILE)",
+}
+"""Commands of 0.6, and what does the same; to be dropped after one version."""
+
+ABOUT = "Detect impacts, jumps and oscillations in robot joint data."
+START = """\
+Finds impacts, velocity jumps and oscillations in robot joint data.
+
+  inspector view                    show the demo: a Panda that touches a table
+  inspector classify log.csv        find faults in your own log
+  inspector import log.csv --list   print what a log holds, if it is read wrongly
+
+Next: `inspector --help` lists all commands, `inspector COMMAND -h` explains one,
+`inspector help logs` lists the options on reading logs.
+Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
+Tutorial: docs/tutorial.md"""
+LOGS = "How logs are read (--robot, --rate, --map, ...): `inspector help logs`."
+OUTPUTS = frozenset(
+    (
+        "output",
+        "save",
+        "csv",
+        "picture",
+        "report",
+        "labels_to",
+        "save_mapping",
+        "resume",
+        "to",
+        "train",
+    )
+)
+"""Names of options that are written; all other paths are read."""
+
+
+class LogCommand(TyperCommand):
+    """A command that opens logs: it also takes `options.log_options`, as a Reading in `ctx.obj`."""
+
+    def __init__(self, *args: Any, params: list[Any], help: str, **settings: Any) -> None:  # noqa: A002
+        from inspector.commands.options import log_options
+
+        own = {each.name for each in params}  # a command's own option of that name stands
+        self.reading = _converted(log_options, "logs")
+        self.added = [each for each in self.reading.params if each.name not in own]
+        if settings["name"] != "import":
+            help = f"{help}\n\n{LOGS}"  # noqa: A001
+            for each in self.added:
+                each.hidden = True
+        super().__init__(*args, params=[*params, *self.added], help=help, **settings)
+
+    def invoke(self, ctx: Any) -> Any:
+        """Turn these options into a Reading, and run the command."""
+        from noisemodel.atomic import reading
+
+        given = {each.name: ctx.params.pop(each.name) for each in self.added}
+        ctx.obj = self.reading.callback(**given)
+        files = (given.get(name) for name in ("robot", "mapping", "desired"))
+        with reading(Path(each) for each in files if each):
+            return super().invoke(ctx)
+
+
+def _protected(command: Callable[..., None]) -> Callable[..., None]:
+    """A command whose outputs never replace what it reads: all paths but those in `OUTPUTS`."""
+
+    @wraps(command)
+    def run(**given: Any) -> None:
+        from noisemodel.atomic import reading, refuse_read
+
+        read: list[Path] = []
+        written: list[Path] = []
+        for name, value in given.items():
+            paths = value if isinstance(value, list) else [value]
+            chosen = written if name in OUTPUTS else read
+            chosen += [each for each in paths if isinstance(each, Path)]
+        with reading(read):
+            for path in written:
+                refuse_read(path)
+            command(**given)
+
+    return run
+
+
+def _converted(function: Callable[..., Any], name: str, **settings: Any) -> Any:
+    """A function as a command of click's."""
+    single = typer.Typer(add_completion=False)
+    single.command(name, **settings)(function)
+    return typer.main.get_command(single)
+
+
+@cache
+def _command(name: str) -> Any:
+    """Import a command."""
+    entry = COMMANDS[name]
+    word = "import_" if name == "import" else name
+    module = import_module(f"inspector.commands.{word}")
+    found = module.app if name == "simulate" else getattr(module, word)
+    example = f"Example: inspector {entry.example}"
+    if isinstance(found, typer.Typer):
+        group = typer.main.get_command(found)
+        group.name, group.epilog = name, example
+        return group
+    cls = LogCommand if entry.reads_logs else TyperCommand
+    return _converted(_protected(found), name, cls=cls, epilog=example)
+
+
+class _Commands(Mapping[str, Any]):
+    """The commands by name, each imported when it is asked for."""
+
+    def __getitem__(self, name: str) -> Any:
+        if name in RENAMED:
+            raise OptionError(f"`inspector {name}` is now `inspector {RENAMED[name]}`")
+        return _command(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(COMMANDS)
+
+    def __len__(self) -> int:
+        return len(COMMANDS)
 
 
 class _Group(TyperGroup):
-    """Commands; what they say of a wrong value begins with the value."""
+    """`inspector` itself: its help imports no command."""
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        if args and args[0] in RENAMED:
-            typer.echo(f"inspector: `{args[0]}` is now `{RENAMED[args[0]]}`", err=True)
-            raise typer.Exit(2)
-        return super().resolve_command(ctx, args)
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(**settings)
+        self.commands = _Commands()  # type: ignore[assignment]
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Print a line for each command, by panels."""
+        lines = ["Usage: inspector [OPTIONS] COMMAND [ARGS]...", "", ABOUT]
+        panel = ""
+        for name, entry in COMMANDS.items():
+            if entry.panel != panel:
+                lines += ["", entry.panel]
+                panel = entry.panel
+            lines.append(f"  {name:11} {entry.summary}")
+        lines += [
+            "",
+            "Options",
+            "  --version   Print the version.",
+            "  -h, --help  Print this help.",
+        ]
+        lines += [
+            "",
+            "`inspector COMMAND -h` explains a command, `inspector help logs` how logs are read.",
+        ]
+        formatter.write("\n".join(lines) + "\n")
 
     def invoke(self, ctx: Any) -> Any:
+        """Run a command; what it says of a wrong value begins with the value."""
         try:
             return super().invoke(ctx)
         except typer.BadParameter as error:
@@ -58,9 +269,9 @@ class _Group(TyperGroup):
 
 app = typer.Typer(
     cls=_Group,
-    no_args_is_help=True,
+    invoke_without_command=True,
     pretty_exceptions_enable=False,
-    epilog="Example: inspector view",
+    context_settings={"help_option_names": ["-h", "--help"]},
 )
 
 
@@ -77,6 +288,7 @@ def _print_version(wanted: bool) -> None:
 
 @app.callback()
 def _inspector(
+    ctx: typer.Context,
     _version: Annotated[
         bool,
         typer.Option(
@@ -84,36 +296,9 @@ def _inspector(
         ),
     ] = False,
 ) -> None:
-    """Find faults of a robot in the noise that its joints would make."""
-
-
-def _add(panel: str, command: Callable[..., None], example: str, *, name: str = "") -> None:
-    """Add a command to a panel of `inspector --help`, and an example to its own help."""
-    add = app.command(name or None, rich_help_panel=panel, epilog=f"Example: {example}")
-    add(command)
-
-
-_add("Look", view, "inspector view run.npz")
-_add("Look", live, "inspector live --rate 1000 --robot panda < samples.csv")
-_add("Look", noise, "inspector noise run.npz --kind normal --csv noise.csv")
-_add("Look", listen, "inspector listen before.npz after.npz -o noise.wav")
-_add("Look", shot, "inspector shot run.npz -o run.png")
-_add("Look", report, "inspector report run.npz -o run.html")
-_add("Look", compare, "inspector compare --robots panda,go2 --csv comparison.csv")
-_add("Look", robots, "inspector robots")
-_add("Judge", classify, "inspector classify run.npz --format junit")
-_add("Judge", expect, "inspector expect runs/")
-_add("Judge", diff, "inspector diff reference/ candidate/ --report changes/")
-_add("Judge", audit, "inspector audit run.npz")
-_add("Judge", smoothness, "inspector smoothness episodes/ --picture smoothness.png")
-_add("Import and export", import_, "inspector import log.csv -o run.npz", name="import")
-_add("Import and export", export, "inspector export run.npz -o run.mcap")
-_add("Train", train, "inspector train data/ --part training --rate 1000 -o model.npz")
-_add("Train", adapt, "inspector adapt good1.npz good2.npz -o robot.npz --alarms 1")
-_add("Train", baseline, "inspector baseline good1.npz good2.npz -o baseline.npz --alarms 1")
-_add("Train", tune, "inspector tune data/ --profile logbands --grid C=1,10 -o tuned.jsonl")
-_add("Train", evaluate, "inspector evaluate model.npz data/ --part test")
-app.add_typer(simulate, name="simulate", rich_help_panel="Simulate")
+    """Detect impacts, jumps and oscillations in robot joint data."""
+    if ctx.invoked_subcommand is None:
+        typer.echo(START)
 
 
 def main() -> None:
@@ -190,20 +375,24 @@ def _run(output: _StandardOutput | None) -> int:
 
 def _failed(error: Exception) -> int:
     """Print an expected error as one line, or the traceback of a bug; the exit status."""
+    if isinstance(error, OptionError):  # needs none of the imports below
+        typer.echo(f"inspector: {printable(str(error))}", err=True)
+        return 2
     if isinstance(error, ValueError):
         import noiseclassifier as nc
         import noisemodel
-        from inspector.analysis.verdict import EXPECTED
-        from inspector.errors import OptionError
         from inspector.recording.viewer import DisplayError
+        from inspector.verdict import EXPECTED
         from noiseclassifier.scenarios import ScenarioError
 
         if isinstance(error, (*EXPECTED, ScenarioError)):
             typer.echo(f"inspector: {printable(str(error))}", err=True)
-            if isinstance(error, (OptionError, noisemodel.UnknownKindError)):
+            if isinstance(error, noisemodel.UnknownKindError):
                 return 2
             output = isinstance(error, (noisemodel.OutputError, nc.OutputError))
             lost = output and isinstance(error.__cause__, OSError)
             return OUTPUT_LOST if lost or isinstance(error, DisplayError) else 3
+    import traceback
+
     traceback.print_exception(error)
     return EXIT[Status.INTERNAL_ERROR]  # Python's own would be that of a finding

@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError, OptionError
 from inspector.text import cell, uncell
+from inspector.verdict import Verdict
 from noiseclassifier import Event
 from noiseclassifier.errors import AnnotationError
 from noiseclassifier.jsontext import text_of
@@ -118,7 +118,7 @@ def label_paths(
     except OSError as error:
         raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
     for target in targets.values():
-        refuse_existing(target, overwrite=overwrite, read=targets)
+        refuse_existing(target, overwrite=overwrite)
     return targets
 
 

@@ -259,7 +259,7 @@ class Noise:
 def _readable() -> Iterator[None]:
     """Fail in one line if a run cannot be read, or not be analysed."""
     __tracebackhide__ = True
-    from inspector.analysis.verdict import EXPECTED
+    from inspector.verdict import EXPECTED
 
     try:
         yield

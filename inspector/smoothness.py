@@ -28,7 +28,6 @@ import numpy as np
 
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import EXPECTED
 from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError, without_path
 from inspector.hold import hold_length, without_hold
@@ -37,8 +36,9 @@ from inspector.logs.importing import Imported
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import jobs_of
 from inspector.text import cell, counted
+from inspector.verdict import EXPECTED
 from noisemodel import Run
-from noisemodel.atomic import replacing
+from noisemodel.atomic import also_reading, replacing
 from noisemodel.differentiate import stretches
 from noisemodel.types import Array, Real
 
@@ -389,6 +389,7 @@ def episodes_of(
     failed: list[Failed] = []
     for source in paths:
         logs = tuple(_logs_in(source))
+        also_reading(logs)
         if not logs:
             failed.append(Failed(str(source), f"holds no log ({', '.join(SUFFIXES)})"))
         for log in logs:

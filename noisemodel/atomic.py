@@ -21,6 +21,45 @@ ABANDONED, ABANDONED_HERE = 86_400.0, 60.0
 shares the folder, and on this one, whose locks are known."""
 
 
+_read: dict[Path, None] | None = None
+"""What the running command reads; None outside of one, where programs decide for themselves."""
+
+
+@contextmanager
+def reading(paths: Iterable[Path]) -> Iterator[None]:
+    """Name files that are read: while the block runs, no output replaces them, by any name."""
+    global _read
+    before = _read
+    _read = {**(before or {}), **dict.fromkeys(paths)}
+    try:
+        yield
+    finally:
+        _read = before
+
+
+def also_reading(paths: Iterable[Path]) -> None:
+    """Add to the files of `reading`, such as the logs of a folder; nothing outside of its block."""
+    if _read is not None:
+        _read.update(dict.fromkeys(paths))
+
+
+def refuse_read(path: str | Path) -> None:
+    """Refuse an output that is a file that is read, or lies in a log that is a folder.
+
+    Raises:
+        OutputError: If it does, by device and inode, whatever its name is.
+    """
+    real = Path(os.path.realpath(path))
+    if not _read or not real.exists():
+        return
+    places = [place.stat() for place in (real, *real.parents)]
+    for each in _read:
+        with suppress(FileNotFoundError, PermissionError):
+            about = each.stat()
+            if any(os.path.samestat(about, place) for place in places):
+                raise OutputError(f"{path}: is read, too; choose another name for the output")
+
+
 @contextmanager
 def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
     """Offer a temporary path beside ``path`` that takes its place only if the block succeeds.
@@ -124,27 +163,23 @@ def _is_left(path: str) -> bool:
         os.close(file)
 
 
-def refuse_existing(
-    path: str | Path, *, overwrite: bool = False, read: Iterable[Path] = ()
-) -> None:
+def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
     """Refuse an output before long work is done for it.
 
     Args:
         path: The file that will be written.
         overwrite: Whether a file that exists may be replaced.
-        read: Files that are read for it, which it never replaces.
 
     Raises:
-        OutputError: If ``path`` exists and may not be replaced, is a folder, a device or a pipe, or
-            has no folder.
+        OutputError: If ``path`` exists and may not be replaced, is a folder, a device or a pipe, is
+            read (`reading`), or has no folder.
     """
     path = Path(path)
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; name a file")
     if path.exists() and not path.is_file():
         raise OutputError(f"{path}: is no regular file; name one")
-    if path.exists() and any(each.exists() and path.samefile(each) for each in read):
-        raise OutputError(f"{path}: is read, too; choose another name for the output")
+    refuse_read(path)
     if path.exists() and not overwrite:
         raise _exists(path)
     if not path.parent.is_dir():

@@ -16,13 +16,13 @@ from hypothesis import strategies as st
 
 from inspector.analysis.analyse import Analysis, analyse, analyse_noise, with_links
 from inspector.analysis.status import Status, Unknown
-from inspector.analysis.verdict import Verdict, classify_file, exit_status
 from inspector.assets import demo_run, model_files
 from inspector.audit import audit
 from inspector.audit.placeholder import without_placeholder
 from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.formats import FORMATS
+from inspector.verdict import Verdict, classify_file, exit_status
 from noiseclassifier import Event, Labels
 from noisemodel import Robot, Run
 from noisemodel.differentiate import METHOD, joint_velocity
@@ -389,7 +389,7 @@ def test_the_audit_names_a_placeholder_of_the_desired_velocity():
     ],
 )
 def test_a_log_of_two_numbers_a_line_is_told_from_one_with_names(tmp_path, content, names):
-    from inspector.analysis.verdict import _has_header
+    from inspector.verdict import _has_header
 
     path = tmp_path / "noise.log"
     path.write_text(content)
@@ -397,7 +397,7 @@ def test_a_log_of_two_numbers_a_line_is_told_from_one_with_names(tmp_path, conte
 
 
 def test_what_is_no_regular_file_is_not_read_for_a_header(tmp_path):
-    from inspector.analysis.verdict import _has_header
+    from inspector.verdict import _has_header
 
     os.mkfifo(tmp_path / "pipe.log")  # has no end, and is never opened
     assert _has_header(tmp_path / "pipe.log")
@@ -409,11 +409,10 @@ def test_a_verdict_has_localisations_where_they_are_asked_for():
     (blow, *_) = found.findings
     found.__dict__["localisations"] = {blow: "there", other: "elsewhere"}
     path = Path("run.npz")
-    assert Verdict.of(path, found).localisations == {}
-    assert Verdict.of(path, found, localise=True).localisations == {blow: "there"}
+    assert Verdict.of(path, found).localisations == {blow: "there"}
     assert Verdict.of(path, found).begin == 0.0
     calm = analysed("....")
-    assert Verdict.of(path, calm, localise=True).localisations == {}
+    assert Verdict.of(path, calm).localisations == {}
     assert "localisations" not in calm.__dict__  # which takes time
 
 
@@ -566,7 +565,7 @@ def test_noises_are_not_written_over_a_file_unasked(tmp_path):
 
 
 def test_samples_take_as_long_as_their_bytes_at_50_mb_a_second(tmp_path):
-    from inspector.analysis.verdict import work_of
+    from inspector.verdict import work_of
 
     (tmp_path / "a.npz").write_bytes(bytes(1_000_000))
     (tmp_path / "b.npz").write_bytes(bytes(500_000))

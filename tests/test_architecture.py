@@ -85,7 +85,7 @@ def test_nothing_is_pickled():
         ("noiseclassifier", [*SLOW, "noisemodel", "noiseclassifier.scenarios", "inspector"]),
         ("noiseclassifier.scenarios", ["rerun", "typer", "sklearn", "mujoco", "inspector"]),
         ("inspector.cli", ["rerun", "sklearn", "mujoco", "pinocchio", "scipy", "numpy"]),
-        ("inspector.analysis.verdict", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
+        ("inspector.verdict", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
         ("inspector.regression.measure", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
     ],
 )

@@ -4,11 +4,11 @@ from generalmodel import fixed
 from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
-from inspector.analysis.verdict import Status, classify_file, exit_status
 from inspector.assets import demo_run, model_files
 from inspector.audit import Observability, audit, shortcomings, summary
 from inspector.audit.observability import OSCILLATIONS, band_edges, has_frame
 from inspector.library import CannotTellError, label_run, load_library
+from inspector.verdict import Status, classify_file, exit_status
 from noiseclassifier import Profile
 from noiseclassifier.signals import MOTION
 from noisemodel import Run, decimated

@@ -13,11 +13,8 @@ from pathlib import Path
 import pytest
 from commandline import call
 
-from inspector import assets
-from inspector.analysis import state, verdict
-from inspector.analysis.resuming import classify_resumed
+from inspector import assets, verdict
 from inspector.analysis.status import Status, Unknown
-from inspector.analysis.verdict import Verdict
 from inspector.assets import demo_run, model_files
 from inspector.errors import InspectorError
 from inspector.library import load_library
@@ -25,6 +22,7 @@ from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.opening import Reading, Source, open_source
 from inspector.logs.options import ReadOptions
+from inspector.verdict import StateError, Verdict, classify_files, digest, kept
 from inspector.version import program_version
 from noiseclassifier import Event
 from noisemodel import OutputError, parallel
@@ -84,7 +82,7 @@ def test_a_run_whose_picture_is_gone_is_done_again(tmp_path):
 
     def resumed():
         run, state = Source(demo_run()), tmp_path / "state.jsonl"
-        (verdict,) = classify_resumed([run], LIBRARY, state, reading=Reading(), draw=draw)
+        (verdict,) = classify_files([run], LIBRARY, resume=state, draw=draw)
         return verdict.picture
 
     first = resumed()
@@ -105,30 +103,30 @@ def test_a_state_that_another_process_releases_in_time_is_opened(tmp_path, monke
         if len(waits) == 3:
             holder.close()
 
-    monkeypatch.setattr(state, "sleep", sleep)
-    with state.opened(tmp_path / "state.jsonl", {}) as opened:
+    monkeypatch.setattr(verdict, "sleep", sleep)
+    with kept(tmp_path / "state.jsonl", {}) as opened:
         assert opened.verdicts == {}
     assert len(waits) == 3
 
 
 def test_a_state_that_another_process_keeps_is_not_opened(tmp_path, monkeypatch):
-    monkeypatch.setattr(state, "PATIENCE", 0.05)
+    monkeypatch.setattr(verdict, "PATIENCE", 0.05)
     with (tmp_path / "state.jsonl").open("ab") as holder:
         fcntl.flock(holder, fcntl.LOCK_EX)
         refused = pytest.raises(InspectorError, match="is being written by another process; wait")
-        with refused, state.opened(tmp_path / "state.jsonl", {}):
+        with refused, kept(tmp_path / "state.jsonl", {}):
             pass
 
 
 @pytest.mark.slow
 def test_only_what_changed_is_done_again(runs, tmp_path):
     state = tmp_path / "state.jsonl"
-    first = call("classify", runs, "--format", "json", "--localise", "--resume", state)[1]
-    again = call("classify", runs, "--format", "json", "--localise", "--resume", state)[1]
+    first = call("classify", runs, "--format", "json", "--resume", state)[1]
+    again = call("classify", runs, "--format", "json", "--resume", state)[1]
     assert again == first
     assert len(rows(state)) == COUNT
     (runs / "03.npz").write_text("broken")
-    status, _, err = call("classify", runs, "--localise", "--format", "json", "--resume", state)
+    status, _, err = call("classify", runs, "--format", "json", "--resume", state)
     assert status == 3
     assert "03.npz" in err
     assert len(rows(state)) == COUNT + 1
@@ -141,7 +139,7 @@ def test_only_what_changed_is_done_again(runs, tmp_path):
         (
             "format",
             "noise-classify-state/0",
-            "is of format noise-classify-state/0, this version writes noise-classify-state/1",
+            "is of format noise-classify-state/0, this version writes noise-classify-state/2",
         ),
         ("version", "0.4.9", f"is of another version (0.4.9, this is {program_version()})"),
     ],
@@ -158,23 +156,13 @@ def test_a_state_of_another_version_is_refused(tmp_path, key, value, problem):
     )
 
 
-def test_a_state_without_a_version_is_continued(tmp_path):
-    state = tmp_path / "state.jsonl"
-    first = call("classify", demo_run(), "--format", "json", "--resume", state)[1]
-    head, row = state.read_text().splitlines()
-    header = {key: value for key, value in json.loads(head).items() if key != "version"}
-    row = {key: value for key, value in json.loads(row).items() if key != "begin"}
-    state.write_text(f"{json.dumps(header)}\n{json.dumps(row)}\n")
-    assert call("classify", demo_run(), "--format", "json", "--resume", state)[1] == first
-
-
 def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
     state, other = tmp_path / "state.jsonl", tmp_path / "other.npz"
     shutil.copy(assets.model_files()[0], other)
     call("classify", demo_run(), "--resume", state)
     for options, differs in [
         (("--unknown", "ignore"), "--unknown"),
-        (("--localise", "--format", "json", "--robot", "panda"), "how logs are read, --localise"),
+        (("--format", "json", "--robot", "panda"), "how logs are read"),
     ]:
         status, _, err = call("classify", demo_run(), "--resume", state, *options)
         advice = "name another file, or delete it"
@@ -212,7 +200,7 @@ def die_of_seven(source, reading=None):
     "change",
     [
         {"events": [0]},
-        {"events": [{"label": 1, "start": "a", "stop": 1.0, "score": 1.0}]},
+        {"events": [{"label": "a", "start": "a", "stop": 1.0, "score": 1.0}]},
         {"duration": "long"},
         {"model": None},
         {"run": 3},
@@ -222,20 +210,20 @@ def die_of_seven(source, reading=None):
 )
 def test_a_state_of_other_types_is_damaged(tmp_path, change):
     path = tmp_path / "state"
-    with state.opened(path, {}) as opened:
+    with kept(path, {}) as opened:
         opened.add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
     header, row = path.read_text().splitlines()
-    with state.opened(path, {}) as opened:
+    with kept(path, {}) as opened:
         assert len(opened.verdicts) == 1
     path.write_text(f"{header}\n{json.dumps(json.loads(row) | change)}\n")
-    with pytest.raises(state.StateError, match="is damaged in line 2"), state.opened(path, {}):
+    with pytest.raises(StateError, match="is damaged in line 2"), kept(path, {}):
         pass
 
 
 def verdict_of(name, **more):
     blow, rattle = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
-    found = Localisation("measured", "desired", 0.01, True, (("a", 0.7), ("b", 0.3)), None, (9, 30))
-    jump = Localisation(onset=1.25)
+    found = Localisation("measured", "desired", 0.01, joints=(("a", 0.7), ("b", 0.3)), band=(9, 30))
+    jump = Localisation()
     return Verdict(
         Path(name),
         Status.FINDINGS,
@@ -246,10 +234,13 @@ def verdict_of(name, **more):
         Unknown.IGNORE,
         "f" * 64,
         {rattle: Order("b", 3.0)},
+        {blow: "+24 dB over 3 repetitions"},
         "assumed",
         "walk",
-        4.5,
-        0.25,
+        duration=4.5,
+        rate=1000.0,
+        joints=6,
+        seconds=0.25,
         picture=Path("picture.png"),
         lost=("a sentence",),
         begin=1.5,
@@ -260,11 +251,11 @@ def verdict_of(name, **more):
 def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
     path, settings = tmp_path / "state", {"models": {"a": "0"}, "version": "1"}
     plain = Verdict(Path("b.npz"), Status.OK)
-    with state.opened(path, settings) as opened:
+    with kept(path, settings) as opened:
         opened.add(verdict_of("a.npz"), "0" * 64)
         opened.add(plain, "1" * 64)
         opened.add(Verdict(Path("c.npz"), Status.INTERNAL_ERROR), "2" * 64)  # tried again
-    with state.opened(path, settings) as opened:
+    with kept(path, settings) as opened:
         found = opened.verdicts
     assert found == {
         (Path("a.npz"), "0" * 64): verdict_of("a.npz"),
@@ -275,11 +266,11 @@ def test_a_verdict_is_read_back_as_it_was_written(tmp_path):
 @pytest.mark.parametrize("torn", [b'{"run": "half a li', b"{}", b"\xff"])
 def test_a_line_that_was_being_written_is_dropped(tmp_path, torn):
     path = tmp_path / "state"
-    with state.opened(path, {"a": 1}) as opened:
+    with kept(path, {"a": 1}) as opened:
         opened.add(Verdict(Path("a.npz"), Status.OK), "0" * 64)
     whole = path.read_bytes()
     path.write_bytes(whole + torn)
-    with state.opened(path, {"a": 1}) as opened:
+    with kept(path, {"a": 1}) as opened:
         assert list(opened.verdicts) == [(Path("a.npz"), "0" * 64)]
         assert path.read_bytes() == whole
         opened.add(Verdict(Path("b.npz"), Status.OK), "1" * 64)
@@ -289,14 +280,14 @@ def test_a_line_that_was_being_written_is_dropped(tmp_path, torn):
 
 def test_a_header_that_was_being_written_is_written_again(tmp_path):
     path = tmp_path / "state"
-    with state.opened(path, {"a": 1}):
+    with kept(path, {"a": 1}):
         whole = path.read_bytes()
     for length in (0, 7, len(whole) - 1):
         path.write_bytes(whole[:length])
-        with state.opened(path, {"a": 1}):
+        with kept(path, {"a": 1}):
             assert path.read_bytes() == whole
     path.write_bytes(whole[:7] + b"x")
-    with pytest.raises(state.StateError, match="holds no state"), state.opened(path, {"a": 1}):
+    with pytest.raises(StateError, match="holds no state"), kept(path, {"a": 1}):
         pass
 
 
@@ -311,26 +302,26 @@ def test_a_header_that_was_being_written_is_written_again(tmp_path):
 )
 def test_a_state_of_other_settings_says_which(tmp_path, settings, problem):
     path = tmp_path / "state"
-    with state.opened(path, {"version": "1", "models": {"a": "0"}}):
+    with kept(path, {"version": "1", "models": {"a": "0"}}):
         pass
-    with pytest.raises(state.StateError) as caught, state.opened(path, settings):
+    with pytest.raises(StateError) as caught, kept(path, settings):
         pass
     assert str(caught.value) == f"{path}: {problem}; name another file, or delete it"
 
 
 def test_a_state_that_cannot_be_a_file_is_refused(tmp_path, monkeypatch):
-    with pytest.raises(state.StateError, match="is no regular file"), state.opened(tmp_path, {}):
+    with pytest.raises(StateError, match="is no regular file"), kept(tmp_path, {}):
         pass
     (tmp_path / "file").touch()
     refused = pytest.raises(
         OutputError, match=r"file/state: cannot be written \(Not a directory\)$"
     )
-    with refused, state.opened(tmp_path / "file" / "state", {}):
+    with refused, kept(tmp_path / "file" / "state", {}):
         pass
     with (tmp_path / "large").open("wb") as file:
         file.truncate(2**28 + 1)
-    refused = pytest.raises(state.StateError, match="large: is larger than 268435456 bytes;")
-    with refused, state.opened(tmp_path / "large", {}):
+    refused = pytest.raises(StateError, match="large: is larger than 268435456 bytes;")
+    with refused, kept(tmp_path / "large", {}):
         pass
 
     def full(_):
@@ -340,20 +331,20 @@ def test_a_state_that_cannot_be_a_file_is_refused(tmp_path, monkeypatch):
     refused = pytest.raises(
         OutputError, match=r"new: cannot be written \(No space left on device\)$"
     )
-    with refused, state.opened(tmp_path / "new", {}):
+    with refused, kept(tmp_path / "new", {}):
         pass
 
 
 def test_a_state_of_the_largest_size_is_read(tmp_path, monkeypatch):
     path = tmp_path / "state"
-    with state.opened(path, {"a": 1}):
+    with kept(path, {"a": 1}):
         pass
     size = path.stat().st_size
-    monkeypatch.setattr(state, "MAX_BYTES", size)
-    with state.opened(path, {"a": 1}):
+    monkeypatch.setattr(verdict, "MAX_BYTES", size)
+    with kept(path, {"a": 1}):
         pass
-    monkeypatch.setattr(state, "MAX_BYTES", size - 1)
-    with pytest.raises(state.StateError, match="is larger than"), state.opened(path, {"a": 1}):
+    monkeypatch.setattr(verdict, "MAX_BYTES", size - 1)
+    with pytest.raises(StateError, match="is larger than"), kept(path, {"a": 1}):
         pass
 
 
@@ -365,9 +356,9 @@ def test_a_file_that_logs_are_read_with_is_one_of_the_settings(tmp_path, beside)
     for content, refused in ((b"one", False), (b"one", False), (b"other", True)):
         other.write_bytes(content)
         reading = Reading(options, desired)
-        done = classify_resumed([], LIBRARY, path, reading=reading)
+        done = classify_files([], LIBRARY, resume=path, reading=reading)
         if refused:
-            with pytest.raises(state.StateError, match="is of other settings"):
+            with pytest.raises(StateError, match="is of other settings"):
                 list(done)
         else:
             assert list(done) == []
@@ -382,8 +373,8 @@ def test_a_digest_is_of_a_file_or_of_all_names_and_files_in_a_folder(tmp_path):
     def sha256(content):
         return hashlib.sha256(content).hexdigest()
 
-    assert state.digest(one) == sha256(b"one")
+    assert digest(one) == sha256(b"one")
     lines = f"b {sha256(b'one')}\ndeep/a {sha256(b'other')}"
-    assert state.digest(tmp_path / "log") == sha256(lines.encode())
+    assert digest(tmp_path / "log") == sha256(lines.encode())
     other.rename(other.with_name("c"))
-    assert state.digest(tmp_path / "log") != sha256(lines.encode())
+    assert digest(tmp_path / "log") != sha256(lines.encode())

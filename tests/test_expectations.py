@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict
 from inspector.expectations.expectations import (
     ExpectationError,
     Expectations,
@@ -17,6 +16,7 @@ from inspector.expectations.first import first
 from inspector.expectations.judge import Gate, judge
 from inspector.library import load_library
 from inspector.localisation.localise import Localisation
+from inspector.verdict import Missing, Ruled, Ruling, Verdict
 from noiseclassifier import Event
 
 TODAY = date(2026, 6, 1)

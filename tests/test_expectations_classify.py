@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from inspector.analysis import verdict as verdicts
+from inspector import verdict as verdicts
 from inspector.analysis.status import worst
 from inspector.assets import demo_run
 from inspector.report.formats import FORMATS
@@ -311,7 +311,7 @@ def test_an_output_never_replaces_a_run_that_is_read(runs, monkeypatch, output, 
 def test_a_report_never_replaces_its_run(runs):
     demo = runs / "demo.npz"
     before = demo.read_bytes()
-    status, _, err = call("report", demo, "-o", demo, "--overwrite")
+    status, _, err = call("export", demo, "-o", demo, "--overwrite")
     assert (status, demo.read_bytes()) == (3, before)
     assert "is read, too" in err
 

@@ -103,7 +103,7 @@ def test_a_viewer_that_ends_is_reported_and_the_recording_stays(inspector, monke
     assert status == 5
     assert err == (
         "inspector: the viewer ended with status 101;"
-        " --web shows it in a browser, --save FILE writes it\n"
+        " --web shows it in a browser, -o FILE.rrd writes it\n"
     )
     assert "recording:" in out
 
@@ -138,7 +138,7 @@ def test_a_display_that_cannot_be_opened_ends_with_5_and_what_to_do(
     assert status == 5
     assert err.count("\n") == 1
     assert reason in err
-    assert "--web shows it in a browser, --save FILE writes it" in err
+    assert "--web shows it in a browser, -o FILE.rrd writes it" in err
     assert "recording:" in out
     assert "open it in the viewer:" in out
 

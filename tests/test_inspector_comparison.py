@@ -35,7 +35,7 @@ def inspector(monkeypatch, capsys):
     """Call the command line; returns exit status, what it printed, and what it complained."""
 
     def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["inspector", "compare", *map(str, arguments)])
+        monkeypatch.setattr(sys, "argv", ["inspector", "noise", "--compare", *map(str, arguments)])
         with pytest.raises(SystemExit) as end:
             main()
         printed = capsys.readouterr()
@@ -128,7 +128,7 @@ def test_the_command_writes_everything_and_continues_after_a_robot_that_cannot_b
 ):
     pytest.importorskip("matplotlib")
     outputs = {name: tmp_path / f"out.{name}" for name in ("csv", "rrd", "png")}
-    arguments = ["--robots", f"{urdf},ur3_empty,robby", "--kinds", ",".join(KINDS), "-j", "2"]
+    arguments = ["--robots", f"{urdf},ur3_empty,robby", "--kind", ",".join(KINDS), "-j", "2"]
     arguments += ["--csv", outputs["csv"], "--save", outputs["rrd"], "--picture", outputs["png"]]
     status, out, err = inspector(*arguments)
     assert status == 0
@@ -145,14 +145,14 @@ def test_the_command_writes_everything_and_continues_after_a_robot_that_cannot_b
 def test_the_command_compares_runs(inspector, tmp_path):
     run = excitation(chain(tmp_path, "revolute", "revolute"))
     run.save(tmp_path / "run.npz")
-    status, out, err = inspector(tmp_path / "run.npz", "--kinds", "simplified,C")
+    status, out, err = inspector(tmp_path / "run.npz", "--kind", "simplified,C")
     assert (status, err) == (0, "")
     assert "Reference 'C'" in out
     assert "run.npz" in out
 
 
 def test_the_command_prints_what_the_function_returns(inspector, urdf):
-    status, out, _ = inspector("--robots", f"{urdf},robby", "--kinds", ",".join(KINDS))
+    status, out, _ = inspector("--robots", f"{urdf},robby", "--kind", ",".join(KINDS))
     assert (status, out) == (0, f"{compare([urdf, 'robby'], kinds=KINDS)}\n")
 
 
@@ -184,7 +184,7 @@ def test_runs_without_robot_are_one_line_and_nothing_else_is_left(inspector, tmp
     ("arguments", "status", "message"),
     [
         ([], 2, "name run files, or robots with --robots"),
-        (["--robots", "panda", "--kinds", "paper,loud"], 2, "no kind 'loud' of noise"),
+        (["--robots", "panda", "--kind", "paper,loud"], 2, "no kind 'loud' of noise"),
         (["--robots", "panda", "--geometry", "skin"], 2, "'skin' is none of visual, collision"),
         (["--robots", "panda", "--csv", "/no/such/folder/x.csv"], 3, "cannot be written"),
         (["--robots", "robby"], 3, "no robot 'robby'"),

@@ -7,7 +7,6 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from inspector.analysis.status import Status, Unknown
-from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict, exit_status
 from inspector.localisation.localise import Localisation
 from inspector.report.cases import ANNOTATIONS, COMMENT, MARKER
 from inspector.report.formats import (
@@ -19,6 +18,7 @@ from inspector.report.formats import (
     sarif,
     text,
 )
+from inspector.verdict import Missing, Ruled, Ruling, Verdict, exit_status
 from noiseclassifier import Event
 
 BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)

@@ -115,7 +115,7 @@ def test_text_and_json_have_the_sentence(tmp_path):
     assert out.count(sentence) == 1
     _, out, _ = call("classify", *options, "--format", "json")
     assert json.dumps(json.loads(out)).count(sentence) == 1
-    call("report", *options, "-o", tmp_path / "report.html")
+    call("view", *options, "-o", tmp_path / "report.html")
     assert (tmp_path / "report.html").read_text().count(sentence) == 1
 
 

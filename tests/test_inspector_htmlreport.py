@@ -178,7 +178,7 @@ def test_without_matplotlib_the_extra_is_named(tmp_path, monkeypatch):
 
 def test_the_command_line_writes_a_page(tmp_path, monkeypatch, capsys):
     short_run().save(tmp_path / "run.npz")
-    arguments = ["report", str(tmp_path / "run.npz"), "-o", str(tmp_path / "out.html")]
+    arguments = ["view", str(tmp_path / "run.npz"), "-o", str(tmp_path / "out.html")]
     monkeypatch.setattr("sys.argv", ["inspector", *arguments])
     with pytest.raises(SystemExit) as end:
         main()

@@ -142,5 +142,5 @@ def test_a_run_too_short_for_a_frame_is_no_bad_input(tmp_path, rate, samples):
     assert (status, err) == (4, "")
     assert "short.npz: cannot-tell: " in out
     assert "too short" in out
-    status, _, err = call("report", tmp_path / "short.npz", "-o", tmp_path / "report.html")
+    status, _, err = call("view", tmp_path / "short.npz", "-o", tmp_path / "report.html")
     assert (status, err) == (0, "")

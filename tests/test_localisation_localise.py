@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from inspector.analysis.analyse import analyse_file
-from inspector.analysis.verdict import classify_file
 from inspector.assets import demo_run, model_files
 from inspector.library import load_library
 from inspector.localisation.band import band
@@ -13,6 +12,7 @@ from inspector.localisation.quiet import quiet_stretches
 from inspector.report.html import found as tables
 from inspector.report.localisation import words
 from inspector.report.markdown import report, sentence
+from inspector.verdict import classify_file
 from noisemodel import Block, Run
 
 RATE, SECONDS = 2000.0, 6.0
@@ -99,7 +99,7 @@ def test_every_failure_is_localised_and_what_is_ok_is_not():
 
 def test_the_localisation_of_a_verdict_is_that_of_a_view_of_its_run():
     library = load_library(model_files())
-    verdict = classify_file(demo_run(), library, localise=True)
+    verdict = classify_file(demo_run(), library)
     assert verdict.events
     seen = analyse_file(demo_run(), library, links=False)
     assert verdict.events == seen.findings

@@ -9,13 +9,13 @@ import pytest
 
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import Verdict
 from inspector.audit import audit
 from inspector.localisation.order import Order, best_lines, order
 from inspector.report.formats import as_json, github, junit, text
 from inspector.report.html import found
 from inspector.report.markdown import report, sentence
 from inspector.report.picture import picture
+from inspector.verdict import Verdict
 from noiseclassifier import Event
 from noisemodel import Run
 

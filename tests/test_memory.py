@@ -32,7 +32,7 @@ def test_peaks_of_commands_do_not_grow_with_a_run(tmp_path, packed):
         run = tmp_path / "run.npz"
         settings = Namespace(rate=1000.0, joints=60, type="f8", robot="", packed=packed)
         write(run, seconds, settings)
-        names = ("audit", "localise") if packed else ("audit", "localise", "report", "diff")
+        names = ("audit",) if packed else ("audit", "report", "diff")
         for name in names:
             peaks.setdefault(name, []).append(peak(commands(run)[name]))
     growth = {name: long - short for name, (short, long) in peaks.items()}

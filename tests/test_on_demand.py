@@ -14,10 +14,10 @@ from numpy.lib import format as npy
 
 import noiseclassifier as nc
 from inspector.analysis.analyse import analyse
-from inspector.analysis.verdict import Verdict
 from inspector.hold import hold_length, without_hold
 from inspector.library import load_library, signal_names, signals_of
 from inspector.logs.opening import open_run
+from inspector.verdict import Verdict
 from noisemodel import Run, RunError, RunFileError, archive, decimated, ondemand, runfile
 from noisemodel.ondemand import OnDemand, pieces
 from noisemodel.run import pieces_of
@@ -124,7 +124,7 @@ def test_the_motion_of_a_floating_base_and_its_joints_is_side_by_side(tmp_path):
 
 def findings(analysis):
     """All that an analysis says."""
-    verdict = Verdict.of(Path("run"), analysis, localise=True)
+    verdict = Verdict.of(Path("run"), analysis)
     labels = analysis.labels
     return (
         replace(verdict, seconds=0.0, localisations={}, orders={}),

@@ -85,7 +85,7 @@ def test_a_size_is_width_and_height():
 def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(picture, "require", lambda: None)
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sys.argv", ["inspector", "shot", *arguments, "-o", "out.png"])
+    monkeypatch.setattr("sys.argv", ["inspector", "view", *arguments, "-o", "out.png"])
     with pytest.raises(SystemExit) as end:
         main()
     err = capsys.readouterr().err
@@ -97,10 +97,11 @@ def test_what_cannot_be_shot_is_one_line(arguments, status, text, tmp_path, monk
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["shot", demo_run(), "-o", "s.jpg"], "s.jpg: only .png is written; name a .png file"),
-        (["view", demo_run(), "--save", "v.png"], "v.png: only .rrd is written; name a .rrd file"),
-        (["shot", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the run lasts from 0.00 s"),
-        (["shot", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the run lasts from 0.00 s"),
+        (["view", demo_run(), "-o", "s.jpg"], "s.jpg: name a .rrd, .png or .html file"),
+        (["view", demo_run(), demo_run(), "-o", "v.png"], ".png takes one run; several are"),
+        (["view", demo_run(), "-o", "v.rrd", "--at", "1"], "--at and --size take -o FILE.png"),
+        (["view", demo_run(), "-o", "s.png", "--at", "100"], "--at 100: the run lasts from 0.00 s"),
+        (["view", demo_run(), "-o", "s.png", "--at", "-1"], "--at -1: the run lasts from 0.00 s"),
     ],
 )
 def test_a_wrong_suffix_or_time_is_wrong_usage(arguments, text, tmp_path, monkeypatch):

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from inspector.analysis import state
+from inspector import verdict
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import classify_file
 from inspector.errors import InspectorError
 from inspector.expectations import expectations
 from inspector.labelfiles import read_labels
@@ -20,6 +19,7 @@ from inspector.logs.reading import read_log
 from inspector.logs.signals import column_signal, time_column
 from inspector.text import counted, plain
 from inspector.training import tuningfile
+from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
 from noiseclassifier.scenarios import DatasetError, SampleError
 from noiseclassifier.scenarios import noisytest as simulated
@@ -33,7 +33,7 @@ RUN = Run(time=TIME, velocity=np.ones((40, 1)), joint_names=("a",))
 
 
 def read_state(path):
-    with state.opened(path, {}):
+    with verdict.kept(path, {}):
         pass
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector.analysis import state
+from inspector import verdict
 from inspector.analysis.analyse import analyse
 from inspector.assets import model_files
 from inspector.errors import InspectorError
@@ -371,7 +371,7 @@ def _read_rows(path: Path) -> None:
 
 
 def _read_resume(path: Path) -> None:
-    with state.opened(path, _header(path)):
+    with verdict.kept(path, _header(path)):
         pass
 
 

@@ -13,7 +13,6 @@ from inspector.commands.options import (
     ModelRate,
     Output,
     Overwrite,
-    reads_logs,
 )
 from inspector.training.part import Part
 
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
     from inspector.logs.opening import Reading
 
 
-@partial(reads_logs, without={"rate"})
 def adapt(
+    ctx: typer.Context,
     inputs: GoodRuns,
     output: Output,
     alarms: Alarms = 1.0,
@@ -37,11 +36,11 @@ def adapt(
     rate: ModelRate = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
-    """Adapt a general model to a robot by good runs of it."""
+    """Adapt the shipped model to your robot, using fault-free runs."""
     from inspector.training.adaptation import adapt as adapt_model
+
+    reading: Reading = ctx.obj
 
     adapted = adapt_model(
         inputs,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles, reads_logs
+from inspector.commands.options import ModelFiles
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
@@ -19,16 +19,14 @@ class Format(StrEnum):
     JSON = "json"
 
 
-@reads_logs
 def audit(
+    ctx: typer.Context,
     logs: Annotated[
         list[Path],
         typer.Argument(help="Run files, or any logs; folders of them.", show_default=False),
     ],
     format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     model: ModelFiles = None,
-    *,
-    reading: "Reading",
 ) -> None:
     """Print what logs can show: rates, quantisation, failure classes.
 
@@ -43,6 +41,8 @@ def audit(
     from inspector.audit.formats import as_json, text
     from inspector.audit.logs import audit_all
     from inspector.library import load_library
+
+    reading: Reading = ctx.obj
 
     library = load_library(assets.model_files(model))
     found, failed, assumed, others = audit_all(logs, library, reading)

@@ -12,7 +12,6 @@ from inspector.commands.options import (
     ModelRate,
     Output,
     Overwrite,
-    reads_logs,
 )
 from inspector.training.part import Part
 
@@ -20,8 +19,8 @@ if TYPE_CHECKING:
     from inspector.logs.opening import Reading
 
 
-@partial(reads_logs, without={"rate"})
 def baseline(
+    ctx: typer.Context,
     inputs: GoodRuns,
     output: Output,
     alarms: Alarms = 1.0,
@@ -35,11 +34,11 @@ def baseline(
     rate: ModelRate = None,
     part: InPart = Part.ALL,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
-    """Train a baseline on good runs only, to find anomalies."""
+    """Train a baseline on fault-free runs only, to find anomalies."""
     from inspector.training.baseline import train
+
+    reading: Reading = ctx.obj
 
     trained = train(
         inputs,

@@ -1,6 +1,5 @@
 """`inspector classify`: the verdicts on runs."""
 
-from collections.abc import Sequence
 from dataclasses import replace
 from datetime import date
 from enum import StrEnum
@@ -12,20 +11,30 @@ import typer
 
 from inspector.analysis.status import OUTPUT_LOST, Status, Unknown, worst
 from inspector.commands.options import (
+    BadInput,
     Dask,
     ModelFiles,
+    NumberOfJobs,
+    OnBadInput,
     Overwrite,
+    ReportUrl,
+    Runs,
+    UnknownFrames,
+    Write,
     finite,
     jobs_or_dask,
-    reads_logs,
     say_assumed,
 )
-from inspector.commands.outputs import BadInput, files_of, tried, written
+from inspector.commands.outputs import files_of, tried, written
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from inspector.analysis.analyse import Analysis
     from inspector.expectations.expectations import Expectations
     from inspector.library import Library
-    from inspector.logs.opening import Reading
+    from inspector.logs.opening import Source
+    from inspector.verdict import Verdict
 
 
 class Format(StrEnum):
@@ -39,205 +48,118 @@ class Format(StrEnum):
     MARKDOWN = "markdown"
 
 
-def _of_gate(*names: str, **settings: Any) -> Any:
+def _gate(*names: str, **settings: Any) -> Any:
     return typer.Option(*names, rich_help_panel="What fails a run", **settings)
 
 
-def _of_output(*names: str, **settings: Any) -> Any:
-    return typer.Option(*names, rich_help_panel="Output", **settings)
+OutputFormat = Annotated[Format, typer.Option("--format", help="Output format.")]
+LabelsTo = Annotated[
+    Path | None, typer.Option(help="Write the findings to this folder, one file per run.")
+]
+LabelsFormat = Annotated[
+    str, typer.Option(help="Format of these files: noisytest, csv or audacity.")
+]
+Report = Annotated[
+    Path | None, typer.Option(help="Write index.html with a picture of each run to this folder.")
+]
+Resume = Annotated[
+    Path | None, typer.Option(help="Keep verdicts in this file; continue if it exists.")
+]
+Expect = Annotated[
+    Path | None, _gate("--expect", help="Expectations (TOML); by default the nearest expect.toml.")
+]
+NoExpect = Annotated[bool, _gate("--no-expect", help="Apply no expectations.")]
+FailOnClass = Annotated[
+    list[str] | None,
+    _gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
+]
+MinScore = Annotated[
+    float | None,
+    _gate("--min-score", callback=finite, help="Only findings of this score or more, 0 to 1."),
+]
+MinDuration = Annotated[
+    float,
+    _gate("--min-duration", min=0.0, callback=finite, help="Only findings of so many seconds."),
+]
 
 
-@reads_logs
 def classify(
-    runs: Annotated[
-        list[Path],
-        typer.Argument(
-            help="Run files, any logs that `import` reads, NoisyTest's logs; folders of them.",
-            show_default=False,
-        ),
-    ],
-    format: Annotated[Format, _of_output("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    ctx: typer.Context,
+    runs: Runs,
+    format: OutputFormat = Format.TEXT,  # noqa: A002
+    jobs: NumberOfJobs = 1,
     dask: Dask = "",
     model: ModelFiles = None,
-    labels_to: Annotated[
-        Path | None, _of_output(help="Write the findings to this folder, one file per run.")
-    ] = None,
-    labels_format: Annotated[
-        str, _of_output(help="Format of these files: noisytest, csv or audacity.")
-    ] = "audacity",
-    localise: Annotated[
-        bool,
-        _of_output("--localise", help="Add the localisation of each finding to the JSON."),
-    ] = False,
-    write: Annotated[
-        list[str] | None,
-        _of_output("--write", help="FORMAT=FILE: write another format as well; repeatable."),
-    ] = None,
-    report: Annotated[
-        Path | None,
-        _of_output("--report", help="Write index.html with a picture of each run to this folder."),
-    ] = None,
-    report_url: Annotated[
-        str,
-        _of_output("--report-url", help="Where this folder is published, for links to pictures."),
-    ] = "",
+    labels_to: LabelsTo = None,
+    labels_format: LabelsFormat = "audacity",
+    localise: Annotated[bool, typer.Option("--localise", hidden=True)] = True,
+    write: Write = None,
+    report: Report = None,
+    report_url: ReportUrl = "",
     overwrite: Overwrite = False,
-    resume: Annotated[
-        Path | None,
-        typer.Option("--resume", help="Keep verdicts in this file; continue if it exists."),
-    ] = None,
-    unknown: Annotated[
-        Unknown,
-        _of_gate(help="Frames out of distribution, two or more: a finding, or ignored."),
-    ] = Unknown.FINDING,
-    expect: Annotated[
-        Path | None,
-        _of_gate("--expect", help="Expectations (TOML); by default the nearest expect.toml."),
-    ] = None,
-    no_expect: Annotated[bool, _of_gate("--no-expect", help="Apply no expectations.")] = False,
-    fail_on_class: Annotated[
-        list[str] | None,
-        _of_gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
-    ] = None,
-    min_score: Annotated[
-        float | None,
-        _of_gate("--min-score", callback=finite, help="Only findings of this score or more."),
-    ] = None,
-    min_duration: Annotated[
-        float,
-        _of_gate(
-            "--min-duration",
-            min=0.0,
-            callback=finite,
-            help="Only findings of so many seconds or more.",
-        ),
-    ] = 0.0,
-    on_bad_input: Annotated[
-        BadInput, _of_gate("--on-bad-input", help="A file that cannot be read: fails, or ignored.")
-    ] = BadInput.FAIL,
-    *,
-    reading: "Reading",
+    resume: Resume = None,
+    unknown: UnknownFrames = Unknown.FINDING,
+    expect: Expect = None,
+    no_expect: NoExpect = False,
+    fail_on_class: FailOnClass = None,
+    min_score: MinScore = None,
+    min_duration: MinDuration = 0.0,
+    on_bad_input: OnBadInput = BadInput.FAIL,
 ) -> None:
-    """Classify runs and print verdicts; the exit status is the worst.
+    """Classify runs and print verdicts.
 
-    Exit status:
-
-      0  ok: no run has a finding that counts
-      1  findings: at least one run has one, or lacks one that is required
-      2  wrong usage
-      3  bad input: a file cannot be read, or the cluster of --dask is lost
-      4  cannot tell: say, the rate is too low for every model
-      5  output lost: an output could not be written
-     70  internal error: a bug, with its traceback on standard error
-
-    Of several, the worst: 70, 5, 3, 1, 4, 0.
+    Exit status: 0 ok, 1 findings, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost, 70 bug.
+    With several runs it is the highest-priority one: 70 > 5 > 3 > 1 > 4 > 0.
     """
     from inspector import assets
-    from inspector.analysis.verdict import classify_files, exit_status
-    from inspector.expectations.expectations import NAME
-    from inspector.expectations.judge import Gate, judge, without_run
+    from inspector.expectations.judge import Gate, judge
     from inspector.library import load_library
-    from inspector.logs.opening import left_out, sources
+    from inspector.logs.opening import sources
     from inspector.progress import progress
     from inspector.report.cases import published
     from inspector.report.formats import FORMATS
-    from noisemodel.atomic import refuse_existing
+    from inspector.verdict import classify_files, exit_status
 
-    if localise and format is not Format.JSON:
-        raise typer.BadParameter("--localise takes --format json")
+    del localise  # of 0.6: each finding is localised now
     if expect is not None and no_expect:
         raise typer.BadParameter("--expect and --no-expect exclude each other")
-    files = files_of(write or [], list(Format), overwrite=overwrite)
     library = load_library(assets.model_files(model))
+    found, others = sources(runs, ctx.obj)
+    expected = {} if no_expect else _expected([each.shown for each in found], runs, expect, library)
+    files = files_of(write or [], list(Format), overwrite=overwrite)
+    outputs = [
+        *_labels(found, labels_to, labels_format, overwrite=overwrite),
+        *_page(report, overwrite=overwrite),
+    ]
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
-    found, others = sources(runs, reading)
-    shown = [each.shown for each in found]
-    for path in files:
-        refuse_existing(path, overwrite=overwrite, read=shown)
-    logs = {each.path for each in found}  # some are folders
-    folders = {
-        each: each / NAME
-        for each in runs
-        if each.is_dir() and (each not in logs or (each / NAME).is_file())
-    }
-    expected = {} if no_expect else _expected([*shown, *folders.values()], expect, library)
-    applied = {each.path: each for each in expected.values()}.values()
-    today = date.today()
-    targets = {}
-    if labels_to:
-        from inspector.labelfiles import label_paths
 
-        targets = label_paths(shown, labels_to, format_name=labels_format, overwrite=overwrite)
-    draw = None
-    if report is not None:
-        from inspector.report import html, index
-
-        html.require()
-        index.prepare(report, overwrite=overwrite)
-        draw = partial(index.draw, folder=report)
-    settings: dict[str, Any] = {
-        "reading": reading,
-        "unknown": unknown,
-        "localise": localise or any(each.by_joint for each in applied),
-        "draw": draw,
-        "jobs": jobs_or_dask(jobs, dask),
-    }
-    if resume is None:
-        classified = classify_files(found, library, **settings)
-    else:
-        from inspector.analysis.resuming import classify_resumed
-
-        classified = classify_resumed(found, library, resume, **settings)
+    where, draw = jobs_or_dask(jobs, dask), _drawing(report)
+    classified = classify_files(
+        found, library, reading=ctx.obj, unknown=unknown, draw=draw, jobs=where, resume=resume
+    )
     classified = progress(classified, "classify", total=len(found))
-    place = {path: number for number, path in enumerate(shown)}
+
+    place = {each.shown: number for number, each in enumerate(found)}
     verdicts = [
         replace(
-            judge(each, expected.get(each.path), gate=gate, today=today),
+            judge(each, expected.get(each.path), gate=gate, today=date.today()),
             ignored=each.status is Status.BAD_INPUT and on_bad_input is BadInput.IGNORE,
             picture_url=published(each.picture, report, report_url),
         )
         for each in sorted(classified, key=lambda each: place[each.path])
     ]
-    for expectations in applied:
-        full = expectations.path.resolve()
-        about = [
-            folder
-            for folder, beside in folders.items()
-            if expected.get(beside) == expectations or full.is_relative_to(folder.resolve())
-        ]
-        if (absent := without_run(verdicts, expectations, about)) is not None:
-            verdicts.append(absent)
-    if unread := [path for path in others if path.name != NAME]:
-        typer.echo(f"inspector: {left_out(unread)}", err=True)
-    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
-    for expectations in applied:
-        for remark in expectations.remarks(today):
-            typer.echo(f"inspector: {remark}", err=True)
+    verdicts += _absent(verdicts, expected, runs)
+
+    _say(verdicts, others, expected)
     lost = [line for verdict in verdicts for line in verdict.lost]
     lost += written(verdicts, FORMATS, format, files, overwrite=overwrite)
-    if targets:
-        from inspector.labelfiles import write_findings
-
-        save = partial(
-            write_findings,
-            [verdict for verdict in verdicts if verdict.path in targets],
-            targets,
-            format_name=labels_format,
-            overwrite=overwrite,
-        )
-        lost += tried(save, str(labels_to))
-    if report is not None:
-        lost += tried(lambda: index.write(verdicts, report), str(report))
-    for bad in verdicts:
-        if bad.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
-            typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.message}", err=True)
-    for line in lost:
-        typer.echo(f"inspector: output lost: {line}", err=True)
+    for name, save in outputs:
+        lost += tried(partial(save, verdicts), name)
+    say_lost(verdicts, lost)
     raise typer.Exit(worst([exit_status(verdicts), *([OUTPUT_LOST] if lost else [])]))
 
 
-def _classes(given: Sequence[str], library: "Library") -> tuple[str, ...]:
+def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
     """The classes that fail a run."""
     from inspector.expectations.expectations import classes_found
     from noisemodel.errors import hint
@@ -254,16 +176,99 @@ def _classes(given: Sequence[str], library: "Library") -> tuple[str, ...]:
 
 
 def _expected(
-    runs: Sequence[Path], chosen: Path | None, library: "Library"
+    shown: "Sequence[Path]", given: "Sequence[Path]", chosen: Path | None, library: "Library"
 ) -> "dict[Path, Expectations]":
-    """The expectations of each run, or file of a folder, that has some."""
-    from inspector.expectations.expectations import found_for, read
+    """The expectations of each run, and of each folder that was named, by its file."""
+    from inspector.expectations.expectations import NAME, found_for, read
 
-    if chosen is None:
-        expected = found_for(runs)
-    else:
-        only = read(chosen)
-        expected = dict.fromkeys(runs, only)
-    for expectations in expected.values():
-        expectations.check_classes(library)
+    folders = [each / NAME for each in given if each.is_dir()]
+    folders = [each for each in folders if each.parent not in shown or each.is_file()]
+    paths = [*shown, *folders]
+    expected = found_for(paths) if chosen is None else dict.fromkeys(paths, read(chosen))
+    for each in set(expected.values()):
+        each.check_classes(library)
     return expected
+
+
+def _absent(
+    verdicts: "Sequence[Verdict]", expected: "Mapping[Path, Expectations]", given: "Sequence[Path]"
+) -> "list[Verdict]":
+    """A verdict for each file of expectations that requires findings of runs that are not there."""
+    from inspector.expectations.expectations import NAME
+    from inspector.expectations.judge import without_run
+
+    absent = []
+    for each in dict.fromkeys(expected.values()):
+        full = each.path.resolve()
+        about = [
+            folder
+            for folder in given
+            if folder / NAME in expected
+            and (expected[folder / NAME] == each or full.is_relative_to(folder.resolve()))
+        ]
+        absent.append(without_run(verdicts, each, about))
+    return [each for each in absent if each is not None]
+
+
+def _labels(
+    runs: "Sequence[Source]", folder: Path | None, form: str, *, overwrite: bool
+) -> "list[tuple[str, Callable[[Sequence[Verdict]], object]]]":
+    """What writes the findings as label files, if a folder is named; its files are checked."""
+    if folder is None:
+        return []
+    from inspector.labelfiles import label_paths, write_findings
+
+    shown = [each.shown for each in runs]
+    targets = label_paths(shown, folder, format_name=form, overwrite=overwrite)
+
+    def write(verdicts: "Sequence[Verdict]") -> None:
+        of_runs = [each for each in verdicts if each.path in targets]
+        write_findings(of_runs, targets, format_name=form, overwrite=overwrite)
+
+    return [(str(folder), write)]
+
+
+def _page(
+    folder: Path | None, *, overwrite: bool
+) -> "list[tuple[str, Callable[[Sequence[Verdict]], object]]]":
+    """What writes the page on all runs, if a folder is named; its files are checked."""
+    if folder is None:
+        return []
+    from inspector.report import html, index
+
+    html.require()
+    index.prepare(folder, overwrite=overwrite)
+    return [(str(folder), lambda verdicts: index.write(verdicts, folder))]
+
+
+def _drawing(folder: Path | None) -> "Callable[[Analysis, Path], Path] | None":
+    """What draws each run into the folder of the report."""
+    if folder is None:
+        return None
+    from inspector.report import index
+
+    return partial(index.draw, folder=folder)
+
+
+def _say(
+    verdicts: "Sequence[Verdict]", others: "Sequence[Path]", expected: "Mapping[Path, Expectations]"
+) -> None:
+    """Print on standard error what was left out and assumed, and what expectations expire."""
+    from inspector.expectations.expectations import NAME
+    from inspector.logs.opening import left_out
+
+    if unread := [path for path in others if path.name != NAME]:
+        typer.echo(f"inspector: {left_out(unread)}", err=True)
+    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
+    for each in dict.fromkeys(expected.values()):
+        for remark in each.remarks(date.today()):
+            typer.echo(f"inspector: {remark}", err=True)
+
+
+def say_lost(verdicts: "Sequence[Verdict]", lost: "Sequence[str]") -> None:
+    """Print on standard error which runs could not be read, and which outputs not be written."""
+    for bad in verdicts:
+        if bad.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+            typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.message}", err=True)
+    for line in lost:
+        typer.echo(f"inspector: output lost: {line}", err=True)

@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from inspector.analysis.status import OUTPUT_LOST, Unknown, worst
-from inspector.commands.options import Dask, ModelFiles, Overwrite, jobs_or_dask
-from inspector.commands.outputs import BadInput, files_of, tried, written
+from inspector.commands.options import BadInput, Dask, ModelFiles, Overwrite, jobs_or_dask
+from inspector.commands.outputs import files_of, tried, written
 
 
 class Format(StrEnum):

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from inspector.analysis.status import EXIT, Status, worst
-from inspector.commands.options import ModelFiles, Overwrite, reads_logs, say_assumed
+from inspector.commands.options import ModelFiles, Overwrite, say_assumed
 from inspector.text import counted
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
 
 
-@reads_logs
 def expect(
+    ctx: typer.Context,
     runs: Annotated[
         list[Path],
         typer.Argument(help="Run files or logs; folders of them.", show_default=False),
@@ -31,8 +31,6 @@ def expect(
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
     """Write a first expect.toml, which allows what is found in runs.
 
@@ -42,19 +40,21 @@ def expect(
     The exit status is 3 if a run cannot be read, 70 at a bug; the others are written, if any.
     """
     from inspector import assets
-    from inspector.analysis.verdict import classify_files
     from inspector.expectations.expectations import is_nearest
     from inspector.expectations.first import first, path_for
     from inspector.library import load_library
     from inspector.logs.opening import sources
     from inspector.progress import progress
+    from inspector.verdict import classify_files
     from noisemodel.atomic import refuse_existing, replacing
+
+    reading: Reading = ctx.obj
 
     path = path_for(runs, output)
     refuse_existing(path, overwrite=overwrite)
     library = load_library(assets.model_files(model))
     found, _ = sources(runs, reading)
-    classified = classify_files(found, library, reading=reading, localise=True, jobs=jobs)
+    classified = classify_files(found, library, reading=reading, jobs=jobs)
     verdicts = list(progress(classified, "classify", total=len(found)))
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
     bad = [each for each in verdicts if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import ModelFiles, Overwrite, RunFile, opened, reads_logs
+from inspector.commands.options import ModelFiles, Overwrite, RunFile, opened
 from inspector.text import counted
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ class Labels(StrEnum):
     ANNOTATED = "annotated"
 
 
-@reads_logs
 def export(
+    ctx: typer.Context,
     run: RunFile,
     output: Annotated[
         Path,
@@ -50,8 +50,6 @@ def export(
         typer.Option("--layouts", help="Write layouts for Foxglove and PlotJuggler beside .mcap."),
     ] = False,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
     """Write noise, labels and scores for other tools.
 
@@ -64,9 +62,10 @@ def export(
     from inspector.library import load_library
     from noisemodel.atomic import refuse_existing
 
+    reading: Reading = ctx.obj
     if labels and annotate:
         raise typer.BadParameter("name one of --labels and --annotate")
-    refuse_existing(output, overwrite=overwrite, read=[run])
+    refuse_existing(output, overwrite=overwrite)
     if annotate:
         _annotated(opened(run, reading).run, annotate, output, overwrite=overwrite)
         return

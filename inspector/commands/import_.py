@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inspector.analysis.status import EXIT, OUTPUT_LOST, Status, worst
-from inspector.commands.options import Overwrite, reads_logs
+from inspector.commands.options import Overwrite
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
 
 
-@reads_logs
 def import_(
+    ctx: typer.Context,
     logs: Annotated[
         list[Path],
         typer.Argument(
@@ -33,8 +33,6 @@ def import_(
         bool, typer.Option("--list", help="List the contents of the logs, write nothing.")
     ] = False,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
     """Convert logs of robots to run files.
 
@@ -45,6 +43,7 @@ def import_(
     from inspector.logs.reading import listing
     from inspector.text import printable
 
+    reading: Reading = ctx.obj
     options = reading.options
     if list_:
         for line in (line for log in logs for line in listing(log, options)):

@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from inspector.commands.options import Overwrite, one_at_a_time, opened, reads_logs, say_warnings
+from inspector.commands.options import Overwrite, one_at_a_time, opened, say_warnings
 
 if TYPE_CHECKING:
     from inspector.logs.opening import Reading
 
 
-@reads_logs
 def listen(
+    ctx: typer.Context,
     runs: Annotated[
         list[Path],
         typer.Argument(
@@ -38,11 +38,11 @@ def listen(
         float, typer.Option("--speed", help="Playback speed; the pitch changes by the same factor.")
     ] = 1.0,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
     """Write the noise of runs as sound, one WAV file per run."""
     from inspector import sound as sonification
+
+    reading: Reading = ctx.obj
 
     one_at_a_time(reading, len(runs))
     settings = sonification.Settings(kind, joint, link, speed)

@@ -1,15 +1,15 @@
-"""Arguments and options that several commands share."""
+"""Options that several commands share: each an alias, and those on reading logs in one function."""
 
-import inspect
 import os
 from collections.abc import Callable, Collection
-from functools import wraps
+from enum import StrEnum
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from inspector.analysis.status import Unknown
 from inspector.training.part import Part
 
 if TYPE_CHECKING:
@@ -17,39 +17,20 @@ if TYPE_CHECKING:
     from noisemodel import Run
     from noisemodel.parallel import Jobs
 
-RunFile = Annotated[
-    Path, typer.Argument(help="A run file, or any log: CSV, bag, ...", show_default=False)
-]
-Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.")]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
-ModelFiles = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--model", help="Use this model only: a file, or the name of a shipped one; repeatable."
-    ),
-]
+KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
+"""Those of ``noisemodel``, which would take too long to import here."""
+LIMITS = ("joints", "columns", "triangles", "bodies")
+"""Those of ``noisemodel.bounds``, which would take too long to import here."""
 
 
-Dask = Annotated[
-    str,
-    typer.Option(
-        "--dask",
-        metavar="ADDRESS",
-        help="Work on the workers of this Dask scheduler, tcp://HOST:PORT, instead of --jobs.",
-        show_default=False,
-    ),
-]
+class BadInput(StrEnum):
+    """What becomes of files that cannot be read."""
+
+    FAIL = "fail"
+    IGNORE = "ignore"
 
 
-def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
-    """Where to work: the number of processes, or the address of a Dask scheduler.
-
-    Raises:
-        BadParameter: If both are given.
-    """
-    if dask and jobs > 1:
-        raise typer.BadParameter("--jobs and --dask exclude each other")
-    return dask or jobs
+# --- checks of values
 
 
 def finite(value: float | None) -> float | None:
@@ -76,55 +57,6 @@ def _above_zero(value: float) -> float:
     return value
 
 
-KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
-"""Those of ``noisemodel``, which would take too long to import here."""
-Kind = Annotated[
-    str,
-    typer.Option(
-        "--kind", callback=one_of(KINDS), help=f"Extended noise, one of {', '.join(KINDS)}."
-    ),
-]
-Alarms = Annotated[
-    float,
-    typer.Option(callback=_above_zero, help="False-alarm budget, per hour of good motion."),
-]
-ModelRate = Annotated[
-    float | None,
-    typer.Option(
-        "--rate",
-        min=1.0,
-        help="Rate of the model in [Hz]; faster runs are decimated.",
-        show_default=False,
-    ),
-]
-Floor = Annotated[
-    float | None,
-    typer.Option(
-        "--floor",
-        help="Darkest level of spectrograms, in dB re 1 rad/s; by default -70.",
-        max=0.0,
-    ),
-]
-InPart = Annotated[
-    Part,
-    typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),
-]
-GoodRuns = Annotated[
-    list[Path],
-    typer.Argument(
-        help="Run files or logs of good motion, samples, folders of them, NoisyTest folders."
-    ),
-]
-Inputs = Annotated[
-    list[Path],
-    typer.Argument(help="Annotated runs, samples, folders of them, or NoisyTest folders."),
-]
-
-
-def _of_log(*names: str, **settings: Any) -> Any:
-    return typer.Option(*names, rich_help_panel="Reading logs", **settings)
-
-
 def _allow(folder: Path | None) -> Path | None:
     if folder is not None:
         os.environ["NOISE_PACKAGE_ROOT"] = str(folder)  # for the workers of this process too
@@ -133,6 +65,7 @@ def _allow(folder: Path | None) -> Path | None:
 
 def _raise_limit(gigabytes: float | None) -> float | None:
     if gigabytes is not None:
+        finite(gigabytes)
         os.environ["NOISE_MAX_UNPACKED"] = str(int(gigabytes * 1e9))
     return gigabytes
 
@@ -146,16 +79,91 @@ def _raise_limits(limits: list[str] | None) -> list[str] | None:
     return limits
 
 
-LIMITS = ("joints", "columns", "triangles", "bodies")
-"""Those of ``noisemodel.bounds``, which would take too long to import here."""
+# --- what several commands take
 
+
+def _of_log(*names: str, **settings: Any) -> Any:
+    return typer.Option(*names, rich_help_panel="Reading logs", **settings)
+
+
+RunFile = Annotated[
+    Path, typer.Argument(help="A run file, or any log: CSV, bag, ...", show_default=False)
+]
+Runs = Annotated[
+    list[Path],
+    typer.Argument(help="Run files, logs, folders of them.", show_default=False),
+]
+GoodRuns = Annotated[
+    list[Path],
+    typer.Argument(help="Fault-free run files, logs, samples, folders of them, NoisyTest folders."),
+]
+Inputs = Annotated[
+    list[Path],
+    typer.Argument(help="Annotated runs, samples, folders of them, or NoisyTest folders."),
+]
+Output = Annotated[Path, typer.Option("--output", "-o", help="The file to write.")]
+Overwrite = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists.")]
+NumberOfJobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")]
+Dask = Annotated[
+    str,
+    typer.Option(
+        "--dask",
+        metavar="ADDRESS",
+        help="Work on this Dask scheduler, tcp://HOST:PORT, instead of --jobs.",
+        show_default=False,
+    ),
+]
+ModelFiles = Annotated[
+    list[Path] | None,
+    typer.Option("--model", help="A model file, or the name of a shipped one; repeatable."),
+]
+Kind = Annotated[
+    str,
+    typer.Option(
+        "--kind", callback=one_of(KINDS), help=f"Extended noise, one of {', '.join(KINDS)}."
+    ),
+]
+Floor = Annotated[
+    float | None,
+    typer.Option("--floor", help="Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0),
+]
+Alarms = Annotated[
+    float,
+    typer.Option(callback=_above_zero, help="False-alarm budget, per hour of fault-free motion."),
+]
+ModelRate = Annotated[
+    float | None,
+    typer.Option(
+        "--rate",
+        min=1.0,
+        help="Rate of the model in [Hz]; faster runs are decimated.",
+        show_default=False,
+    ),
+]
+InPart = Annotated[
+    Part,
+    typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),
+]
+UnknownFrames = Annotated[
+    Unknown, typer.Option("--unknown", help="What to do with frames out of distribution.")
+]
+OnBadInput = Annotated[
+    BadInput, typer.Option("--on-bad-input", help="What to do with unreadable files.")
+]
+Write = Annotated[
+    list[str] | None,
+    typer.Option("--write", help="FORMAT=FILE: write another format as well; repeatable."),
+]
+ReportUrl = Annotated[
+    str, typer.Option("--report-url", help="Where the report's folder is published.")
+]
 Limits = Annotated[
     list[str] | None,
     _of_log(
         "--limit",
         callback=_raise_limits,
         metavar="NAME=N",
-        help=f"Another limit on what files ask for: {', '.join(LIMITS)}; repeatable.",
+        help=f"Raise a size limit: {', '.join(LIMITS)}; repeatable.",
     ),
 ]
 MaxUnpacked = Annotated[
@@ -163,24 +171,21 @@ MaxUnpacked = Annotated[
     _of_log(
         "--max-unpacked",
         callback=_raise_limit,
-        help="Most that a compressed file may unpack to, in GB; by default 0.5, or 20 times its"
-        " size.",
+        help="Refuse compressed files that expand beyond this many GB.",
     ),
 ]
 PackageRoot = Annotated[
     Path | None,
-    typer.Option(
-        "--package-root",
-        callback=_allow,
-        help="A further folder of packages, for the meshes of a robot.",
+    _of_log(
+        "--package-root", callback=_allow, help="A further folder of packages, for robots' meshes."
     ),
 ]
 
 
-def _log_options(
+def log_options(
     robot: Annotated[
         str | None,
-        _of_log("--robot", help="A name that `robots` lists, URDF or MJCF; none takes no robot."),
+        _of_log("--robot", help='Robot name (see `inspector robots`), URDF or MJCF, or "none".'),
     ] = None,
     package_root: PackageRoot = None,
     max_unpacked: MaxUnpacked = None,
@@ -216,12 +221,14 @@ def _log_options(
     ] = None,
     offset: Annotated[
         float | None,
-        _of_log(
-            "--offset", help="Added to the time stamps of --desired, in seconds; else estimated."
-        ),
+        _of_log("--offset", help="Add to the timestamps of --desired, in seconds; else estimated."),
     ] = None,
-) -> "Reading":
-    """Options by which a log is opened, the same in all commands; see `reads_logs`."""
+) -> Any:
+    """Options on reading logs, the same in all commands that read logs.
+
+    They are in the help of `import` only; the others take them as well (`inspector.cli`). Returns
+    an ``inspector.logs.opening.Reading``.
+    """
     from inspector.logs.opening import Reading
     from inspector.logs.reading import read_options
 
@@ -240,38 +247,14 @@ def _log_options(
     return Reading(options, desired, tuple(episode or ()), without_robot=robot == "none")
 
 
-def reads_logs(
-    command: Callable[..., None], *, without: Collection[str] = ()
-) -> Callable[..., None]:
-    """Give a command the options by which logs are opened.
+# --- what several commands do with them
 
-    Args:
-        command: Takes them as ``reading``, a ``inspector.logs.opening.Reading``.
-        without: Names of options that mean something else in this command.
 
-    Returns:
-        The command with these options in place of ``reading``.
-    """
-    own = inspect.signature(command, eval_str=False)
-    added = {
-        name: option
-        for name, option in inspect.signature(_log_options).parameters.items()
-        if name not in without
-    }
-
-    @wraps(command)
-    def reading_logs(**given: Any) -> None:
-        options = {name: given.pop(name) for name in added}
-        command(**given, reading=_log_options(**options))
-
-    kept = [each for name, each in own.parameters.items() if name != "reading"]
-    every = [*kept, *added.values()]
-    signature = own.replace(
-        parameters=[each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in every]
-    )
-    reading_logs.__signature__ = signature  # type: ignore[attr-defined]
-    reading_logs.__annotations__ = {each.name: each.annotation for each in every}
-    return reading_logs
+def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
+    """Where to work: the number of processes, or the address of a Dask scheduler."""
+    if dask and jobs > 1:
+        raise typer.BadParameter("--jobs and --dask exclude each other")
+    return dask or jobs
 
 
 def opened(path: Path, reading: "Reading", *, said: bool = True) -> "Opened":

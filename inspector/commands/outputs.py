@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
-from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -10,13 +9,6 @@ from typing import TypeVar
 import typer
 
 Result = TypeVar("Result")
-
-
-class BadInput(StrEnum):
-    """What becomes of files that cannot be read."""
-
-    FAIL = "fail"
-    IGNORE = "ignore"
 
 
 def check_suffix(path: Path, suffix: str) -> None:
@@ -32,14 +24,9 @@ def check_suffix(path: Path, suffix: str) -> None:
 def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -> dict[Path, str]:
     """The files of `--write FORMAT=FILE`, with the format of each.
 
-    Args:
-        given: What was typed.
-        known: Names of the formats.
-        overwrite: Whether files that exist may be replaced.
-
     Raises:
         BadParameter: If one is not of that form.
-        OutputError: If a file exists.
+        OutputError: If a file exists, or is read.
     """
     from noisemodel.atomic import refuse_existing
 
@@ -68,13 +55,6 @@ def written(
 ) -> list[str]:
     """Print a result in one format, and write it to files in others.
 
-    Args:
-        result: The result.
-        formats: What writes it, by format.
-        printed: Format of standard output.
-        files: Files, with the format of each.
-        overwrite: Whether files that exist may be replaced.
-
     Returns:
         What was lost, a sentence each.
     """
@@ -85,12 +65,7 @@ def written(
 
 
 def tried(output: Callable[[], object], name: str) -> list[str]:
-    """Write an output; a sentence if it is lost.
-
-    Args:
-        output: Writes it.
-        name: What it is called.
-    """
+    """Write an output; a sentence if it is lost."""
     from noisemodel import OutputError
 
     try:

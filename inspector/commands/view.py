@@ -1,8 +1,9 @@
-"""`inspector view`: one run in the viewer, or several side by side."""
+"""`inspector view`: a run, or several side by side, in the viewer or as a file."""
 
 import hashlib
 from enum import StrEnum
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -15,13 +16,15 @@ from inspector.commands.options import (
     Overwrite,
     one_at_a_time,
     opened,
-    reads_logs,
 )
-from inspector.commands.outputs import check_suffix
 
 if TYPE_CHECKING:
     from inspector.library import Library
     from inspector.logs.opening import Opened, Reading
+
+SUFFIXES = ("", ".rrd", ".png", ".html")
+"""Of what is written; without a suffix a recording."""
+SIZE = "1440x900"
 
 
 class Aligned(StrEnum):
@@ -32,19 +35,17 @@ class Aligned(StrEnum):
     NONE = "none"
 
 
-@reads_logs
 def view(
+    ctx: typer.Context,
     runs: Annotated[
         list[Path] | None,
-        typer.Argument(
-            help="A run file, or any log; by default the shipped demo. Two are before and after a"
-            " change; more lie side by side."
-        ),
+        typer.Argument(help="Runs, logs, or a recording (.rrd) for a picture; else the demo."),
     ] = None,
-    save: Annotated[
+    output: Annotated[
         Path | None,
-        typer.Option("--save", help="Write the recording to this .rrd file, open no viewer."),
+        typer.Option("--output", "-o", help="Write a recording .rrd, a picture .png or a .html."),
     ] = None,
+    save: Annotated[Path | None, typer.Option("--save", hidden=True)] = None,
     model: ModelFiles = None,
     no_robot: Annotated[
         bool, typer.Option("--no-robot", help="Do not draw the robot and the noise of its links.")
@@ -54,6 +55,10 @@ def view(
     terms: Annotated[
         bool, typer.Option("--terms", help="Show the terms A, B and C of the paper separately.")
     ] = False,
+    at: Annotated[
+        float | None, typer.Option("--at", help="Time of a picture, in s; else the worst finding.")
+    ] = None,
+    size: Annotated[str, typer.Option("--size", help="Width and height of a picture.")] = SIZE,
     web: Annotated[
         bool, typer.Option("--web", help="Serve it to a browser on this machine until Ctrl-C.")
     ] = False,
@@ -62,65 +67,150 @@ def view(
     ] = 0,
     align: Annotated[
         Aligned | None,
-        typer.Option(
-            "--align",
-            help="Align two runs by motion (auto), several by start, or not at all (none).",
-        ),
+        typer.Option("--align", help="Align two runs by motion (auto), or several by start."),
     ] = None,
     overwrite: Overwrite = False,
-    *,
-    reading: "Reading",
 ) -> None:
-    """Show a run, or several side by side, in the rerun viewer.
+    """Show a run, or several side by side.
 
-    The views: joints, noise, spectrogram, classes and the moving robot; of two runs, what is new,
-    resolved and louder. Runs that cannot be read are named, and the others shown (exit status 3).
+    Two runs are before and after a change. A picture needs a Vulkan driver (Debian:
+    mesa-vulkan-drivers libvulkan1), a page matplotlib.
+
+    Runs that cannot be read are named, and the others shown (exit status 3).
     """
     from inspector import assets
     from inspector.library import load_library
     from inspector.recording import viewer
     from noisemodel.atomic import refuse_existing
 
-    if web and save:
-        raise typer.BadParameter("name one of --web and --save")
+    reading: Reading = ctx.obj
+    output = output or save
     paths = runs or [assets.demo_run()]
     one_at_a_time(reading, len(paths))
-    if align and len(paths) < 2:
-        raise typer.BadParameter("--align takes two runs or more")
-    if align is Aligned.AUTO and len(paths) > 2:
-        raise typer.BadParameter("--align auto takes two runs; more lie side by side from start")
-    if terms and len(paths) > 1:
-        raise typer.BadParameter("--terms takes one run")
-    if floor is not None and len(paths) > 1:
-        raise typer.BadParameter("--floor takes one run")
+    _check(paths, output, align, terms=terms, floor=floor, web=web, at=at, size=size)
     if port:
         from inspector.recording import viewer as browser
 
         browser.free_port(port)
-    if save:
-        check_suffix(save, ".rrd")
-    target = save or viewer.scratch_path(_together(paths))
-    overwrite = overwrite or save is None
+    target = output or viewer.scratch_path(_together(paths))
+    overwrite = overwrite or output is None
     refuse_existing(target, overwrite=overwrite)
     library = load_library(assets.model_files(model))
-    robot, unread, seconds = not no_robot, False, None
+    if output and output.suffix.lower() in (".png", ".html"):
+        write = _picture if output.suffix.lower() == ".png" else _page
+        links = "" if no_robot else kind
+        write(paths[0], output, reading, library, links, floor, at, size, overwrite=overwrite)
+        return
+    seconds, unread = None, False
     if len(paths) == 1:
         found = [opened(paths[0], reading, said=False)]  # remarks say it
     else:
         found, unread = _read(paths, reading)
     if len(found) == 1:
-        links = kind if robot else ""
+        links = "" if no_robot else kind
         seconds = _one(
             found[0], target, library, links, terms=terms, floor=floor, overwrite=overwrite
         )
     elif len(paths) == 2:
         both, how = (found[0], found[1]), align or Aligned.AUTO
-        _two(both, target, library, how, robot=robot, kind=kind, overwrite=overwrite)
+        _two(both, target, library, how, robot=not no_robot, kind=kind, overwrite=overwrite)
     else:
         _several(found, target, library, from_start=align is not Aligned.NONE, overwrite=overwrite)
-    _show(target, seconds, web=web, port=port, saved=save is not None)
+    _show(target, seconds, web=web, port=port, saved=output is not None)
     if unread:
         raise typer.Exit(EXIT[Status.BAD_INPUT])
+
+
+def _check(
+    paths: list[Path],
+    output: Path | None,
+    align: Aligned | None,
+    *,
+    terms: bool,
+    floor: float | None,
+    web: bool,
+    at: float | None,
+    size: str,
+) -> None:
+    """Refuse options that do not go together, and what cannot be written."""
+    suffix = "" if output is None else output.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise typer.BadParameter(f"{output}: name a .rrd, .png or .html file", param_hint="'-o'")
+    if web and output:
+        raise typer.BadParameter("name one of --web and -o")
+    if align and len(paths) < 2:
+        raise typer.BadParameter("--align takes two runs or more")
+    if align is Aligned.AUTO and len(paths) > 2:
+        raise typer.BadParameter("--align auto takes two runs; more lie side by side from start")
+    for option, given in (("--terms", terms), ("--floor", floor is not None)):
+        if given and len(paths) > 1:
+            raise typer.BadParameter(f"{option} takes one run")
+    if suffix in (".png", ".html") and len(paths) > 1:
+        raise typer.BadParameter(f"{suffix} takes one run; several are written as .rrd")
+    if (at is not None or size != SIZE) and suffix != ".png":
+        raise typer.BadParameter("--at and --size take -o FILE.png")
+
+
+def _picture(
+    run: Path,
+    output: Path,
+    reading: "Reading",
+    library: "Library",
+    kind: str,
+    floor: float | None,
+    at: float | None,
+    size: str,
+    *,
+    overwrite: bool,
+) -> None:
+    """Write a PNG of what the viewer shows, without a display."""
+    from inspector.analysis.analyse import analyse_file
+    from inspector.recording import picture as screenshot
+    from inspector.recording.run import write
+    from inspector.sound import worst_time
+
+    screenshot.require()
+    points = screenshot.parse_size(size)
+    with TemporaryDirectory() as folder:
+        recording, seconds = run, at or 0.0
+        if run.suffix != ".rrd":
+            source = opened(run, reading)
+            first, last = (float(source.run.time[place]) for place in (0, -1))
+            if at is not None and not first <= at <= last:
+                raise typer.BadParameter(
+                    f"--at {at:g}: the run lasts from {first:.2f} s to {last:.2f} s"
+                )
+            found = analyse_file(source, library, links=bool(kind), kind=kind)
+            recording = Path(folder) / "run.rrd"
+            seconds = worst_time(found) if at is None else at
+            write(found, recording, floor=floor)
+        complaints = screenshot.shoot(recording, output, seconds, size=points, overwrite=overwrite)
+    typer.echo(f"{output}: {run} at {seconds:.2f} s")
+    for complaint in complaints:
+        typer.echo(f"  the viewer reports: {complaint}", err=True)
+
+
+def _page(
+    run: Path,
+    output: Path,
+    reading: "Reading",
+    library: "Library",
+    kind: str,
+    floor: float | None,
+    *_: object,
+    overwrite: bool,
+) -> None:
+    """Write one HTML page about a run: pictures, tables, sound."""
+    from inspector.analysis.analyse import analyse_file
+    from inspector.audit.formats import text
+    from inspector.report import html
+
+    html.require()
+    found = analyse_file(opened(run, reading), library, links=bool(kind), kind=kind)
+    assert found.audit is not None
+    seen = text(found.name, found.audit)
+    html.write(found, output, audit=seen, overwrite=overwrite, floor=floor)
+    typer.echo(f"{output}: {found.headline} ({output.stat().st_size / 1e6:.1f} MB)")
 
 
 def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: bool) -> None:
@@ -140,7 +230,7 @@ def _show(target: Path, seconds: float | None, *, web: bool, port: int, saved: b
     typer.echo(f"recording: {target} ({target.stat().st_size / 1e6:.1f} MB)")
     typer.echo(viewer.how_to_open(target))
     if problem:
-        raise viewer.DisplayError(f"{problem}; --web shows it in a browser, --save FILE writes it")
+        raise viewer.DisplayError(f"{problem}; --web shows it in a browser, -o FILE.rrd writes it")
 
 
 def _together(paths: list[Path]) -> Path:
@@ -154,8 +244,8 @@ def _together(paths: list[Path]) -> Path:
 
 def _read(paths: list[Path], reading: "Reading") -> tuple[list["Opened"], bool]:
     """Open the runs that can be read, and name the others; whether there are such."""
-    from inspector.analysis.verdict import EXPECTED
     from inspector.errors import InspectorError
+    from inspector.verdict import EXPECTED
 
     found = []
     for path in paths:

@@ -13,6 +13,7 @@ from inspector.errors import FileError
 from inspector.library import Library
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
 from noiseclassifier.labels import UNKNOWN
+from noisemodel.atomic import also_reading
 from noisemodel.errors import hint
 
 NAME = "expect.toml"
@@ -242,6 +243,7 @@ def read(path: Path) -> Expectations:
     Raises:
         ExpectationError: If it cannot be read, or holds what is not known.
     """
+    also_reading([path])
     try:
         content = from_toml(text_of(path))
     except OSError as error:

@@ -6,9 +6,9 @@ from datetime import date
 from glob import escape
 from pathlib import Path
 
-from inspector.analysis.verdict import Verdict
 from inspector.errors import InspectorError
 from inspector.expectations.expectations import FORMAT, NAME, TOLERANCE, relative
+from inspector.verdict import Verdict
 
 HEAD = f"""\
 # Which findings `inspector classify` expects of the runs in this folder, and below it.

@@ -7,8 +7,8 @@ from datetime import date
 from pathlib import Path
 
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import Missing, Ruled, Ruling, Verdict
 from inspector.expectations.expectations import Entry, Expectations
+from inspector.verdict import Missing, Ruled, Ruling, Verdict
 from noiseclassifier import Event
 
 RULINGS = {

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from inspector.analysis.status import EXIT, Status
-from inspector.analysis.verdict import Verdict, counts
 from inspector.expectations.expectations import Expectations
 from inspector.expectations.judge import judge
 from inspector.live.session import LiveSession, Summary
+from inspector.verdict import Verdict, counts
 from inspector.version import program_version
 from noiseclassifier import Event
 from noiseclassifier.labels import interval

@@ -19,7 +19,7 @@ from inspector.logs.reading import Job, jobs_of
 from inspector.wrongrobot import limit_warnings
 from noiseclassifier.jsontext import from_json
 from noisemodel import NoiseModelError, OutputError, archive
-from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.atomic import also_reading, refuse_existing, replacing
 
 
 @dataclass(frozen=True)
@@ -104,6 +104,7 @@ def import_logs(
         NoiseModelError: If an output exists, or a single log makes no run.
     """
     logs = [log for path in logs for log in logs_in(path)[0]]
+    also_reading(logs)
     several = len(logs) > 1
     if desired and several:
         raise InspectorError(f"{desired}: belongs to one log, {len(logs)} are given")

@@ -18,6 +18,7 @@ from inspector.logs.signals import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.text import printable
 from inspector.wrongrobot import check_joints, named
 from noisemodel import NoiseModelError, Run, RunFileError, archive
+from noisemodel.atomic import also_reading
 from noisemodel.checks import NotUniformError
 from noisemodel.limits import joint_limits
 from noisemodel.types import Real
@@ -176,6 +177,7 @@ def sources(
         others += rest
         new = [log for log in logs if os.path.realpath(log) not in seen]  # may link to itself
         seen.update(map(os.path.realpath, new))
+        also_reading(new)
         found += (each for log in new for each in _episodes(log, reading))
     if reading.desired and len(found) > 1:
         raise InspectorError(

@@ -9,6 +9,7 @@ from pathlib import Path
 from inspector.errors import InspectorError
 from inspector.logs.opening import logs_in
 from inspector.regression.measure import Measured
+from noisemodel.atomic import also_reading
 
 REPETITION = re.compile(r"(?P<name>.+?)[-_.](?:run|rep|take|seed)?[-_.]?(?P<number>\d+)")
 """Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
@@ -61,7 +62,9 @@ def files_in(path: Path) -> tuple[Path, ...]:
     """
     if not path.exists():
         raise PairingError(f"{path}: no such file or folder")
-    return logs_in(path)[0]
+    logs = logs_in(path)[0]
+    also_reading(logs)
+    return logs
 
 
 def paired(

@@ -5,20 +5,17 @@ import json
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import quote
 
 from inspector.analysis.status import IGNORED, Status, Unknown
-from inspector.analysis.verdict import Verdict, counts, exit_status
 from inspector.report import cases
 from inspector.report.cases import Case, Job, Outcome
 from inspector.text import counted
+from inspector.verdict import Verdict, counts, exit_status
 from inspector.version import program_version
 from noiseclassifier import Event
 from noiseclassifier.labels import interval
-
-if TYPE_CHECKING:
-    from inspector.localisation.localise import Localisation
 
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 RESULTS = 5000
@@ -66,53 +63,8 @@ def text(verdicts: Sequence[Verdict]) -> str:
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
-    """Verdicts as JSON, ``noise-verdict/3``; its schema is docs/noise-verdict-3.schema.json.
-
-    Args:
-        verdicts: What was found in runs; findings that were localised have a ``localisation``.
-    """
-    runs = [
-        {
-            "run": str(verdict.path),
-            "model": verdict.model,
-            "model_sha256": verdict.model_sha256,
-            "status": verdict.status.value,
-            "unknown": verdict.unknown.value,
-            "events": [
-                {
-                    "label": event.label,
-                    "start": round(event.start, 6),
-                    "stop": round(event.stop, 6),
-                    "score": round(event.score, 6),
-                    "novel": event.novel,
-                    "order": _order(verdict, event),
-                    "fails": verdict.ruled(event).ruling.fails,
-                    "ruling": verdict.ruled(event).ruling.value,
-                    "reason": verdict.ruled(event).reason,
-                    **_localised(verdict, event),
-                }
-                for event in verdict.events
-            ],
-            "missing": [
-                {
-                    "label": missing.label,
-                    "start": missing.start and round(missing.start, 6),
-                    "stop": missing.stop and round(missing.stop, 6),
-                    "reason": missing.reason,
-                }
-                for missing in verdict.missing
-            ],
-            "expectations": verdict.expectations,
-            "message": verdict.message,
-            "assumed": verdict.assumed,
-            "scenario": verdict.scenario,
-            "duration": round(verdict.duration, 6),
-            "seconds": round(verdict.seconds, 3),
-            "counted": not verdict.ignored,
-            "picture": None if verdict.picture is None else str(verdict.picture),
-        }
-        for verdict in verdicts
-    ]
+    """Verdicts as JSON, ``noise-verdict/3``; its schema is docs/noise-verdict-3.schema.json."""
+    runs = [verdict.as_dict() for verdict in verdicts]
     whole = {
         "format": "noise-verdict/3",
         "version": program_version(),
@@ -264,30 +216,6 @@ def failing(verdict: Verdict) -> list[str]:
 def excused(verdict: Verdict) -> list[str]:
     """Sentences on findings that do not."""
     return [_sentence(verdict, event) for event in verdict.excused]
-
-
-def _localised(verdict: Verdict, event: Event) -> dict[str, object]:
-    known = verdict.localisations.get(event)
-    return {} if known is None else {"localisation": _localisation(known)}
-
-
-def _localisation(known: "Localisation") -> dict[str, object]:
-    """Localisation of a finding: lag in [s], band in [Hz], null where it is not known."""
-    return {
-        "stage": known.stage or None,
-        "following": known.following or None,
-        "lag": round(known.lag, 6) if known.stage else None,
-        "joints": {name: round(share, 3) for name, share in known.joints},
-        "band": known.band and [round(frequency, 3) for frequency in known.band],
-    }
-
-
-def _order(verdict: Verdict, event: Event) -> dict[str, object] | None:
-    """Joint with whose speed a finding goes, and periods per turn of it; None if none."""
-    known = verdict.orders.get(event)
-    if known is None:
-        return None
-    return {"joint": known.joint, "periods_per_turn": round(known.periods_per_turn, 1)}
 
 
 def _sentence(verdict: Verdict, event: Event) -> str:

@@ -9,11 +9,11 @@ from xml.etree import ElementTree as ET
 
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.status import Status
-from inspector.analysis.verdict import Verdict
 from inspector.colors import of_classes
 from inspector.errors import InspectorError
 from inspector.report.formats import WORDS, excused, failing, summary
 from inspector.report.html import STYLE, add_text, document
+from inspector.verdict import Verdict
 from noisemodel.atomic import replacing
 
 PAGE = "index.html"

@@ -17,6 +17,7 @@ from noiseclassifier.logbands import HIGHEST, LOWEST
 from noiseclassifier.profile import NOMINAL
 from noiseclassifier.scenarios.sample import DECIMATED, Sample, is_sample
 from noiseclassifier.scenarios.signals import WHOLE
+from noisemodel.atomic import also_reading
 
 SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}
 """Software whose versions in the ``meta`` of a run go into the manifest of a model."""
@@ -116,10 +117,12 @@ def _read(
     taken: set[str] = set()
     for path in inputs:
         if path.is_dir() and any(path.glob("*.toml")):
+            also_reading([path])
             for each in nc.noisytest.read_folder(path, rate=rate):
                 yield _apart(each, path / each.name, taken), None
             continue
         for file in sorted(path.rglob("*.npz")) if path.is_dir() else [path]:
+            also_reading([file])
             recording, run = read(file)
             yield _apart(recording, file, taken), run
 

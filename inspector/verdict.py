@@ -1,0 +1,668 @@
+"""Verdicts on files: what `classify` prints of an analysis, in batch, and resumed.
+
+A verdict is written as a run of ``noise-verdict/3`` (`as_dict`) and read again (`from_dict`): by
+`classify --resume`, whose state is a header and a line of JSON for each verdict, by `merge` and by
+`history`. A state's line without its end was being written when the process was killed: it is
+dropped. Of several verdicts on a run the last one of its present content counts. Internal errors
+are not kept: these runs are tried again.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cache, partial
+from itertools import zip_longest
+from pathlib import Path
+from time import monotonic, perf_counter, sleep
+from typing import IO, TYPE_CHECKING, Any
+
+import noiseclassifier as nc
+import noisemodel as nm
+from inspector.analysis.analyse import Analysis, analyse, analyse_noise
+from inspector.analysis.status import EXIT, Status, Unknown, worst
+from inspector.errors import FileError, InspectorError, without_path
+from inspector.library import Library
+from inspector.logs.opening import Reading, Source, open_source
+from inspector.version import program_version
+from noiseclassifier import Event
+from noiseclassifier.jsontext import from_json
+from noisemodel import OutputError
+from noisemodel.parallel import DIED, Jobs, as_done, in_order
+
+if TYPE_CHECKING:
+    from inspector.localisation.localise import Localisation
+    from inspector.localisation.order import Order
+
+EXPECTED = (InspectorError, nc.ModelsError, nm.NoiseModelError)
+"""The errors that are printed in one line; all others are bugs."""
+KIND = "noise-classify-state/"
+FORMAT = f"{KIND}2"
+PATIENCE = 2.0
+"""How long a file that another process holds is waited for, in [s]."""
+SETTINGS = ("how logs are read", "--unknown", "--report")
+"""The first settings of a header; what follows are files that options name."""
+MAX_BYTES = 256 * 2**20
+"""Most bytes of a state file that is read: those of some hundred thousand runs."""
+LONGEST_LINE = 2**16
+"""Characters of a line that are looked at."""
+
+
+class StateError(FileError):
+    """A state file that a batch cannot resume."""
+
+    advice = "; name another file, or delete it"
+
+
+class Ruling(StrEnum):
+    """What became of a finding."""
+
+    FOUND = "found"
+    FORBIDDEN = "forbidden"
+    EXPIRED = "waiver-expired"
+    OVER_BUDGET = "over-budget"
+    REQUIRED = "required"
+    ALLOWED = "allowed"
+    WAIVED = "waived"
+    IN_BUDGET = "in-budget"
+    FILTERED = "filtered"
+
+    @property
+    def fails(self) -> bool:
+        """Whether it fails its run."""
+        return self in (Ruling.FOUND, Ruling.FORBIDDEN, Ruling.EXPIRED, Ruling.OVER_BUDGET)
+
+
+@dataclass(frozen=True)
+class Ruled:
+    """What became of a finding, and why.
+
+    Attributes:
+        ruling: What became of it.
+        reason: Why, in a few words; may be empty.
+    """
+
+    ruling: Ruling = Ruling.FOUND
+    reason: str = ""
+
+    def __str__(self) -> str:
+        if self.ruling is Ruling.FOUND:
+            return self.reason
+        words = self.ruling.value.replace("-", " ")
+        return f"{words}: {self.reason}" if self.reason else words
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A finding that is required and was not found.
+
+    Attributes:
+        label: Its class; several are joined by " or ".
+        start: The earliest onset, in [s]; None if any.
+        stop: The latest onset, in [s]; None if any.
+        reason: Why it is required; may be empty.
+    """
+
+    label: str
+    start: float | None = None
+    stop: float | None = None
+    reason: str = ""
+
+    def __str__(self) -> str:
+        when = "" if self.start is None else f" from {self.start:.2f} s to {self.stop:.2f} s"
+        return f"missing: {self.label}{when}{self.reason and f' (required: {self.reason})'}"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What was found in one file.
+
+    Attributes:
+        path: The file.
+        status: The outcome.
+        model: Name of the model that labelled, empty if none could.
+        events: Findings, in order.
+        message: A line that says more, may be empty.
+        localisations: The localisation of each finding, where it is known.
+        model_sha256: SHA-256 of the model's file, empty without.
+        orders: Of the findings whose vibration goes with the speed of a joint.
+        over: How far a finding is above the reference, in words; empty without a reference.
+        assumed: What was assumed when its log was read, in a line; empty of a run file.
+        scenario: The scenario that the run names, empty without.
+        duration: Duration of the run, in [s]; 0 if it cannot be read.
+        rate: Its rate, in [Hz]; 0 if it cannot be read.
+        joints: Number of its joints.
+        seconds: How long it took to classify it, in [s].
+        rulings: What became of findings, of those that are not simply found.
+        missing: Required findings that were not found.
+        expectations: The file of expectations that was applied, empty without.
+        ignored: Whether it is left out of the exit status: bad input that is ignored.
+        picture: A picture of the run, if one was drawn.
+        picture_url: Where that will be published, empty if that is not known.
+        lost: Outputs of the run that could not be written, a sentence each.
+        trace: The traceback of an internal error.
+        begin: Time of the run's first sample, in [s].
+    """
+
+    path: Path
+    status: Status
+    model: str = ""
+    events: tuple[Event, ...] = ()
+    message: str = ""
+    localisations: Mapping[Event, "Localisation"] = field(default_factory=dict)
+    unknown: Unknown = Unknown.FINDING
+    model_sha256: str = ""
+    orders: Mapping[Event, "Order"] = field(default_factory=dict)
+    over: Mapping[Event, str] = field(default_factory=dict)
+    assumed: str = ""
+    scenario: str = ""
+    duration: float = 0.0
+    rate: float = 0.0
+    joints: int = 0
+    seconds: float = 0.0
+    rulings: Mapping[Event, Ruled] = field(default_factory=dict)
+    missing: tuple[Missing, ...] = ()
+    expectations: str = ""
+    ignored: bool = False
+    picture: Path | None = None
+    picture_url: str = ""
+    lost: tuple[str, ...] = ()
+    trace: str = ""
+    begin: float = 0.0
+
+    @property
+    def of_run(self) -> bool:
+        """Whether it is on a run; if not, on a file of expectations that requires missing logs."""
+        return str(self.path) != self.expectations
+
+    def ruled(self, event: Event) -> Ruled:
+        """Give what became of a finding."""
+        return self.rulings.get(event, Ruled())
+
+    @property
+    def failing(self) -> tuple[Event, ...]:
+        """Findings that fail the run."""
+        return tuple(event for event in self.events if self.ruled(event).ruling.fails)
+
+    @property
+    def excused(self) -> tuple[Event, ...]:
+        """Findings that do not: expected, waived, in a budget, or filtered."""
+        return tuple(event for event in self.events if not self.ruled(event).ruling.fails)
+
+    @property
+    def severity(self) -> tuple[int, int, float]:
+        """Sorts runs, the worst first: by status, number of findings that fail it, best score."""
+        score = max((event.score for event in self.failing), default=0.0)
+        return list(EXIT).index(self.status), -len(self.failing) - len(self.missing), -score
+
+    @classmethod
+    def of(cls, path: Path, analysis: Analysis) -> "Verdict":
+        """Take from an analysis of a file what is printed."""
+        known = analysis.localisations if analysis.findings else {}
+        run = analysis.run
+        return cls(
+            path,
+            analysis.status,
+            analysis.model,
+            analysis.findings,
+            analysis.message,
+            {event: known[event] for event in analysis.findings if event in known},
+            analysis.unknown,
+            analysis.model_sha256,
+            analysis.orders,
+            assumed=analysis.assumed,
+            scenario=str(run.meta.get("scenario", "")),
+            duration=run.duration,
+            rate=run.rate,
+            joints=len(run.joint_names),
+            begin=float(run.time[0]),
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The verdict as a run of ``noise-verdict/3``, as JSON can hold it."""
+        return {
+            "run": str(self.path),
+            "model": self.model,
+            "model_sha256": self.model_sha256,
+            "status": self.status.value,
+            "unknown": self.unknown.value,
+            "events": [self._event_as_dict(event) for event in self.events],
+            "missing": [
+                {
+                    "label": missing.label,
+                    "start": missing.start and round(missing.start, 6),
+                    "stop": missing.stop and round(missing.stop, 6),
+                    "reason": missing.reason,
+                }
+                for missing in self.missing
+            ],
+            "expectations": self.expectations,
+            "message": self.message,
+            "assumed": self.assumed,
+            "scenario": self.scenario,
+            "begin": round(self.begin, 6),
+            "duration": round(self.duration, 6),
+            "rate": round(self.rate, 6),
+            "joints": self.joints,
+            "seconds": round(self.seconds, 3),
+            "counted": not self.ignored,
+            "picture": None if self.picture is None else str(self.picture),
+        }
+
+    def _event_as_dict(self, event: Event) -> dict[str, Any]:
+        ruled, known, order = self.ruled(event), self.localisations.get(event), None
+        if event in self.orders:
+            of = self.orders[event]
+            order = {"joint": of.joint, "periods_per_turn": round(of.periods_per_turn, 1)}
+        written: dict[str, Any] = {
+            "label": event.label,
+            "start": round(event.start, 6),
+            "stop": round(event.stop, 6),
+            "score": round(event.score, 6),
+            "novel": event.novel,
+            "order": order,
+            "fails": ruled.ruling.fails,
+            "ruling": ruled.ruling.value,
+            "reason": ruled.reason,
+        }
+        if event in self.over:
+            written["over"] = self.over[event]
+        if known is not None:
+            written["localisation"] = {
+                "stage": known.stage or None,
+                "following": known.following or None,
+                "lag": round(known.lag, 6) if known.stage else None,
+                "joints": {name: round(share, 3) for name, share in known.joints},
+                "band": known.band and [round(frequency, 3) for frequency in known.band],
+            }
+        return written
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Verdict":
+        """Read what `as_dict` wrote.
+
+        Raises:
+            KeyError, TypeError, ValueError: If it is anything else.
+        """
+        from inspector.localisation.order import Order
+        from inspector.localisation.stage import Localisation
+
+        events, rulings, known, orders, over = [], {}, {}, {}, {}
+        for row in content["events"]:
+            event = Event(
+                str(row["label"]),
+                float(row["start"]),
+                float(row["stop"]),
+                float(row["score"]),
+                bool(row["novel"]),
+            )
+            events.append(event)
+            ruled = Ruled(Ruling(row["ruling"]), str(row["reason"]))
+            if ruled != Ruled():
+                rulings[event] = ruled
+            if row["order"]:
+                order = row["order"]
+                orders[event] = Order(str(order["joint"]), float(order["periods_per_turn"]))
+            if "over" in row:
+                over[event] = str(row["over"])
+            if "localisation" in row:
+                found = row["localisation"]
+                low, high = found["band"] or (0.0, 0.0)
+                known[event] = Localisation(
+                    str(found["stage"] or ""),
+                    str(found["following"] or ""),
+                    float(found["lag"] or 0.0),
+                    joints=tuple((str(k), float(v)) for k, v in found["joints"].items()),
+                    band=(float(low), float(high)) if found["band"] else None,
+                )
+        missing = tuple(
+            Missing(str(each["label"]), each["start"], each["stop"], str(each["reason"]))
+            for each in content["missing"]
+        )
+        " ".join(map(str, missing))  # a number that is none fails here
+        texts = ("model", "message", "model_sha256", "assumed", "scenario", "expectations")
+        numbers = ("begin", "duration", "rate", "seconds")
+        if not all(isinstance(content[name], str) for name in ("run", *texts)):
+            raise TypeError("expected text")
+        plain: dict[str, Any] = {name: content[name] for name in texts}
+        plain |= {name: float(content[name]) for name in numbers}
+        return cls(
+            Path(content["run"]),
+            Status(content["status"]),
+            events=tuple(events),
+            localisations=known,
+            unknown=Unknown(content["unknown"]),
+            orders=orders,
+            over=over,
+            rulings=rulings,
+            missing=missing,
+            joints=int(content["joints"]),
+            ignored=not content["counted"],
+            picture=None if content["picture"] is None else Path(content["picture"]),
+            **plain,
+        )
+
+
+def classify_file(
+    path: Path | Source,
+    library: Library,
+    *,
+    reading: Reading | None = None,
+    unknown: Unknown = Unknown.FINDING,
+    draw: Callable[[Analysis, Path], Path] | None = None,
+) -> Verdict:
+    """Classify one file; errors become part of the verdict.
+
+    Args:
+        path: A run file, any log that `inspector import` reads, or one of NoisyTest's two-column
+            logs (``*.log``).
+        library: Models to choose from.
+        reading: How logs are read.
+        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
+        draw: Draws a picture of an analysis of a file and gives its path, if one is wanted.
+
+    Returns:
+        The verdict.
+    """
+    source = path if isinstance(path, Source) else Source(path)
+    begun = perf_counter()
+    try:
+        if source.path.suffix == ".log" and not _has_header(source.path):
+            analysis = analyse_noise(*nc.read_log(source.path), library, unknown=unknown)
+        else:
+            opened = open_source(source, reading)
+            analysis = analyse(opened.run, library, unknown=unknown)
+            analysis = replace(analysis, assumed=opened.assumed)
+        verdict = Verdict.of(source.shown, analysis)
+        if draw is not None:
+            try:
+                verdict = replace(verdict, picture=draw(analysis, source.shown))
+            except (OutputError, OSError) as error:
+                verdict = replace(verdict, lost=(str(error),))
+    except EXPECTED as error:
+        message = without_path(error, source.path)
+        verdict = Verdict(source.shown, Status.BAD_INPUT, message=message, unknown=unknown)
+    except Exception as error:  # a bug that one run shows must not hide the findings of others
+        verdict = Verdict(
+            source.shown,
+            Status.INTERNAL_ERROR,
+            message=f"{type(error).__name__}: {error}",
+            unknown=unknown,
+            trace=traceback.format_exc(),
+        )
+    return replace(verdict, seconds=perf_counter() - begun)
+
+
+def classify_files(
+    paths: Sequence[Path | Source],
+    library: Library,
+    *,
+    reading: Reading | None = None,
+    unknown: Unknown = Unknown.FINDING,
+    draw: Callable[[Analysis, Path], Path] | None = None,
+    jobs: Jobs = 1,
+    resume: Path | None = None,
+) -> Iterator[Verdict]:
+    """Classify many files; one bad file never stops the rest.
+
+    Args:
+        paths: The files, see `classify_file`.
+        library: Models to choose from.
+        reading: How logs are read.
+        unknown: Whether out-of-distribution frames below the alarm threshold are findings.
+        draw: Draws a picture of an analysis, see `classify_file`; importable for several jobs.
+        jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
+            worker dies is an internal error.
+        resume: A file that keeps the verdicts; those on unchanged runs are taken from it.
+
+    Yields:
+        A verdict per file, in their order; with ``resume`` in no order, first those of the file.
+
+    Raises:
+        InspectorError: If that file cannot be resumed or written.
+    """
+    one = partial(classify_file, library=library, reading=reading, unknown=unknown, draw=draw)
+    end = partial(_died, unknown=unknown)
+    if resume is None:
+        yield from in_order(one, paths, jobs=jobs, died=end, work=work_of(paths))
+        return
+    reading = reading or Reading()
+    beside = (reading.desired, Path(str(reading.options.robot or "")))
+    settings = {
+        "version": program_version(),
+        "models": {name: model.sha256 for name, model in library.items()},
+        "settings": [repr(reading), unknown.value, draw is not None]
+        + [digest(each) for each in beside if each and each.is_file()],
+    }
+    content = cache(digest)
+    with kept(resume, settings) as state:
+        todo = []
+        for path in paths:
+            run = path if isinstance(path, Source) else Source(path)
+            known = state.verdicts.get((run.shown, content(run.path)))
+            if known is None or (known.picture is not None and not known.picture.exists()):
+                todo.append(run)
+            else:
+                yield known
+        work = partial(_with_digest, one=one)
+        for _, (verdict, sha256) in as_done(
+            work, todo, jobs=jobs, died=lambda run: (end(run), ""), work=work_of(todo)
+        ):
+            state.add(verdict, sha256)
+            yield verdict
+
+
+def _with_digest(run: Source, one: Callable[[Source], Verdict]) -> tuple[Verdict, str]:
+    sha256 = digest(run.path)  # before it is read: what changes meanwhile is done again
+    return one(run), sha256
+
+
+def _died(path: Path | Source, unknown: Unknown) -> Verdict:
+    """The verdict on a run with which a worker died."""
+    shown = path.shown if isinstance(path, Source) else path
+    message = f"{DIED}; classify this run alone to see why"
+    return Verdict(shown, Status.INTERNAL_ERROR, message=message, unknown=unknown)
+
+
+def work_of(paths: Sequence[Path | Source]) -> float:
+    """About how long runs take, in [s]: one core does 50 MB/s of samples that are not packed."""
+    files = (each.path if isinstance(each, Source) else each for each in paths)
+    return sum(file.stat().st_size for file in files if file.is_file()) / 50e6
+
+
+def _has_header(path: Path) -> bool:
+    """Whether a text begins with a line of names: NoisyTest's logs have two numbers a line."""
+    if not path.is_file():  # a device or a pipe may have no end
+        return True
+    with suppress(OSError), path.open(encoding="utf-8", errors="replace") as stream:
+        while line := stream.readline(LONGEST_LINE):
+            content = line.partition("#")[0].strip()
+            if content:
+                return len(re.split(r"[,;\s]+", content)) > 2 or content[0].isalpha()
+    return False
+
+
+def exit_status(verdicts: Sequence[Verdict]) -> int:
+    """Take the worst of several; bad input that is ignored counts if there is nothing else."""
+    counted = [verdict for verdict in verdicts if not verdict.ignored] or verdicts
+    return worst(EXIT[verdict.status] for verdict in counted)
+
+
+def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
+    """Count what all outputs state.
+
+    Args:
+        verdicts: What was found in runs.
+
+    Returns:
+        `runs`, by status, and `findings`: those that fail their runs, those that are missing, and
+        the others by what became of them. Each has all its keys.
+    """
+    runs: Counter[str] = Counter()
+    found: Counter[str] = Counter()
+    for verdict in verdicts:
+        runs[verdict.status.value] += verdict.of_run
+        found["failing"] += len(verdict.failing)
+        found["missing"] += len(verdict.missing)
+        found.update(verdict.ruled(event).ruling.value for event in verdict.excused)
+    excuses = [each.value for each in Ruling if not each.fails]
+    return {
+        "runs": {status.value: runs[status.value] for status in EXIT},
+        "findings": {name: found[name] for name in ("failing", "missing", *excuses)},
+    }
+
+
+@dataclass(eq=False)
+class State:
+    """The verdicts so far, by run and SHA-256 of its content."""
+
+    path: Path
+    verdicts: dict[tuple[Path, str], Verdict]
+    _file: IO[bytes]
+
+    def add(self, verdict: Verdict, sha256: str) -> None:
+        """Append a verdict, flushed to the disk.
+
+        Raises:
+            OutputError: If it cannot be written.
+        """
+        if verdict.status is not Status.INTERNAL_ERROR:
+            row = {"sha256": sha256, **verdict.as_dict(), "lost": list(verdict.lost)}
+            _append(self.path, self._file, row)
+
+
+@contextmanager
+def kept(path: Path, settings: Mapping[str, Any]) -> Iterator[State]:
+    """Open a state file to resume, or create it.
+
+    Args:
+        path: The file.
+        settings: Models and settings, by name, as JSON can hold them.
+
+    Yields:
+        The state so far.
+
+    Raises:
+        StateError: If the file is no such file, is damaged, or of other models or settings.
+        InspectorError: If another process is writing it.
+        OutputError: If it cannot be written.
+    """
+    if path.exists() and not path.is_file():
+        raise StateError(path, "is no regular file")
+    try:
+        file = path.open("a+b")
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    with _closing(file):
+        try:
+            _lock(file)
+        except OSError as error:
+            raise InspectorError(
+                f"{path}: is being written by another process; wait for it, or name another file"
+            ) from error
+        if os.fstat(file.fileno()).st_size > MAX_BYTES:
+            raise StateError(path, f"is larger than {MAX_BYTES} bytes")
+        file.seek(0)
+        whole, end, torn = file.read().rpartition(b"\n")
+        header = {"format": FORMAT, **settings}
+        verdicts = {}
+        if end:
+            first, *rows = whole.split(b"\n")
+            _check_header(path, first, header)
+            for number, row in enumerate(rows, start=2):
+                try:
+                    content = from_json(row)
+                    verdict = Verdict.from_dict(content)
+                    lost = tuple(map(" ".join, ([each] for each in content["lost"])))
+                    verdict = replace(verdict, lost=lost)
+                    verdicts[verdict.path, content["sha256"]] = verdict
+                except (ValueError, KeyError, TypeError, AttributeError) as error:
+                    raise StateError(path, f"is damaged in line {number}") from error
+        elif not json.dumps(header).encode().startswith(torn):
+            raise StateError(path, "holds no state of classify")
+        file.truncate(len(whole) + len(end))
+        if not end:
+            _append(path, file, header)
+        yield State(path, verdicts, file)
+
+
+def _lock(file: IO[bytes]) -> None:
+    """Lock a file, once the workers of a process that was killed have ended.
+
+    Raises:
+        OSError: If another process still holds it after ``PATIENCE``.
+    """
+    until = monotonic() + PATIENCE
+    while True:
+        try:
+            return fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            if monotonic() > until:
+                raise
+            sleep(0.02)
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file, or of all names and files in a folder; empty if it cannot be read."""
+    try:
+        if path.is_file():
+            with path.open("rb") as file:
+                return hashlib.file_digest(file, "sha256").hexdigest()
+        inside = sorted(each for each in path.rglob("*") if each.is_file())
+        lines = [f"{each.relative_to(path)} {digest(each)}" for each in inside]
+        return hashlib.sha256("\n".join(lines).encode()).hexdigest()
+    except OSError:
+        return ""
+
+
+def _append(path: Path, file: IO[bytes], content: Mapping[str, Any]) -> None:
+    try:
+        file.write(json.dumps(content).encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+@contextmanager
+def _closing(file: IO[bytes]) -> Iterator[None]:
+    """Close a file in the end; what it could not write has been said by then."""
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            file.close()
+
+
+def _check_header(path: Path, line: bytes, header: Mapping[str, Any]) -> None:
+    try:
+        there = from_json(line)
+    except ValueError:
+        there = None
+    form = there.get("format") if isinstance(there, dict) else None
+    if not isinstance(there, dict) or not str(form).startswith(KIND):
+        raise StateError(path, "holds no state of classify")
+    if form != header["format"]:
+        raise StateError(path, f"is of format {form}, this version writes {header['format']}")
+    there = {"version": header.get("version"), **there}  # 0.5.0 wrote none
+    for name, value in header.items():
+        if there.get(name) != value:
+            raise StateError(path, f"is of {_difference(name, there.get(name), value)}")
+
+
+def _difference(name: str, there: Any, here: Any) -> str:
+    """What of a header differs, in words."""
+    if name == "version":
+        return f"another version ({there}, this is {here})"
+    if name != "settings" or not isinstance(there, list):
+        return f"other {name}"
+    differs = [one != two for one, two in zip_longest(there, here)]
+    named = [what for what, other in zip(SETTINGS, differs, strict=False) if other]
+    return f"other settings ({', '.join(named or ['the file of an option'])})"
