@@ -254,7 +254,7 @@ class _Group(TyperGroup):
         ]
         lines += [
             "",
-            "`inspector COMMAND -h` explains a command, `inspector help logs` how logs are read.",
+            "`inspector COMMAND -h` explains a command, `inspector help logs` reading logs.",
         ]
         formatter.write("\n".join(lines) + "\n")
 

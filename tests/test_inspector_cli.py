@@ -190,16 +190,11 @@ def test_noisytests_logs_are_classified(inspector, tmp_path):
     assert verdict["model"] == "general"
 
 
-def test_findings_are_localised_on_request(inspector):
-    status, out, _ = inspector("classify", demo_run(), "--format", "json", "--localise")
+def test_findings_are_localised(inspector):
+    status, out, _ = inspector("classify", demo_run(), "--format", "json")
     (run,) = json.loads(out)["runs"]
     assert status == 1
     assert all(event["localisation"]["stage"] in ("desired", "measured") for event in run["events"])
-    status, out, _ = inspector("classify", demo_run(), "--format", "json")
-    assert "localisation" not in out
-    status, _, err = inspector("classify", demo_run(), "--localise")
-    assert status == 2
-    assert "--localise takes --format json" in err
 
 
 def test_one_bad_file_never_stops_the_rest(inspector, tmp_path):
