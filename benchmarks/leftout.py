@@ -29,6 +29,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import groupby, product
 from math import inf
 from pathlib import Path
@@ -44,15 +45,13 @@ from inspector.errors import InspectorError
 from inspector.progress import progress
 from inspector.training.recordings import classified
 from inspector.training.training import ANY_RATE, THIN, LeftOut, lacking, profile_at
+from noiseclassifier.confusion import ratio
 from noiseclassifier.estimators.calibration import identity, unthinned
 from noiseclassifier.estimators.estimator import ESTIMATORS
 from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT, Probable
 from noiseclassifier.estimators.trees import TAIL, Trees
-from noiseclassifier.evaluation.intervals import ratio
-from noiseclassifier.evaluation.matching import OK, UNCLEAR, Matched
-from noiseclassifier.evaluation.outcomes import Outcome
-from noiseclassifier.evaluation.predictions import Predictions, silent
-from noiseclassifier.evaluation.ranking import auc, harmonic_mean, partial_auc
+from noiseclassifier.evaluation.matching import OK, UNCLEAR, Outcome, Predictions, within
+from noiseclassifier.evaluation.measures import MOST, auc, harmonic_mean
 from noiseclassifier.features import standard
 from noiseclassifier.framefeatures import frame_features
 from noiseclassifier.general import LEARNT, UNBOUNDED, kept
@@ -266,7 +265,7 @@ class Measured:
 
     def ranked(self, number: int | None) -> tuple[str, ...]:
         """Measures of the ranking of runs, and those at a threshold if there is one."""
-        ranks = (f"{self.ranking(each):.3f}" for each in (partial_auc, auc))
+        ranks = (f"{self.ranking(each):.3f}" for each in (partial(auc, most=MOST), auc))
         at = ("none",) + ("-",) * 6 if number is None else self.cells(number)
         return (*ranks, *at)
 
@@ -467,7 +466,7 @@ def of_recording(
     starts, whole = frame_features(recording.signal, profile, recording.valid)
     whole = whole.astype(np.float32)
     base = silent(recording, starts, profile.duration)
-    truth = Matched.of([base]).frames.truth
+    truth = base.whole_truth
     places = np.arange(whole.shape[1])
     if names:
         number = {name: place for place, name in enumerate(names)}
@@ -491,6 +490,24 @@ def of_recording(
         cut[learnt],
         labels[learnt],
         places,
+    )
+
+
+def silent(recording: nc.Recording, starts: np.ndarray, duration: float) -> Predictions:
+    """Predictions of nothing but `ok` on frames of a recording, by their first samples."""
+    begin, nothing = recording.start + starts / recording.rate, np.array([], dtype=str)
+    ok = np.full(len(starts), OK)
+    labels = nc.Labels(begin, begin + duration, ok, np.ones((len(starts), 1)), (OK,))
+    return Predictions(
+        recording.name,
+        nc.group_of(recording.name),
+        1.0 / recording.rate,
+        within(recording),
+        nothing,
+        nothing,
+        labels,
+        recording.events,
+        recording.facts,
     )
 
 

@@ -34,7 +34,7 @@ import noiseclassifier as nc
 from inspector.training import recordings, training
 from inspector.training.part import Part
 from noiseclassifier.evaluation.assessment import measure, number, percent
-from noiseclassifier.evaluation.predictions import Predictions, predict
+from noiseclassifier.evaluation.matching import Predictions, predict
 from noiseclassifier.scenarios.sample import Sample
 from noiseclassifier.scenarios.signals import WHOLE
 from noisemodel.parallel import DIED, in_order
@@ -251,7 +251,7 @@ def row(name: str, score: Score) -> str:
         name,
         *(" / ".join(f"{100.0 * side[c].value:.1f}" for c in nc.CLASSES) for side in errors),
         *map(percent, shares),
-        number(score.alarms.events.false_alarms_per_hour),
+        number(score.alarms.protocol.pooled["false_alarms_per_hour"]),
     )
 
 
@@ -269,8 +269,8 @@ def _table(title: str, found: Sequence[tuple[str, Score]]) -> str:
         lines += [
             "",
             f"{sum(counts)} frames ({each_class}) of {frames.runs} runs in {frames.groups} groups;"
-            f" false alarms in {alarms.events.ok_hours:.3g} h of ok motion of {alarms.runs} runs in"
-            f" {alarms.groups} groups.",
+            f" false alarms in {alarms.protocol.counts['ok_hours']:.3g} h of ok motion of"
+            f" {alarms.runs} runs in {alarms.groups} groups.",
         ]
     return "\n".join(lines)
 

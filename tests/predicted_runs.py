@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from noiseclassifier.evaluation.predictions import Predictions
+from noiseclassifier.evaluation.matching import Predictions
 from noiseclassifier.labels import Labels
 from noiseclassifier.recording import Block
 from noiseclassifier.splitting import group_of

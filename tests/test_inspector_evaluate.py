@@ -47,8 +47,8 @@ def test_the_measures_of_a_model_are_printed(folder):
     status, out, err = call("evaluate", folder / "model.npz", folder / "test")
     assert (status, err) == (0, "")
     assert "6 runs in 6 groups" in out
-    assert "all failures            100.0% [54.1, 100.0]" in out
-    assert "False alarms            0, or 0 per hour [0, " in out
+    assert "Faults found, of all injected         100.0%" in out
+    assert "False alarms per hour of ok time      0 [0, " in out
     assert "As the paper measures, in shares of ALL frames" in out
 
 
@@ -216,7 +216,7 @@ def test_a_picture_is_drawn(folder, tmp_path):
     assert (status, err) == (0, "")
     png = path.read_bytes()
     assert png.startswith(b"\x89PNG")
-    assert struct.unpack(">II", png[16:24]) == (1100, 850)
+    assert struct.unpack(">II", png[16:24]) == (1400, 500)
 
 
 def probable_recording(name, blocks, random):

@@ -13,8 +13,7 @@ from inspector.training.recordings import classified
 from noiseclassifier.estimators.calibration import identity
 from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT
 from noiseclassifier.estimators.trees import Trees
-from noiseclassifier.evaluation.outcomes import Outcome
-from noiseclassifier.evaluation.predictions import predict
+from noiseclassifier.evaluation.matching import Outcome, predict
 from noiseclassifier.logbands import ANY
 from noiseclassifier.pooling import columns
 from noiseclassifier.scenarios.robots import TARGETS, WIDE

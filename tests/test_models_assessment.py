@@ -19,8 +19,9 @@ from predicted_runs import (
 import noiseclassifier as nc
 from noiseclassifier.confusion import Evaluation
 from noiseclassifier.evaluation.assessment import WORDS, measure, number, table
-from noiseclassifier.evaluation.intervals import Estimate
-from noiseclassifier.evaluation.predictions import Unanswered
+from noiseclassifier.evaluation.intervals import Estimate, Resampling
+from noiseclassifier.evaluation.matching import Unanswered, are_probabilities, failure_score
+from noiseclassifier.evaluation.measures import Reliability
 from noiseclassifier.labels import Event
 from noiseclassifier.recording import Fault
 
@@ -56,9 +57,9 @@ def test_a_model_is_measured_by_runs_outside_of_its_training_set(classifier):
     assert (found.runs, found.groups) == (12, 6)
     assert found.blocks == {"ok": 12, "oscillations": 6}
     assert found.runs_with == {"ok": 12, "oscillations": 6}
-    assert found.events.all_found.value == found.events.all_named.value == 1.0
-    assert found.events.false_alarms == 0
-    assert found.events.ok_hours == pytest.approx(6 * (4.0 + 1.9) / 3600)
+    assert found.protocol.pooled["class_recall"].value == 1.0
+    assert found.protocol.counts["false_alarms"] == 0
+    assert found.protocol.counts["ok_hours"] == pytest.approx(6 * (4.0 + 1.95) / 3600)
     assert found.frames.balanced_accuracy.value > 0.95
     assert found.calibration_error is None
 
@@ -68,18 +69,6 @@ def test_frames_are_those_that_were_always_counted(classifier):
     dataset = nc.Dataset.of(fresh(), PROFILE, training=False)
     whole = nc.evaluate(classifier, dataset)
     assert found.frames.evaluation.confusion.tolist() == whole.confusion.tolist()
-
-
-def test_the_events_of_a_robot_are_those_of_its_runs_alone():
-    good = [predicted(f"go2/good-{seed:03d}", GOOD) for seed in range(2)]
-    missed = [predicted("go2/blow-000", IMPACT, ["ok"] * len(good[0].labels))]
-    found = measure([*many(2), *good, *missed])
-    for robot, runs in (("talos", many(2)), ("go2", [*good, *missed])):
-        own, alone = found.by_robot[robot], measure(runs).events
-        assert own.all_found.value == alone.all_found.value
-        assert own.false_alarms == alone.false_alarms
-        assert own.ok_hours == pytest.approx(alone.ok_hours)
-    assert found.by_robot["go2"].all_found.value < found.by_robot["talos"].all_found.value
 
 
 def test_measures_with_intervals_are_the_measures_without():
@@ -176,7 +165,6 @@ def test_a_run_whose_blocks_lie_in_gaps_is_classified_from_end_to_end(classifier
     found = nc.assess(classifier, [gappy, *fresh()[1:]])
     assert found.frames.evaluation.confusion.sum() < count_frames(classifier)
     assert found.blocks["oscillations"] == 6
-    assert len(found.score.missed()) == 1  # no frame of it can be classified
 
 
 def count_frames(classifier):
@@ -186,11 +174,9 @@ def count_frames(classifier):
 def test_everything_goes_through_json(classifier):
     plain = nc.assess(classifier, fresh()).as_dict()
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain
-    assert plain["format"] == "noise-evaluation/2"
+    assert plain["format"] == "noise-evaluation/3"
     assert plain["calibration_error"] is plain["reliability"] is None
-    assert plain["events"]["false_alarms_per_hour"]["value"] == 0.0
-    assert len(plain["curve"]["threshold"]) == len(plain["curve"]["failure_recall"])
-    assert [each["false_alarms_per_hour"] for each in plain["at_budgets"]] == [5.0, 20.0, 100.0]
+    assert plain["protocol"]["pooled"]["false_alarms_per_hour"]["value"] == 0.0
 
 
 def text_of(assessment):
@@ -206,15 +192,9 @@ def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
     lines = text_of(measure([*many(6), predicted("talos/good-009", GOOD, ["impact"] * 47)]))
     assert "ok 100.0% [82.4, 100.0] 100.0% [82.4, 100.0] 31 31 19" in lines
     assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6 6" in lines
-    assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6" in lines
-    alarms = [line for line in lines if line.startswith("False alarms 1, or")]
-    assert len(alarms) == 1
-    assert "per hour [" in alarms[0]
     assert "impact in talos/good-009, 0.00 s to 5.00 s" in lines
     assert "Calibration error - (the scores are no probabilities)" in lines
     assert "highaccelerations - - 0 0 0" in lines
-    for budget, share in ((5, "0.0%"), (20, "0.0%"), (100, "100.0%")):
-        assert f"{budget} false alarms per h {share} [0.0, 100.0] {share} [0.0, 100.0]" in lines
 
 
 def test_it_prints_the_papers_measures_under_the_papers_names():
@@ -251,26 +231,73 @@ def test_a_table_of_arrow_has_all_measures_in_long_form():
     found = measure([*many(6), *many_robots])
     table = found.to_arrow()
     assert table.column_names[:4] == ["of", "measure", "class", "robot"]
-    rows = {tuple(row[name] for name in (*WORDS, "budget")): row for row in table.to_pylist()}
+    rows = {tuple(row[name] for name in WORDS): row for row in table.to_pylist()}
     assert len(rows) == len(table)
-    recall = rows["frames", "recall", "impact", None, None, None, None]
+    recall = rows["frames", "recall", "impact", None, None, None]
     expected = found.frames.recall["impact"].as_dict()
     assert {name: recall[name] for name in expected} == expected
-    assert rows["events", "false_alarms", None, "talos", None, None, None]["value"] == 0.0
-    assert (
-        rows["events", "all_found", None, "go2", None, None, None]["value"] is None
-    )  # it has no failures
-    at_budget = rows["scores", "events_found", None, None, None, None, 5.0]
-    assert at_budget["value"] == found.at_budgets[5.0][1].value
     f1 = found.protocol.alike["class_f1"]
-    assert rows["protocol", "class_f1", None, None, None, None, None]["value"] == f1.value
-    assert rows["protocol", "recall_felt", None, "talos", None, None, None]["value"] == 1.0
-    assert rows["chance", "class_f1", None, None, None, None, None]["value"] < f1.value
+    assert rows["protocol", "class_f1", None, None, None, None]["value"] == f1.value
+    assert rows["protocol", "recall_felt", None, "talos", None, None]["value"] == 1.0
+    assert rows["chance", "class_f1", None, None, None, None]["value"] < f1.value
     assert {row["class"] for row in rows.values()} == {None, *CLASSES}
     for domain, ranked in found.protocol.ranked.items():
-        auc = rows["protocol", "auc", None, None, domain, None, None]
+        auc = rows["protocol", "auc", None, None, domain, None]
         assert auc["value"] == pytest.approx(ranked.auc, nan_ok=True)
     assert found.protocol.ranked
+
+
+def test_probabilities_differ_from_margins():
+    above_threshold = np.array([[0.7, 0.1, 0.2, 0.0], [0.0, 0.0, 0.5, 0.5]])
+    assert are_probabilities(above_threshold)
+    assert failure_score(above_threshold, CLASSES).tolist() == pytest.approx([0.3, 1.0])
+    votes = np.array([[3.1, 2.0, 1.0, -0.1]])
+    assert not are_probabilities(votes)
+    assert failure_score(votes, CLASSES).tolist() == pytest.approx([-1.1])
+    assert not are_probabilities(np.array([[1.5, -0.5]]))
+    assert not are_probabilities(np.array([[0.5, 0.5], [0.5, 0.4]]))
+
+
+def confident(name, confidence, right, random):
+    """A recording of a model with such a confidence, and right so often."""
+    hits = random.random(len(frames())) < right
+    labels = np.where(hits, "ok", "impact")
+    scores = np.full((len(frames()), 4), (1 - confidence) / 3)
+    scores[np.arange(len(frames())), np.where(hits, 0, 1)] = confidence
+    return predicted(name, GOOD, labels.tolist(), scores=scores)
+
+
+@pytest.mark.parametrize(("confidence", "right"), [(0.75, 0.75), (0.99, 0.69), (0.55, 0.95)])
+def test_the_calibration_error_is_how_far_confidence_is_from_truth(confidence, right):
+    random = np.random.default_rng(0)
+    recordings = [confident(f"r{number}", confidence, right, random) for number in range(60)]
+    table = Reliability.of(recordings)
+    error = table.error(Resampling.of([each.group for each in recordings]))
+    assert error.value == pytest.approx(abs(confidence - right), abs=0.02)
+    assert error.low <= error.value <= error.high
+    bins = table.table()
+    (full,) = np.flatnonzero(bins["frames"])
+    assert bins["low"][full] <= confidence <= bins["high"][full]
+    assert bins["frames"].sum() == 60 * len(frames())
+    assert bins["confidence"][full] == pytest.approx(confidence)
+    assert bins["right"][full] == pytest.approx(right, abs=0.02)
+
+
+def test_two_bins_with_errors_of_opposite_sign_do_not_cancel():
+    random = np.random.default_rng(0)
+    recordings = [confident(f"a{number}", 0.99, 0.79, random) for number in range(40)]
+    recordings += [confident(f"b{number}", 0.65, 0.85, random) for number in range(40)]
+    error = Reliability.of(recordings).error(Resampling.of([r.name for r in recordings]))
+    assert error.value == pytest.approx(0.2, abs=0.02)
+
+
+def test_a_confidence_of_one_has_a_bin():
+    table = Reliability.of([confident("a", 1.0, 1.0, np.random.default_rng(0))])
+    assert table.table()["frames"].tolist() == [0.0] * 9 + [len(frames())]
+
+
+def test_votes_have_no_calibration():
+    assert Reliability.of(many(1)) is None
 
 
 def sure(name, annotated, labels, confidence, findings, *, cut=None, faults=(), **facts):
@@ -417,18 +444,7 @@ oscillations            0.0%                       0.0%                         
 Balanced accuracy       54.2%
 Failure recall          88.9%
 False alarm rate        12.5%
-
-Whole runs by frames and annotated blocks, robots not weighed (`noise-evaluation/1`)
-                        found                      by its own name              failures                runs
-impact                  12.5%                      12.5%                               8                   3
-highaccelerations       -                          -                                   0                   0
-oscillations            100.0%                     0.0%                                1                   1
-all failures            22.2%                      11.1%                               9                   4
-Delay of onset          median 0.07 s, 90th percentile 1.45 s
-False alarms            2, or 439 per hour [53.2, 1586] of ok motion
-Wrong stretches         3, or 659 per hour [136, 1925] of ok motion
-Failure recall          30.2% of all frames
-False alarm rate        6.4% of all frames
+Calibration error       17.1% in ten bins
 
 As the paper measures, in shares of ALL frames
                         false negative errors      false positive errors
@@ -444,13 +460,6 @@ ok                                        7                  1                  
 impact                                    1                  6                  0                  1
 highaccelerations                         0                  0                  0                  0
 oscillations                              0                  0                  1                  0
-
-NOT the operating point: trade-off with thresholds chosen on these very runs
-at most                 failures found             recall of frames
-5 false alarms per h    11.1%                      5.7%
-20 false alarms per h   11.1%                      5.7%
-100 false alarms per h  11.1%                      5.7%
-Calibration error       17.1% in ten bins
 
 Brackets are 95 % confidence intervals over groups of runs.
 Measures of fewer than 5 groups have none.

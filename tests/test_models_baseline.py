@@ -297,8 +297,8 @@ def test_a_failure_of_any_class_is_an_anomaly(learnt):
     blocks = ((0.0, 3.5, "ok"), (4.0, 6.0, "oscillations"), (6.5, 8.0, "ok"))
     tests = [recording(f"bad{seed}", seed, 0.3, blocks) for seed in (21, 22)]
     measured = nc.assess(learnt.classifier, tests)
-    assert measured.events.all_found.value == 1.0
-    assert measured.events.false_alarms == 0
+    assert measured.protocol.pooled["class_recall"].value == 1.0
+    assert measured.protocol.counts["false_alarms"] == 0
     assert measured.frames.failure_recall.value == 1.0
     assert measured.calibration_error is None
     with pytest.raises(nc.SeenError, match="good0"):

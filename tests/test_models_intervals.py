@@ -3,7 +3,6 @@ from math import isnan, nan
 import numpy as np
 import pytest
 
-from noiseclassifier.evaluation.eventmeasures import quantile_of
 from noiseclassifier.evaluation.intervals import Resampling, garwood
 
 
@@ -131,15 +130,15 @@ def test_the_mean_of_one_set_or_of_two_that_are_the_same_is_the_share_of_the_set
 
 def test_a_quantile_has_the_runs_that_hold_its_values():
     owner = np.repeat(np.arange(2, 10), 3)
-    alike = quantile_of(np.full(24, 7.0), owner, 0.5, each_its_own(12))
+    alike = each_its_own(12).quantile(np.full(24, 7.0), owner, 0.5)
     assert (alike.value, alike.low, alike.high, alike.runs, alike.groups) == (7, 7, 7, 8, 8)
     values = np.random.default_rng(0).permutation(24).astype(np.float64)
     for share in (0.1, 0.5, 0.9):
-        found = quantile_of(values, owner, share, each_its_own(12))
+        found = each_its_own(12).quantile(values, owner, share)
         assert found.value == np.quantile(values, share, method="inverted_cdf")
         assert 0.0 <= found.low <= found.value <= found.high <= 23.0
         assert found.low < found.high
-    few = quantile_of(values[:6], owner[:6], 0.5, each_its_own(12))
+    few = each_its_own(12).quantile(values[:6], owner[:6], 0.5)
     assert (few.runs, few.groups) == (2, 2)
     assert isnan(few.low)
 

@@ -92,7 +92,7 @@ class Outputs:
     """The files to write; None is not written.
 
     Attributes:
-        json: All measures, the curve, and each missed failure.
+        json: All measures, and each missed fault.
         picture: A PNG file.
         overwrite: Whether files that exist may be replaced.
     """
@@ -140,10 +140,10 @@ def as_json(assessment: Assessment, model: Path) -> str:
     return dumps({"model": model.name, **assessment.as_dict()}, indent=1, allow_nan=False)
 
 
-SIZE = (11.0, 8.5)
+SIZE = (14.0, 5.0)
 """Width and height, in [inch]."""
 DPI = 100
-BLUE, ORANGE = SERIES[6], SERIES[5]
+BLUE = SERIES[6]
 GREY = "0.6"
 
 require = picture.require
@@ -166,15 +166,14 @@ def draw(assessment: Assessment, path: Path, *, title: str, overwrite: bool = Fa
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
-    (confusion, intervals), (reliability, trade_off) = figure.subplots(2, 2)
+    confusion, intervals, reliability = figure.subplots(1, 3, width_ratios=(4, 4, 3))
     _confusion(confusion, assessment)
     _intervals(intervals, assessment)
     _reliability(reliability, assessment)
-    _trade_off(trade_off, assessment)
     seen = f", NOT A TEST: {len(assessment.seen)} were trained on" if assessment.seen else ""
     figure.suptitle(
         f"{title}: {counted(assessment.runs, 'run')} of {counted(assessment.groups, 'group')},"
-        f" {assessment.events.ok_hours:.3g} h of ok motion{seen}"
+        f" {assessment.protocol.counts['ok_hours']:.3g} h of ok motion{seen}"
     )
     with replacing(path, overwrite=overwrite) as temporary:
         figure.savefig(temporary, format="png")
@@ -198,7 +197,7 @@ def _confusion(axes: "Axes", assessment: Assessment) -> None:
 
 
 def _intervals(axes: "Axes", assessment: Assessment) -> None:
-    frames, events = assessment.frames, assessment.events
+    frames, found = assessment.frames, assessment.protocol.pooled
     colors = of_classes(frames.evaluation.classes)
     rows: list[tuple[str, Estimate, Color]] = [
         (f"recall of {name}", each, colors[name]) for name, each in frames.recall.items()
@@ -206,8 +205,10 @@ def _intervals(axes: "Axes", assessment: Assessment) -> None:
     rows += [
         ("balanced accuracy", frames.balanced_accuracy, (0, 0, 0)),
         ("failure recall", frames.failure_recall, (0, 0, 0)),
-        ("failures found", events.all_found, (0, 0, 0)),
-        ("found with the right class", events.all_named, (0, 0, 0)),
+        ("faults found", found["recall_injected"], (0, 0, 0)),
+        ("faults found, if felt", found["recall_felt"], (0, 0, 0)),
+        ("found with the right class", found["class_recall"], (0, 0, 0)),
+        ("ok time flagged", found["ok_flagged"], (0, 0, 0)),
     ]
     rows = [row for row in rows if not np.isnan(row[1].value)]
     for place, (_, each, color) in enumerate(rows):
@@ -240,34 +241,6 @@ def _reliability(axes: "Axes", assessment: Assessment) -> None:
             axes.annotate(f"{frames:.0f}", (x, y), (0, -12), textcoords="offset points", fontsize=7)
     error = assessment.calibration_error
     axes.text(0.03, 0.94, f"expected calibration error {error.value:.1%}")
-
-
-def _trade_off(axes: "Axes", assessment: Assessment) -> None:
-    curve, events = assessment.trade_off.curve(), assessment.events
-    rate = np.maximum.accumulate(curve["false_alarms_per_hour"])
-    for name, label, color, done in (
-        ("failure_recall", "failure frames", BLUE, events.failure_recall),
-        ("events_found", "failures", ORANGE, events.all_found),
-    ):
-        axes.step(rate, curve[name], where="post", color=_ink(color), label=label)
-        axes.plot(events.false_alarms_per_hour.value, done.value, "o", color=_ink(color))
-    for budget in assessment.at_budgets:
-        axes.axvline(budget, color=GREY, lw=0.8, ls=":")
-    if events.ok_hours:
-        # Rates below one false alarm in the whole time cannot be distinguished.
-        least = 1.0 / events.ok_hours
-        axes.set_xscale("symlog", linthresh=least)
-        decades = 10.0 ** np.arange(np.ceil(np.log10(least)), 6.0)
-        ticks = [0.0, *decades[decades <= max(rate.max(initial=0.0), 10.0 * least)].tolist()]
-        axes.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    axes.set_xlim(left=0.0)
-    axes.set_xlabel("false alarms per hour of ok motion")
-    axes.set_ylabel("share found")
-    axes.grid(alpha=0.4)
-    axes.plot([], [], "o", color="black", label="the alarm threshold of the model")
-    axes.legend(loc="best", fontsize=8)
-    axes.set_ylim(0.0, 1.02)
-    axes.set_title("Found against false alarms, by a threshold", fontsize=10)
 
 
 def _ink(color: Color) -> tuple[float, float, float]:

@@ -33,9 +33,8 @@ from noiseclassifier.errors import (
     SignalError,
     UnknownLabelError,
 )
-from noiseclassifier.evaluation.assessment import Assessment, assess
-from noiseclassifier.evaluation.framescore import evaluate
-from noiseclassifier.evaluation.predictions import Unanswered
+from noiseclassifier.evaluation.assessment import Assessment, assess, evaluate
+from noiseclassifier.evaluation.matching import Unanswered, match
 from noiseclassifier.examples import Examples
 from noiseclassifier.features import features
 from noiseclassifier.framing import frame
@@ -111,6 +110,7 @@ __all__ = [
     "learn_baseline",
     "leave_one_out",
     "load",
+    "match",
     "nearest",
     "noisytest",
     "nominal_rate",

@@ -43,11 +43,9 @@ class Evaluation:
             )
         there = {str(each) for each in (*truth, *predicted)}
         names = (*classes, *sorted(there - set(classes)))
-        index = {name: number for number, name in enumerate(names)}
-        confusion = np.zeros((len(names), len(names)), dtype=np.int64)
-        np.add.at(
-            confusion, ([index[str(t)] for t in truth], [index[str(c)] for c in predicted]), 1
-        )
+        from sklearn.metrics import confusion_matrix
+
+        confusion = confusion_matrix(truth, predicted, labels=list(names))
         return cls(names, confusion)
 
     @property
@@ -80,13 +78,13 @@ class Evaluation:
     @property
     def recall(self) -> Array:
         """Frames of a class that were predicted as it, of its frames; NaN if it has none."""
-        recall: Array = _ratio(self._right, self.confusion.sum(axis=1))
+        recall: Array = ratio(self._right.astype(float), self.confusion.sum(axis=1))
         return recall
 
     @property
     def precision(self) -> Array:
         """Frames of a class, of those that were predicted as it; NaN if there are none."""
-        precision: Array = _ratio(self._right, self.confusion.sum(axis=0))
+        precision: Array = ratio(self._right.astype(float), self.confusion.sum(axis=0))
         return precision
 
     @property
@@ -98,13 +96,13 @@ class Evaluation:
     def failure_recall(self) -> float:
         """Failure frames that were not predicted as `ok`, of the failure frames; NaN if none."""
         failures = self.confusion[~self._ok]
-        return float(_ratio(failures[:, ~self._ok].sum(), failures.sum()))
+        return float(ratio(failures[:, ~self._ok].sum(), failures.sum()))
 
     @property
     def false_alarm_rate(self) -> float:
         """`ok` frames that were not predicted as `ok`, of the `ok` frames; NaN if none."""
         ok = self.confusion[self._ok]
-        return float(_ratio(ok[:, ~self._ok].sum(), ok.sum()))
+        return float(ratio(ok[:, ~self._ok].sum(), ok.sum()))
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
@@ -174,10 +172,11 @@ class Evaluation:
         return np.array([name == "ok" for name in self.classes])
 
 
-def _ratio(part: Any, whole: Any) -> Any:
+def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:
     """Quotient, NaN where the denominator is 0."""
-    whole = np.asarray(whole, dtype=np.float64)
-    return np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
+    part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
+    share: Array = np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
+    return share
 
 
 def _plain(value: float) -> float | None:

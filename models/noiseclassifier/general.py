@@ -19,8 +19,7 @@ from noiseclassifier.confusion import Evaluation
 from noiseclassifier.errors import DatasetError, MissingSignalError, RateError
 from noiseclassifier.estimators.calibration import unthinned
 from noiseclassifier.estimators.trees import Detector, Trees
-from noiseclassifier.evaluation.matching import OK, UNCLEAR, Matched
-from noiseclassifier.evaluation.predictions import silent
+from noiseclassifier.evaluation.matching import OK, UNCLEAR, truth_of, within
 from noiseclassifier.features import standard
 from noiseclassifier.framefeatures import frame_features
 from noiseclassifier.labels import UNKNOWN
@@ -30,6 +29,7 @@ from noiseclassifier.profile import TOLERANCE
 from noiseclassifier.recording import Recording
 from noiseclassifier.reference import Reference
 from noiseclassifier.signals import NOISE, feeds, named
+from noiseclassifier.splitting import group_of
 from noiseclassifier.types import Array, Index, Real, Words
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])
@@ -243,13 +243,13 @@ def frames_of(
         for number, names in enumerate(fed):
             profile = recipe.bound(recording.rate, names)
             starts, features = frame_features(recording.signal, profile, recording.valid)
-            frames = silent(recording, starts, profile.duration)
-            truth = Matched.of([frames]).frames.truth
+            begin, step = recording.start + starts / recording.rate, 1.0 / recording.rate
+            truth = truth_of(begin, begin + profile.duration, within(recording), step=step)
             known = kept(truth, thin, first=not number)
             full = np.full((len(known), count), np.nan, dtype=np.float32)
             full[:, recipe.places(profile)] = features[known]
             full[:, recipe.without_unit] = np.nan
-            groups = np.full(len(full), frames.group)
+            groups = np.full(len(full), group_of(recording.name))
             yield Frames(full, truth[known], groups, {recording.name: recording.sha256})
 
 

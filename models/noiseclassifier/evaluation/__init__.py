@@ -1,6 +1,6 @@
-"""Evaluation of a classifier: whole runs, events, intervals over groups of runs.
+"""Evaluation of a classifier: whole runs, frames, intervals over groups of runs.
 
-    run -> predictions -> matching -> frames and events -> intervals -> assessment -> table
+    run -> predictions -> outcome (`matching`) -> protocol, frames (`measures`) -> `assessment`
 
-Nothing here is trained: `predictions` calls the classifier, the rest counts.
+Nothing here is trained: `matching` calls the classifier, the rest counts.
 """

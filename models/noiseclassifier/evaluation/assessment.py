@@ -1,46 +1,70 @@
-"""The assessment: all measures of a model on recordings, with confidence intervals."""
+"""The assessment of a model on recordings: all measures, as JSON, as an Arrow table and as text."""
 
 import typing
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import islice
 from math import isnan
 from typing import Any
 
 import numpy as np
 
 from noiseclassifier.classifier import Classifier
+from noiseclassifier.confusion import Evaluation
+from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import DatasetError, SeenError, SignalError
-from noiseclassifier.evaluation import eventmeasures, eventscore, framescore, protocol
-from noiseclassifier.evaluation.calibration import Reliability, reliability
-from noiseclassifier.evaluation.eventmeasures import EventMeasures
-from noiseclassifier.evaluation.eventscore import EventScore
-from noiseclassifier.evaluation.framescore import FrameScore
 from noiseclassifier.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
-from noiseclassifier.evaluation.matching import Matched, with_frames
-from noiseclassifier.evaluation.outcomes import FALSE
-from noiseclassifier.evaluation.predictions import (
-    UNNAMED,
-    Localise,
-    Predictions,
-    Unanswered,
-    predict,
+from noiseclassifier.evaluation.matching import FALSE, Localise, Predictions, Unanswered, predict
+from noiseclassifier.evaluation.measures import (
+    RATES,
+    WORST,
+    FrameScore,
+    Part,
+    Protocol,
+    Reliability,
 )
-from noiseclassifier.evaluation.protocol import Protocol
-from noiseclassifier.evaluation.protocoltable import lines_of
-from noiseclassifier.evaluation.tradeoff import TradeOff, trade_off
 from noiseclassifier.labels import interval
 from noiseclassifier.recording import Recording
 from noiseclassifier.signals import named
 from noiseclassifier.splitting import seen
-from noiseclassifier.types import Array
 
-FORMAT = "noise-evaluation/2"
+FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
+NO_FRAME = "no frame without a gap"
 WORDS = ("of", "measure", "class", "robot", "domain", "scenario")
 """Columns of the table of Arrow that name a row."""
-BUDGETS = (5.0, 20.0, 100.0)
-"""False-alarm budgets, per hour, at which recall is read from the trade-off."""
+NAME, WIDE, NARROW = 38, 26, 12
+"""Widths of the columns: names, figures with intervals, plain numbers."""
+CLASS = 24
+"""Width of the names of classes."""
+SHOWN, ROWS_SHOWN = 5, 12
+"""Most lines of a list, and most rows of a table by robot or domain; the JSON has all."""
+LONGEST = 32
+"""Characters of a name at most."""
+ROWS = (
+    ("False alarms per hour of ok time", "false_alarms_per_hour", "false_alarms"),
+    ("  by findings unknown", "unknown_false_alarms_per_hour", "unknown_false_alarms"),
+    ("Ok time flagged", "ok_flagged", ""),
+    ("Alarms per hour of unlabelled time", "alarms_in_unlabelled_per_hour", "alarms_in_unlabelled"),
+    ("Faults found, of all injected", "recall_injected", "found/faults"),
+    ("Faults found, of those felt", "recall_felt", "found_felt/felt"),
+    ("Onset right within 0.2 s, of found", "onset_within", "onset_close/found"),
+    ("Events by class, precision", "class_precision", "matched_by_class/findings"),
+    ("  recall", "class_recall", "matched_by_class/faults"),
+    ("  F1", "class_f1", ""),
+    ("Events of any class, precision", "any_precision", "matched/findings"),
+    ("  recall", "any_recall", "matched/faults"),
+    ("  F1", "any_f1", ""),
+)
+"""Title, measure and counts of each row."""
+COLUMNS = (
+    ("false/h", "false_alarms_per_hour"),
+    ("ok flagged", "ok_flagged"),
+    ("unlab./h", "alarms_in_unlabelled_per_hour"),
+    ("found", "recall_injected"),
+    ("felt found", "recall_felt"),
+    ("F1 class", "class_f1"),
+    ("delay", "delay"),
+)
 
 
 class Model(typing.Protocol):
@@ -67,11 +91,6 @@ class Assessment:
         seen: Recordings that the model was trained on, and what of them, by name.
         protocol: Measures of the findings as they are reported, robots weighed alike.
         frames: Measures of the frames that are cut from blocks.
-        events: Measures of whole recordings.
-        by_robot: The same of each robot alone.
-        score: The events themselves.
-        trade_off: Counts at falling thresholds.
-        at_budgets: For each false-alarm budget, recall of failure frames and failures found.
         reliability: Confidence and truth; None if the scores are no probabilities.
         calibration_error: Expected calibration error; None likewise.
     """
@@ -84,17 +103,17 @@ class Assessment:
     seen: dict[str, str]
     protocol: Protocol
     frames: FrameScore
-    events: EventMeasures
-    by_robot: dict[str, EventMeasures]
-    score: EventScore
-    trade_off: TradeOff
-    at_budgets: dict[float, tuple[Estimate, Estimate]]
     reliability: Reliability | None
     calibration_error: Estimate | None
 
     def as_dict(self) -> dict[str, Any]:
         """All measures for JSON, None where undefined."""
-        evaluation, table = self.frames.evaluation, self.reliability
+        evaluation, bins = self.frames.evaluation, self.reliability
+        table = {} if bins is None else bins.table()
+        columns = {
+            name: [None if np.isnan(value) else float(value) for value in column]
+            for name, column in table.items()
+        }
         return {
             "format": FORMAT,
             "runs": self.runs,
@@ -107,21 +126,8 @@ class Assessment:
             "classes": list(evaluation.classes),
             "confusion": evaluation.confusion.tolist(),
             "frames": self.frames.as_dict(),
-            "events": self.events.as_dict(),
-            "by_robot": {robot: each.as_dict() for robot, each in self.by_robot.items()},
-            "at_budgets": [
-                {
-                    "false_alarms_per_hour": budget,
-                    "failure_recall": recall.as_dict(),
-                    "events_found": found.as_dict(),
-                }
-                for budget, (recall, found) in self.at_budgets.items()
-            ],
             "calibration_error": self.calibration_error and self.calibration_error.as_dict(),
-            "reliability": table and _columns(table.table()),
-            "curve": _columns(self.trade_off.curve()),
-            "missed": self.score.missed(),
-            "false_alarms": self.score.false_alarms(),
+            "reliability": columns or None,
         }
 
     def to_arrow(self) -> Any:
@@ -129,22 +135,29 @@ class Assessment:
 
         Returns:
             A ``pyarrow.Table`` with one row for each measure, and of it for each class and robot.
-            Columns: ``of`` (protocol, pooled or chance, frames, events or scores), ``measure``,
-            ``class``, ``robot``, ``domain``, ``scenario``, ``budget`` in false alarms per hour,
-            ``value``, ``low``, ``high``, ``runs`` and ``groups``; null where undefined.
+            Columns: ``of`` (protocol, pooled or chance, frames or scores), ``measure``, ``class``,
+            ``robot``, ``domain``, ``scenario``, ``value``, ``low``, ``high``, ``runs`` and
+            ``groups``; null where undefined.
         """
         import pyarrow as pa
 
-        rows = _protocol_rows(self.protocol)
-        rows += [*_rows("frames", vars(self.frames)), *_rows("events", vars(self.events))]
-        for robot, events in self.by_robot.items():
-            rows += _rows("events", vars(events), robot=robot)
-        for budget, (recall, found) in self.at_budgets.items():
-            measures = {"failure_recall": recall, "events_found": found}
-            rows += _rows("scores", measures, budget=budget)
+        found = self.protocol
+        ranking = {"auc": found.auc, "pauc": found.pauc, "official_score": found.official}
+        rows = _rows("protocol", {**found.alike, **ranking, "not_answered": found.not_answered})
+        rows += _rows("pooled", found.pooled)
+        rows += _rows("chance", found.by_chance)
+        for key in ("robot", "domain"):
+            for name, part in found.by[key].items():
+                rows += _rows("protocol", part.measures, **{key: name})
+        for second, parts in (("domain", found.cells), ("scenario", found.cases)):
+            for (robot, name), part in parts.items():
+                rows += _rows("protocol", part.measures, robot=robot, **{second: name})
+        for name, ranked in found.ranked.items():
+            rows += _rows("protocol", {"auc": ranked.auc, "pauc": ranked.pauc}, domain=name)
+        rows += _rows("frames", vars(self.frames))
         rows += _rows("scores", {"calibration_error": self.calibration_error})
         columns = {name: pa.string() for name in WORDS}
-        columns |= {name: pa.float64() for name in ("budget", "value", "low", "high")}
+        columns |= {name: pa.float64() for name in ("value", "low", "high")}
         columns |= {name: pa.int64() for name in ("runs", "groups")}
         return pa.Table.from_pylist(rows, schema=pa.schema(columns))
 
@@ -195,32 +208,29 @@ def assess(
             raise SeenError(known, 1, ADVICE)
         if digest in first:
             copies[name] = first[digest]
+            continue
+        first[digest] = name
+        try:
+            bound = model.at(recording.rate, named(recording.signal))
+            found = predict(bound, recording, localise)
+            # Frames that are cut out of blocks have no reference.
+            found = found.with_frames() if bound.profile.reference else found
+            reason = "" if len(found.labels) else NO_FRAME
+        except SignalError as error:
+            reason = str(error)
+        if reason:
+            unanswered[name] = Unanswered(name, recording.facts, reason)
         else:
-            first[digest] = name
-            try:
-                bound = model.at(recording.rate, named(recording.signal))
-                found = predict(bound, recording, localise)
-                if bound.profile.reference:  # which frames that are cut out of blocks do not have
-                    found = with_frames(found)
-                reason = "" if len(found.labels) else NO_FRAME
-            except SignalError as error:
-                reason = str(error)
-            if reason:
-                unanswered[name] = Unanswered(name, recording.facts, reason)
-            else:
-                predictions[name] = found
+            predictions[name] = found
     return measure(
-        tuple(predictions.values()),
-        unanswered=tuple(unanswered.values()),
-        copies=copies,
-        known=known,
+        tuple(predictions.values()), tuple(unanswered.values()), copies=copies, known=known
     )
 
 
 def measure(
     predictions: Sequence[Predictions],
-    *,
     unanswered: Sequence[Unanswered] = (),
+    *,
     copies: Mapping[str, str] | None = None,
     known: Mapping[str, str] | None = None,
 ) -> Assessment:
@@ -231,9 +241,6 @@ def measure(
         unanswered: Recordings without a verdict.
         copies: Recordings that were left out, and the equal one of each.
         known: Recordings that the model was trained on, and what of them.
-
-    Returns:
-        All measures.
 
     Raises:
         DatasetError: If there is no annotated frame, or no recording has a verdict.
@@ -246,10 +253,8 @@ def measure(
     if not any(len(one.truth) for one in predictions):
         raise DatasetError(f"no annotated frame in {len(predictions)} recordings; annotate blocks")
     groups = [one.group for one in predictions]
-    resampling, matched = Resampling.of(groups), Matched.of(predictions)
-    events, curve, table = eventscore.score(matched), trade_off(matched), reliability(matched)
-    robots = np.array([one.origin.robot for one in predictions])
-    frames = framescore.score(predictions, resampling)
+    resampling = Resampling.of(groups)
+    frames, bins = FrameScore.of(predictions, resampling), Reliability.of(predictions)
     owned = {
         label: [sum(block.label == label for block in one.blocks) for one in predictions]
         for label in frames.evaluation.classes
@@ -261,39 +266,24 @@ def measure(
         runs_with={label: sum(map(bool, counts)) for label, counts in owned.items()},
         copies=dict(copies or {}),
         seen=dict(known or {}),
-        protocol=protocol.measure(predictions, resampling, unanswered),
+        protocol=Protocol.of(predictions, resampling, unanswered),
         frames=frames,
-        events=eventmeasures.measure(events, resampling),
-        by_robot={
-            robot: eventmeasures.measure(events, resampling, robots == robot)
-            for robot in sorted(set(robots.tolist()) - {UNNAMED})
-        },
-        score=events,
-        trade_off=curve,
-        at_budgets=dict(zip(BUDGETS, curve.at_budgets(BUDGETS, resampling), strict=True)),
-        reliability=table,
-        calibration_error=table.error(resampling) if table else None,
+        reliability=bins,
+        calibration_error=None if bins is None else bins.error(resampling),
     )
 
 
-def _protocol_rows(found: Protocol) -> list[dict[str, Any]]:
-    """Rows of the protocol: means over robots, runs pooled, by chance, and parts of the runs."""
-    ranking = {"auc": found.auc, "pauc": found.pauc, "official_score": found.official}
-    rows = _rows("protocol", {**found.alike, **ranking, "not_answered": found.not_answered})
-    rows += _rows("pooled", found.pooled)
-    rows += _rows("chance", found.by_chance)
-    for key in ("robot", "domain"):
-        for name, part in found.by[key].items():
-            rows += _rows("protocol", part.measures, **{key: name})
-    for second, parts in (("domain", found.cells), ("scenario", found.cases)):
-        for (robot, name), part in parts.items():
-            rows += _rows("protocol", part.measures, robot=robot, **{second: name})
-    for name, ranked in found.ranked.items():
-        rows += _rows("protocol", {"auc": ranked.auc, "pauc": ranked.pauc}, domain=name)
-    return rows
+def evaluate(classifier: Classifier, dataset: Dataset) -> Evaluation:
+    """Confusion matrix of a classifier on annotated frames, and all measures that follow from it.
+
+    Args:
+        classifier: The classifier.
+        dataset: Annotated frames; labels that the classifier does not have count as missed.
+    """
+    return Evaluation.of(dataset.labels, classifier.predict(dataset.frames), classifier.classes)
 
 
-def _rows(of: str, measures: Mapping[str, Any], **keys: str | float) -> list[dict[str, Any]]:
+def _rows(of: str, measures: Mapping[str, Any], **keys: str) -> list[dict[str, Any]]:
     """Rows of the measures that are estimates, estimates by class, or plain numbers."""
     rows = []
     for measure, found in measures.items():
@@ -306,48 +296,40 @@ def _rows(of: str, measures: Mapping[str, Any], **keys: str | float) -> list[dic
     return rows
 
 
-def _columns(table: Mapping[str, Array]) -> dict[str, list[float | None]]:
-    return {
-        name: [None if np.isnan(value) else float(value) for value in column]
-        for name, column in table.items()
-    }
-
-
-NAME, CELL, COUNT = 24, 27, 10
-"""Widths of the columns: names, figures with intervals, plain numbers."""
-NO_FRAME = "no frame without a gap"
-SHOWN = 5
-"""Lines at most of missed failures, and of false alarms."""
+# --- as text
 
 
 def table(assessment: Assessment, by: str = "") -> str:
-    """Table of an assessment, as text: the protocol first, then all other measures.
+    """Table of an assessment, as text, in lines of up to 140 characters.
 
     Args:
         assessment: The measures.
         by: ``robot``, ``domain`` or ``scenario``: the one table of parts to print, whole.
-
-    Returns:
-        Lines of up to 140 characters.
     """
-    parts = [_errors, _frames, _events, _paper, _confusion, _scores, _foot]
-    paragraphs = [_head(assessment), *lines_of(assessment.protocol, by)]
-    paragraphs += [lines for part in parts if (lines := part(assessment))]
-    return "\n\n".join("\n".join(lines) for lines in paragraphs)
+    protocol = assessment.protocol
+    paragraphs = [_head(assessment), *protocol_lines(protocol, by), _errors(protocol)]
+    paragraphs += [part(assessment) for part in (_frames, _paper, _confusion, _foot)]
+    return "\n\n".join("\n".join(lines) for lines in paragraphs if lines)
+
+
+def protocol_lines(protocol: Protocol, by: str = "") -> list[list[str]]:
+    """Paragraphs of lines: what it is worth, where it is worst, and by robot and domain."""
+    keys = [by] if by else [key for key in ("robot", "domain") if len(protocol.by[key]) > 1]
+    parts = [_summary(protocol), _not_answered(protocol), _worst(protocol)]
+    parts += [_table(protocol, key, whole=bool(by)) for key in keys]
+    return [part for part in parts if part]
 
 
 def percent(estimate: Estimate) -> str:
     """A share as text: ``97.9% [96.1, 98.8]``."""
-    return _figure(estimate, lambda value: f"{100 * value:.1f}", "%")
+    return _ranged(estimate, _share)
 
 
 def number(estimate: Estimate, unit: str = "") -> str:
     """A number of any unit as text: ``0.14 s [0.12, 0.15]``."""
-
-    def text(value: float) -> str:
-        return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-    return _figure(estimate, text, f" {unit}" if unit else "")
+    text = _ranged(estimate, _rate)
+    value, bracket, bounds = text.partition(" [")
+    return f"{value} {unit}{bracket}{bounds}" if unit and text != "-" else text
 
 
 def _head(assessment: Assessment) -> list[str]:
@@ -373,6 +355,123 @@ def _head(assessment: Assessment) -> list[str]:
     return lines
 
 
+def _summary(protocol: Protocol) -> list[str]:
+    counts, delay = protocol.counts, protocol.pooled["delay"]
+    lines = [
+        "At the operating point that ships: findings as `inspector classify` reports them",
+        _line("", ["robots alike", "all runs pooled"], ["by chance", "counts"]),
+    ]
+    for title, name, behind in ROWS:
+        form = _rate if name in RATES else _share
+        chance = protocol.by_chance.get(name)
+        count = " of ".join(f"{counts[each]:.0f}" for each in behind.split("/")) if behind else ""
+        figures = [_ranged(each[name], form) for each in (protocol.alike, protocol.pooled)]
+        lines.append(_line(title, figures, ["" if chance is None else _share(chance), count]))
+    late = _time(protocol.alike["late_delay"].value)
+    figures = [f"{_time(protocol.alike['delay'].value)}, 90 %: {late}", _ranged(delay, _time)]
+    lines.append(_line("Delay until a live listener knows", figures))
+    for title, value in (
+        ("AUC of runs, mean over domains", protocol.auc),
+        ("pAUC (FPR up to 10 %)", protocol.pauc),
+        ("Score of DCASE task 2 (harmonic mean)", protocol.official),
+    ):
+        lines.append(_line(title, [_share(value), ""], ["50.0%"]))
+    runs = len(protocol.outcomes) + len(protocol.unanswered)
+    count = f"{len(protocol.unanswered)} of {runs}"
+    figures = [_share(protocol.not_answered), ""]
+    return [*lines, _line("Runs without a verdict", figures, ["", count])]
+
+
+def _not_answered(protocol: Protocol) -> list[str]:
+    """Reasons why runs have no verdict, each with its runs and robots."""
+    reasons: dict[str, list[str]] = {}
+    for each in protocol.unanswered:
+        reasons.setdefault(each.reason, []).append(each.origin.robot)
+    lines = []
+    for reason, robots in reasons.items():
+        names = sorted(set(robots))
+        rest = f" and {len(names) - WORST} more" if len(names) > WORST else ""
+        names = names[:WORST]
+        lines.append(
+            f"not answered: {_many(len(robots), 'run')} ({reason}) of {', '.join(names)}{rest}"
+        )
+    return lines
+
+
+def _worst(protocol: Protocol) -> list[str]:
+    lines = []
+    cases, cells = protocol.cases, protocol.cells
+    if worst := protocol.worst(cases, "recall_injected"):
+        lines.append(f"The worst {len(worst)} of robot and scenario, by injected faults found")
+        for key in worst:
+            counts = cases[key].counts
+            found = (
+                f"{counts['found']:.0f} of {counts['faults']:.0f} injected,"
+                f" {counts['found_felt']:.0f} of {counts['felt']:.0f} felt"
+            )
+            share = _share(cases[key].measures["recall_injected"])
+            lines.append(_line("  " + _short(" ".join(key)), [share], [found]))
+    for measure in ("false_alarms_per_hour", "alarms_in_unlabelled_per_hour"):
+        if worst := protocol.worst(cells, measure):
+            what = "unlabelled time" if "unlabelled" in measure else "ok time"
+            lines.append(
+                f"The worst {len(worst)} of robot and domain, by alarms per hour of {what}"
+            )
+            alarms, hours = RATES[measure]
+            for key in worst:
+                counts = cells[key].counts
+                rate = f"{_rate(cells[key].measures[measure])} per hour"
+                found = f"{counts[alarms]:.0f} in {counts[hours]:.3g} h"
+                lines.append(_line("  " + _short(" ".join(key)), [rate], [found]))
+    return lines
+
+
+def _table(protocol: Protocol, key: str, *, whole: bool) -> list[str]:
+    parts = protocol.by[key]
+    names = list(parts)
+    head = f"By {key}"
+    lines = []
+    if not whole and len(names) > ROWS_SHOWN:
+        names = sorted(names, key=lambda name: _order(parts[name]))[:ROWS_SHOWN]
+        lines = [f"By {key}, the worst {ROWS_SHOWN} of {len(parts)} by F1 of the class"]
+        head = ""
+    ranked = protocol.ranked if key == "domain" else {}
+    titles = ["runs", "ok h", *(title for title, _ in COLUMNS)]
+    titles += ["AUC", "pAUC"] if ranked else []
+    lines.append(_cells(head, titles, titles))
+    for name in names:
+        part = parts[name]
+        figures = [_figure(measure, part.measures[measure]) for _, measure in COLUMNS]
+        if ranked:
+            own = ranked.get(name)
+            figures += [_share(own.auc), _share(own.pauc)] if own else ["-", "-"]
+        runs = f"{part.counts['runs']:.0f}" + (f"+{part.unanswered}" if part.unanswered else "")
+        figures = [runs, f"{part.counts['ok_hours']:.3g}", *figures]
+        lines.append(_cells(_short(name), figures, titles))
+    if any(part.unanswered for part in parts.values()):
+        lines.append("(+n: runs without a verdict)")
+    return lines
+
+
+def _order(part: Part) -> float:
+    value = part.measures["class_f1"]
+    return 2.0 if isnan(value) else value
+
+
+def _errors(protocol: Protocol) -> list[str]:
+    lines = []
+    for title, errors in (
+        ("Missed, of the faults that are felt", [e for e in protocol.missed() if e["felt"]]),
+        ("False alarms", protocol.alarms(FALSE)),
+    ):
+        if errors:
+            lines.append(title)
+            lines += _few(
+                [f"  {e['label']} in {e['run']}, {interval(e['start'], e['stop'])}" for e in errors]
+            )
+    return lines
+
+
 def _frames(assessment: Assessment) -> list[str]:
     frames = assessment.frames
     counts = frames.evaluation.confusion.sum(axis=1).tolist()
@@ -384,67 +483,17 @@ def _frames(assessment: Assessment) -> list[str]:
         figures = [percent(frames.recall[label]), percent(frames.precision[label])]
         behind = [count, assessment.blocks[label], assessment.runs_with[label]]
         lines.append(_row(label, figures, behind))
+    error = assessment.calibration_error
+    calibration = (
+        f"{percent(error)} in ten bins" if error else "- (the scores are no probabilities)"
+    )
     return [
         *lines,
         _row("Balanced accuracy", [percent(frames.balanced_accuracy)]),
         _row("Failure recall", [percent(frames.failure_recall)]),
         _row("False alarm rate", [percent(frames.false_alarm_rate)]),
+        _row("Calibration error", [calibration]),
     ]
-
-
-def _events(assessment: Assessment) -> list[str]:
-    events = assessment.events
-    lines = [
-        "Whole runs by frames and annotated blocks, robots not weighed (`noise-evaluation/1`)",
-        _row("", ["found", "by its own name"], ["failures", "", "runs"]),
-    ]
-    for label, found in events.found.items():
-        figures = [percent(found), percent(events.named[label])]
-        lines.append(_row(label, figures, [assessment.blocks.get(label, 0), "", found.runs]))
-    late = f"90th percentile {number(events.late_delay, 's')}"
-    return [
-        *lines,
-        _row(
-            "all failures",
-            [percent(events.all_found), percent(events.all_named)],
-            [len(assessment.score.found), "", events.all_found.runs],
-        ),
-        _row("Delay of onset", [f"median {number(events.delay, 's')}, {late}"]),
-        _row("False alarms", [_per_hour(events.false_alarms, events.false_alarms_per_hour)]),
-        _row(
-            "Wrong stretches",
-            [_per_hour(events.wrong_stretches, events.wrong_stretches_per_hour)],
-        ),
-        _row("Failure recall", [f"{percent(events.failure_recall)} of all frames"]),
-        _row("False alarm rate", [f"{percent(events.false_alarm_rate)} of all frames"]),
-    ]
-
-
-def _errors(assessment: Assessment) -> list[str]:
-    missed = [
-        f"  {each['label']} in {each['run']}, {interval(each['start'], each['stop'])}"
-        for each in assessment.protocol.missed()
-        if each["felt"]
-    ]
-    false = [
-        f"  {each['label']} in {each['run']}, {interval(each['start'], each['stop'])}"
-        for each in assessment.protocol.alarms(FALSE)
-    ]
-    lines = ["Missed, of the faults that are felt", *_few(missed)] if missed else []
-    return lines + (["False alarms", *_few(false)] if false else [])
-
-
-def _scores(assessment: Assessment) -> list[str]:
-    lines = [
-        "NOT the operating point: trade-off with thresholds chosen on these very runs",
-        _row("at most", ["failures found", "recall of frames"]),
-    ]
-    for budget, (recall, found) in assessment.at_budgets.items():
-        title = f"{budget:g} false alarms per h"
-        lines.append(_row(title, [percent(found), percent(recall)]))
-    error = assessment.calibration_error
-    figure = f"{percent(error)} in ten bins" if error else "- (the scores are no probabilities)"
-    return [*lines, _row("Calibration error", [figure])]
 
 
 def _paper(assessment: Assessment) -> list[str]:
@@ -469,11 +518,11 @@ def _paper(assessment: Assessment) -> list[str]:
 def _confusion(assessment: Assessment) -> list[str]:
     evaluation = assessment.frames.evaluation
     width = max(len(name) for name in evaluation.classes) + 2
-    head = "Frames of row predicted".ljust(NAME)
+    head = "Frames of row predicted".ljust(CLASS)
     return [
         head + "".join(name.rjust(width) for name in evaluation.classes),
         *(
-            name.ljust(NAME) + "".join(str(count).rjust(width) for count in row)
+            name.ljust(CLASS) + "".join(str(count).rjust(width) for count in row)
             for name, row in zip(evaluation.classes, evaluation.confusion.tolist(), strict=True)
         ),
     ]
@@ -486,20 +535,55 @@ def _foot(assessment: Assessment) -> list[str]:
     return lines
 
 
-def _figure(estimate: Estimate, text: Callable[[float], str], unit: str) -> str:
-    if isnan(estimate.value):
-        return "-"
-    bounds = f" [{text(estimate.low)}, {text(estimate.high)}]" if not isnan(estimate.low) else ""
-    return f"{text(estimate.value)}{unit}{bounds}"
+# --- figures, rows and lists
 
 
-def _per_hour(count: int, rate: Estimate) -> str:
-    return f"{count}, or {number(rate, 'per hour')} of ok motion"
+def _share(value: float) -> str:
+    return "-" if isnan(value) else f"{100.0 * value:.1f}%"
+
+
+def _rate(value: float) -> str:
+    return "-" if isnan(value) else f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def _time(value: float) -> str:
+    return "-" if isnan(value) else f"{value:.3g} s"
+
+
+def _figure(measure: str, value: float) -> str:
+    if measure == "delay":
+        return _time(value)
+    return (_rate if measure in RATES else _share)(value)
+
+
+def _ranged(estimate: Estimate, form: Callable[[float], str]) -> str:
+    bounds = "" if isnan(estimate.low) else f" [{form(estimate.low)}, {form(estimate.high)}]"
+    bounds = "" if isnan(estimate.value) else bounds.replace("%", "").replace(" s", "")
+    return form(estimate.value) + bounds
+
+
+def _line(name: str, figures: Sequence[str], others: Sequence[str] = ()) -> str:
+    line = name.ljust(NAME) + "".join(figure.ljust(WIDE) for figure in figures)
+    return (line + "".join(other.ljust(NARROW) for other in others)).rstrip()
 
 
 def _row(name: str, figures: Sequence[str], counts: Sequence[object] = ()) -> str:
-    line = name.ljust(NAME) + "".join(figure.ljust(CELL) for figure in figures)
-    return (line + "".join(str(count).rjust(COUNT) for count in counts)).rstrip()
+    line = name.ljust(CLASS) + "".join(figure.ljust(WIDE + 1) for figure in figures)
+    return (line + "".join(str(count).rjust(NARROW - 2) for count in counts)).rstrip()
+
+
+def _cells(name: str, cells: Sequence[str], titles: Sequence[str]) -> str:
+    """A row, each cell as wide as its title or a figure."""
+    widths = [max(len(title), 7) + 2 for title in titles]
+    figures = (cell.rjust(width) for cell, width in zip(cells, widths, strict=True))
+    return name.ljust(LONGEST) + "".join(figures)
+
+
+def _short(name: str) -> str:
+    """A name that fits its column: its middle is left out if it is long."""
+    most = LONGEST - 2
+    half = (most - 1) // 2
+    return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"
 
 
 def _named(names: Iterable[str], what: str) -> str:
@@ -511,7 +595,7 @@ def _named(names: Iterable[str], what: str) -> str:
 
 def _few(lines: Sequence[str]) -> list[str]:
     rest = len(lines) - SHOWN
-    return [*islice(lines, SHOWN), *([f"  and {rest} more"] if rest > 0 else [])]
+    return [*lines[:SHOWN], *([f"  and {rest} more"] if rest > 0 else [])]
 
 
 def _many(count: int, what: str) -> str:

@@ -24,6 +24,7 @@ from typing import Self
 
 import numpy as np
 
+from noiseclassifier.confusion import ratio
 from noiseclassifier.types import Array, Index, Mask
 
 RESAMPLES = 2000
@@ -69,33 +70,19 @@ class Resampling:
 
     @classmethod
     def of(cls, groups: Sequence[str]) -> Self:
-        """Draw the sets.
-
-        Args:
-            groups: Group of each recording, shape (runs,).
-        """
+        """Draw the sets."""
         names, group = np.unique(np.asarray(groups, dtype=str), return_inverse=True)
         random = np.random.default_rng(SEED)
         drawn = random.multinomial(len(names), np.full(len(names), 1 / len(names)), RESAMPLES)
         return cls(group, drawn[:, group].astype(np.float64))
 
     def share(self, part: Array, whole: Array) -> Estimate:
-        """Estimate a share.
-
-        Args:
-            part: Numerator, shape (runs,).
-            whole: Denominator, shape (runs,).
-        """
+        """Estimate a share."""
         drawn = ratio(self.weights @ part, self.weights @ whole)
         return self.bounded(float(ratio(part.sum(), whole.sum())), drawn, [whole > 0])
 
     def rate(self, events: Array, time: Array) -> Estimate:
-        """Estimate the rate of events.
-
-        Args:
-            events: Of each recording, shape (runs,).
-            time: Time of each, shape (runs,).
-        """
+        """Estimate the rate of events."""
         value = float(ratio(events.sum(), time.sum()))
         runs, groups = self._behind(time > 0)
         low, high = garwood(float(events.sum()))
@@ -106,13 +93,7 @@ class Resampling:
         return Estimate(value, low, high, runs, groups)
 
     def mean_share(self, part: Array, whole: Array, of: Sequence[Mask]) -> Estimate:
-        """Estimate the unweighted mean of the shares of several sets of recordings.
-
-        Args:
-            part: Numerator, shape (runs,).
-            whole: Denominator, shape (runs,).
-            of: The sets, each of shape (runs,); those without a denominator do not count.
-        """
+        """Estimate the unweighted mean of the shares of several sets of recordings."""
         behind = [own & (whole > 0) for own in of if (whole * own).sum() > 0]
         if not behind:
             return Estimate(nan, nan, nan, 0, 0)
@@ -120,13 +101,7 @@ class Resampling:
         return self.bounded(value, drawn, behind)
 
     def mean_rate(self, events: Array, time: Array, of: Sequence[Mask]) -> Estimate:
-        """Estimate the unweighted mean of the rates of several sets of recordings.
-
-        Args:
-            events: Of each recording, shape (runs,).
-            time: Of each recording, shape (runs,).
-            of: The sets, each of shape (runs,); those without time do not count.
-        """
+        """Estimate the unweighted mean of the rates of several sets of recordings."""
         behind = [own & (time > 0) for own in of if (time * own).sum() > 0]
         if not behind:
             return Estimate(nan, nan, nan, 0, 0)
@@ -148,13 +123,7 @@ class Resampling:
         return float(value), ratio(np.where(known, each, 0.0).sum(axis=0), known.sum(axis=0))
 
     def bounded(self, value: float, drawn: Array, behind: Sequence[Mask]) -> Estimate:
-        """Bounds of a share, or of a mean of shares, that was computed for all sets.
-
-        Args:
-            value: The measure.
-            drawn: The same of each set, shape (resamples,).
-            behind: For each share, whether recordings are in its sample, shape (runs,).
-        """
+        """Bounds of a mean of shares of runs, computed for all sets, shape (resamples,)."""
         runs = int(np.any(behind, axis=0).sum())
         groups = min(self._behind(mask)[1] for mask in behind)
         if groups < LEAST_GROUPS:
@@ -165,16 +134,26 @@ class Resampling:
         return Estimate(value, min(low, room), max(high, 1.0 - room), runs, groups)
 
     def plain(self, value: float, drawn: Array, behind: Mask) -> Estimate:
-        """Bounds of any other measure that was computed for all sets.
-
-        Args:
-            value: The measure.
-            drawn: The same of each set, shape (resamples,).
-            behind: Whether recordings are in the sample, shape (runs,).
-        """
+        """Bounds of any other measure computed for all sets, shape (resamples,), of some runs."""
         runs, groups = self._behind(behind)
         low, high = _middle(drawn) if groups >= LEAST_GROUPS else (nan, nan)
         return Estimate(value, low, high, runs, groups)
+
+    def quantile(self, values: Array, owner: Index, share: float) -> Estimate:
+        """Estimate a quantile of values, shape (values,), that belong to recordings."""
+        ascending = np.argsort(values, kind="stable")
+        values, owner = values[ascending], owner[ascending]
+        behind = np.bincount(owner, minlength=self.weights.shape[1]) > 0
+
+        def of_sets(weights: Array) -> Array:
+            total = np.cumsum(weights[:, owner], axis=1)
+            if not len(values):
+                return np.full(len(weights), np.nan)
+            place = (total < share * total[:, -1:]).sum(axis=1)
+            return np.where(total[:, -1] > 0, values[np.minimum(place, len(values) - 1)], np.nan)
+
+        once = np.ones((1, len(behind)))
+        return self.plain(float(of_sets(once)[0]), of_sets(self.weights), behind)
 
     def _behind(self, mask: Mask) -> tuple[int, int]:
         return int(mask.sum()), len(np.unique(self.group[mask]))
@@ -182,9 +161,6 @@ class Resampling:
 
 def garwood(events: float) -> tuple[float, float]:
     """Exact bounds of the mean of a Poisson distribution.
-
-    Args:
-        events: How many there were.
 
     Returns:
         Lower and upper bound with 95 %.
@@ -197,15 +173,7 @@ def garwood(events: float) -> tuple[float, float]:
 
 
 def fay_feuer(events: Array, weights: Array) -> tuple[float, float]:
-    """Bounds of a weighted sum of the means of Poisson distributions.
-
-    Args:
-        events: How many there were of each, shape (distributions,).
-        weights: Weight of each, shape (distributions,).
-
-    Returns:
-        Lower and upper bound with 95 %; of equal weights, those of Garwood.
-    """
+    """Bounds of a weighted sum of the means of Poisson distributions."""
     from scipy.special import gammaincinv
 
     total, variance, most = weights @ events, weights**2 @ events, weights.max()
@@ -213,13 +181,6 @@ def fay_feuer(events: Array, weights: Array) -> tuple[float, float]:
     total, variance = total + most, variance + most**2
     high = variance / total * gammaincinv(total**2 / variance, 1.0 - TAIL)
     return float(low), float(high)
-
-
-def ratio(part: Array | np.float64 | float, whole: Array | np.float64 | float) -> Array:
-    """Quotient, NaN where the denominator is 0."""
-    part, whole = np.broadcast_arrays(np.asarray(part, float), np.asarray(whole, float))
-    share: Array = np.divide(part, whole, out=np.full(whole.shape, nan), where=whole > 0)
-    return share
 
 
 def _middle(drawn: Array) -> tuple[float, float]:

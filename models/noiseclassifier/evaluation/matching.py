@@ -1,237 +1,544 @@
-"""True class of each frame of whole recordings, and which frames overlap which failure.
+"""Findings and faults matched in time: spans, the matcher, predictions, and the outcome of a run.
+
+A finding and a fault *meet* if they overlap, or are no more than a collar of 0.2 s apart. A fault
+is *found* if a finding of any class meets it. Findings and faults are also matched *one to one*, as
+many as can be, so that two findings on one fault are one found and one false, and one finding on
+two faults finds one of them (collar and matching as in sed_eval: Mesaros, Heittola and Virtanen,
+Metrics for polyphonic sound event detection, Applied Sciences 6, 2016).
+
+A finding that meets no fault and touches no failure block is a *false alarm* if half of it or more
+lies in `ok` time, and an *alarm in unlabelled time* otherwise: that which follows a fault often
+ends in `ok` time. What it flags there counts in the share of ok time that is flagged.
+
+The level of *chance* is what the same findings score where they mean nothing: shifted circularly
+within their run, all by the same random time.
 
 A frame *is* a failure if it holds an annotated block of it whole, or is filled by it by half or
 more (by several: that which fills most); it is `ok` if it lies wholly in `ok` blocks. Any other
 frame is unclear, and counts for nothing. Times that differ by a sample or less are the same:
 annotations are written with few digits.
+
+Spans are arrays of shape (spans, 2), start and stop of each, in [s].
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
-from typing import Self
+import hashlib
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import inf
+from typing import Protocol
 
 import numpy as np
 
-from noiseclassifier.evaluation.predictions import Predictions
-from noiseclassifier.labels import Labels
-from noiseclassifier.recording import Block
+from noiseclassifier.classifier import Classifier
+from noiseclassifier.dataset import Dataset
+from noiseclassifier.errors import DatasetError
+from noiseclassifier.labels import ANOMALY, CONFIRM, UNKNOWN, Event, Labels
+from noiseclassifier.recording import Block, Fault, Recording
+from noiseclassifier.splitting import group_of, robot_of
 from noiseclassifier.types import Array, Index, Mask, Words
 
-OK = "ok"
-UNCLEAR = ""
+OK, UNCLEAR = "ok", ""
+UNNAMED = "unnamed"
+"""Robot or domain of a recording that names none."""
+COLLAR = 0.2
+"""Time between a finding and a fault that still meet, in [s]."""
+CLOSE = 0.2
+"""Largest error of an onset that counts as right, in [s]."""
+SHIFTS = 40
+"""Random shifts of the findings of each run."""
+HOUR = 3600.0
+MET, FALSE, UNLABELLED = "met", "false", "unlabelled"
+"""Kinds of findings: on a fault or failure, in `ok` time, and in unlabelled time."""
+
+Localise = Callable[[Recording, Labels], tuple[tuple[Event, ...], tuple[Event, ...]]]
+"""Gives the events of labels by their frames, and the same from onset to end."""
 
 
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """Frames of whole recordings, in order.
+class Lasting(Protocol):
+    """What has a start and a stop in [s]: a block, an event, a finding, a fault."""
 
-    Attributes:
-        run: Number of the recording, shape (frames,).
-        start: When it starts, shape (frames,), in [s].
-        stop: When it stops, shape (frames,), in [s].
-        predicted: Its predicted class, debounced, shape (frames,).
-        suspect: Whether it is not `ok` by itself, shape (frames,).
-        novel: Whether it is out of distribution, shape (frames,).
-        flagged: Whether it belongs to a finding, shape (frames,).
-        scores: Of each class, shape (frames, classes).
-        truth: Its true class, `UNCLEAR` where that is not annotated, shape (frames,).
-        in_ok: Whether it lies wholly in `ok` blocks, shape (frames,).
-        failing: Whether it overlaps a failure, shape (frames,).
-    """
+    @property
+    def start(self) -> float:
+        """Start, in [s]."""
 
-    run: Index
-    start: Array
-    stop: Array
-    predicted: Words
-    suspect: Mask
-    novel: Mask
-    flagged: Mask
-    scores: Array
-    truth: Words
-    in_ok: Mask
-    failing: Mask
-
-    def __len__(self) -> int:
-        return len(self.run)
+    @property
+    def stop(self) -> float:
+        """Stop, in [s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Failures:
-    """Annotated blocks of failures, in order.
-
-    Attributes:
-        run: Number of the recording, shape (failures,).
-        start: When it starts, shape (failures,), in [s].
-        stop: When it stops, shape (failures,), in [s].
-        label: Its class, shape (failures,).
-        first: The first frame that overlaps it, shape (failures,).
-        end: The frame after the last one that does, ``first`` if none does, shape (failures,).
-    """
-
-    run: Index
-    start: Array
-    stop: Array
-    label: Words
-    first: Index
-    end: Index
-
-    def __len__(self) -> int:
-        return len(self.run)
+# --- spans
 
 
-@dataclass(frozen=True, eq=False)
-class Matched:
-    """Recordings, one after another, with frames matched to annotations.
-
-    Attributes:
-        names: Of the recordings, shape (runs,).
-        classes: Of the model.
-        confirms: Whether a finding takes more than one frame of evidence.
-        frames: Their frames.
-        failures: Their failures.
-        ok_annotated: `ok` time of each recording, shape (runs,), in [s].
-        ok_covered: That part of it that frames within `ok` blocks cover, shape (runs,), in [s]. In
-            `ok` blocks shorter than a frame, no false alarm is possible.
-        slack: Times that differ by less are the same, in [s].
-    """
-
-    names: tuple[str, ...]
-    classes: tuple[str, ...]
-    confirms: bool
-    frames: Frames
-    failures: Failures
-    ok_annotated: Array
-    ok_covered: Array
-    slack: float
-
-    @classmethod
-    def of(cls, predictions: Sequence[Predictions]) -> Self:
-        """Match predictions with annotations.
-
-        Args:
-            predictions: Recordings, one or more.
-        """
-        slack = 1.5 * max(one.step for one in predictions)
-        frames, failures, annotated, covered = [], [], [], []
-        count = 0
-        for number, one in enumerate(predictions):
-            found, bad, ok = _match(one, number, count, slack)
-            frames.append(found)
-            failures.append(bad)
-            annotated.append(sum(block.stop - block.start for block in ok))
-            covered.append(_covered(found))
-            count += len(found)
-        return cls(
-            tuple(one.name for one in predictions),
-            predictions[0].labels.classes,
-            predictions[0].labels.above_threshold is not None,
-            Frames(*_joined(frames)),
-            Failures(*_joined(failures)),
-            np.array(annotated, dtype=np.float64),
-            np.array(covered),
-            slack,
-        )
-
-    def by_run(self, run: Index) -> Array:
-        """Count by recording, shape (runs,)."""
-        return np.bincount(run, minlength=len(self.names)).astype(np.float64)
+def spans_of(items: Iterable[Lasting]) -> Array:
+    """Spans of blocks, events or findings, as they come."""
+    pairs = [(item.start, item.stop) for item in items]
+    return np.array(pairs, dtype=np.float64).reshape(-1, 2)
 
 
-def with_frames(one: Predictions) -> Predictions:
-    """Predictions on the frames of the whole recording whose true class is known, not on blocks."""
-    truth = Matched.of([one]).frames.truth
-    known = truth != UNCLEAR
-    return replace(one, truth=truth[known], predicted=one.labels.label[known])
+def union(spans: Array) -> Array:
+    """Spans in order, merged where they overlap or touch, so that no time counts twice."""
+    if not len(spans):
+        return spans
+    spans = spans[np.argsort(spans[:, 0], kind="stable")]
+    reach = np.maximum.accumulate(spans[:, 1])
+    first = np.append(True, spans[1:, 0] > reach[:-1])
+    last = np.append(first[1:], True)
+    return np.stack((spans[first, 0], reach[last]), axis=1)
 
 
-def _match(
-    one: Predictions, number: int, before: int, slack: float
-) -> tuple[Frames, Failures, list[Block]]:
-    """Match the frames of one recording.
+def overlap(spans: Array, others: Array) -> Array:
+    """Time that each span shares with each of others, shape (spans, others), in [s]."""
+    start = np.maximum(spans[:, None, 0], others[None, :, 0])
+    stop = np.minimum(spans[:, None, 1], others[None, :, 1])
+    return np.asarray(np.maximum(stop - start, 0.0), dtype=np.float64)
+
+
+def common(spans: Array, others: Array) -> Array:
+    """Time that is in both, as spans in order."""
+    one, other = union(spans), union(others)
+    start = np.maximum(one[:, None, 0], other[None, :, 0])
+    stop = np.minimum(one[:, None, 1], other[None, :, 1])
+    shared = stop > start
+    return union(np.stack((start[shared], stop[shared]), axis=1))
+
+
+def duration(spans: Array) -> float:
+    """Time in any of the spans, in [s]."""
+    merged = union(spans)
+    return float((merged[:, 1] - merged[:, 0]).sum())
+
+
+# --- the matcher
+
+
+def match(
+    found: Sequence[Lasting],
+    wanted: Sequence[Lasting],
+    *,
+    collar: float = COLLAR,
+    same: Callable[[int, int], bool] | None = None,
+) -> list[tuple[int, int]]:
+    """Match findings with faults, or findings of one run with those of another, one to one.
 
     Args:
-        one: The recording.
-        number: Its number.
-        before: Frames of the recordings before it.
-        slack: Times that differ by less are the same, in [s].
+        found: Whatever has a start and a stop in [s].
+        wanted: What it is matched with.
+        collar: Time between two that still meet, in [s].
+        same: Whether two may be matched at all, by their indices, say because their class is one.
 
     Returns:
-        Its frames, its failures, and its `ok` blocks, merged.
+        Indices of ``found`` and of ``wanted``, as many pairs as can be, each index in one at most.
     """
-    start, stop = one.labels.start, one.labels.stop
-    ok = _merged([block for block in one.blocks if block.label == OK])
-    bad = [block for block in one.blocks if block.label != OK]
-    in_ok = _overlap(start, stop, ok).sum(axis=1) > stop - start - slack
-    shared = _overlap(start, stop, bad)
-    overlaps = shared > slack
-    first = overlaps.argmax(axis=0) if len(start) else np.zeros(len(bad), dtype=np.intp)
-    own = np.full(len(start), number)
-    frames = Frames(
-        own,
-        start,
-        stop,
-        one.labels.debounced,
-        one.labels.label != OK,
-        _novel(one.labels),
-        one.labels.flagged,
-        one.labels.scores,
-        np.where(in_ok, OK, _failure_of(shared, start, stop, bad, slack)),
-        in_ok,
-        np.any(overlaps, axis=1),
-    )
-    failures = Failures(
-        np.full(len(bad), number),
-        np.array([block.start for block in bad], dtype=np.float64),
-        np.array([block.stop for block in bad], dtype=np.float64),
-        np.array([block.label for block in bad], dtype=str),
-        before + first,
-        before + first + overlaps.sum(axis=0),
-    )
-    return frames, failures, ok
+    met = meet(spans_of(found), spans_of(wanted), collar)
+    if same is not None:
+        for row, column in np.argwhere(met):
+            met[row, column] = same(int(row), int(column))
+    partner = _partners(met[None])[0]
+    return [(row, int(column)) for row, column in enumerate(partner) if column >= 0]
 
 
-def _novel(labels: Labels) -> Mask:
-    return np.zeros(len(labels), dtype=bool) if labels.novel is None else labels.novel
+def meet(spans: Array, wanted: Array, collar: float = COLLAR) -> Mask:
+    """Whether findings meet faults, shape (..., findings, faults).
+
+    Args:
+        spans: Of the findings, shape (..., findings, 2), in [s].
+        wanted: Of the faults, shape (faults, 2), in [s].
+        collar: Time between two that still meet, in [s].
+    """
+    early = spans[..., :, None, 0] <= wanted[:, 1] + collar
+    late = spans[..., :, None, 1] >= wanted[:, 0] - collar
+    met: Mask = early & late
+    return met
 
 
-def _overlap(start: Array, stop: Array, blocks: Sequence[Block]) -> Array:
-    """Time that frames share with blocks, shape (frames, blocks), in [s]."""
-    begins = np.array([block.start for block in blocks], dtype=np.float64)
-    ends = np.array([block.stop for block in blocks], dtype=np.float64)
-    shared = np.minimum(stop[:, None], ends) - np.maximum(start[:, None], begins)
-    return np.asarray(np.maximum(shared, 0.0), dtype=np.float64)
+def one_to_one(met: Mask) -> Array:
+    """Largest number of pairs that meet, each finding and each fault in one pair at most.
+
+    Args:
+        met: Whether findings meet faults, shape (cases, findings, faults).
+
+    Returns:
+        Shape (cases,).
+    """
+    matched: Array = (_partners(met) >= 0).sum(axis=1).astype(np.float64)
+    return matched
 
 
-def _failure_of(
-    shared: Array, start: Array, stop: Array, bad: Sequence[Block], slack: float
-) -> Words:
-    """True failure class of each frame, `UNCLEAR` where it is none, shape (frames,)."""
+def _partners(met: Mask) -> Index:
+    """The fault of each finding, -1 for none, shape (cases, findings)."""
+    from scipy.sparse import csr_matrix
+    from scipy.sparse.csgraph import maximum_bipartite_matching
+
+    cases, findings, faults = met.shape
+    case, row, column = np.nonzero(met)
+    if not len(case):
+        return np.full((cases, findings), -1, dtype=np.intp)
+    # All cases at once, as the blocks of one matrix.
+    shape = cases * findings, cases * faults
+    pairs = (np.ones(len(case)), (case * findings + row, case * faults + column))
+    partner = maximum_bipartite_matching(csr_matrix(pairs, shape=shape), perm_type="column")
+    first = np.arange(cases)[:, None] * faults
+    own = np.reshape(partner, (cases, findings))
+    return np.asarray(np.where(own >= 0, own - first, -1), dtype=np.intp)
+
+
+def truth_of(start: Array, stop: Array, blocks: Iterable[Block], *, step: float) -> Words:
+    """True class of each frame, `UNCLEAR` where annotations tell none, shape (frames,).
+
+    Args:
+        start: Of each frame, shape (frames,), in [s].
+        stop: Of each frame, shape (frames,), in [s].
+        blocks: Annotations, in order, with a finite stop.
+        step: Time from one sample to the next, in [s].
+    """
+    blocks = list(blocks)
+    frames, slack = np.stack((start, stop), axis=1), 1.5 * step
+    ok = union(spans_of(block for block in blocks if block.label == OK))
+    in_ok = overlap(frames, ok).sum(axis=1) > stop - start - slack
+    bad = [block for block in blocks if block.label != OK]
     if not bad:
-        return np.full(len(start), UNCLEAR)
+        return np.where(in_ok, OK, UNCLEAR)
+    shared = overlap(frames, spans_of(bad))
     whole = np.array([block.stop - block.start for block in bad])
     enough = shared > np.minimum(whole, (stop - start)[:, None] / 2.0) - slack
     filled = np.where(enough & (shared > 0.0), shared, 0.0)
     names = np.array([block.label for block in bad])
-    return np.where(filled.any(axis=1), names[filled.argmax(axis=1)], UNCLEAR)
+    failure = np.where(filled.any(axis=1), names[filled.argmax(axis=1)], UNCLEAR)
+    return np.where(in_ok, OK, failure)
 
 
-def _merged(blocks: Sequence[Block]) -> list[Block]:
-    """Merge blocks that overlap or touch, so that no time counts twice."""
-    merged: list[Block] = []
-    for block in blocks:
-        if merged and block.start <= merged[-1].stop:
-            merged[-1] = merged[-1]._replace(stop=max(merged[-1].stop, block.stop))
-        else:
-            merged.append(block)
-    return merged
+# --- predictions
 
 
-def _covered(frames: Frames) -> float:
-    """Time that frames within `ok` blocks cover, in [s]."""
-    start, stop = frames.start[frames.in_ok], frames.stop[frames.in_ok]
-    return float((stop - np.maximum(start, np.append(-np.inf, stop[:-1]))).sum())
+@dataclass(frozen=True)
+class Origin:
+    """Where a recording comes from: its robot, domain and scenario."""
+
+    name: str
+    facts: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def robot(self) -> str:
+        """Its robot."""
+        return self.facts.get("robot") or robot_of(self.name) or UNNAMED
+
+    @property
+    def domain(self) -> str:
+        """Its domain: simulator, drives, sensing and control together."""
+        return self.facts.get("domain") or UNNAMED
+
+    @property
+    def scenario(self) -> str:
+        """Its scenario: the name of what was made to happen."""
+        return self.facts.get("scenario") or UNNAMED
 
 
-def _joined(parts: Sequence[Frames] | Sequence[Failures]) -> list[np.ndarray]:
-    names = [field.name for field in fields(parts[0])]
-    return [np.concatenate([getattr(part, name) for part in parts]) for name in names]
+@dataclass(frozen=True)
+class Unanswered:
+    """A recording that a model cannot classify."""
+
+    name: str
+    """Its name."""
+    facts: Mapping[str, str] = field(default_factory=dict)
+    """Its robot, scenario and domain."""
+    reason: str = ""
+    """Why there is no verdict, in a few words."""
+
+    @cached_property
+    def origin(self) -> Origin:
+        """Where it comes from."""
+        return Origin(self.name, self.facts)
+
+    def as_dict(self) -> dict[str, str]:
+        """All of it for JSON."""
+        origin = self.origin
+        own = {"robot": origin.robot, "domain": origin.domain, "scenario": origin.scenario}
+        return {"run": self.name, **own, "reason": self.reason}
+
+
+@dataclass(frozen=True, eq=False)
+class Predictions:
+    """Annotations of one recording, and predictions of a model.
+
+    Attributes:
+        name: Of the recording.
+        group: Of the recording, as `splitting.group_of` names it.
+        step: Time from one sample to the next, in [s].
+        blocks: Annotations, in order; each ends with the recording at the latest.
+        truth: Class of each frame that is cut from a block, shape (frames,).
+        predicted: Predicted class of it, shape (frames,).
+        labels: Predictions on the whole recording.
+        events: All injected faults; empty where they are not known.
+        facts: Robot, scenario and domain of the recording.
+        located: Findings by their frames, and from onset to end; those of the labels unless given.
+    """
+
+    name: str
+    group: str
+    step: float
+    blocks: tuple[Block, ...]
+    truth: Words
+    predicted: Words
+    labels: Labels
+    events: tuple[Fault, ...] = ()
+    facts: Mapping[str, str] = field(default_factory=dict)
+    located: tuple[tuple[Event, ...], tuple[Event, ...]] | None = None
+
+    @cached_property
+    def origin(self) -> Origin:
+        """Where it comes from."""
+        return Origin(self.name, self.facts)
+
+    @cached_property
+    def spans(self) -> tuple[Event, ...]:
+        """Findings by their frames."""
+        return self.labels.events() if self.located is None else self.located[0]
+
+    @cached_property
+    def findings(self) -> tuple[Event, ...]:
+        """The same findings from onset to end, as they are reported."""
+        return self.spans if self.located is None else self.located[1]
+
+    @cached_property
+    def whole_truth(self) -> Words:
+        """True class of each frame of the whole recording, `UNCLEAR` where not annotated."""
+        return truth_of(self.labels.start, self.labels.stop, self.blocks, step=self.step)
+
+    def with_frames(self) -> "Predictions":
+        """The same, with the frames of the whole recording whose class is known, not of blocks."""
+        known = self.whole_truth != UNCLEAR
+        return replace(self, truth=self.whole_truth[known], predicted=self.labels.label[known])
+
+
+def predict(
+    classifier: Classifier, recording: Recording, localise: Localise | None = None
+) -> Predictions:
+    """Predictions of a model on a recording, on its annotated blocks and from end to end.
+
+    A recording whose blocks all lie in gaps has no frame of a block. For a baseline, which names no
+    failure, each failure is an anomaly.
+
+    Args:
+        classifier: The model.
+        recording: Annotated noise at its rate.
+        localise: Estimates onset and end of the findings; else they last as their frames do.
+
+    Raises:
+        ModelsError: If the recording does not fit the model.
+    """
+    if ANOMALY in classifier.classes:
+        blocks = tuple(
+            block if block.label == OK else block._replace(label=ANOMALY)
+            for block in recording.blocks
+        )
+        events = tuple(fault._replace(label=ANOMALY) for fault in recording.events)
+        recording = replace(recording, blocks=blocks, events=events)
+    try:
+        # Frames that are cut from blocks, as the paper does for validation.
+        dataset = Dataset.of([recording], classifier.profile, training=False)
+        truth, predicted = dataset.labels, classifier.predict(dataset.frames)
+    except DatasetError:  # no frame without a gap
+        truth = predicted = np.array([], dtype=str)
+    labels = classifier.classify(
+        recording.signal, recording.rate, start=recording.start, valid=recording.valid
+    )
+    return Predictions(
+        recording.name,
+        group_of(recording.name),
+        1.0 / recording.rate,
+        within(recording),
+        truth,
+        predicted,
+        labels,
+        recording.events,
+        recording.facts,
+        localise(recording, labels) if localise and len(labels) else None,
+    )
+
+
+def within(recording: Recording) -> tuple[Block, ...]:
+    """Blocks of a recording, in order; each ends with the recording at the latest."""
+    end = recording.start + len(recording.time) / recording.rate
+    blocks = recording.blocks
+    return tuple(sorted(b._replace(stop=end if b.stop == inf else b.stop) for b in blocks))
+
+
+# --- the outcome of a run
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Findings and faults of one run.
+
+    Attributes:
+        run: The predictions.
+        faults: All injected faults, or failure blocks where those are not known.
+        kind: Kind of each finding, shape (findings,).
+        found: Whether each fault is found, shape (faults,).
+        close: Whether the nearest onset of a finding that meets it is right, shape (faults,).
+        delay: Time from its start until a live listener knows, NaN unless found, shape (faults,),
+            in [s].
+        counts: Numbers and times in [h] of the run, by name; of matches also by chance.
+        score: Score of the run, see `run_score`.
+    """
+
+    run: Predictions
+    faults: tuple[Fault, ...]
+    kind: Words
+    found: Mask
+    close: Mask
+    delay: Array
+    counts: dict[str, float]
+    score: float
+
+    @classmethod
+    def of(cls, run: Predictions) -> "Outcome":
+        """Match findings and faults of a run."""
+        labels, findings = run.labels, run.findings
+        bad = [block for block in run.blocks if block.label != OK]
+        faults = run.events or tuple(Fault(*block) for block in bad)
+        spans, wanted = spans_of(findings), spans_of(faults)
+        met = meet(spans, wanted)
+        close = met & (np.abs(spans[:, None, 0] - wanted[None, :, 0]) <= CLOSE)
+        classified = union(np.stack((labels.start, labels.stop), axis=1))
+        ok_blocks = union(spans_of(block for block in run.blocks if block.label == OK))
+        ok = common(ok_blocks, classified)
+        known = np.concatenate((ok, spans_of(bad), wanted))
+        slack = np.minimum(1.5 * run.step, (spans[:, 1] - spans[:, 0]) / 2.0)
+        on_fault = met.any(axis=1) | (overlap(spans, spans_of(bad)) > slack[:, None]).any(axis=1)
+        in_ok = overlap(spans, ok_blocks).sum(axis=1) >= (spans[:, 1] - spans[:, 0]) / 2.0
+        kind = np.where(on_fault, MET, np.where(in_ok, FALSE, UNLABELLED))
+        unknown = np.array([finding.label == UNKNOWN for finding in findings], dtype=bool)
+        felt = np.array([fault.felt for fault in faults], dtype=bool)
+        same = np.array([[f.label == w.label for w in faults] for f in findings], dtype=bool)
+        same = same.reshape(met.shape)
+        counts = {
+            "runs": 1.0,
+            "faulty": float(len(faults) > 0),
+            "ok_hours": duration(ok) / HOUR,
+            "ok_hours_flagged": duration(common(ok, spans)) / HOUR,
+            "unlabelled_hours": (duration(classified) - duration(common(classified, known))) / HOUR,
+            "findings": len(findings),
+            "false_alarms": int((kind == FALSE).sum()),
+            "unknown_false_alarms": int((unknown & (kind == FALSE)).sum()),
+            "alarms_in_unlabelled": int((kind == UNLABELLED).sum()),
+            "faults": len(faults),
+            "felt": int(felt.sum()),
+            **_matches(met[None], close[None], felt, same),
+        }
+        chance = _matches(*_by_chance(run, spans, wanted), felt, same)
+        counts |= {f"{name}_by_chance": value for name, value in chance.items()}
+        return cls(
+            run,
+            faults,
+            kind,
+            np.any(met, axis=0),
+            np.any(close, axis=0),
+            _delays(run, faults, met),
+            counts,
+            run_score(labels),
+        )
+
+
+def confirmed_at(labels: Labels) -> Index:
+    """Frame at which each flagged frame's stretch is confirmed, shape (frames,).
+
+    A live listener knows of a stretch once it has enough frames of evidence, as `labels`
+    counts them. What is given for frames that are not flagged has no meaning.
+    """
+    flagged, frames = labels.flagged, np.arange(len(labels))
+    if labels.above_threshold is None:
+        return frames
+    evidence = flagged & (labels.above_threshold | (labels.label == UNKNOWN))
+    apart = labels.start[1:] > labels.stop[:-1]
+    first, last = np.append(True, apart)[: len(frames)], np.append(apart, True)[: len(frames)]
+    begins = flagged & (first | ~np.append(False, flagged)[: len(frames)])
+    total = np.cumsum(np.where(first | last, 2, 1) * evidence)
+    own = frames[np.maximum.accumulate(np.where(begins, frames, 0))] if len(frames) else frames
+    before = np.append(0, total)[own]
+    place: Index = np.searchsorted(total, before + CONFIRM)
+    return np.minimum(place, len(frames) - 1)
+
+
+def run_score(labels: Labels) -> float:
+    """Largest failure score that two neighbouring frames both reach; NaN without a frame.
+
+    A finding takes two frames. A frame without a neighbour on one side stands alone, as in the rule
+    from frames to findings.
+    """
+    if not len(labels):
+        return float("nan")
+    scores = failure_score(labels.scores, labels.classes)
+    if labels.above_threshold is None:
+        return float(scores.max())
+    apart = labels.start[1:] > labels.stop[:-1]
+    alone = np.append(True, apart) | np.append(apart, True)
+    pairs = np.minimum(scores[1:], scores[:-1])[~apart]
+    return float(np.concatenate((scores[alone], pairs)).max())
+
+
+def failure_score(scores: Array, classes: Sequence[str]) -> Array:
+    """Score of any failure: 1 - P(ok), or the largest score of a failure less that of `ok`.
+
+    Args:
+        scores: Of all classes, shape (frames, classes).
+        classes: Their names, `ok` among them.
+
+    Returns:
+        Shape (frames,).
+    """
+    ok = list(classes).index(OK)
+    if are_probabilities(scores):
+        return 1.0 - scores[:, ok]
+    margin: Array = np.delete(scores, ok, axis=1).max(axis=1) - scores[:, ok]
+    return margin
+
+
+def are_probabilities(scores: Array) -> bool:
+    """Whether scores of shape (frames, classes) are probabilities: none below 0, with the sum 1."""
+    whole = np.allclose(scores.sum(axis=1), 1.0, rtol=0.0, atol=1e-6)
+    return bool(whole and (scores >= 0.0).all())
+
+
+def _matches(met: Mask, close: Mask, felt: Mask, same: Mask) -> dict[str, float]:
+    """Mean counts of cases: ``met`` and ``close`` have the shape (cases, findings, faults)."""
+    found: Mask = np.any(met, axis=1)
+    return {
+        "found": float(found.sum(axis=1).mean()),
+        "found_felt": float(found[:, felt].sum(axis=1).mean()),
+        "onset_close": float(np.any(close, axis=1).sum(axis=1).mean()),
+        "matched_by_class": float(one_to_one(met & same).mean()),
+        "matched": float(one_to_one(met).mean()),
+    }
+
+
+def _by_chance(run: Predictions, spans: Array, wanted: Array) -> tuple[Mask, Mask]:
+    """What meets, and with the right onset, of findings shifted at random; the name is the seed."""
+    if not len(spans) or not len(run.labels):
+        none = np.zeros((1, len(spans), len(wanted)), dtype=bool)
+        return none, none
+    start, stop = float(run.labels.start[0]), float(run.labels.stop[-1])
+    seed = int.from_bytes(hashlib.sha256(run.name.encode()).digest()[:8], "big")
+    offset = np.random.default_rng(seed).uniform(0.0, stop - start, SHIFTS)[:, None]
+    begin = start + (spans[:, 0] - start + offset) % (stop - start)
+    shifted = np.stack((begin, begin + spans[:, 1] - spans[:, 0]), axis=-1)
+    end = shifted[..., 1] - (stop - start)  # what is beyond the end comes at the beginning
+    over = np.stack((np.where(end > start, start, np.inf), end), axis=-1)
+    met = meet(np.minimum(shifted, stop), wanted) | meet(over, wanted)
+    return met, met & (np.abs(shifted[..., :, None, 0] - wanted[:, 0]) <= CLOSE)
+
+
+def _delays(run: Predictions, faults: Sequence[Fault], met: Mask) -> Array:
+    """Time from the start of each fault to the end of the frame at which it is known."""
+    labels, known = run.labels, confirmed_at(run.labels)
+    delay = np.full((len(run.findings), len(faults)), np.nan)
+    for row, column in np.argwhere(met):
+        span, fault = run.spans[row], faults[column]
+        first = int(np.searchsorted(labels.start, span.start - run.step / 2.0))
+        own = max(first, int(np.searchsorted(labels.stop, fault.start, side="right")))
+        last = int(np.searchsorted(labels.stop, span.stop - run.step / 2.0))
+        frame = max(int(known[first]), min(own, last))
+        delay[row, column] = max(labels.stop[frame] - fault.start, 0.0)
+    soonest: Array = np.fmin.reduce(delay, axis=0, initial=np.nan)
+    return soonest
