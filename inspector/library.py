@@ -1,6 +1,6 @@
 """Choose a model for a run and let it label the run's noise."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from inspector.errors import InspectorError
 from inspector.hold import without_hold
 from noiseclassifier.profile import NOMINAL
 from noisemodel.run import pieces_of
-from noisemodel.types import Array, Real
+from noisemodel.types import Array, Mask, Real
 
 Library = Mapping[str, nc.Model]
 """Models by name."""
@@ -32,12 +32,14 @@ class Labelled:
         model: The model's name.
         remark: What was done to the run before, a sentence; empty if nothing was.
         alarm: Alarm threshold, a probability of any failure; None of a model without one.
+        lasting: Oscillations that stand out of any robot's motion, see `noiseclassifier.lasting`.
     """
 
     labels: nc.Labels
     model: str
     remark: str = ""
     alarm: float | None = None
+    lasting: tuple[nc.Event, ...] = ()
 
 
 def load_library(paths: Sequence[str | Path] = ()) -> Library:
@@ -110,14 +112,25 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     if not _close(run.rate, rate):
         run = nm.decimated(run, rate)
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
-    pieces = ((_signals(piece), piece.mask) for piece in pieces_of(run))
-    labels = classifier.classify_pieces(pieces, run.rate, start=float(run.time[0]))
+    start = float(run.time[0])
+    lasting = nc.Lasting(run.rate, start=start)
+    labels = classifier.classify_pieces(_watched(run, lasting), run.rate, start=start)
+    lasting.finish()
     if not len(labels):
         raise CannotTellError(
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"
             " requires"
         )
-    return _counted(Labelled(labels, name, remark, _alarm(classifier, labels)))
+    alarm = _alarm(classifier, labels)
+    return _counted(Labelled(labels, name, remark, alarm, lasting.events))
+
+
+def _watched(run: nm.Run, lasting: nc.Lasting) -> Iterator[tuple[dict[str, Real], Mask]]:
+    """Signals of a run piece by piece, which also goes to what looks for what lasts."""
+    for piece in pieces_of(run):
+        signals = _signals(piece)
+        lasting.push(signals, piece.mask)
+        yield signals, piece.mask
 
 
 def nearest(

@@ -32,6 +32,10 @@ from inspector.library import (
 from inspector.localisation.extent import extent
 from inspector.logs.opening import Opened, open_run
 from noiseclassifier import Event
+from noiseclassifier.lasting import HOP as LASTING_HOP
+from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
+from noiseclassifier.lasting import WINDOW as LASTING_WINDOW
+from noiseclassifier.lasting import joined
 from noisemodel.catalog import is_file_name, is_name
 from noisemodel.types import Array
 
@@ -162,10 +166,21 @@ class Analysis:
         return f"{line}; {IGNORED}" if self.unknown is Unknown.IGNORE else line
 
     @property
+    def evidence(self) -> str:
+        """What an `ok` relies on, and what it cannot rely on, a sentence or two."""
+        if self.audit is None:
+            return "Nothing stands out within the log."
+        desired = self.run.velocity_desired is not None
+        without = "" if desired else " No desired velocity: tracking errors were not judged."
+        return f"Nothing stands out, within the run or for any robot.{without}"
+
+    @property
     def message(self) -> str:
         """What `classify` says beside the findings, in a line; may be empty."""
         ignored = [f"{IGNORED[0].upper()}{IGNORED[1:]}."] if self.unknown is Unknown.IGNORE else []
         notes = [*ignored, *self.notes]
+        if self.status is Status.OK:
+            notes.insert(0, self.evidence)
         if self.status is Status.CANNOT_TELL:
             return " ".join([f"{self.reason.rstrip('.')}.", *notes]) if notes else self.reason
         return " ".join([*notes, *(() if self.audit is None else shortcomings(self.audit))])
@@ -355,7 +370,7 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     """Add labels to an analysis, with the findings and the status that follow from them."""
     reported = empty.unknown is Unknown.FINDING
     labels = replace(labelled.labels, unknown_is_finding=reported)
-    spans, findings = extents(empty.run, labels)
+    spans, findings = extents(empty.run, labels, labelled.lasting)
     known = int((labels.label != nc.UNKNOWN).sum())
     return replace(
         empty,
@@ -371,12 +386,26 @@ def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis
     )
 
 
-def extents(run: nm.Run, labels: nc.Labels) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
-    """List the events of labels, and the same from onset to end, in order of time."""
-    spans, frame = labels.events(), float(labels.stop[0] - labels.start[0])
-    times = [extent(run, e.start, e.stop, frame=frame, hop=labels.step) for e in spans]
-    pairs = zip(spans, times, strict=True)
-    return spans, tuple(replace(span, start=start, stop=stop) for span, (start, stop) in pairs)
+def extents(
+    run: nm.Run, labels: nc.Labels, lasting: Sequence[Event] = ()
+) -> tuple[tuple[Event, ...], tuple[Event, ...]]:
+    """List the findings of labels and of what lasts, as they were found, and from onset to end.
+
+    Those that overlap or touch are one, of the class that lasts longer.
+    """
+    frame, pairs = float(labels.stop[0] - labels.start[0]), list[tuple[Event, Event]]()
+    found = [(event, 0.0, frame, labels.step) for event in labels.events()]
+    found += [(event, LASTING_MARGIN, LASTING_WINDOW, LASTING_HOP) for event in lasting]
+    for span, more, length, step in sorted(found, key=lambda each: (each[0].start, each[0].stop)):
+        start, stop = extent(run, span.start - more, span.stop + more, frame=length, hop=step)
+        own = replace(span, start=start, stop=stop)
+        if pairs and pairs[-1][0].stop >= span.start:
+            before, located = pairs.pop()
+            span = joined(before, span)
+            start, stop = min(located.start, own.start), max(located.stop, own.stop)
+            own = replace(span, start=start, stop=stop)
+        pairs.append((span, own))
+    return tuple(span for span, _ in pairs), tuple(finding for _, finding in pairs)
 
 
 def _missing(run: nm.Run) -> Iterator[str]:

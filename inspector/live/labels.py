@@ -69,6 +69,7 @@ class NoiseSignals:
         columns: How many columns make noise: those of ``NOISY``, in that order.
         names: Noise signals that there are.
         joints: How many joints there are.
+        lasting: Names of those in which what lasts is looked for.
     """
 
     def __init__(self, widths: Mapping[str, int]) -> None:
@@ -95,6 +96,7 @@ class NoiseSignals:
         if efforts:
             self._ways[EFFORT] = lambda motion: motion[:, end:].T
         self.names = tuple(self._ways)
+        self.lasting = tuple(name for name in (measured_joints, error_joints) if name in self.names)
 
     def of(self, motion: Array, names: Sequence[str]) -> dict[str, Array]:
         """Compute noise signals.
@@ -125,6 +127,7 @@ class Labeller:
         self._decimator: Decimator | None = None
         self._signals, self._names = NoiseSignals(widths), tuple[str, ...]()
         self._ratio, self._samples = 1, 0
+        self._lasting: nc.Lasting | None = None
         try:
             self.model, chosen = nc.nearest(library, rate, self._signals.names)
         except nc.ModelsError as error:
@@ -142,6 +145,7 @@ class Labeller:
             return
         self._ratio, self._names = ratio, chosen.profile.signals
         self._stream = nc.Stream(chosen, rate=rate / ratio, joints=self._signals.joints)
+        self._lasting = nc.Lasting(rate / ratio)
         if ratio > 1:
             self._decimator = Decimator(ratio, self._signals.columns)
             self.remark = f"Labelled at {rate / ratio:g} Hz, the rate of model {self.model}."
@@ -184,24 +188,48 @@ class Labeller:
             return None
         if self._decimator is not None:
             motion, valid = self._decimator.push(motion, valid)
+        return self._take(motion, valid)
+
+    def _take(self, motion: Array, valid: Mask) -> nc.Labels:
+        assert self._stream is not None
+        assert self._lasting is not None
+        self._lasting.push(self._signals.of(motion, self._signals.lasting), valid)
         return self._stream.push(self._signals.of(motion, self._names), valid)
+
+    @property
+    def lasting(self) -> tuple[Event, ...]:
+        """What lasts so far, on the clock of the labels."""
+        return () if self._lasting is None else self._lasting.events
+
+    @property
+    def decided(self) -> float:
+        """Time before which nothing begins any more that lasts, on the clock of the labels."""
+        return float("inf") if self._lasting is None else self._lasting.decided
+
+    def finish(self) -> None:
+        """End the signal."""
+        if self._lasting is not None:
+            self._lasting.finish()
 
     def skip(self, samples: int) -> None:
         """Pass over samples that were lost."""
         self._samples += samples
         if self._stream is None:
             return
+        assert self._lasting is not None
         if self._decimator is None:
             self._stream.skip(samples)
+            self._lasting.skip(samples)
             return
         # Samples in a gap are all alike: enough of them to fill the filter are processed.
         whole = max(samples - 4 * self._ratio * EDGE, 0) // self._ratio
         self._stream.skip(whole)
+        self._lasting.skip(whole)
         rest = samples - whole * self._ratio
         lower, valid = self._decimator.push(
             np.zeros((rest, self._decimator.columns)), np.zeros(rest, dtype=bool)
         )
-        self._stream.push(self._signals.of(lower, self._names), valid)
+        self._take(lower, valid)
 
 
 SETTLED = 3

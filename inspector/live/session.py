@@ -30,7 +30,7 @@ from inspector.live.samples import (
 )
 from inspector.live.sink import Sink
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
-from noiseclassifier import Event
+from noiseclassifier import Event, merged
 from noisemodel.bounds import beyond, limit
 from noisemodel.limits import joint_limits
 from noisemodel.types import Array, Mask
@@ -72,6 +72,7 @@ class Worker:
         self._lane = Lane(self._labeller.hop, self._labeller.length)
         self._counts: Counter[str] = Counter()
         self._findings = Findings()
+        self._shift: float | None = None  # from the clock of the labels to that of the samples
         wait = self._labeller.length + SETTLED * self._labeller.hop
         self._news, self._on_finding = News(self._tell, wait), on_finding
         self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
@@ -128,7 +129,7 @@ class Worker:
     @property
     def findings(self) -> tuple[Event, ...]:
         """The findings so far, as if the signal ended here."""
-        return self._findings.events
+        return self._with_lasting(self._findings.events)
 
     @property
     def frames(self) -> int:
@@ -180,6 +181,7 @@ class Worker:
 
     def finish(self) -> None:
         """Show what waits, and tell of findings that last to the end."""
+        self._labeller.finish()
         self._news.update(self.findings, float("inf"))
         if self._sink.alive:
             self._drawing.changes(self._lane.end())
@@ -247,8 +249,10 @@ class Worker:
             shift = end - self._labeller.elapsed
             labels = replace(labels, start=labels.start + shift, stop=labels.stop + shift)
             self._findings.add(labels)
-            told = self._findings.confirmed
-            self._news.update(told, self._findings.decided, float(labels.stop[-1]))
+            self._shift = shift if self._shift is None else self._shift
+            told = self._with_lasting(self._findings.confirmed)
+            decided = min(self._findings.decided, self._labeller.decided + self._shift)
+            self._news.update(told, decided, float(labels.stop[-1]))
             labels = replace(labels, label=labels.raw)
             self._counts.update(labels.label.tolist())
             changes = self._lane.take(labels)
@@ -262,6 +266,15 @@ class Worker:
                 self._show_findings(end)
         if columns is not None and self._sink.alive:
             self._drawing.spectrogram(columns)
+
+    def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
+        """Findings of the labels and of what lasts, on the clock of the samples."""
+        shift = self._shift or 0.0
+        lasting = (
+            replace(each, start=each.start + shift, stop=each.stop + shift)
+            for each in self._labeller.lasting
+        )
+        return merged(*events, *lasting)
 
     def _tell(self, event: Event, over: bool) -> None:
         if self._sink.alive and not over:

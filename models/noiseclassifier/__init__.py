@@ -40,6 +40,7 @@ from noiseclassifier.features import features
 from noiseclassifier.framing import frame
 from noiseclassifier.general import Frames, General, frames_of
 from noiseclassifier.labels import ANOMALY, UNKNOWN, Event, Labels
+from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
 from noiseclassifier.logfile import nominal_rate, read_log
 from noiseclassifier.novelty.adaptation import adapt
@@ -77,6 +78,7 @@ __all__ = [
     "General",
     "GoodMotion",
     "Labels",
+    "Lasting",
     "Learnt",
     "Limit",
     "LogBands",
@@ -111,6 +113,7 @@ __all__ = [
     "leave_one_out",
     "load",
     "match",
+    "merged",
     "nearest",
     "noisytest",
     "nominal_rate",

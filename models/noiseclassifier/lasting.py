@@ -1,0 +1,276 @@
+"""What lasts: a line in the spectrum of a joint that stands out, for as long as it is there.
+
+Trees on features relative to a run see what changes in it; a joint that vibrates from the first
+sample to the last is its own reference. A line needs no past: its *prominence* is its level over
+the median level of the frequencies within a factor of 1.5 around it. Motion, impacts and the noise
+of sensors are broad; a control loop that chatters, a resonance that is excited or an added tone are
+lines. The *strength* of a line, in [dB], is its prominence, but at most its level re 1 rad/s plus
+50 dB: a line of 3 mrad/s has the strength 0 however silent the joint is beside it.
+
+Where there is a tracking error, a line of both stands out from the neighbourhood in either: motion
+is no part of the error. A line of the error alone is none of the robot: the desired motion has it.
+
+A line that is strong in windows that follow each other, in one joint and at one frequency, is
+oscillations. The ripple of a drive follows the speed of its joint from window to window, and thus
+has no one frequency. Files and streams have the same windows, hence the same numbers.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from noiseclassifier.labels import UNKNOWN, Event
+from noiseclassifier.signals import JOINTS
+from noiseclassifier.types import Array, Mask, Real
+
+WINDOW, HOP = 1.0, 0.25
+"""Duration of a window, and time from one to the next, in [s]."""
+MARGIN = (WINDOW - HOP) / 2
+"""Time by which a finding begins after the first of its windows, and ends before the last, in [s],
+but where the signal begins or ends."""
+SHORTEST = 0.6
+"""Shortest stretch without a gap that can be judged, in [s]: it is a window of its own."""
+LOWEST, HIGHEST = 10.0, 0.47
+"""Lines that count: lowest frequency, in [Hz], and highest, as a share of the sample rate."""
+AROUND = 1.5
+"""Ratio of frequencies up to which the neighbourhood of a line reaches."""
+BAND = 1.1
+"""Ratio of frequencies whose lines have one neighbourhood."""
+FLOOR = -50.0
+"""Level of a line whose strength is 0 at most, in [dB re 1 rad/s]."""
+STRONG = 20.0
+"""Strength of a line in each of ``WINDOWS`` windows that makes it a finding, in [dB]."""
+WINDOWS = 3
+"""Windows in a row; in a stretch that has fewer, all of them."""
+SHARP = 26.0
+"""Strength in one window that makes a finding of a strong line of any length, in [dB]."""
+DRIFT = 2.0
+"""How far a line moves from one window to the next, in [Hz]."""
+TINY = 1e-30
+"""Mean square of silence, in [rad²/s²]."""
+MEASURED, ERROR = JOINTS[1], JOINTS[2]
+
+
+@dataclass(frozen=True)
+class Line:
+    """A strong line of a joint that was followed from window to window.
+
+    Attributes:
+        row: The joint.
+        frequency: In the latest window, in [Hz].
+        strength: Least strength of its windows, in [dB].
+        windows: How many it was followed through.
+        first: Number of the first one's first sample.
+        stop: Number of the sample after its last window.
+        sharp: Largest strength of a window, in [dB].
+    """
+
+    row: int
+    frequency: float
+    strength: float
+    windows: int
+    first: int
+    stop: int
+    sharp: float
+
+    @property
+    def found(self) -> bool:
+        """Whether it is a finding."""
+        return self.windows >= WINDOWS or self.sharp >= SHARP
+
+
+class Lasting:
+    """Finds lines that last in signals that come in chunks of any size.
+
+    Args:
+        rate: Sample rate, in [Hz].
+        start: Time of the first sample, in [s].
+    """
+
+    def __init__(self, rate: float, *, start: float = 0.0) -> None:
+        self.rate, self.start = rate, start
+        self._length, self._hop = round(WINDOW * rate), max(1, round(HOP * rate))
+        self._margin = round(MARGIN * rate)
+        self._first = 0  # number of the first sample that is held
+        self._samples = np.empty((0, 0, 0))  # of the stretch, from where the next window begins
+        self._windows = 0  # of the stretch
+        self._lines: list[Line] = []  # of the latest window
+        self._events: list[Event] = []
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Findings so far, in order of time."""
+        return tuple(self._events)
+
+    @property
+    def decided(self) -> float:
+        """Time before which no finding begins that is still to come, in [s]."""
+        firsts = [line.first for line in self._lines]
+        return self.start + min([self._first, *firsts]) / self.rate
+
+    def push(self, signals: Mapping[str, Real], valid: Mask | None = None) -> None:
+        """Take samples.
+
+        Args:
+            signals: By name; measured velocities and tracking errors joint by joint are taken, of
+                shape (joints, samples).
+            valid: False in gaps, shape (samples,); no window touches a gap.
+        """
+        if MEASURED not in signals:
+            return
+        names = [name for name in (MEASURED, ERROR) if name in signals]
+        fresh = np.stack([np.asarray(signals[name], np.float64) for name in names])
+        gaps = [] if valid is None else np.flatnonzero(np.diff(valid, prepend=True)).tolist()
+        for first, stop in pairwise([0, *gaps, fresh.shape[2]]):
+            if valid is None or first == stop or valid[first]:
+                self._take(fresh[..., first:stop])
+            else:
+                self.skip(stop - first)
+
+    def skip(self, samples: int) -> None:
+        """Skip a gap."""
+        self.finish()
+        self._first += samples
+
+    def finish(self) -> None:
+        """End a stretch: the signal ends, or a gap begins."""
+        rest = self._samples.shape[2]
+        if not self._windows and rest >= SHORTEST * self.rate:
+            self._follow(strong(self._samples, self.rate), rest)
+        for line in self._lines:
+            if line.found or line.windows == self._windows < WINDOWS:
+                self._add(line, self._first + rest)
+        self._lines, self._windows = [], 0
+        self._samples = self._samples[..., :0]
+        self._first += rest
+
+    def _take(self, fresh: Array) -> None:
+        held = self._samples if len(self._samples) == len(fresh) else fresh[..., :0]
+        self._samples = np.concatenate((held, fresh), axis=2)
+        while self._samples.shape[2] >= self._length:
+            self._follow(strong(self._samples[..., : self._length], self.rate), self._length)
+            self._samples = self._samples[..., self._hop :]
+            self._first += self._hop
+
+    def _follow(self, peaks: list[tuple[int, float, float]], length: int) -> None:
+        """Continue the lines of the window before with the peaks of the next one."""
+        stop, lines = self._first + length, []
+        self._windows += 1
+        for row, frequency, strength in peaks:
+            line = Line(row, frequency, strength, 1, self._first, stop, strength)
+            before = [
+                each
+                for each in self._lines
+                if each.row == row and abs(each.frequency - frequency) <= DRIFT
+            ]
+            if before:
+                best = max(before, key=lambda each: (each.windows, each.strength))
+                line = replace(
+                    line,
+                    first=best.first,
+                    windows=best.windows + 1,
+                    strength=min(strength, best.strength),
+                    sharp=max(strength, best.sharp),
+                )
+            lines.append(line)
+        self._lines = lines
+        for line in lines:
+            if line.found:
+                self._add(line, line.stop - self._margin)
+
+    def _add(self, line: Line, stop: int) -> None:
+        # The line begins somewhere in its first window, but with that of a stretch.
+        first = line.first + (self._margin if line.windows < self._windows else 0)
+        times = self.start + first / self.rate, self.start + stop / self.rate
+        score = 1.0 - 0.5 * 10.0 ** (-max(line.strength - STRONG, 0.0) / 10.0)
+        self._events = [*merged(*self._events, Event("oscillations", *times, score))]
+
+
+def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
+    """Strong lines of a window.
+
+    Args:
+        window: Measured velocities, and tracking errors if there are any, shape (1 or 2, joints,
+            samples), in [rad/s].
+        rate: Sample rate, in [Hz].
+
+    Returns:
+        Joint, frequency in [Hz] and strength in [dB] of each.
+    """
+    power, frequency = spectrum(window, rate)
+    line = power[0]
+    loud = line >= 10.0 ** ((STRONG + FLOOR) / 10.0)
+    loud &= (frequency >= LOWEST) & (frequency <= HIGHEST * rate)
+    loud[:, 1:-1] &= (line[:, 1:-1] >= line[:, :-2]) & (line[:, 1:-1] >= line[:, 2:])
+    if not loud.any():
+        return []
+    rows, places = np.nonzero(loud)
+    strength = np.full(len(rows), -np.inf)
+    band = np.floor(np.log(frequency[places] / LOWEST) / np.log(BAND))
+    for each in np.unique(band).tolist():
+        middle = LOWEST * BAND ** (each + 0.5)
+        around = slice(*np.searchsorted(frequency, (middle / AROUND, middle * AROUND)))
+        own = np.flatnonzero(band == each)
+        there, which = np.unique(rows[own], return_inverse=True)
+        for signal in power:
+            median = np.median(signal[there, around], axis=-1)[which]
+            shared = np.minimum(line[rows[own], places[own]], signal[rows[own], places[own]])
+            found = 10.0 * np.log10(shared / np.maximum(median, TINY))
+            level = 10.0 * np.log10(np.maximum(shared, TINY)) - FLOOR
+            strength[own] = np.maximum(strength[own], np.minimum(found, level))
+    kept = np.flatnonzero(strength >= STRONG)
+    return [(int(rows[k]), float(frequency[places[k]]), float(strength[k])) for k in kept.tolist()]
+
+
+def spectrum(window: Array, rate: float) -> tuple[Array, Array]:
+    """Mean square of the line at each frequency of a Hann window.
+
+    Args:
+        window: Shape (..., samples).
+        rate: Sample rate, in [Hz].
+
+    Returns:
+        Shape (..., frequencies), and the frequencies, in [Hz].
+    """
+    taper, response = _taper(window.shape[-1] - 1)
+    # Of the differences: slow motion, which is far louder, would leak into all frequencies.
+    waves = np.fft.rfft(np.diff(window, axis=-1) * taper, axis=-1)
+    frequency = np.arange(waves.shape[-1]) * (rate / (window.shape[-1] - 1))
+    return np.asarray((np.square(waves.real) + np.square(waves.imag)) * response), frequency
+
+
+@lru_cache
+def _taper(length: int) -> tuple[Array, Array]:
+    """Hann window, and factors from squares of the transform to mean squares of the signal."""
+    taper = 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+    slope = 2.0 * np.sin(np.pi * np.arange(length // 2 + 1) / length)
+    slope[0] = np.inf
+    return taper, 2.0 / np.square(taper.sum() * slope)
+
+
+def merged(*events: Event) -> tuple[Event, ...]:
+    """Events in order of time, those that overlap or touch as one."""
+    found: list[Event] = []
+    for event in sorted(events, key=lambda event: (event.start, event.stop)):
+        if found and found[-1].stop >= event.start:
+            found[-1] = joined(found[-1], event)
+        else:
+            found.append(event)
+    return tuple(found)
+
+
+def joined(event: Event, other: Event) -> Event:
+    """One event of two that overlap or touch, of the class that lasts longer and is known."""
+    known = event.label != UNKNOWN, other.label != UNKNOWN
+    durations = event.stop - event.start, other.stop - other.start
+    longer = event if (known[0], durations[0]) >= (known[1], durations[1]) else other
+    return replace(
+        longer,
+        start=min(event.start, other.start),
+        stop=max(event.stop, other.stop),
+        score=max(event.score, other.score) if event.label == other.label else longer.score,
+        novel=event.novel or other.novel,
+    )
