@@ -194,10 +194,3 @@ def test_our_twists_are_those_of_the_loops_that_they_are_timed_with(bench):
     motion = twists.states(robot, 3)
     for loop in (twists.loop_by_twist, twists.loop_by_sample):
         np.testing.assert_allclose(loop(robot, *motion), nm.link_twists(robot, *motion), atol=1e-12)
-
-
-def test_the_page_has_every_benchmark():
-    page = (ROOT / "docs" / "benchmarks.md").read_text(encoding="utf-8")
-    scripts = {path.stem for path in (ROOT / "benchmarks").glob("*.py")} | {"elsewhere"}
-    helpers = {"__init__", "__main__", "table", "noisytestside"}
-    assert [name for name in sorted(scripts - helpers) if f"`{name}`" not in page] == []

@@ -276,7 +276,7 @@ def test_a_baseline_is_a_model_file_and_the_same_runs_give_the_same_bytes(learnt
 def test_a_limit_of_another_shape_is_no_model(learnt, tmp_path):
     odd = replace(learnt.classifier.estimator, limit=np.ones(2))
     replace(learnt.classifier, estimator=odd).save(tmp_path / "odd.npz")
-    with pytest.raises(nc.FileError, match=r"array 'limit' has shape \(2,\)"):
+    with pytest.raises(nc.ModelFileError, match=r"array 'limit' has shape \(2,\)"):
         nc.Classifier.load(tmp_path / "odd.npz")
 
 
@@ -301,7 +301,7 @@ def test_a_failure_of_any_class_is_an_anomaly(learnt):
     assert measured.protocol.counts["false_alarms"] == 0
     assert measured.frames.failure_recall.value == 1.0
     assert measured.calibration_error is None
-    with pytest.raises(nc.DatasetError, match="good0"):
+    with pytest.raises(nc.SeenError, match="good0"):
         nc.assess(learnt.classifier, [recording("good0", 0, blocks=((0.0, 8.0, "ok"),))])
 
 

@@ -1,6 +1,6 @@
 """Classification of a robot's noise: from a signal to labels.
 
-    frames -> |STFT| -> bands -> log -> temporal pooling -> estimator -> class
+    frames -> STFT -> bands -> log -> temporal pooling -> estimator -> class
 
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` holds
 all settings: NoisyTest's, the paper's, or ours for any rate (`LogBands`). A `Dataset` holds
@@ -15,45 +15,42 @@ only to train.
 from noiseclassifier.choice import Model, load, nearest
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.dataset import Dataset, Examples
+from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import (
     AnnotationError,
+    DataFileError,
     DatasetError,
     FileError,
     MissingSignalError,
+    ModelFileError,
     ModelsError,
     NoFrameError,
     OutputError,
     ProfileError,
     RateError,
     RecordingError,
+    SeenError,
     SignalError,
+    UnknownLabelError,
 )
 from noiseclassifier.evaluation.assessment import Assessment, assess, evaluate
 from noiseclassifier.evaluation.matching import Unanswered, match
+from noiseclassifier.examples import Examples
 from noiseclassifier.features import features
 from noiseclassifier.framing import frame
 from noiseclassifier.general import Frames, General, frames_of
 from noiseclassifier.labels import ANOMALY, UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
-from noiseclassifier.noisytest import nominal_rate, read_log
+from noiseclassifier.logfile import nominal_rate, read_log
 from noiseclassifier.novelty.adaptation import adapt
 from noiseclassifier.novelty.frames import GoodMotion
 from noiseclassifier.novelty.limit import Limit
 from noiseclassifier.novelty.training import Learnt, learn_baseline
 from noiseclassifier.profile import CLASSES, Profile
-from noiseclassifier.recording import (
-    Block,
-    Fault,
-    Recording,
-    check_apart,
-    folds,
-    group_of,
-    held_out,
-    leave_one_out,
-)
+from noiseclassifier.recording import Block, Fault, Recording
 from noiseclassifier.signals import NOISE, Signals
+from noiseclassifier.splitting import check_apart, folds, group_of, held_out, leave_one_out
 from noiseclassifier.stream import Stream
 
 __all__ = [
@@ -69,6 +66,7 @@ __all__ = [
     "Assessment",
     "Block",
     "Classifier",
+    "DataFileError",
     "Dataset",
     "DatasetError",
     "Evaluation",
@@ -86,6 +84,7 @@ __all__ = [
     "LogBands",
     "MissingSignalError",
     "Model",
+    "ModelFileError",
     "ModelsError",
     "NoFrameError",
     "OutputError",
@@ -94,10 +93,12 @@ __all__ = [
     "RateError",
     "Recording",
     "RecordingError",
+    "SeenError",
     "SignalError",
     "Signals",
     "Stream",
     "Unanswered",
+    "UnknownLabelError",
     "adapt",
     "assess",
     "check_apart",

@@ -19,7 +19,7 @@ import numpy as np
 
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.errors import ProfileError
-from noiseclassifier.estimators.decision import NOVELTY_LIMIT
+from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT
 from noiseclassifier.estimators.trees import TAIL, Trees
 from noiseclassifier.general import UNBOUNDED
 from noiseclassifier.novelty.frames import GoodMotion, parts

@@ -11,7 +11,8 @@ from noiseclassifier.errors import DatasetError, MissingSignalError, RateError, 
 from noiseclassifier.features import feature_count
 from noiseclassifier.framefeatures import frame_features
 from noiseclassifier.profile import NOMINAL, Profile
-from noiseclassifier.recording import Recording, folds, group_of
+from noiseclassifier.recording import Recording
+from noiseclassifier.splitting import folds, group_of
 from noiseclassifier.types import Array, Index, Mask, Words
 
 OK = "ok"

@@ -1,0 +1,54 @@
+"""Write the pages that are made from the code: `python docs/generate.py`; a test holds them."""
+
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).parent
+NOTE = "Written by `python docs/generate.py`.\n\n"
+
+
+def commands() -> str:
+    """The page of commands: the help of each, and its options that are shown."""
+    from typer.main import get_command
+
+    from inspector.cli import app
+
+    command: Any = get_command(app)
+    parts = [f"# Commands\n\n{NOTE}{_prose(command.help)}\n"]
+    for name, each in command.commands.items():
+        if each.hidden:
+            continue
+        arguments = " ".join(
+            (param.metavar or param.name or "").upper() + ("…" if param.nargs != 1 else "")
+            for param in each.params
+            if param.param_type_name == "argument"
+        )
+        parts.append(f"\n## {name}\n\n`inspector {name} {arguments}`\n\n{_prose(each.help)}\n")
+        rows = [
+            f"| {', '.join(f'`{flag}`' for flag in (*param.opts, *param.secondary_opts))}"
+            f" | {_cell(param.help)} |"
+            for param in each.params
+            if param.param_type_name == "option" and not param.hidden and param.name != "help"
+        ]
+        if rows:
+            parts.append("\n".join(("\n| option | meaning |", "|---|---|", *rows)) + "\n")
+    return "".join(parts)
+
+
+def _prose(text: str | None) -> str:
+    """Help text as Markdown, without the marks that only a terminal knows."""
+    lines = (text or "").replace("\b", "").replace("\f", "\n").strip().splitlines()
+    return "\n".join(line.strip() for line in lines)
+
+
+def _cell(text: str | None) -> str:
+    return " ".join((text or "").split()).replace("|", "\\|")
+
+
+PAGES = {"commands.md": commands}
+"""Files of this folder, and what makes each."""
+
+
+if __name__ == "__main__":
+    for page, make in PAGES.items():
+        (HERE / page).write_text(make(), encoding="utf-8")

@@ -1,0 +1,91 @@
+"""The estimators that there are, and what each of them offers."""
+
+from collections.abc import Mapping
+from typing import ClassVar, Protocol
+
+from noiseclassifier.estimators.baseline import Baseline
+from noiseclassifier.estimators.mlp import Networks
+from noiseclassifier.estimators.svm import SupportVectorMachines
+from noiseclassifier.estimators.trees import Detector, Trees
+from noiseclassifier.profile import EstimatorKind, Profile
+from noiseclassifier.types import Array, Index, Mask, Words
+
+
+class Estimator(Protocol):
+    """A classifier of standardised features, with its training and its arrays in a model file."""
+
+    DIMENSIONS: ClassVar[Mapping[str, int]]
+    """Number of dimensions of each array in a model file, by name."""
+
+    @classmethod
+    def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> "Estimator":
+        """Train an estimator; needs scikit-learn.
+
+        Args:
+            features: Standardised, shape (frames, features).
+            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
+            groups: Runs of a group share their motion, shape (frames,).
+            profile: Hyperparameters.
+
+        Returns:
+            The estimator; equal input gives an equal one.
+        """
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> "Estimator":
+        """Make an estimator from the arrays of a model file.
+
+        Args:
+            arrays: Those that ``DIMENSIONS`` lists, by name.
+            profile: Hyperparameters.
+        """
+
+    @staticmethod
+    def shapes(
+        arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
+    ) -> dict[str, tuple[int, ...]]:
+        """Expected shape of each array.
+
+        Args:
+            arrays: The arrays, each of the right number of dimensions; where the profile leaves a
+                size open, theirs counts.
+            profile: Hyperparameters.
+            features: Features of a frame.
+            classes: How many classes there are.
+        """
+
+    @staticmethod
+    def highest(profile: Profile, *, features: int) -> dict[str, int]:
+        """Highest value of each array that holds indices; the lowest is 0."""
+
+    @property
+    def width(self) -> int:
+        """Decision values of one frame."""
+
+    def decision(self, features: Array) -> Array:
+        """Decision values, shape (frames, width), of features, shape (frames, features)."""
+
+    def choose(self, decisions: Array) -> Index:
+        """Class of each frame, as an index, shape (frames,); beyond the last is unknown."""
+
+    def above_threshold(self, decisions: Array) -> Mask | None:
+        """Frames that may raise an alarm, shape (frames,); None: all that are failures."""
+
+    def novel(self, decisions: Array) -> Mask | None:
+        """Which frames are out of distribution, shape (frames,); None: not measured."""
+
+    def score(self, decisions: Array) -> Array:
+        """Score of each class, larger meaning more certain, shape (frames, classes)."""
+
+    def arrays(self) -> dict[str, Array]:
+        """Arrays for a model file, by name."""
+
+
+ESTIMATORS: Mapping[EstimatorKind, type[Estimator]] = {
+    "svm": SupportVectorMachines,
+    "networks": Networks,
+    "trees": Trees,
+    "detector": Detector,
+    "baseline": Baseline,
+}
+"""Class of each estimator, by the name that profiles have for it."""

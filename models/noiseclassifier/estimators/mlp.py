@@ -1,0 +1,226 @@
+"""Small neural networks, evaluated in NumPy, with calibrated probabilities of the classes.
+
+The probabilities of several networks with one hidden layer are averaged, and then calibrated.
+Features below nearly all of the training set are raised to its lower bound: a motion that is
+quieter than any other is no failure, and a simulator without sensor noise is not out of
+distribution for that.
+"""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Self, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noiseclassifier.estimators.calibration import TINY, calibrate, identity, of_seen_classes
+from noiseclassifier.estimators.probabilistic import Probable
+from noiseclassifier.profile import Profile
+from noiseclassifier.splitting import folds
+from noiseclassifier.types import Array, Index, Words
+
+Single: TypeAlias = NDArray[np.float32]
+
+RATE, BATCH = 2e-3, 256
+"""Learning rate and batch size of the gradient descent (Adam)."""
+UNSEEN = -30.0
+"""Bias of a class without training frames."""
+TAIL = 1e-3
+"""Share of the training frames below the lower bound of a feature, and above the upper one."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Networks(Probable):
+    """Networks whose probabilities are averaged, their calibration, and bounds of the features.
+
+    Attributes:
+        hidden: Weights to the hidden layers, shape (networks, features, units).
+        hidden_bias: Shape (networks, units).
+        output: Weights to the classes, shape (networks, units, classes).
+        output_bias: Shape (networks, classes).
+        known: Lowest and highest value of each feature in nearly all training frames, shape
+            (2, features).
+    """
+
+    DIMENSIONS: ClassVar[Mapping[str, int]] = {
+        "hidden": 3,
+        "hidden_bias": 2,
+        "output": 3,
+        "output_bias": 2,
+        "calibration": 1,
+        "frequency": 1,
+        "known": 2,
+    }
+
+    hidden: Array
+    hidden_bias: Array
+    output: Array
+    output_bias: Array
+    known: Array
+
+    @classmethod
+    def fit(cls, features: Array, targets: Index, groups: Words, profile: Profile) -> "Networks":
+        """Train networks, each from another start and on other groups, and calibrate them.
+
+        Each network leaves out a part of the groups; its logits there calibrate the average.
+
+        Rare classes have larger weights, by the square root of how much rarer they are: with
+        balanced weights, networks would raise alarms for the rarest class. Calibration restores
+        the frequencies.
+
+        Args:
+            features: Standardised, shape (frames, features).
+            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
+            groups: Runs of a group share their motion, shape (frames,).
+            profile: Size and training of the networks.
+
+        Returns:
+            The networks; equal input gives equal networks. Those of one group are not calibrated.
+        """
+        classes = int(targets.max()) + 1
+        networks, logits, truth = [], [], []
+        for seed, (train, test) in enumerate(_parts(targets, groups, profile.networks)):
+            network = _fit(seed, features[train], targets[train], profile, classes)
+            networks.append(network)
+            seen = of_seen_classes(targets, train, test)
+            logits.append(network.average(features[seen]))
+            truth.append(targets[seen])
+        labels = np.concatenate(truth)
+        calibration = networks[0].calibration
+        if len(labels):
+            calibration = calibrate(np.concatenate(logits), labels)
+        return Networks(
+            hidden=np.concatenate([network.hidden for network in networks]),
+            hidden_bias=np.concatenate([network.hidden_bias for network in networks]),
+            output=np.concatenate([network.output for network in networks]),
+            output_bias=np.concatenate([network.output_bias for network in networks]),
+            known=np.quantile(features, (TAIL, 1.0 - TAIL), axis=0),
+            calibration=calibration,
+            frequency=np.bincount(targets, minlength=classes) / len(targets),
+            alarm=profile.alarm,
+        )
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
+        """Make networks from the arrays of a model file."""
+        return cls(**{name: arrays[name] for name in cls.DIMENSIONS}, alarm=profile.alarm)
+
+    @staticmethod
+    def shapes(
+        arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
+    ) -> dict[str, tuple[int, ...]]:
+        """Expected shape of each array."""
+        count, units = profile.networks, profile.units
+        return {
+            "hidden": (count, features, units),
+            "hidden_bias": (count, units),
+            "output": (count, units, classes),
+            "output_bias": (count, classes),
+            "calibration": (1 + classes,),
+            "frequency": (classes,),
+            "known": (2, features),
+        }
+
+    @staticmethod
+    def highest(profile: Profile, *, features: int) -> dict[str, int]:
+        """No array holds indices."""
+        return {}
+
+    @property
+    def maximum(self) -> Array:
+        """Highest value of each feature in nearly all training frames, shape (features,)."""
+        maximum: Array = self.known[1]
+        return maximum
+
+    def logits(self, features: Array) -> Array:
+        """Logits of the classes, features being raised to their bound, shape (frames, classes)."""
+        return self.average(np.maximum(features, self.known[0]))
+
+    def average(self, features: Array) -> Array:
+        """Logarithms of the mean probabilities of all networks, shape (frames, classes)."""
+        weights, bias, output = self._single
+        # A product for each frame: the rounding of one for all depends on how many they are.
+        hidden = features.astype(np.float32)[:, None] @ weights
+        hidden += bias
+        np.maximum(hidden, 0.0, out=hidden)
+        logits = (hidden @ output).reshape(len(features), *self.output_bias.shape)
+        each = np.exp(_log_softmax(logits + self.output_bias))
+        average: Array = np.log(np.add.reduce(each, 1) / each.shape[1] + TINY)
+        return average
+
+    @cached_property
+    def _single(self) -> tuple[Single, Single, Single]:
+        """Weights and biases of all networks in one layer, in single precision: less to fetch."""
+        networks, features, units = self.hidden.shape
+        side_by_side = self.hidden.swapaxes(0, 1).reshape(features, networks * units)
+        classes = self.output.shape[-1]
+        block = np.zeros((networks, units, networks, classes))
+        block[range(networks), :, range(networks)] = self.output  # no connections between networks
+        each = side_by_side, self.hidden_bias, block
+        shapes = (features, -1), (-1,), (networks * units, -1)
+        weights, bias, output = (
+            np.ascontiguousarray(one.reshape(shape), dtype=np.float32)
+            for one, shape in zip(each, shapes, strict=True)
+        )
+        return weights, bias, output
+
+    def arrays(self) -> dict[str, Array]:
+        """Arrays for a model file, by name."""
+        return {name: getattr(self, name) for name in self.DIMENSIONS}
+
+
+def _log_softmax(values: Array) -> Array:
+    softmax: Array = values - np.logaddexp.reduce(values, -1, keepdims=True)
+    return softmax
+
+
+def _parts(targets: Index, groups: Words, networks: int) -> list[tuple[Index, Index]]:
+    """Training and test frames of each network, as indices."""
+    everything = np.arange(len(targets)), np.arange(0)
+    count = min(networks, len(set(groups.tolist())))
+    parts = folds(groups.tolist(), count) if count > 1 else [everything]
+    usable = [part if len(set(targets[part[0]].tolist())) > 1 else everything for part in parts]
+    return [usable[number % len(usable)] for number in range(networks)]
+
+
+def _fit(seed: int, features: Array, targets: Index, profile: Profile, classes: int) -> Networks:
+    """Train one network, without calibration."""
+    counts = np.bincount(targets, minlength=classes)
+    weights = np.sqrt(counts.max() / counts[targets])
+    there = np.flatnonzero(counts)
+    network = _train(seed, features, targets, weights, profile)
+    # scikit-learn has no output for a class that it does not see, and of two for the second alone.
+    learnt = there if len(there) > 2 else there[1:]
+    output = np.zeros((1, profile.units, classes))
+    output_bias = np.where(counts > 0, 0.0, UNSEEN)[None]
+    output[0][:, learnt], output_bias[0, learnt] = network.coefs_[1], network.intercepts_[1]
+    return Networks(
+        hidden=network.coefs_[0][None],
+        hidden_bias=network.intercepts_[0][None],
+        output=output,
+        output_bias=output_bias,
+        known=np.stack((features.min(axis=0), features.max(axis=0))),
+        calibration=identity(classes),
+        frequency=counts / len(targets),
+        alarm=profile.alarm,
+    )
+
+
+def _train(seed: int, features: Array, targets: Index, weights: Array, profile: Profile) -> Any:
+    from sklearn.exceptions import ConvergenceWarning
+    from sklearn.neural_network import MLPClassifier
+
+    network = MLPClassifier(
+        (profile.units,),
+        alpha=profile.decay,
+        batch_size=min(BATCH, len(features)),
+        learning_rate_init=RATE,
+        max_iter=profile.epochs,
+        n_iter_no_change=profile.epochs + 1,
+        random_state=seed,
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)  # so many epochs and no more
+        return network.fit(features, targets, weights)
