@@ -121,6 +121,66 @@ class Missing:
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What a finding is known by.
+
+    Attributes:
+        kind: "repetitions" of this motion, "other motions" of this robot, or the "general" model.
+        db: Loudest exceedance over the reference, in [dB]; None by the general model.
+        peak: When that is, in [s].
+        joint: Its joint.
+        signal: "velocity" or "tracking error".
+        octave: Its octave, in [Hz].
+        level: Its level, in [dB re 1 rad/s].
+        excused: Why the finding does not count; empty if it does.
+    """
+
+    kind: str
+    db: float | None = None
+    peak: float | None = None
+    joint: str = ""
+    signal: str = ""
+    octave: tuple[float, float] | None = None
+    level: float | None = None
+    excused: str = ""
+
+    def __str__(self) -> str:
+        if self.db is None or self.octave is None:
+            return "by the general model"
+        low, high = self.octave
+        return (
+            f"{self.db:.1f} dB over {self.kind} at {self.peak:.2f} s ({self.joint}, {self.signal},"
+            f" {low:.0f} to {high:.0f} Hz)"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """The evidence as JSON can hold it."""
+        return {
+            "kind": self.kind,
+            "over_db": self.db,
+            "peak": self.peak,
+            "joint": self.joint or None,
+            "signal": self.signal or None,
+            "band_hz": list(self.octave) if self.octave else None,
+            "level_db": self.level,
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Evidence":
+        """Read what `as_dict` wrote."""
+        band = content["band_hz"]
+        return cls(
+            str(content["kind"]),
+            content["over_db"] and float(content["over_db"]),
+            content["peak"] and float(content["peak"]),
+            str(content["joint"] or ""),
+            str(content["signal"] or ""),
+            (float(band[0]), float(band[1])) if band else None,
+            content["level_db"] and float(content["level_db"]),
+        )
+
+
+@dataclass(frozen=True)
 class Verdict:
     """What was found in one file.
 
@@ -133,7 +193,6 @@ class Verdict:
         localisations: The localisation of each finding, where it is known.
         model_sha256: SHA-256 of the model's file, empty without.
         orders: Of the findings whose vibration goes with the speed of a joint.
-        over: How far a finding is above the reference, in words; empty without a reference.
         assumed: What was assumed when its log was read, in a line; empty of a run file.
         scenario: The scenario that the run names, empty without.
         duration: Duration of the run, in [s]; 0 if it cannot be read.
@@ -149,6 +208,7 @@ class Verdict:
         lost: Outputs of the run that could not be written, a sentence each.
         trace: The traceback of an internal error.
         begin: Time of the run's first sample, in [s].
+        evidence: What each finding is known by, beside a reference.
     """
 
     path: Path
@@ -160,7 +220,6 @@ class Verdict:
     unknown: Unknown = Unknown.FINDING
     model_sha256: str = ""
     orders: Mapping[Event, "Order"] = field(default_factory=dict)
-    over: Mapping[Event, str] = field(default_factory=dict)
     assumed: str = ""
     scenario: str = ""
     duration: float = 0.0
@@ -176,6 +235,7 @@ class Verdict:
     lost: tuple[str, ...] = ()
     trace: str = ""
     begin: float = 0.0
+    evidence: Mapping[Event, Evidence] = field(default_factory=dict)
 
     @property
     def of_run(self) -> bool:
@@ -271,9 +331,8 @@ class Verdict:
             "fails": ruled.ruling.fails,
             "ruling": ruled.ruling.value,
             "reason": ruled.reason,
+            "evidence": self.evidence.get(event, Evidence("general")).as_dict(),
         }
-        if event in self.over:
-            written["over"] = self.over[event]
         if known is not None:
             written["localisation"] = {
                 "stage": known.stage or None,
@@ -294,7 +353,7 @@ class Verdict:
         from inspector.localisation.order import Order
         from inspector.localisation.stage import Localisation
 
-        events, rulings, known, orders, over = [], {}, {}, {}, {}
+        events, rulings, known, orders, evidence = [], {}, {}, {}, {}
         for row in content["events"]:
             event = Event(
                 str(row["label"]),
@@ -310,8 +369,8 @@ class Verdict:
             if row["order"]:
                 order = row["order"]
                 orders[event] = Order(str(order["joint"]), float(order["periods_per_turn"]))
-            if "over" in row:
-                over[event] = str(row["over"])
+            if (by := Evidence.from_dict(row["evidence"])) != Evidence("general"):
+                evidence[event] = by
             if "localisation" in row:
                 found = row["localisation"]
                 low, high = found["band"] or (0.0, 0.0)
@@ -340,7 +399,7 @@ class Verdict:
             localisations=known,
             unknown=Unknown(content["unknown"]),
             orders=orders,
-            over=over,
+            evidence=evidence,
             rulings=rulings,
             missing=missing,
             joints=int(content["joints"]),

@@ -21,6 +21,7 @@ from inspector.audit import audit
 from inspector.audit.placeholder import without_placeholder
 from inspector.library import load_library
 from inspector.report import html, markdown
+from inspector.report.findings import WORDS
 from inspector.report.formats import FORMATS
 from inspector.verdict import Verdict, classify_file, exit_status
 from noiseclassifier import Event, Labels
@@ -69,7 +70,7 @@ def test_the_status_is_the_same_in_every_output(tmp_path):
         status = found.status.value
         verdict = Verdict.of(tmp_path / "run.npz", found)
         assert json.loads(FORMATS["json"]([verdict]))["runs"][0]["status"] == status
-        assert f"run.npz: {status}" in FORMATS["text"]([verdict])
+        assert f"run.npz   {WORDS[found.status]}" in FORMATS["text"]([verdict])
         outcome = {"ok": None, "findings": "failure", "cannot-tell": "skipped"}[status]
         case = ET.fromstring(FORMATS["junit"]([verdict])).find(".//testcase")
         tags = {child.tag for child in case} - {"system-out"}

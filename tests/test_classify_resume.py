@@ -22,7 +22,7 @@ from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
 from inspector.logs.opening import Reading, Source, open_source
 from inspector.logs.options import ReadOptions
-from inspector.verdict import StateError, Verdict, classify_files, digest, kept
+from inspector.verdict import Evidence, StateError, Verdict, classify_files, digest, kept
 from inspector.version import program_version
 from noiseclassifier import Event
 from noisemodel import OutputError, parallel
@@ -234,9 +234,8 @@ def verdict_of(name, **more):
         Unknown.IGNORE,
         "f" * 64,
         {rattle: Order("b", 3.0)},
-        {blow: "+24 dB over 3 repetitions"},
-        "assumed",
-        "walk",
+        assumed="assumed",
+        scenario="walk",
         duration=4.5,
         rate=1000.0,
         joints=6,
@@ -244,6 +243,7 @@ def verdict_of(name, **more):
         picture=Path("picture.png"),
         lost=("a sentence",),
         begin=1.5,
+        evidence={blow: Evidence("repetitions", 24.0, 1.1, "a", "velocity", (16.0, 32.0), -20.0)},
         **more,
     )
 

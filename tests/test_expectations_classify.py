@@ -44,7 +44,9 @@ def test_what_expect_writes_makes_classify_pass(runs):
     assert '# joints = "panda_joint' in (runs / "expect.toml").read_text()
     status, out, _ = call("classify", demo)
     assert status == 0
-    assert out.startswith(f"{demo}: ok [general], by {runs}/expect.toml\n  impact from 1.78 s")
+    head, finding = out.splitlines()[:2]
+    assert head == f"{demo}   ok   4.0 s, 7 joints, 10000 Hz   by {runs}/expect.toml"
+    assert finding.split()[:5] == ["1.78", "-", "1.91", "s", "impact"]
     assert call("classify", demo, "--no-expect")[0] == 1
     status, _, err = call("expect", demo)
     assert status == 3
@@ -60,7 +62,7 @@ def test_what_expect_says_to_type_next_applies_its_file(runs, tmp_path, monkeypa
     assert ("--expect" in command) is (place != "expect.toml")
     status, out, _ = call(*command[1:])
     assert status == 0
-    assert out.startswith(f"runs/demo.npz: ok [general], by {place}\n")
+    assert out.startswith("runs/demo.npz   ok   4.0 s, 7 joints, 10000 Hz   by " + place)
 
 
 def test_expect_names_a_bad_file_and_writes_the_others(runs):
@@ -119,8 +121,8 @@ def test_a_log_that_is_missing_from_a_folder_lacks_its_required_finding(runs):
     status, out, _ = call("classify", runs)
     assert status == 1
     lines = out.splitlines()
-    place = next(i for i, line in enumerate(lines) if line.startswith(f"{runs}/expect.toml: find"))
-    assert lines[place + 1] == "  missing: impact (required: [[require]] 1: no run is grasp.npz)"
+    missing = "missing: impact (required: [[require]] 1: no run is grasp.npz)"
+    assert lines[0].split(maxsplit=2) == [f"{runs}/expect.toml", "FAIL", missing]
     assert call("classify", runs, "--labels-to", runs / "labels")[0] == 1
     assert {each.name for each in (runs / "labels").iterdir()} == {"demo.txt"}
     assert call("classify", runs / "demo.npz")[0] == 0  # not the whole folder
@@ -139,13 +141,13 @@ def test_a_missing_log_has_its_reason_and_is_no_run(runs, tmp_path):
     status, out, _ = call("classify", runs, *written)
     assert status == 1
     told = "missing: impact (required: the {0} closes; [[require]] {1}: no run is {0}-*.npz)"
-    place = out.splitlines().index(f"{runs}/expect.toml: findings")
-    assert out.splitlines()[place + 1 :] == [
-        f"  {told.format('pick', 1)}",
-        f"  {told.format('grip', 2)}",
+    first, second, *_, last = out.splitlines()
+    assert first.split(maxsplit=2) == [f"{runs}/expect.toml", "FAIL", told.format("pick", 1)]
+    assert second.strip() == told.format("grip", 2)
+    assert last == (
         "2 runs: 1 cannot tell, 1 ok; no log for 2 required findings;"
-        " findings: 2 missing, 1 allowed",
-    ]
+        " findings: 2 missing, 1 allowed"
+    )
     suite = ET.parse(junit).getroot().find("testsuite")
     assert [suite.get(each) for each in ("tests", "failures", "skipped")] == ["3", "1", "1"]
     html = (page / "index.html").read_text()
@@ -399,7 +401,7 @@ def test_a_bug_that_one_run_shows_has_exit_status_70_and_hides_no_finding(runs, 
     monkeypatch.setattr(verdicts, "open_source", wrong)
     status, out, err = call("classify", runs)
     assert status == 70
-    assert "impact from 1.78 s" in out
+    assert " 1.78 -   1.91 s   impact " in out
     assert "3 runs: 2 internal error, 1 with findings" in out
     assert "Traceback" in err
     assert f"inspector: {runs}/slow.npz: KeyError: 'slow'" in err
@@ -423,7 +425,7 @@ def test_an_output_that_is_lost_has_exit_status_5(runs, tmp_path, monkeypatch):
     report = tmp_path / "report"
     status, out, err = call("classify", runs, "--report", report)
     assert status == 5  # worse than the bad input
-    assert "impact from 1.78 s" in out
+    assert " 1.78 -   1.91 s   impact " in out
     assert f"inspector: output lost: {report}: cannot be written (No space left on device)" in err
 
 

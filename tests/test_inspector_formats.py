@@ -18,7 +18,7 @@ from inspector.report.formats import (
     sarif,
     text,
 )
-from inspector.verdict import Missing, Ruled, Ruling, Verdict, exit_status
+from inspector.verdict import Evidence, Missing, Ruled, Ruling, Verdict, exit_status
 from noiseclassifier import Event
 
 BLOW, RATTLE = Event("impact", 1.0, 1.5, 0.9), Event("oscillations", 2.0, 3.0, 0.8, novel=True)
@@ -73,21 +73,97 @@ def test_the_exit_status_is_that_of_the_worst_run(verdicts, status):
     assert exit_status(verdicts) == status
 
 
-def test_text_states_what_was_found_and_when():
-    lines = text([QUIET, LOUD]).splitlines()
-    assert lines[0] == "quiet.npz: ok [general]"
-    assert lines[2] == "  impact from 1.00 s to 1.50 s"
-    assert lines[3] == "  oscillations from 2.00 s to 3.00 s, out of distribution"
+def test_text_has_a_line_for_each_finding_and_says_what_to_type():
+    located = Localisation(joints=(("wrist_1", 0.71), ("wrist_2", 0.28)), band=(32.0, 35.0))
+    louder = Evidence("repetitions", 24.3, 5.6, "wrist_1", "velocity", (22.0, 45.0))
+    run = replace(
+        LOUD,
+        localisations={BLOW: located},
+        evidence={BLOW: louder},
+        duration=20.0,
+        rate=500.0,
+        joints=6,
+        message="At 500 Hz, oscillations above 220 Hz cannot be seen.",
+    )
+    assert text([run]).splitlines() == [
+        "loud.npz   FAIL   20.0 s, 6 joints, 500 Hz",
+        "    1.00 -   1.50 s   impact         wrist_1 71%, wrist_2 28%   32-35 Hz"
+        "   +24 dB over repetitions",
+        "    2.00 -   3.00 s   oscillations" + " " * 41 + "out of distribution",
+        "note:    At 500 Hz, oscillations above 220 Hz cannot be seen.",
+        "next:    inspector view loud.npz",
+    ]
+    line = (
+        "impact from 1.00 s to 1.50 s, wrist_1 71%, wrist_2 28%, 32-35 Hz, +24 dB over repetitions"
+    )
+    for write in (junit, sarif, markdown):
+        assert line in write([run])
+    assert line.replace("%", "%25") in github([run])
 
 
 def test_text_states_what_was_expected_and_what_is_missing():
-    assert text([EXPECTED]).splitlines() == [
-        "expected.npz: ok [general], by expect.toml",
-        "  impact from 1.00 s to 1.50 s (allowed: the pick)",
-        "  oscillations from 2.00 s to 3.00 s, out of distribution (waived: ticket 1)",
-    ]
+    head, blow, rattle = text([EXPECTED]).splitlines()
+    assert head == "expected.npz   ok   by expect.toml"
+    assert blow == "    1.00 -   1.50 s   impact         (allowed: the pick)"
+    assert rattle.endswith("oscillations   out of distribution (waived: ticket 1)")
     missing = "  missing: impact from 1.10 s to 1.30 s (required: the pick)"
     assert text([LACKING]).splitlines()[1] == missing
+
+
+def repetitions(name, count, *events, **more):
+    status = Status.FINDINGS if events else Status.OK
+    return [
+        Verdict(Path(f"runs/{name}-{each}.npz"), status, "general", events, **more)
+        for each in range(count)
+    ]
+
+
+def test_repetitions_are_one_row_and_failures_come_first():
+    later = replace(BLOW, start=1.2, score=0.7)
+    pick = repetitions("pick", 3, BLOW)
+    pick += [replace(pick[0], path=Path("runs/pick-3.npz"), events=(later, RATTLE))]
+    note = "At 500 Hz, oscillations above 220 Hz cannot be seen."
+    lines = text([*repetitions("reach", 5, message=note), SLOW, *pick]).splitlines()
+    assert lines == [
+        "runs/pick    FAIL            1.00 -   1.50 s   impact         4 of 4 runs",
+        "                             2.00 -   3.00 s   oscillations   out of distribution,"
+        " 1 of 4 runs",
+        "slow.npz     cannot tell   30 Hz is below every model",
+        "runs/reach   ok            5 runs",
+        f"note:    {note} (5 of 10 runs)",
+        "next:    inspector view runs/pick-3.npz",
+        "10 runs: 4 with findings, 1 cannot tell, 5 ok; findings: 5 failing",
+    ]
+    rows = [each for each in markdown(pick).splitlines() if each.startswith("| `")]
+    assert len(rows) == 1
+    assert rows[0].startswith("| `runs/pick` | FAIL | impact from 1.00 s to 1.50 s, 4 of 4 runs;")
+    error, *_ = github(pick).splitlines()
+    assert error.startswith("::error file=runs/pick-3.npz,title=runs/pick::findings: impact from")
+    assert junit(pick).count("<testcase ") == 4
+
+
+def test_findings_of_repetitions_are_apart_by_class_time_and_ruling():
+    far, other = replace(BLOW, start=1.3), replace(BLOW, label="velocityjump")
+    one, two = repetitions("a", 2, BLOW), [far, other]
+    for event in two:
+        pair = [one[0], replace(one[1], events=(event,))]
+        assert text(pair).count("1 of 2 runs") == 2
+    ruled = replace(one[1], rulings={BLOW: Ruled(Ruling.FORBIDDEN, "never")})
+    assert text([one[0], ruled]).count("1 of 2 runs") == 2
+    twice = replace(one[0], events=(BLOW, replace(BLOW, start=1.1)))
+    assert text([twice, one[1]]).count("impact") == 2
+
+
+def test_runs_that_name_a_scenario_are_of_it_in_each_folder():
+    runs = [
+        Verdict(Path(f"{folder}/{name}.npz"), Status.OK, scenario="walk")
+        for folder in ("a", "b")
+        for name in ("one", "two")
+    ]
+    assert [line.split() for line in text(runs).splitlines()[:2]] == [
+        ["walk", "ok", "2", "runs"]
+    ] * 2
+    assert "run:     a/one.npz [no model]" in text(runs, verbose=True).splitlines()
 
 
 def test_text_ends_with_the_counts_of_several_runs():
@@ -106,6 +182,7 @@ def test_json_is_noise_verdict_3():
     assert loud["events"][1] == {
         "label": "oscillations", "start": 2.0, "stop": 3.0, "score": 0.8, "novel": True,
         "order": None, "fails": True, "ruling": "found", "reason": "",
+        "evidence": Evidence("general").as_dict(),
     }  # fmt: skip
     assert loud["events"][0]["novel"] is False
     assert (loud["run"], loud["status"], loud["unknown"]) == ("loud.npz", "findings", "finding")
@@ -235,7 +312,9 @@ def test_github_annotations_escape_what_would_end_them():
 
 def test_github_gets_the_ten_worst_and_then_a_summary():
     worst = replace(LOUD, path=Path("worst.npz"), missing=LACKING.missing)
-    lines = github([LACKING] * 5 + [LOUD] * 19 + [worst, SLOW]).splitlines()
+    lacking = [replace(LACKING, path=Path(f"{each}/lacking.npz")) for each in range(5)]
+    loud = [replace(LOUD, path=Path(f"{each}/loud.npz")) for each in range(19)]
+    lines = github([*lacking, *loud, worst, SLOW]).splitlines()
     errors = [line for line in lines if line.startswith("::error")]
     assert len(errors) == ANNOTATIONS
     assert errors[0].startswith("::error file=worst.npz")
@@ -246,7 +325,12 @@ def test_github_gets_the_ten_worst_and_then_a_summary():
 
 
 def test_bad_input_hides_no_finding_from_github():
-    errors = [line for line in github([BROKEN] * 20 + [LOUD] * 20).splitlines() if "error" in line]
+    many = [
+        replace(each, path=Path(f"{place}/{each.path}"))
+        for each in (BROKEN, LOUD)
+        for place in range(20)
+    ]
+    errors = [line for line in github(many).splitlines() if "error" in line]
     assert sum("broken" in line for line in errors) == ANNOTATIONS // 2
     assert sum("loud" in line for line in errors) == ANNOTATIONS // 2
 
@@ -318,7 +402,7 @@ def test_markdown_fits_into_a_comment():
 def test_markdown_keeps_what_a_run_is_named_in_its_cell():
     odd = replace(LACKING, path=Path("a|b`c<i>.npz"), missing=(Missing("x|y<b>"),))
     row = next(line for line in markdown([odd]).splitlines() if line.startswith("| `"))
-    assert row == "| `a\\|b'c<i>.npz` | with findings | missing: x\\|y&lt;b> |"
+    assert row == "| `a\\|b'c<i>.npz` | FAIL | missing: x\\|y&lt;b> |"
 
 
 def test_an_empty_list_of_verdicts_is_valid_in_every_format():

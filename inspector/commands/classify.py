@@ -53,6 +53,9 @@ def _gate(*names: str, **settings: Any) -> Any:
 
 
 OutputFormat = Annotated[Format, typer.Option("--format", help="Output format.")]
+Verbose = Annotated[
+    bool, typer.Option("--verbose", "-v", help="All that was assumed, and the runs of scenarios.")
+]
 LabelsTo = Annotated[
     Path | None, typer.Option(help="Write the findings to this folder, one file per run.")
 ]
@@ -87,6 +90,7 @@ def classify(
     ctx: typer.Context,
     runs: Runs,
     format: OutputFormat = Format.TEXT,  # noqa: A002
+    verbose: Verbose = False,
     jobs: NumberOfJobs = 1,
     dask: Dask = "",
     model: ModelFiles = None,
@@ -117,7 +121,7 @@ def classify(
     from inspector.logs.opening import sources
     from inspector.progress import progress
     from inspector.report.cases import published
-    from inspector.report.formats import FORMATS
+    from inspector.report.formats import FORMATS, text
     from inspector.verdict import classify_files, exit_status
 
     del localise  # of 0.6: each finding is localised now
@@ -150,9 +154,10 @@ def classify(
     ]
     verdicts += _absent(verdicts, expected, runs)
 
-    _say(verdicts, others, expected)
+    _say(verdicts, others, expected, verbose=verbose)
     lost = [line for verdict in verdicts for line in verdict.lost]
-    lost += written(verdicts, FORMATS, format, files, overwrite=overwrite)
+    formats = FORMATS | {"text": partial(text, verbose=verbose)}
+    lost += written(verdicts, formats, format, files, overwrite=overwrite)
     for name, save in outputs:
         lost += tried(partial(save, verdicts), name)
     say_lost(verdicts, lost)
@@ -251,7 +256,11 @@ def _drawing(folder: Path | None) -> "Callable[[Analysis, Path], Path] | None":
 
 
 def _say(
-    verdicts: "Sequence[Verdict]", others: "Sequence[Path]", expected: "Mapping[Path, Expectations]"
+    verdicts: "Sequence[Verdict]",
+    others: "Sequence[Path]",
+    expected: "Mapping[Path, Expectations]",
+    *,
+    verbose: bool,
 ) -> None:
     """Print on standard error what was left out and assumed, and what expectations expire."""
     from inspector.expectations.expectations import NAME
@@ -259,7 +268,7 @@ def _say(
 
     if unread := [path for path in others if path.name != NAME]:
         typer.echo(f"inspector: {left_out(unread)}", err=True)
-    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
+    say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts}, verbose=verbose)
     for each in dict.fromkeys(expected.values()):
         for remark in each.remarks(date.today()):
             typer.echo(f"inspector: {remark}", err=True)

@@ -282,12 +282,19 @@ def say_warnings(run: "Run") -> None:
         typer.echo(f"  {warning}", err=True)
 
 
-def say_assumed(lines: dict[str, str]) -> None:
+ASSUMED = 100
+"""Most characters of what was assumed of a log, unless all is asked for."""
+
+
+def say_assumed(lines: dict[str, str], *, verbose: bool = True) -> None:
     """Print what was assumed of logs on standard error, once for those with one line."""
     together: dict[str, list[str]] = {}
     for name, line in lines.items():
         if line:
             together.setdefault(line, []).append(name)
     for line, names in together.items():
+        told = line
+        if len(line) > ASSUMED and not verbose:
+            told = f"{line[: ASSUMED - 10].rpartition('; ')[0]}; ... (-v)"
         others = f" and {len(names) - 1} more" if len(names) > 1 else ""
-        typer.echo(f"{names[0]}{others}: {line}", err=True)
+        typer.echo(f"{names[0]}{others}: {told}", err=True)

@@ -2,8 +2,10 @@
 
 import hashlib
 import json
+import shlex
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -11,30 +13,33 @@ from urllib.parse import quote
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.report import cases
 from inspector.report.cases import Case, Job, Outcome
+from inspector.report.findings import (
+    COUNTED,
+    WORDS,
+    Group,
+    excused,
+    failing,
+    groups,
+    row,
+    sentence,
+    table,
+)
 from inspector.text import counted
 from inspector.verdict import Verdict, counts, exit_status
 from inspector.version import program_version
-from noiseclassifier import Event
-from noiseclassifier.labels import interval
 
 SARIF_SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
+UNREAD = (Status.BAD_INPUT, Status.INTERNAL_ERROR)
+MOST = 20
+"""Findings of a scenario that are listed."""
 RESULTS = 5000
 """GitHub shows no more results of one SARIF file."""
-
-WORDS = {
-    Status.INTERNAL_ERROR: "internal error",
-    Status.BAD_INPUT: "bad input",
-    Status.FINDINGS: "with findings",
-    Status.CANNOT_TELL: "cannot tell",
-    Status.OK: "ok",
-}
-"""How people read a status."""
 
 
 def summary(verdicts: Sequence[Verdict]) -> str:
     """Count runs by status and findings by what became of them, in a line."""
     number = counts(verdicts)
-    runs = [f"{n} {WORDS[Status(name)]}" for name, n in number["runs"].items() if n]
+    runs = [f"{n} {COUNTED[Status(name)]}" for name, n in number["runs"].items() if n]
     ignored = sum(verdict.ignored for verdict in verdicts)
     runs += [f"{ignored} of the bad input ignored"] if ignored else []
     absent = sum(len(verdict.missing) for verdict in verdicts if not verdict.of_run)
@@ -45,21 +50,70 @@ def summary(verdicts: Sequence[Verdict]) -> str:
     return f"{total}: {', '.join(runs) or 'none'}{logs}{findings}"
 
 
-def text(verdicts: Sequence[Verdict]) -> str:
-    """Verdicts as text: a line per run, a line per finding, and the counts of several runs.
+def text(verdicts: Sequence[Verdict], *, verbose: bool = False) -> str:
+    """Verdicts as text: a line for each finding; of several runs a row per scenario, worst first.
 
-    Bad inputs are left out: the command line prints them on stderr.
+    What limits a verdict is said once at the end, and what to type next. Bad inputs are left out:
+    the command line prints them on stderr.
+
+    Args:
+        verdicts: What was found in runs.
+        verbose: Whether to name the runs of each scenario, and their models.
     """
-    lines = []
-    for verdict in verdicts:
-        if verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
-            continue
-        model = f" [{verdict.model}]" if verdict.model else ""
-        expected = f", by {verdict.expectations}" if verdict.expectations and verdict.of_run else ""
-        message = f": {verdict.message}" if verdict.message else ""
-        lines.append(f"{verdict.path}: {verdict.status}{model}{expected}{message}")
-        lines += [f"  {sentence}" for sentence in (*failing(verdict), *excused(verdict))]
+    read = [each for each in verdicts if each.status not in UNREAD]
+    if len(verdicts) == 1 and read:
+        lines = _one(read[0])
+    else:
+        lines = table([cells for group in groups(read) for cells in _rows(group)])
+    if verbose:
+        lines += [f"run:     {each.path} [{each.model or 'no model'}]" for each in read]
+    lines += _remarks(read)
+    worst = min(read, key=lambda each: each.severity, default=None)
+    if worst is not None and worst.failing:
+        lines.append(f"next:    inspector view {shlex.quote(str(worst.path))}")
     return "\n".join([*lines, summary(verdicts)] if len(verdicts) > 1 else lines)
+
+
+def _one(verdict: Verdict) -> list[str]:
+    """A run and its findings."""
+    facts = f"{verdict.duration:.1f} s, {counted(verdict.joints, 'joint')}, {verdict.rate:g} Hz"
+    status = WORDS[verdict.status]
+    if verdict.status is Status.CANNOT_TELL:
+        status, facts = f"{status}: {verdict.message}", ""
+    facts = facts if verdict.rate else ""
+    by = f"by {verdict.expectations}" if verdict.expectations and verdict.of_run else ""
+    head = "   ".join(filter(None, [str(verdict.path), status, facts, by]))
+    found = [row(verdict, event) for event in (*verdict.failing, *verdict.excused)]
+    return [head, *(f"  {line}" for line in [*table(found), *map(str, verdict.missing)])]
+
+
+def _rows(group: Group) -> Iterator[tuple[str, ...]]:
+    """Rows of a scenario: its first finding beside its name, the others below."""
+    name, status = group.name, WORDS[group.worst.status]
+    number = len(group.verdicts)
+    found = [row(*each) for fails in (True, False) for each in group.found(fails=fails)]
+    others = group.missing or ([counted(number, "run")] if number > 1 and not found else [])
+    if group.worst.status is Status.CANNOT_TELL:
+        others = [*others, group.worst.message]
+    cells: list[tuple[str, ...]] = [*found, *((each,) for each in others)]
+    for each in cells[:MOST] or [("",)]:
+        yield (name, status, *each)
+        name = status = ""
+    if (left := len(cells) - MOST) > 0:
+        yield ("", "", f"and {left} more (--format json)")
+
+
+def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
+    """What limits verdicts, once for all runs that it limits, and what they were compared with."""
+    runs: Counter[str] = Counter()
+    for verdict in verdicts:
+        if verdict.status is not Status.CANNOT_TELL:
+            runs.update(filter(None, [verdict.message]))
+        if len(verdicts) > 1 and verdict.of_run:
+            runs.update([f"by {verdict.expectations}"] if verdict.expectations else [])
+    for message, number in runs.items():
+        several = f" ({number} of {len(verdicts)} runs)" if 1 < len(verdicts) != number else ""
+        yield f"note:    {message}{several}"
 
 
 def as_json(verdicts: Sequence[Verdict]) -> str:
@@ -85,7 +139,7 @@ def github(verdicts: Sequence[Verdict]) -> str:
 
     Runs that cannot be told, and bad input that is ignored, are warnings.
     """
-    return cases.github(_job(verdicts))
+    return cases.github(_folded(verdicts))
 
 
 def sarif(verdicts: Sequence[Verdict]) -> str:
@@ -142,8 +196,8 @@ def sarif(verdicts: Sequence[Verdict]) -> str:
 
 def markdown(verdicts: Sequence[Verdict]) -> str:
     """Write verdicts for a job's summary or a comment: a table, the worst first, and a picture."""
-    head, notes = "| run | status | findings |", "Findings that do not count"
-    return cases.markdown(_job(verdicts), head=head, notes=notes)
+    head, notes = "| scenario | status | findings |", "Findings that do not count"
+    return cases.markdown(_folded(verdicts), head=head, notes=notes)
 
 
 FORMATS: dict[str, Callable[[Sequence[Verdict]], str]] = {
@@ -161,6 +215,7 @@ def _ignoring(verdicts: Sequence[Verdict]) -> bool:
 
 
 def _job(verdicts: Sequence[Verdict]) -> Job:
+    """All runs as cases, for programs that count runs."""
     found = [
         Case(
             name=str(verdict.path),
@@ -185,6 +240,25 @@ def _job(verdicts: Sequence[Verdict]) -> Job:
     return Job("Noise", summary(verdicts), counts(verdicts), found, remarks)
 
 
+def _folded(verdicts: Sequence[Verdict]) -> Job:
+    """All scenarios as cases, for people."""
+    found = []
+    for group in groups(verdicts):
+        (case,) = _job([group.worst]).cases
+        drawn = next((each for each in group.verdicts if each.picture), group.worst)
+        found.append(
+            replace(
+                case,
+                name=group.name,
+                sentences=tuple(group.sentences),
+                notes=tuple(group.notes),
+                picture=drawn.picture,
+                picture_url=drawn.picture_url,
+            )
+        )
+    return replace(_job(verdicts), cases=found)
+
+
 def _outcome(verdict: Verdict) -> Outcome:
     """What a run is as a test."""
     if verdict.ignored:
@@ -205,26 +279,6 @@ def _kind(verdict: Verdict) -> str:
     return "missing" if verdict.missing else verdict.status.value
 
 
-def failing(verdict: Verdict) -> list[str]:
-    """Sentences on what fails a run."""
-    return [
-        *(_sentence(verdict, event) for event in verdict.failing),
-        *map(str, verdict.missing),
-    ]
-
-
-def excused(verdict: Verdict) -> list[str]:
-    """Sentences on findings that do not."""
-    return [_sentence(verdict, event) for event in verdict.excused]
-
-
-def _sentence(verdict: Verdict, event: Event) -> str:
-    order = f", {verdict.orders[event]}" if event in verdict.orders else ""
-    ruled = str(verdict.ruled(event))
-    became = f" ({ruled})" if ruled else ""
-    return f"{event.label} from {interval(event.start, event.stop)}{event.novelty}{order}{became}"
-
-
 def _results(verdict: Verdict) -> list[dict[str, Any]]:
     if _outcome(verdict) is not Outcome.FAILURE:
         return []
@@ -233,7 +287,7 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
     facts = [
         (
             event.label,
-            _sentence(verdict, event),
+            sentence(verdict, event),
             {"start": round(event.start, 6), "stop": round(event.stop, 6)},
         )
         for event in verdict.failing
@@ -241,14 +295,14 @@ def _results(verdict: Verdict) -> list[dict[str, Any]]:
     facts += [
         (f"missing-{each.label.replace(' ', '-')}", str(each), {}) for each in verdict.missing
     ]
-    for rule, sentence, span in facts:
+    for rule, told, span in facts:
         number[rule] += 1
         same = f"{_uri(verdict.path)}:{rule}:{number[rule]}"
         results.append(
             {
                 "ruleId": rule,
                 "level": "error",
-                "message": {"text": f"{verdict.path}: {sentence}"},
+                "message": {"text": f"{verdict.path}: {told}"},
                 "locations": [_location(verdict.path)],
                 "partialFingerprints": {
                     "primaryLocationLineHash": hashlib.sha256(same.encode()).hexdigest()[:16]

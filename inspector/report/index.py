@@ -11,7 +11,8 @@ from inspector.analysis.analyse import Analysis
 from inspector.analysis.status import Status
 from inspector.colors import of_classes
 from inspector.errors import InspectorError
-from inspector.report.formats import WORDS, excused, failing, summary
+from inspector.report.findings import COUNTED, excused, failing
+from inspector.report.formats import summary
 from inspector.report.html import STYLE, add_text, document
 from inspector.verdict import Verdict
 from noisemodel.atomic import replacing
@@ -163,7 +164,7 @@ def _add_counts(body: ET.Element, ranked: Sequence[Verdict]) -> None:
         link = ET.SubElement(line, "a", href=f"#run-{number}")
         badge = ET.SubElement(link, "span", {"class": f"status {status}"})
         add_text(badge, "strong", str(sum(each.status is status for _, each in runs)))
-        badge[-1].tail = WORDS[status]
+        badge[-1].tail = COUNTED[status]
 
 
 def _shared_facts(verdicts: Sequence[Verdict]) -> list[str]:
@@ -252,6 +253,6 @@ def _add_run(body: ET.Element, verdict: Verdict, number: int, shared: Sequence[s
 
 
 def _add_status(parent: ET.Element, verdict: Verdict) -> None:
-    words = f"{WORDS[verdict.status]}{' (ignored)' if verdict.ignored else ''}"
+    words = f"{COUNTED[verdict.status]}{' (ignored)' if verdict.ignored else ''}"
     kind = Status.CANNOT_TELL if verdict.ignored else verdict.status
     add_text(parent, "span", words, f"status {kind}")

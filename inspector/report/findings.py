@@ -1,0 +1,178 @@
+"""Findings in a line, alike in all formats, and runs of one scenario folded into a row."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from inspector.analysis.status import Status
+from inspector.report.localisation import words
+from inspector.text import counted
+from inspector.verdict import Verdict
+from noiseclassifier import Event
+from noiseclassifier.labels import interval
+
+REPETITION = re.compile(r"(?P<name>.+?)[-_.](?:run|rep|take|seed)?[-_.]?\d+")
+"""Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
+TOGETHER = 0.25
+"""Onsets this close, of one class and joint in repetitions, are one row, in [s]: the hop of frames
+is 0.1 s or 0.2 s."""
+WORDS = {
+    Status.INTERNAL_ERROR: "internal error",
+    Status.BAD_INPUT: "bad input",
+    Status.FINDINGS: "FAIL",
+    Status.CANNOT_TELL: "cannot tell",
+    Status.OK: "ok",
+}
+"""How people read a status."""
+COUNTED = WORDS | {Status.FINDINGS: "with findings"}
+"""How people count them."""
+Row = tuple[str, str, str, str, str]
+"""Time, class, joints, band, and what else is known of a finding."""
+
+
+def row(verdict: Verdict, event: Event, runs: str = "") -> Row:
+    """A finding as cells of a table.
+
+    Args:
+        verdict: The verdict that it is of.
+        event: The finding.
+        runs: In how many repetitions it is, in words.
+    """
+    known = verdict.localisations.get(event)
+    _, joints, band = words(known) if known else ("", "", "")
+    evidence, order = verdict.evidence.get(event), verdict.orders.get(event)
+    over = ""
+    if evidence is not None and evidence.db is not None and not evidence.excused:
+        over = f"{evidence.db:+.0f} dB over {evidence.kind}"
+        joints = joints or evidence.joint
+    ruled = f"({verdict.ruled(event)})" if str(verdict.ruled(event)) else ""
+    rest = (event.novelty.removeprefix(", "), str(order or ""), over, runs, ruled)
+    when = f"{event.start:6.2f} - {event.stop:6.2f} s"
+    return when, event.label, joints, band, ", ".join(filter(None, rest)).replace(", (", " (")
+
+
+def sentence(verdict: Verdict, event: Event, runs: str = "") -> str:
+    """The same as a sentence."""
+    _, label, joints, band, rest = row(verdict, event, runs)
+    parts = [f"{label} from {interval(event.start, event.stop)}", joints, band, rest]
+    return ", ".join(filter(None, parts)).replace(", (", " (")
+
+
+def failing(verdict: Verdict) -> list[str]:
+    """Sentences on what fails a run."""
+    found = [sentence(verdict, event) for event in verdict.failing]
+    return [*found, *map(str, verdict.missing)]
+
+
+def excused(verdict: Verdict) -> list[str]:
+    """Sentences on findings that do not."""
+    return [sentence(verdict, event) for event in verdict.excused]
+
+
+@dataclass(frozen=True)
+class Group:
+    """The runs of one scenario, or a single run.
+
+    Attributes:
+        name: The scenario, or the path of the run.
+        verdicts: The verdicts on its runs, the worst first.
+    """
+
+    name: str
+    verdicts: Sequence[Verdict]
+
+    @property
+    def worst(self) -> Verdict:
+        """The verdict that stands for all."""
+        return self.verdicts[0]
+
+    def found(self, *, fails: bool) -> list[tuple[Verdict, Event, str]]:
+        """Findings that fail their runs, or those that do not, once for those of repetitions.
+
+        Returns:
+            Of each, the verdict and the event with the best score, and in how many runs it is.
+        """
+        folded: list[list[tuple[Verdict, Event]]] = []
+        for verdict in self.verdicts:
+            for event in verdict.failing if fails else verdict.excused:
+                alike = (each for each in folded if _alike(each[0], (verdict, event)))
+                group = next(alike, None)
+                if group is None:
+                    folded.append(group := [])
+                group.append((verdict, event))
+        several = len(self.verdicts)
+        result = []
+        for each in folded:
+            number = len({id(verdict) for verdict, _ in each})
+            runs = f"{number} of {counted(several, 'run')}" if several > 1 else ""
+            result.append((*max(each, key=lambda one: one[1].score), runs))
+        return result
+
+    @property
+    def missing(self) -> list[str]:
+        """Required findings that were not found."""
+        return list(dict.fromkeys(str(each) for one in self.verdicts for each in one.missing))
+
+    @property
+    def sentences(self) -> list[str]:
+        """Sentences on what fails its runs."""
+        return [*(sentence(*each) for each in self.found(fails=True)), *self.missing]
+
+    @property
+    def notes(self) -> list[str]:
+        """Sentences on findings that do not."""
+        return [sentence(*each) for each in self.found(fails=False)]
+
+
+def groups(verdicts: Sequence[Verdict]) -> list[Group]:
+    """Runs by scenario, the worst first.
+
+    A scenario is what runs of one folder name so, or have one name but for a number. What could not
+    be read stays alone.
+    """
+    found: dict[tuple[str, str], list[Verdict]] = {}
+    for verdict in sorted(verdicts, key=lambda each: each.severity):
+        found.setdefault(_key(verdict), []).append(verdict)
+    return [
+        Group(name if len(each) > 1 else str(each[0].path), each)
+        for (_, name), each in found.items()
+    ]
+
+
+def _key(verdict: Verdict) -> tuple[str, str]:
+    """Folder and scenario of a run."""
+    path, alone = verdict.path, verdict.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR)
+    if alone or not verdict.of_run:
+        return str(path), ""
+    repeated = REPETITION.fullmatch(path.stem)
+    name = verdict.scenario or (str(path.with_name(repeated["name"])) if repeated else str(path))
+    return str(path.parent), name
+
+
+def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
+    """Whether two findings of repetitions are one."""
+    (first, event), (second, same) = one, other
+    return (
+        event.label == same.label
+        and abs(event.start - same.start) <= TOGETHER
+        and first.ruled(event) == second.ruled(same)
+        and (first is not second or event is same)
+    )
+
+
+def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:
+    """Lines of cells, each column as wide as its widest cell.
+
+    A row of fewer cells ends with a sentence, which may reach over the columns to its right.
+    """
+    most = max(map(len, rows), default=0)
+    widths = [0] * most
+    for cells in rows:
+        for place, cell in enumerate(cells if len(cells) == most else cells[:-1]):
+            widths[place] = max(widths[place], len(cell))
+    lines = []
+    for cells in rows:
+        padded = [cell.ljust(width) for cell, width in zip(cells, widths, strict=False)]
+        used = [cell for cell, width in zip(padded, widths, strict=False) if width or cell]
+        lines.append(gap.join(used).rstrip())
+    return lines
