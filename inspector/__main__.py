@@ -1,5 +1,10 @@
 """`python -m inspector` is `inspector`."""
 
-from inspector.cli import main
+import sys
 
-main()
+try:
+    from inspector.cli import main
+
+    main()
+except KeyboardInterrupt:  # while modules are loaded; afterwards, the command line sees to it
+    sys.exit(130)

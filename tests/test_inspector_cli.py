@@ -46,7 +46,7 @@ def test_the_demo_is_shown_without_a_display(inspector, tmp_path, monkeypatch):
     (recording,) = tmp_path.rglob("demo-*.rrd")
     assert f"recording: {recording}" in out
     assert f"rerun {recording}" in out
-    assert "--serve-web --bind 127.0.0.1" in out
+    assert "inspector view RUN --web" in out
 
 
 def test_the_demo_run_is_small_and_has_its_defect(inspector):

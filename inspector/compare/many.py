@@ -118,12 +118,9 @@ LINE = 8.0
 """Most height of a line, in points: thick ones have round ends, so a row is several of them."""
 LETTERS = 16
 """Of a name beside a row."""
-SPAN = "/span"
-"""What makes every plot reach from the first start to the last end."""
 SIGNS = "\u25c6\u25a0\u25b2\u25cf\u2716\u271a\u25bc"
 """The markers of `classes.MARKERS` as text."""
 ROWS = ("class", "levels")
-ALL = ("$origin/**", SPAN)
 
 
 def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
@@ -133,8 +130,7 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
     with writing(path, key, overwrite=overwrite) as recording:
         begin = min(float(side.run.time[0]) for side in several.sides)
         end = max(float(side.run.time[-1]) for side in several.sides)
-        ends, nothing = np.array([begin, end]), np.full((2, 1), np.nan)
-        axes.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
+        axes.log_span(recording, begin, end)
         height = _height(len(several.names))
         panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
         panels["curves"] = Panel("curves", CURVE)
@@ -152,7 +148,7 @@ def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
     plots = {
         name: axes.part(
             panels[name],
-            unstable.plot("", f"/{name}", ALL, between=(0.0, axes.TOP), fixed=True, titled=False),
+            axes.row_plot(f"/{name}"),
             name={"class": "Classes", "levels": "Level above 10 Hz"}[name],
         )
         for name in ROWS

@@ -49,8 +49,6 @@ LIGHTEST = 0.75
 """Place on the palette of what is farthest: numbers have to be read on it."""
 WHOLE, WIDE, TITLES = 832.0, 720.0, 28.0
 """Height of all parts, width of half of them, height of tabs, in points, at 1440 x 900."""
-SPAN = "/span"
-"""What makes every plot reach from the first start to the last end."""
 
 
 def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
@@ -62,9 +60,8 @@ def write(found: Comparisons, path: Path, *, overwrite: bool = False) -> None:
         recording.send_blueprint(layout(found))  # takes the place of an older layout
         for name in MAPS:
             _log_map(recording, found, name)
-        ends = np.array([min(one.time[0] for one in found), max(one.time[-1] for one in found)])
-        nothing = np.full((2, 1), np.nan)
-        axes.log_lines(recording, SPAN, ends, nothing, names=[""], colours=[axes.INK])
+        begin, end = min(one.time[0] for one in found), max(one.time[-1] for one in found)
+        axes.log_span(recording, float(begin), float(end))
         for one in found:
             _log(recording, one)
         document = rr.TextDocument(f"```\n{text}\n```", media_type="text/markdown")
@@ -230,7 +227,7 @@ def _robot(one: RobotComparison) -> Part:
         ("vibration", RANGE_DB),
         ("level", RANGE_DB),
     ):
-        path, every = f"{_root(one)}/{part}", ("$origin/**", SPAN)
+        path, every = f"{_root(one)}/{part}", ("$origin/**", axes.SPAN)
         plot = unstable.plot("", path, every, between=between, fixed=True, titled=False)
         panel = _panel(one, part)
         parts.append((axes.part(panel, plot), panel.height))

@@ -44,7 +44,6 @@ from inspector.recording.panels import (
     found_stretches,
     limbs,
     log_signal,
-    log_span,
     scaled,
     signals,
 )
@@ -418,10 +417,7 @@ WHOLE = 832.0
 """Height of all parts, in points, in a window of 1440 x 900."""
 ABOVE = 240.0
 """Least height of the report and the robots."""
-SPAN = "/span"
-"""What makes every plot reach from the start of the runs to their end."""
-ALL = ("$origin/**", SPAN)
-CHANGE_PATHS = ("/change/noise", "/change/none", "/change/finding/**", SPAN)
+CHANGE_PATHS = ("/change/noise", "/change/none", "/change/finding/**", axes.SPAN)
 TITLES = 28.0
 """Height of a row of tabs."""
 
@@ -468,12 +464,12 @@ def layout(contents: Contents) -> Blueprint:
     over_time = [
         (
             contents.classes,
-            _row_plot("/class"),
+            axes.row_plot("/class"),
         ),
         (
             LEVEL,
             unstable.plot(
-                "Level", "/level", ALL, between=(LOW_DB, HIGH_DB), fixed=True, titled=False
+                "Level", "/level", axes.ALL, between=(LOW_DB, HIGH_DB), fixed=True, titled=False
             ),
         ),
         (
@@ -498,33 +494,26 @@ def layout(contents: Contents) -> Blueprint:
 def _details(contents: Contents) -> Part:
     parts: list[Part] = []
     if contents.changes is not None:
-        plot = unstable.plot(
-            "Links", "/change/links", between=(0.0, axes.TOP), fixed=True, titled=False
-        )
+        plot = axes.row_plot("/change/links")
         parts.append(axes.part(contents.changes, plot, name="Links, change"))
     for what, panel in contents.spectra.items():
-        plot = _row_plot(f"/spectrogram/{what}")
+        plot = axes.row_plot(f"/spectrogram/{what}")
         comma = ", " if what == "change" else " "
         parts.append(axes.part(panel, plot, name=f"Spectrum{comma}{what}"))
     plot = unstable.plot(
-        "Noise", "/noise", ALL, between=contents.ends.noise, fixed=True, titled=False
+        "Noise", "/noise", axes.ALL, between=contents.ends.noise, fixed=True, titled=False
     )
     parts.append(axes.part(NOISE_PANEL, plot, name="Noise"))
     if contents.cameras:
-        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", ALL, legend=True))
+        parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", axes.ALL, legend=True))
     if contents.links:
         both = [
-            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", ALL, legend=True)
+            unstable.plot(f"{name} [dB re 1 pW]", f"/links/{name}", axes.ALL, legend=True)
             for name in contents.links
         ]
         parts.append(unstable.tabs(*both, name="Links, before and after"))
     parts += [unstable.audio(f"Listen {name}", f"/sound/{name}") for name in contents.sounds]
     return unstable.tabs(*parts, *limb_tabs(contents.joints))
-
-
-def _row_plot(path: str) -> Part:
-    """A plot of rows."""
-    return unstable.plot("", path, ALL, between=(0.0, axes.TOP), fixed=True, titled=False)
 
 
 ASPECT = 1.35
@@ -556,7 +545,7 @@ def _log(
 ) -> Contents:
     run, found = pair.after.run, changes(pair)
     panel, shown, cameras = None, list[str](), dict[str, Camera]()
-    log_span(recording, run)
+    axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
     if trees:
         assert run.robot is not None
         pairs = [(trees[side], each.run) for side, each in pair.sides]

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from inspector.errors import InspectorError
+from inspector.recording.axes import FARTHEST
 from noisemodel.checks import LARGEST
 from noisemodel.types import Array, Mask
 
@@ -172,8 +173,6 @@ AGREE = 5
 """Timestamps in a row that make a jump a new segment, and no outlier."""
 LONGEST = 3600.0
 """Jump ahead up to which samples are missing, in [s]; beyond, the clock was set."""
-FARTHEST = 9e9
-"""Rerun counts nanoseconds in 64 bits: 292 years, in [s]."""
 RATE_TOLERANCE = 0.05
 """Share by which the rate of the timestamps may differ from the nominal one."""
 RATE_STEPS = 20

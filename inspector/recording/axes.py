@@ -17,17 +17,33 @@ from numpy.typing import NDArray
 
 from inspector import colors
 from inspector.colors import Color
+from inspector.errors import InspectorError
 from inspector.levels import Scale
 from inspector.recording import unstable
 from inspector.recording.unstable import Part
 from noisemodel.types import Array, Mask, Real
 
 TIMELINE = "time"
+SPAN = "/span"
+"""Lies in every plot over time, so that it reaches from the start to the end."""
+FARTHEST = 9e9
+"""Rerun counts nanoseconds in 64 bits: 292 years, in [s]."""
 
 
 def at(time: Array) -> rr.TimeColumn:
     """Index columns by seconds from the start of the run."""
     return rr.TimeColumn(TIMELINE, duration=np.round(time * 1e9).astype("timedelta64[ns]"))
+
+
+def log_span(recording: rr.RecordingStream, begin: float, end: float) -> None:
+    """Log that plots reach from one time to another, in [s], whatever they show."""
+    if not max(abs(begin), abs(end)) < FARTHEST:
+        raise InspectorError(
+            f"times from {begin:g} s to {end:g} s: a recording holds times within {FARTHEST:g} s;"
+            " let the log begin at 0"
+        )
+    ends, nothing = np.array([begin, end]), np.full((2, 1), np.nan)
+    log_lines(recording, SPAN, ends, nothing, names=[""], colours=[INK])
 
 
 def scalars(values: Real) -> list[rr.ComponentColumn]:
@@ -179,6 +195,15 @@ def log_scale(recording: rr.RecordingStream, panel: Panel, scale: Scale, title: 
         for tick in scale.ticks
     ]
     log_right(recording, panel, [*ticks, Label(1.0, title)])
+
+
+ALL = ("$origin/**", SPAN)
+"""What a plot shows: all that lies below its path, from the start to the end."""
+
+
+def row_plot(path: str) -> Part:
+    """Plot the rows that lie below a path."""
+    return unstable.plot("", path, ALL, between=(0.0, TOP), fixed=True, titled=False)
 
 
 def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:

@@ -23,8 +23,6 @@ TALLEST = 264.0
 WHOLE, EVENTS, EVENT, DETAILS, TITLES = 836.0, 84.0, 23.0, 190.0, 28.0
 """Heights of the whole window's parts, of the list of events without and for each, of the samples
 of a moment, and of a row of tabs, in points."""
-SPAN = "/span"
-"""What makes every plot reach from the start of the run to its end."""
 
 
 @dataclass(frozen=True)
@@ -116,13 +114,18 @@ def height(markdown: str) -> float:
 def _rows(panel: Panel, path: str, *, name: str | None = None) -> Part:
     """A panel of rows."""
     plot = unstable.plot(
-        panel.name, path, ["$origin/**", SPAN], between=(0.0, axes.TOP), fixed=True, titled=False
+        panel.name,
+        path,
+        ["$origin/**", axes.SPAN],
+        between=(0.0, axes.TOP),
+        fixed=True,
+        titled=False,
     )
     return axes.part(panel, plot, name=name)
 
 
 def _curve(curve: Curve) -> Part:
-    panel, paths = curve.panel, ["$origin/**", SPAN]
+    panel, paths = curve.panel, ["$origin/**", axes.SPAN]
     plot = unstable.plot(panel.name, curve.path, paths, between=curve.between, titled=False)
     return axes.part(panel, plot)
 
@@ -135,10 +138,10 @@ def _spectrogram(contents: Contents) -> Part:
     top = min(TOP_HZ, contents.rate / 2)
     parts.append(unstable.bars(f"At the cursor, 0-{top:.0f} Hz [dB]", "/spectrum/now"))
     if contents.links:
-        paths = ["/power/total", SPAN]
+        paths = ["/power/total", axes.SPAN]
         parts.append(unstable.plot("Sound power [dB re 1 pW]", "/power", paths))
     if contents.terms:
-        terms = ["/power/terms/**", "/power/total", SPAN]
+        terms = ["/power/terms/**", "/power/total", axes.SPAN]
         parts.append(unstable.plot("Terms A, B, C", "/power", terms, legend=True))
     if contents.sound:
         parts.append(unstable.audio("Listen", "/sound"))
@@ -149,9 +152,9 @@ def _strips(contents: Contents) -> Part:
     """Levels of joints and links, then scores, then each limb's signals."""
     parts = [_rows(panel, f"/strips/{panel.name}", name=name) for name, panel in contents.strips]
     if contents.scores:
-        parts.append(unstable.plot("Scores", "/score", ["$origin/**", SPAN], legend=True))
+        parts.append(unstable.plot("Scores", "/score", ["$origin/**", axes.SPAN], legend=True))
     if contents.links:
-        paths = ["$origin/**", SPAN]
+        paths = ["$origin/**", axes.SPAN]
         parts.append(
             unstable.plot("Power of links [dB re 1 pW]", "/power/links", paths, legend=True)
         )
@@ -164,7 +167,7 @@ def limb_tabs(plots: Sequence[Plot]) -> list[Part]:
     return [
         unstable.tabs(
             *(
-                unstable.plot(plot.title, "/joints", (*plot.paths, SPAN), legend=True)
+                unstable.plot(plot.title, "/joints", (*plot.paths, axes.SPAN), legend=True)
                 for plot in plots
                 if plot.limb == limb
             ),

@@ -243,8 +243,8 @@ def _log_marks(
     count: int,
 ) -> None:
     for row, name in enumerate(names):
-        listed_events = [event for event in analysis.findings if event.label == name]
-        if listed_events:
+        starts = [event.start for event in analysis.findings if event.label == name]
+        if starts:
             place = axes.TOP * (1.0 - (row + sum(FOUND) / 2) / count)
             points = rr.SeriesPoints(
                 names=[spoken(name)],
@@ -255,8 +255,8 @@ def _log_marks(
             recording.log(f"/class/mark/{name}", points, static=True)
             recording.send_columns(
                 f"/class/mark/{name}",
-                indexes=[axes.at(np.array([event.start for event in listed_events]))],
-                columns=axes.scalars(np.full(len(listed_events), place)),
+                indexes=[axes.at(np.array(starts))],
+                columns=axes.scalars(np.full(len(starts), place)),
             )
 
 
@@ -327,13 +327,6 @@ def log_curves(recording: rr.RecordingStream, analysis: Analysis) -> list[Curve]
     for curve in curves:
         log_gaps(recording, curve.path, analysis.run, curve.between)
     return curves
-
-
-def log_span(recording: rr.RecordingStream, run: Run) -> None:
-    """Log that plots reach from the start of the run to its end, whatever they show."""
-    ends = np.array([run.time[0], run.time[-1]])
-    nothing = np.full((2, 1), np.nan)
-    axes.log_lines(recording, "/span", ends, nothing, names=[""], colours=[colors.THRESHOLD])
 
 
 def scaled(values: Array) -> tuple[float, str]:
@@ -755,7 +748,8 @@ def log_details(
     """Log noise, and the velocities of the joints that vibrate most, sample by sample."""
     run, found = analysis.run, []
     for number, moment in enumerate(moments):
-        edges = (moment.peak - DETAIL / 2, moment.peak + DETAIL / 2)
+        half = max(DETAIL / 2, 4.0 / run.rate)
+        edges = (moment.peak - half, moment.peak + half)
         first, last = np.searchsorted(run.time, edges)
         part = slice(int(first), int(last))
         valid = run.mask[part]

@@ -108,7 +108,7 @@ def _log(
     floor: float | None,
 ) -> Contents:
     run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
-    panels.log_span(recording, run)
+    axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
     strips = []
     if (panel := strip_rows.log_joint_levels(recording, analysis)) is not None:
         strips.append(("Joints above 10 Hz", panel))

@@ -4,8 +4,10 @@ import hashlib
 import os
 import re
 import shlex
+import shutil
 import signal
 import socket
+import socketserver
 import subprocess
 import sys
 import tempfile
@@ -14,8 +16,11 @@ import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from http.client import HTTPConnection
+from http.server import BaseHTTPRequestHandler
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Thread
 from typing import IO
 from urllib.parse import quote
 
@@ -257,8 +262,7 @@ def how_to_open(recording: Path) -> str:
     path = shlex.quote(str(recording))
     rerun = shlex.quote(str(Path(sys.executable).with_name("rerun")))
     return (
-        f"open it in the viewer:  {rerun} {path}\n"
-        f"or in a browser:        {rerun} --serve-web --bind {HOST} {path}"
+        f"open it in the viewer:  {rerun} {path}\nor in a browser:        inspector view RUN --web"
     )
 
 
@@ -297,18 +301,81 @@ def serve(recording: Path, announce: Callable[[str], None], *, port: int = 0) ->
 
 @contextmanager
 def serving(recording: Path, *, port: int = 0) -> Iterator[Served]:
-    """Serve a recording on loopback, for as long as the block lasts."""
-    data_port = free_port()
-    page_port = free_port(port, other=data_port)
-    ports = ("--port", str(data_port), "--web-viewer-port", str(page_port))
-    with started("--serve-web", *ports, str(recording)) as server:
+    """Serve a recording on loopback, for as long as the block lasts.
+
+    Rerun's own server answers whatever host a browser asks for. A page from elsewhere whose name is
+    made to point to this machine (DNS rebinding) could read a recording from it. So rerun serves
+    the empty viewer only, and the recording comes from here, to those who ask for this host.
+    """
+
+    class Relay(_Relay):
+        """Of this recording."""
+
+    with socketserver.ThreadingTCPServer((HOST, free_port(port)), Relay, False) as server:
+        server.allow_reuse_address = server.daemon_threads = True
+        server.server_bind()
+        taken = server.server_address[1]
+        page, other = (free_port(other=taken) for _ in range(2))
+        ports = ("--web-viewer-port", str(page), "--port", str(other))
+        with started("--serve-web", *ports) as viewer:
+            try:
+                _wait_for(page, viewer)
+                Relay.recording, Relay.page = recording, page
+                Relay.hosts = {f"{name}:{taken}" for name in (HOST, "localhost")}
+                server.server_activate()
+                Thread(target=server.serve_forever, daemon=True).start()
+                address = f"http://{HOST}:{taken}"
+                try:
+                    yield Served(f"{address}/?url={quote(address + RECORDING, safe='')}", viewer)
+                finally:
+                    server.shutdown()
+            finally:
+                viewer.kill()
+
+
+RECORDING = "/recording.rrd"
+
+
+class _Relay(BaseHTTPRequestHandler):
+    """Hands out the recording, and the viewer's page."""
+
+    recording: Path
+    page: int
+    hosts: set[str]
+
+    def do_GET(self) -> None:  # as the base class names it
+        """Answer a request."""
+        if self.headers.get("Host") not in self.hosts:
+            self.send_error(403, "this host is not served")
+            return
+        if self.path.partition("?")[0] == RECORDING:
+            with self.recording.open("rb") as file:
+                size = self.recording.stat().st_size
+                self._head(
+                    200, {"Content-Type": "application/octet-stream", "Content-Length": size}
+                )
+                shutil.copyfileobj(file, self.wfile)
+            return
+        upstream = HTTPConnection(HOST, self.page, timeout=SERVE_TIMEOUT)
         try:
-            for needed in (data_port, page_port):
-                _wait_for(needed, server)
-            data = quote(f"rerun+http://{HOST}:{data_port}/proxy", safe="")
-            yield Served(f"http://{HOST}:{page_port}/?url={data}", server)
+            accepted = {"Accept-Encoding": self.headers.get("Accept-Encoding", "identity")}
+            upstream.request("GET", self.path, headers=accepted)
+            answer = upstream.getresponse()
+            kept = ("Content-Type", "Content-Encoding", "Content-Length")
+            self._head(answer.status, {name: answer.getheader(name) for name in kept})
+            shutil.copyfileobj(answer, self.wfile)
         finally:
-            server.kill()
+            upstream.close()
+
+    def _head(self, status: int, headers: Mapping[str, object]) -> None:
+        self.send_response(status)
+        for name, value in headers.items():
+            if value is not None:
+                self.send_header(name, str(value))
+        self.end_headers()
+
+    def log_message(self, format: str, *args: object) -> None:  # noqa: A002
+        """Say nothing."""
 
 
 def free_port(wanted: int = 0, *, other: int = 0) -> int:
