@@ -148,11 +148,6 @@ class Probe:
             )
             for what, profile in {"noisytest-rbf": original, **profiles}.items()
         }
-        profile = self.names("noiseclassifier.estimators.baseline.NOISE_ALONE").at(RATE)
-        recordings = self.names("noiseclassifier.noisytest.read_folder")(Path(folder, "training"))
-        good = self.names("noiseclassifier.GoodMotion.read")(recordings, profile)
-        learnt = self.names("noiseclassifier.learn_baseline")(good, profile)
-        trained["baseline"] = self.names.field("noiseclassifier.Learnt.classifier", learnt)
         validation = read(Path(folder, "validation"), original, training=False)
         frames = self.names.field("noiseclassifier.Dataset.frames", validation)
         for what, classifier in trained.items():

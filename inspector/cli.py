@@ -49,8 +49,8 @@ COMMANDS = {
         "diff reference/ candidate/ --report changes/",
         reads_logs=False,
     ),
-    "expect": Entry(
-        "Check", "Write a first expect.toml, which allows what is found in runs.", "expect runs/"
+    "accept": Entry(
+        "Check", "Accept good runs: what is normal.", 'accept runs/ --reason "first release"'
     ),
     "audit": Entry(
         "Check", "Print what logs can show: rates, quantisation, failure classes.", "audit run.npz"
@@ -75,16 +75,6 @@ COMMANDS = {
         "train data/ --part training --rate 1000 -o model.npz",
         reads_logs=False,
     ),
-    "adapt": Entry(
-        "Train",
-        "Adapt the shipped model to your robot, using fault-free runs.",
-        "adapt good1.npz good2.npz -o robot.npz --alarms 1",
-    ),
-    "baseline": Entry(
-        "Train",
-        "Train a baseline on fault-free runs only, to find anomalies.",
-        "baseline good1.npz good2.npz -o baseline.npz --alarms 1",
-    ),
     "tune": Entry(
         "Train",
         "Tune a profile's settings by grid search; resumes if killed.",
@@ -108,6 +98,9 @@ COMMANDS = {
     ),
 }
 RENAMED = {
+    "adapt": "accept",
+    "baseline": "accept",
+    "expect": "accept",
     "shot": "view RUN -o FILE.png",
     "report": "view RUN -o FILE.html",
     "compare": "noise --compare",

@@ -1,7 +1,7 @@
 """One colour scheme everywhere; the classes stay apart for the colour-blind.
 
 Each class has a contrast of at least 3:1 (WCAG 2.2, 1.4.11) against the backgrounds of the viewer
-and against the white of reports. Any two of NoisyTest's own, `anomaly` and `unknown` differ by a
+and against the white of reports. Any two of NoisyTest's own, `louder` and `unknown` differ by a
 CIEDE2000 of at least 15 as deuteranopes and protanopes see them (Machado, Oliveira and Fernandes
 2009); found by search under these conditions. No class is told by its colour alone: each has a row
 or a name.
@@ -12,7 +12,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from noiseclassifier import ANOMALY, UNKNOWN
+from noiseclassifier import UNKNOWN
 
 Color: TypeAlias = tuple[int, int, int]
 
@@ -24,7 +24,7 @@ CLASSES: dict[str, Color] = {
     "impact": (180, 63, 25),
     "highaccelerations": (221, 124, 11),
     "oscillations": (90, 144, 252),
-    ANOMALY: (132, 84, 150),
+    "louder": (132, 84, 150),
     UNKNOWN: (144, 144, 150),
 }
 OTHERS: tuple[Color, ...] = ((162, 144, 114), (24, 84, 252), (198, 30, 90), (138, 138, 180))

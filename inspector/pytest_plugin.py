@@ -189,7 +189,7 @@ class Noise:
         """What may be there, of classes that there are."""
         __tracebackhide__ = True
         from inspector.analysis.status import Status
-        from inspector.expectations.expectations import classes_found
+        from inspector.reference.verdicts import classes_found
         from noisemodel.errors import hint
 
         known = (*classes_found(self._library), Status.CANNOT_TELL.value)

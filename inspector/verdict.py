@@ -16,7 +16,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from enum import StrEnum
 from functools import cache, partial
 from itertools import zip_longest
@@ -47,7 +47,7 @@ KIND = "noise-classify-state/"
 FORMAT = f"{KIND}2"
 PATIENCE = 2.0
 """How long a file that another process holds is waited for, in [s]."""
-SETTINGS = ("how logs are read", "--unknown", "--report")
+SETTINGS = ("how logs are read", "--unknown", "--report", "--reference")
 """The first settings of a header; what follows are files that options name."""
 MAX_BYTES = 256 * 2**20
 """Most bytes of a state file that is read: those of some hundred thousand runs."""
@@ -73,6 +73,7 @@ class Ruling(StrEnum):
     WAIVED = "waived"
     IN_BUDGET = "in-budget"
     FILTERED = "filtered"
+    AS_REFERENCE = "as-reference"
 
     @property
     def fails(self) -> bool:
@@ -163,6 +164,7 @@ class Evidence:
             "signal": self.signal or None,
             "band_hz": list(self.octave) if self.octave else None,
             "level_db": self.level,
+            "excused": self.excused,
         }
 
     @classmethod
@@ -177,7 +179,56 @@ class Evidence:
             str(content["signal"] or ""),
             (float(band[0]), float(band[1])) if band else None,
             content["level_db"] and float(content["level_db"]),
+            str(content.get("excused", "")),
         )
+
+
+@dataclass(frozen=True)
+class Beside:
+    """How a run compares with its reference, see `inspector.reference`.
+
+    Attributes:
+        path: The reference.
+        scenarios: Names of the scenarios whose motion it makes.
+        repetitions: How many accepted repetitions these have.
+        shares: Share of the run by kind of evidence.
+        margins: From how many decibels on a moment is a finding, by kind of evidence.
+        bounds: What is known of the margins, by kind of evidence, a sentence or two each.
+        worst: Largest score of a frame over the reference, in [dB]; None without one.
+        quieter: By how much it is quieter than each repetition, in [dB]; 0 if it is not.
+        speed: Its speed over that of the repetitions; None without.
+        failures: What it lacks of its scenario, and why.
+        words: The evidence, in a line.
+    """
+
+    path: str
+    scenarios: tuple[str, ...] = ()
+    repetitions: int = 0
+    shares: Mapping[str, float] = field(default_factory=dict)
+    margins: Mapping[str, float] = field(default_factory=dict)
+    bounds: Mapping[str, str] = field(default_factory=dict)
+    worst: float | None = None
+    quieter: float = 0.0
+    speed: float | None = None
+    failures: tuple[tuple[str, str], ...] = ()
+    words: str = ""
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Beside":
+        """Read what `as_dict` wrote."""
+        known = {UNITS_GONE.get(name, name): value for name, value in content.items()}
+        known["scenarios"] = tuple(map(str, known["scenarios"]))
+        known["failures"] = tuple((str(what), str(why)) for what, why in known["failures"])
+        return cls(**known)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The comparison as a run of ``noise-verdict/3`` has it."""
+        names = {short: name for name, short in UNITS_GONE.items()}
+        return {names.get(name, name): value for name, value in asdict(self).items()}
+
+
+UNITS_GONE = {"margins_db": "margins", "over_db": "worst", "quieter_db": "quieter"}
+"""Names of `Beside` by those that JSON has, which state the unit."""
 
 
 @dataclass(frozen=True)
@@ -193,6 +244,7 @@ class Verdict:
         localisations: The localisation of each finding, where it is known.
         model_sha256: SHA-256 of the model's file, empty without.
         orders: Of the findings whose vibration goes with the speed of a joint.
+        beside: How the run compares with its reference; None without one.
         assumed: What was assumed when its log was read, in a line; empty of a run file.
         scenario: The scenario that the run names, empty without.
         duration: Duration of the run, in [s]; 0 if it cannot be read.
@@ -220,6 +272,7 @@ class Verdict:
     unknown: Unknown = Unknown.FINDING
     model_sha256: str = ""
     orders: Mapping[Event, "Order"] = field(default_factory=dict)
+    beside: Beside | None = None
     assumed: str = ""
     scenario: str = ""
     duration: float = 0.0
@@ -304,6 +357,7 @@ class Verdict:
                 for missing in self.missing
             ],
             "expectations": self.expectations,
+            "reference": None if self.beside is None else self.beside.as_dict(),
             "message": self.message,
             "assumed": self.assumed,
             "scenario": self.scenario,
@@ -400,6 +454,7 @@ class Verdict:
             unknown=Unknown(content["unknown"]),
             orders=orders,
             evidence=evidence,
+            beside=Beside.from_dict(content["reference"]) if content.get("reference") else None,
             rulings=rulings,
             missing=missing,
             joints=int(content["joints"]),
@@ -416,6 +471,7 @@ def classify_file(
     reading: Reading | None = None,
     unknown: Unknown = Unknown.FINDING,
     draw: Callable[[Analysis, Path], Path] | None = None,
+    reference: Callable[[Analysis, Verdict], Verdict] | None = None,
 ) -> Verdict:
     """Classify one file; errors become part of the verdict.
 
@@ -426,6 +482,7 @@ def classify_file(
         reading: How logs are read.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         draw: Draws a picture of an analysis of a file and gives its path, if one is wanted.
+        reference: Adds the evidence of a reference, see `inspector.reference.verdicts`.
 
     Returns:
         The verdict.
@@ -440,6 +497,8 @@ def classify_file(
             analysis = analyse(opened.run, library, unknown=unknown)
             analysis = replace(analysis, assumed=opened.assumed)
         verdict = Verdict.of(source.shown, analysis)
+        if reference is not None:
+            verdict = reference(analysis, verdict)
         if draw is not None:
             try:
                 verdict = replace(verdict, picture=draw(analysis, source.shown))
@@ -466,6 +525,7 @@ def classify_files(
     reading: Reading | None = None,
     unknown: Unknown = Unknown.FINDING,
     draw: Callable[[Analysis, Path], Path] | None = None,
+    reference: Callable[[Analysis, Verdict], Verdict] | None = None,
     jobs: Jobs = 1,
     resume: Path | None = None,
 ) -> Iterator[Verdict]:
@@ -477,6 +537,7 @@ def classify_files(
         reading: How logs are read.
         unknown: Whether out-of-distribution frames below the alarm threshold are findings.
         draw: Draws a picture of an analysis, see `classify_file`; importable for several jobs.
+        reference: Adds the evidence of a reference, see `classify_file`.
         jobs: How many to work on at once, or the address of a Dask scheduler. A run with which a
             worker dies is an internal error.
         resume: A file that keeps the verdicts; those on unchanged runs are taken from it.
@@ -487,7 +548,14 @@ def classify_files(
     Raises:
         InspectorError: If that file cannot be resumed or written.
     """
-    one = partial(classify_file, library=library, reading=reading, unknown=unknown, draw=draw)
+    one = partial(
+        classify_file,
+        library=library,
+        reading=reading,
+        unknown=unknown,
+        draw=draw,
+        reference=reference,
+    )
     end = partial(_died, unknown=unknown)
     if resume is None:
         yield from in_order(one, paths, jobs=jobs, died=end, work=work_of(paths))
@@ -497,7 +565,7 @@ def classify_files(
     settings = {
         "version": program_version(),
         "models": {name: model.sha256 for name, model in library.items()},
-        "settings": [repr(reading), unknown.value, draw is not None]
+        "settings": [repr(reading), unknown.value, draw is not None, str(reference or "")]
         + [digest(each) for each in beside if each and each.is_file()],
     }
     content = cache(digest)

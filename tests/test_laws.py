@@ -23,7 +23,7 @@ from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
 from noiseclassifier import scenarios
-from noiseclassifier.novelty.faults import KINDS, fault
+from noiseclassifier.faults import KINDS, fault
 from noiseclassifier.scenarios.domains.added import LEVELS
 
 FLOOR = 0.3

@@ -1,4 +1,4 @@
-"""`inspector live` as a gate: findings as they come, expectations, exit statuses."""
+"""`inspector live` as a gate: findings as they come, exit statuses."""
 
 import io
 import json
@@ -65,47 +65,6 @@ def test_fail_fast_ends_at_the_first_finding_that_counts(live, rows):
     (*_, summary) = map(json.loads, out.splitlines())
     assert status == 1
     assert 1.8 < summary["duration"] < len(rows[0].splitlines()) / rows[1]
-
-
-def expected(tmp_path, text):
-    path = tmp_path / "expect.toml"
-    path.write_text(text)
-    return path
-
-
-def test_an_expected_finding_of_a_stream_does_not_count(live, tmp_path):
-    path = expected(tmp_path, '[[require]]\nclass = "impact"\nat = 1.78\ntolerance = 0.1\n')
-    status, out, _ = live("--expect", path, "--fail-fast")
-    assert status == 0
-    assert out.splitlines()[0].endswith("s (required)")
-    assert "  impact from 1." in out.splitlines()[-1]
-    assert out.splitlines()[-1].endswith("does not count: required")
-
-
-def test_a_required_finding_that_a_stream_lacks_ends_with_1(live, tmp_path):
-    text = 'runs = "live"\nclass = "oscillations"\nreason = "the shaker"\n'
-    path = expected(tmp_path, f'[[allow]]\nclass = "impact"\n[[require]]\n{text}')
-    status, out, _ = live("--expect", path)
-    assert status == 1
-    assert out.splitlines()[-1] == "  missing: oscillations (required: the shaker)"
-    _, out, _ = live("--expect", path, "--format", "json")
-    assert json.loads(out.splitlines()[-1])["missing"] == [
-        out and "missing: oscillations (required: the shaker)"
-    ]
-
-
-def test_expectations_of_other_runs_are_not_about_the_stream(live, tmp_path):
-    path = expected(tmp_path, '[[allow]]\nruns = "pick*"\nclass = "impact"\n')
-    assert live("--expect", path)[0] == 1
-
-
-def test_wrong_expectations_of_a_stream_are_one_line(live, tmp_path):
-    path = expected(tmp_path, '[[allow]]\nclass = "bang"\n')
-    status, out, err = live("--expect", path)
-    assert (status, out) == (3, "")
-    assert err.startswith(
-        f"inspector: {path}: [[allow]] 1: no model has the class 'bang'; there are "
-    )
 
 
 def test_a_rate_without_a_model_ends_with_4(live):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
+from noiseclassifier.faults import with_fault
 from noiseclassifier.logbands import HIGHEST, LOWEST
-from noiseclassifier.novelty.faults import with_fault
 from noiseclassifier.pooling import columns
 from noiseclassifier.signals import JOINTS, MOTION
 

@@ -10,13 +10,13 @@ import noiseclassifier as nc
 from inspector import verdict
 from inspector.analysis.status import Status
 from inspector.errors import InspectorError
-from inspector.expectations import expectations
 from inspector.labelfiles import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.input import reader_of
 from inspector.logs.options import ReadOptions
 from inspector.logs.reading import read_log
 from inspector.logs.signals import column_signal, time_column
+from inspector.reference import store
 from inspector.text import counted, plain
 from inspector.training import tuningfile
 from inspector.verdict import classify_file
@@ -46,7 +46,7 @@ READERS = {
     "labels.toml": lambda path: read_labels(path, RUN),
     "labels.csv": lambda path: read_labels(path, RUN),
     "labels.txt": lambda path: read_labels(path, RUN),
-    "expect.toml": expectations.read,
+    "reference.toml": store.Reference.load,
     "mapping.toml": ReadOptions.load,
     "state": read_state,
     "tuned.jsonl": read_tuning,

@@ -782,7 +782,7 @@ BY_NAME: dict[str, Callable[[bytes], Iterator[Bomb]]] = {
     "NoisyTest, two": _tables,
     "labels, NoisyTest": _toml,
     "mapping": _toml,
-    "expect": _toml,
+    "reference": _toml,
     "NoisyTest labels": _toml,
     "simulated": _toml,
     "resume": _json_lines,

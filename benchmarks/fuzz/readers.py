@@ -24,12 +24,12 @@ from inspector import verdict
 from inspector.analysis.analyse import analyse
 from inspector.assets import model_files
 from inspector.errors import InspectorError
-from inspector.expectations import expectations
 from inspector.labelfiles import read_labels
 from inspector.library import load_library
 from inspector.live import input as feeding
 from inspector.logs.options import ReadOptions, parse_mapping
 from inspector.logs.reading import listing, read_logs
+from inspector.reference.store import Reference
 from inspector.training import tuningfile
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
@@ -83,21 +83,18 @@ DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="
 </visual_scene></library_visual_scenes><scene><instance_visual_scene url="#vs"/></scene></COLLADA>
 """
 LABELS = ((0.0, 0.5, "ok"), (0.6, 0.9, "impact"))
-EXPECT = """format = "noise-expect/1"
-others = "fail"
-[[allow]]
-class = ["impact", "oscillations"]
-time = [0.5, 1.0]
-joints = "a"
-reason = "known"
-[[waive]]
-class = "unknown"
+STORE = """format = "noise-reference/1"
+[[scenario]]
+name = "pick"
+joints = ["a"]
+levels = "pick.npz"
+sha256 = "0"
+[[scenario.repetition]]
+rate_hz = 1000.0
+duration_s = 1.0
+[[scenario.waive]]
 until = 2099-01-31
 reason = "later"
-[[budget]]
-class = "impact"
-findings = 2
-percent = 5.5
 """
 
 
@@ -435,8 +432,8 @@ def _read_model(path: Path) -> None:
 EVALUATE = ("evaluate", "general", "{parent}", "--seen-too")
 NPY = ReadOptions(rate=100.0, entries=parse_mapping(["position=array[:2]"]))
 OUT = "{folder}/out.npz"
-CLASSIFY = ("classify", "{}", "--no-expect")
-WITH_MODEL = ("classify", "{folder}/run.npz", "--no-expect", "--model", "{}")
+CLASSIFY = ("classify", "{}", "--no-reference")
+WITH_MODEL = ("classify", "{folder}/run.npz", "--no-reference", "--model", "{}")
 TUNE = ("tune", "{folder}/fast", "--folds", "2", "--profile", "noisytest-linear")
 SIMULATE = ("simulate", "dataset", "--robots", "panda", "--seeds", "1", "--scenarios", "straight")
 SIMULATE += ("--duration", "3")
@@ -472,11 +469,11 @@ READERS: Mapping[str, Reader] = MappingProxyType(
             ReadOptions.load,
             ("import", "{folder}/log.csv", "--mapping", "{}", "-o", OUT),
         ),
-        "expect.toml": Reader(
+        "reference.toml": Reader(
             "text",
-            _written("expect.toml", EXPECT),
-            expectations.read,
-            ("classify", "{folder}/run.npz", "--expect", "{}"),
+            _written("reference.toml", STORE),
+            Reference.load,
+            ("classify", "{folder}/run.npz", "--reference", "{}"),
         ),
         "resume state": Reader(
             "text",

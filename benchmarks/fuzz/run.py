@@ -1,6 +1,6 @@
 """Fuzz the readers with atheris, which needs the extra `fuzz`.
 
-    python -m benchmarks.fuzz.run "live rows, JSON" "expect.toml" --seconds 15
+    python -m benchmarks.fuzz.run "live rows, JSON" "reference.toml" --seconds 15
     python -m benchmarks.fuzz.run --group text --seconds 600 --found found/
 
 The corpus begins with a whole file of each reader and with damaged ones. An error that is not
@@ -29,7 +29,7 @@ with atheris.instrument_imports(include=["inspector", "noiseclassifier", "noisem
 
 GROUPS = {
     "labels": tuple(name for name in READERS if name.startswith(("labels", "NoisyTest", "simul"))),
-    "settings": ("mapping", "expect.toml", "resume state", "tune state", "dataset.json"),
+    "settings": ("mapping", "reference.toml", "resume state", "tune state", "dataset.json"),
     "rows": ("live rows, CSV", "live rows, JSON"),
     "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
     "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy", "sample"),

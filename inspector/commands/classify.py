@@ -28,12 +28,12 @@ from inspector.commands.options import (
 from inspector.commands.outputs import files_of, tried, written
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Sequence
 
     from inspector.analysis.analyse import Analysis
-    from inspector.expectations.expectations import Expectations
     from inspector.library import Library
     from inspector.logs.opening import Source
+    from inspector.reference.verdicts import References
     from inspector.verdict import Verdict
 
 
@@ -68,10 +68,14 @@ Report = Annotated[
 Resume = Annotated[
     Path | None, typer.Option(help="Keep verdicts in this file; continue if it exists.")
 ]
-Expect = Annotated[
-    Path | None, _gate("--expect", help="Expectations (TOML); by default the nearest expect.toml.")
+ReferenceFolder = Annotated[
+    Path | None,
+    _gate(
+        "--reference",
+        help="Accepted runs, or a folder of good ones; by default the nearest reference/.",
+    ),
 ]
-NoExpect = Annotated[bool, _gate("--no-expect", help="Apply no expectations.")]
+NoReference = Annotated[bool, _gate("--no-reference", help="Use the general model alone.")]
 FailOnClass = Annotated[
     list[str] | None,
     _gate("--fail-on-class", help="Only findings of this class; repeatable, or a,b,c."),
@@ -103,8 +107,8 @@ def classify(
     overwrite: Overwrite = False,
     resume: Resume = None,
     unknown: UnknownFrames = Unknown.FINDING,
-    expect: Expect = None,
-    no_expect: NoExpect = False,
+    reference: ReferenceFolder = None,
+    no_reference: NoReference = False,
     fail_on_class: FailOnClass = None,
     min_score: MinScore = None,
     min_duration: MinDuration = 0.0,
@@ -116,20 +120,21 @@ def classify(
     With several runs it is the highest-priority one: 70 > 5 > 3 > 1 > 4 > 0.
     """
     from inspector import assets
-    from inspector.expectations.judge import Gate, judge
     from inspector.library import load_library
     from inspector.logs.opening import sources
     from inspector.progress import progress
+    from inspector.reference.verdicts import Gate, References
     from inspector.report.cases import published
     from inspector.report.formats import FORMATS, text
     from inspector.verdict import classify_files, exit_status
 
     del localise  # of 0.6: each finding is localised now
-    if expect is not None and no_expect:
-        raise typer.BadParameter("--expect and --no-expect exclude each other")
+    if reference is not None and no_reference:
+        raise typer.BadParameter("--reference and --no-reference exclude each other")
     library = load_library(assets.model_files(model))
     found, others = sources(runs, ctx.obj)
-    expected = {} if no_expect else _expected([each.shown for each in found], runs, expect, library)
+    shown = [each.shown for each in found]
+    beside = References() if no_reference else References.found(shown, reference, ctx.obj)
     files = files_of(write or [], list(Format), overwrite=overwrite)
     outputs = [
         *_labels(found, labels_to, labels_format, overwrite=overwrite),
@@ -139,22 +144,29 @@ def classify(
 
     where, draw = jobs_or_dask(jobs, dask), _drawing(report)
     classified = classify_files(
-        found, library, reading=ctx.obj, unknown=unknown, draw=draw, jobs=where, resume=resume
+        found,
+        library,
+        reading=ctx.obj,
+        unknown=unknown,
+        draw=draw,
+        reference=beside if beside.of else None,
+        jobs=where,
+        resume=resume,
     )
     classified = progress(classified, "classify", total=len(found))
 
-    place = {each.shown: number for number, each in enumerate(found)}
+    place = {path: number for number, path in enumerate(shown)}
     verdicts = [
         replace(
-            judge(each, expected.get(each.path), gate=gate, today=date.today()),
+            beside.judge(each, gate, date.today()),
             ignored=each.status is Status.BAD_INPUT and on_bad_input is BadInput.IGNORE,
             picture_url=published(each.picture, report, report_url),
         )
         for each in sorted(classified, key=lambda each: place[each.path])
     ]
-    verdicts += _absent(verdicts, expected, runs)
+    verdicts += beside.absent(verdicts, [each for each in runs if each.is_dir()])
 
-    _say(verdicts, others, expected, verbose=verbose)
+    _say(verdicts, others, beside, verbose=verbose)
     lost = [line for verdict in verdicts for line in verdict.lost]
     formats = FORMATS | {"text": partial(text, verbose=verbose)}
     lost += written(verdicts, formats, format, files, overwrite=overwrite)
@@ -166,7 +178,7 @@ def classify(
 
 def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
     """The classes that fail a run."""
-    from inspector.expectations.expectations import classes_found
+    from inspector.reference.verdicts import classes_found
     from noisemodel.errors import hint
 
     known = classes_found(library)
@@ -178,41 +190,6 @@ def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
                 param_hint="'--fail-on-class'",
             )
     return tuple(names)
-
-
-def _expected(
-    shown: "Sequence[Path]", given: "Sequence[Path]", chosen: Path | None, library: "Library"
-) -> "dict[Path, Expectations]":
-    """The expectations of each run, and of each folder that was named, by its file."""
-    from inspector.expectations.expectations import NAME, found_for, read
-
-    folders = [each / NAME for each in given if each.is_dir()]
-    folders = [each for each in folders if each.parent not in shown or each.is_file()]
-    paths = [*shown, *folders]
-    expected = found_for(paths) if chosen is None else dict.fromkeys(paths, read(chosen))
-    for each in set(expected.values()):
-        each.check_classes(library)
-    return expected
-
-
-def _absent(
-    verdicts: "Sequence[Verdict]", expected: "Mapping[Path, Expectations]", given: "Sequence[Path]"
-) -> "list[Verdict]":
-    """A verdict for each file of expectations that requires findings of runs that are not there."""
-    from inspector.expectations.expectations import NAME
-    from inspector.expectations.judge import without_run
-
-    absent = []
-    for each in dict.fromkeys(expected.values()):
-        full = each.path.resolve()
-        about = [
-            folder
-            for folder in given
-            if folder / NAME in expected
-            and (expected[folder / NAME] == each or full.is_relative_to(folder.resolve()))
-        ]
-        absent.append(without_run(verdicts, each, about))
-    return [each for each in absent if each is not None]
 
 
 def _labels(
@@ -258,20 +235,18 @@ def _drawing(folder: Path | None) -> "Callable[[Analysis, Path], Path] | None":
 def _say(
     verdicts: "Sequence[Verdict]",
     others: "Sequence[Path]",
-    expected: "Mapping[Path, Expectations]",
+    beside: "References",
     *,
     verbose: bool,
 ) -> None:
-    """Print on standard error what was left out and assumed, and what expectations expire."""
-    from inspector.expectations.expectations import NAME
+    """Print on standard error what was left out and assumed, and which waivers expire."""
     from inspector.logs.opening import left_out
 
-    if unread := [path for path in others if path.name != NAME]:
-        typer.echo(f"inspector: {left_out(unread)}", err=True)
+    if others:
+        typer.echo(f"inspector: {left_out(others)}", err=True)
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts}, verbose=verbose)
-    for each in dict.fromkeys(expected.values()):
-        for remark in each.remarks(date.today()):
-            typer.echo(f"inspector: {remark}", err=True)
+    for remark in beside.remarks(date.today()):
+        typer.echo(f"inspector: {remark}", err=True)
 
 
 def say_lost(verdicts: "Sequence[Verdict]", lost: "Sequence[str]") -> None:

@@ -2,15 +2,11 @@
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from inspector.commands.options import Limits, ModelFiles, Overwrite, PackageRoot
-
-if TYPE_CHECKING:
-    from inspector.library import Library
-    from inspector.live.gate import Gate
 
 
 class Format(StrEnum):
@@ -46,10 +42,6 @@ def live(
     format: Annotated[  # noqa: A002
         Format, typer.Option("--format", help="Of findings: lines of text, or JSON lines.")
     ] = Format.TEXT,
-    expect: Annotated[
-        Path | None,
-        typer.Option("--expect", help="Expectations (TOML); a stream is a run called `live`."),
-    ] = None,
     fail_fast: Annotated[
         bool, typer.Option("--fail-fast", help="End at the first finding that counts.")
     ] = False,
@@ -67,7 +59,7 @@ def live(
     Exit status:
 
       0  ok: no finding that counts
-      1  findings: there was one, or one that is required is missing
+      1  findings: there was one
       2  wrong usage
       3  bad input: the samples cannot be understood
       4  cannot tell: say, the rate is too low for every model
@@ -80,6 +72,7 @@ def live(
     from inspector import assets
     from inspector.library import load_library
     from inspector.live import LiveError, LiveSession
+    from inspector.live.gate import Gate
     from inspector.live.input import follow
 
     del package_root, limit  # have been set
@@ -88,7 +81,7 @@ def live(
             "samples are read from standard input; pipe them in: robot | inspector live"
         )
     library = load_library(assets.model_files(model))
-    gate = _gate(expect, library, as_json=format is Format.JSON)
+    gate = Gate(_tell, as_json=format is Format.JSON)
     session = partial(
         LiveSession,
         rate,
@@ -104,29 +97,14 @@ def live(
     summary = follow(
         sys.stdin.buffer,
         given,
-        lambda found: gate.watch(session(joint_names=found)),
+        lambda found: session(joint_names=found),
         enough=lambda: fail_fast and gate.failed,
     )
     raise typer.Exit(gate.end(summary))
 
 
-def _gate(expect: Path | None, library: "Library", *, as_json: bool) -> "Gate":
-    """What becomes of the findings."""
+def _tell(line: str) -> None:
     from contextlib import suppress
-    from datetime import date
 
-    from inspector.expectations.expectations import read
-    from inspector.live.gate import Gate
-
-    expectations = None if expect is None else read(expect)
-    today = date.today()
-    if expectations is not None:
-        expectations.check_classes(library)
-        for remark in expectations.remarks(today):
-            typer.echo(f"inspector: {remark}", err=True)
-
-    def tell(line: str) -> None:
-        with suppress(OSError):  # the recording goes on; the command line says what is lost
-            typer.echo(line)
-
-    return Gate(tell, expectations, as_json=as_json, today=today)
+    with suppress(OSError):  # the recording goes on; the command line says what is lost
+        typer.echo(line)

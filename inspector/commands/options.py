@@ -93,10 +93,6 @@ Runs = Annotated[
     list[Path],
     typer.Argument(help="Run files, logs, folders of them.", show_default=False),
 ]
-GoodRuns = Annotated[
-    list[Path],
-    typer.Argument(help="Fault-free run files, logs, samples, folders of them, NoisyTest folders."),
-]
 Inputs = Annotated[
     list[Path],
     typer.Argument(help="Annotated runs, samples, folders of them, or NoisyTest folders."),
@@ -126,19 +122,6 @@ Kind = Annotated[
 Floor = Annotated[
     float | None,
     typer.Option("--floor", help="Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0),
-]
-Alarms = Annotated[
-    float,
-    typer.Option(callback=_above_zero, help="False-alarm budget, per hour of fault-free motion."),
-]
-ModelRate = Annotated[
-    float | None,
-    typer.Option(
-        "--rate",
-        min=1.0,
-        help="Rate of the model in [Hz]; faster runs are decimated.",
-        show_default=False,
-    ),
 ]
 InPart = Annotated[
     Part,

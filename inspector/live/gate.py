@@ -2,15 +2,11 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
-from datetime import date
 from pathlib import Path
 from typing import Any
 
 from inspector.analysis.status import EXIT, Status
-from inspector.expectations.expectations import Expectations
-from inspector.expectations.judge import judge
-from inspector.live.session import LiveSession, Summary
+from inspector.live.session import Summary
 from inspector.verdict import Verdict, counts
 from inspector.version import program_version
 from noiseclassifier import Event
@@ -18,14 +14,11 @@ from noiseclassifier.labels import interval
 
 FORMAT = "noise-live/1"
 NAME = Path("live")
-"""What entries of expectations call the stream."""
+"""What stands for the file of the stream."""
 
 
 class Gate:
-    """Applies expectations to findings while they come, and prints them.
-
-    Args:
-        expectations: What is expected, nothing unless given.
+    """Prints findings while they come.
 
     Attributes:
         failed: Whether a finding counts so far.
@@ -34,28 +27,17 @@ class Gate:
     def __init__(
         self,
         tell: Callable[[str], None],
-        expectations: Expectations | None = None,
         *,
         as_json: bool = False,
-        today: date,
     ) -> None:
         self.failed = False
-        self._tell, self._as_json, self._today = tell, as_json, today
-        self._expectations = expectations
+        self._tell, self._as_json = tell, as_json
         self._found: dict[tuple[str, float], Event] = {}
-        self._session: LiveSession | None = None
-
-    def watch(self, session: LiveSession) -> LiveSession:
-        """Begin with a session, whose frames say how early findings may begin."""
-        self._session = session
-        return session
 
     def take(self, event: Event, over: bool) -> None:
         """Print a finding when it is there, and when it is over."""
         self._found[event.label, event.start] = event
-        frame = 0.0 if self._session is None else self._session.summary.frame
-        whole = Verdict(NAME, Status.FINDINGS, events=tuple(self._found.values()))
-        verdict = self._judged(replace(whole, duration=event.stop), frame)
+        verdict = Verdict(NAME, Status.FINDINGS, events=tuple(self._found.values()))
         self.failed = self.failed or event in verdict.failing
         ruled = verdict.ruled(event)
         if self._as_json:
@@ -79,7 +61,6 @@ class Gate:
         """Print what became of the stream."""
         events, duration = tuple(summary.findings), summary.samples / summary.rate
         verdict = Verdict(NAME, summary.status, summary.model, events, duration=duration)
-        verdict = self._judged(verdict, summary.frame)
         if self._as_json:
             line = {
                 "event": "summary",
@@ -105,8 +86,3 @@ class Gate:
         for missing in verdict.missing:
             self._tell(f"  {missing}")
         return EXIT[verdict.status]
-
-    def _judged(self, verdict: Verdict, frame: float) -> Verdict:
-        if self._expectations is None:
-            return verdict
-        return judge(verdict, self._expectations.widened(frame), today=self._today)

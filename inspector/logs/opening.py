@@ -201,7 +201,12 @@ def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     others: list[Path] = []
     for name, folders, files in walk(path):
         here = Path(name)
-        folders[:] = sorted(each for each in folders if not each.startswith("."))
+        folders[:] = sorted(
+            each
+            for each in folders
+            # The levels of accepted runs are no logs.
+            if not each.startswith(".") and not os.path.lexists(here / each / "reference.toml")
+        )
         one = [each for each in folders if is_one_log(here / each)]
         folders[:] = [each for each in folders if each not in one]
         logs += [here / each for each in one]

@@ -109,6 +109,7 @@ def _remarks(verdicts: Sequence[Verdict]) -> Iterator[str]:
     for verdict in verdicts:
         if verdict.status is not Status.CANNOT_TELL:
             runs.update(filter(None, [verdict.message]))
+        runs.update([verdict.beside.words] if verdict.beside else [])
         if len(verdicts) > 1 and verdict.of_run:
             runs.update([f"by {verdict.expectations}"] if verdict.expectations else [])
     for message, number in runs.items():

@@ -1,1 +1,1 @@
-"""Models trained and evaluated on files: training, baselines, grid search, evaluation."""
+"""Models trained and evaluated on files: training, grid search, evaluation."""

@@ -5,8 +5,7 @@
 after F. Sygulla and D. Rixen, *Learning the Noise of Failure*, Sec. III. A `Profile` holds
 all settings: NoisyTest's, the paper's, or ours for any rate (`LogBands`). A `Dataset` holds
 annotated frames, a `Classifier` is trained on them and labels signals, `evaluate` measures frames,
-and `assess` whole recordings. A `Stream` labels a signal sample by sample. `learn_baseline` takes
-good runs alone, and so does `adapt`, which adapts a general model to a robot.
+and `assess` whole recordings. A `Stream` labels a signal sample by sample.
 
 This package needs no robot: its input is a signal and its rate. It needs NumPy, and scikit-learn
 only to train.
@@ -39,14 +38,10 @@ from noiseclassifier.examples import Examples
 from noiseclassifier.features import features
 from noiseclassifier.framing import frame
 from noiseclassifier.general import Frames, General, frames_of
-from noiseclassifier.labels import ANOMALY, UNKNOWN, Event, Labels
+from noiseclassifier.labels import UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
 from noiseclassifier.logfile import nominal_rate, read_log
-from noiseclassifier.novelty.adaptation import adapt
-from noiseclassifier.novelty.frames import GoodMotion
-from noiseclassifier.novelty.limit import Limit
-from noiseclassifier.novelty.training import Learnt, learn_baseline
 from noiseclassifier.profile import CLASSES, Profile
 from noiseclassifier.recording import Block, Fault, Recording
 from noiseclassifier.signals import NOISE, Signals
@@ -54,7 +49,6 @@ from noiseclassifier.splitting import check_apart, folds, group_of, held_out, le
 from noiseclassifier.stream import Stream
 
 __all__ = [
-    "ANOMALY",
     "ANY",
     "CLASSES",
     "EACH",
@@ -76,11 +70,8 @@ __all__ = [
     "FileError",
     "Frames",
     "General",
-    "GoodMotion",
     "Labels",
     "Lasting",
-    "Learnt",
-    "Limit",
     "LogBands",
     "MissingSignalError",
     "Model",
@@ -99,7 +90,6 @@ __all__ = [
     "Stream",
     "Unanswered",
     "UnknownLabelError",
-    "adapt",
     "assess",
     "check_apart",
     "evaluate",
@@ -109,7 +99,6 @@ __all__ = [
     "frames_of",
     "group_of",
     "held_out",
-    "learn_baseline",
     "leave_one_out",
     "load",
     "match",

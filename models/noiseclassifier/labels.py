@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 UNKNOWN = "unknown"
 """Label of a frame that is out of distribution and below the alarm threshold."""
-ANOMALY = "anomaly"
-"""Label that a baseline, which is learnt from good runs alone, gives a frame beyond its limit."""
 
 CONFIRM = 2
 """Frames of evidence in a stretch that make it a finding."""

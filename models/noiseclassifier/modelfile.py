@@ -29,7 +29,6 @@ from noiseclassifier.estimators.estimator import ESTIMATORS
 from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.features import feature_count
 from noiseclassifier.jsontext import from_json
-from noiseclassifier.labels import ANOMALY
 from noiseclassifier.logbands import HIGHEST, LogBands
 from noiseclassifier.profile import Profile
 from noiseclassifier.types import Array
@@ -39,6 +38,8 @@ OLD_FORMATS = ("noise-model/4", "noise-model/5")
 LARGEST = 512 * 1024**2
 """Bytes that a model file may have: a thousand times those of the shipped ones."""
 
+ACCEPT = "that is replaced; accept these runs (`inspector accept`), and classify without this model"
+"""What becomes of models that earlier versions learnt from good runs alone."""
 _REFERENCE = {"location": 1, "spread": 1}
 
 _KINDS = [
@@ -240,23 +241,21 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
             f"is of format {given!r}, this version reads {', '.join(map(repr, known))}:"
             " train it again, or read it by the version that wrote it",
         )
-    return dict(manifest) if given == FORMAT else _renamed(manifest)
+    found = dict(manifest) if given == FORMAT else _renamed(manifest)
+    profile = found.get("profile")
+    if isinstance(profile, dict) and profile.get("estimator") == "baseline":
+        raise ModelFileError(path, f"is a baseline of good runs: {ACCEPT}")
+    return found
 
 
 def _renamed(manifest: dict[str, Any]) -> dict[str, Any]:
     """Give the entries of versions 4 and 5 the names of version 6."""
-
-    def renamed(classes: Any) -> Any:
-        old = isinstance(classes, list)
-        return [ANOMALY if name == "departure" else name for name in classes] if old else classes
-
     profile = manifest.get("profile")
     if isinstance(profile, dict):
         names = {"machine": "estimator"}
         profile = {names.get(name, name): value for name, value in profile.items()}
-        profile["classes"] = renamed(profile.get("classes"))
         profile.setdefault("reference", False)
-    return {**manifest, "profile": profile, "classes": renamed(manifest.get("classes"))}
+    return {**manifest, "profile": profile}
 
 
 _JSON_TYPES = {
@@ -327,12 +326,8 @@ def _check_arrays(
             raise ModelFileError(
                 path, f"array {name!r} has shape {arrays[name].shape}, its profile asks for {shape}"
             )
-    if "location" in arrays and not (
-        arrays["location"].shape == arrays["spread"].shape == (count // 2,)
-        and profile.reference
-        and (arrays["spread"] >= 0).all()
-    ):
-        raise ModelFileError(path, "location and spread are no reference for its profile")
+    if "location" in arrays:
+        raise ModelFileError(path, f"is adapted to good runs: {ACCEPT}")
     if not (arrays["scale"] > 0).all():
         raise ModelFileError(path, "array 'scale' holds values that are not above 0")
     for name, most in estimator.highest(profile, features=count).items():

@@ -25,7 +25,7 @@ computed of the spectrum is off by as much."""
 
 Bands: TypeAlias = Literal["adjacent", "comb", "log"]
 Kernel: TypeAlias = Literal["linear", "rbf"]
-EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "detector", "baseline"]
+EstimatorKind: TypeAlias = Literal["svm", "networks", "trees", "detector"]
 Multiclass: TypeAlias = Literal["one-vs-one", "one-vs-rest"]
 
 _CHOICES = {"bands": Bands, "kernel": Kernel, "estimator": EstimatorKind, "multiclass": Multiclass}
@@ -107,7 +107,7 @@ class Profile:
     them as they are."""
     estimator: EstimatorKind = "svm"
     """Support vector machines, small networks, boosted trees, trees that first tell failures from
-    `ok` and then name them, or a baseline of good runs."""
+    `ok` and then name them."""
     kernel: Kernel = "rbf"
     """Kernel of the support vector machine."""
     regularization: float = 1.1

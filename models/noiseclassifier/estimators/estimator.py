@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import ClassVar, Protocol
 
-from noiseclassifier.estimators.baseline import Baseline
 from noiseclassifier.estimators.mlp import Networks
 from noiseclassifier.estimators.svm import SupportVectorMachines
 from noiseclassifier.estimators.trees import Detector, Trees
@@ -86,6 +85,5 @@ ESTIMATORS: Mapping[EstimatorKind, type[Estimator]] = {
     "networks": Networks,
     "trees": Trees,
     "detector": Detector,
-    "baseline": Baseline,
 }
 """Class of each estimator, by the name that profiles have for it."""

@@ -33,7 +33,7 @@ import numpy as np
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import DatasetError
-from noiseclassifier.labels import ANOMALY, CONFIRM, UNKNOWN, Event, Labels
+from noiseclassifier.labels import CONFIRM, UNKNOWN, Event, Labels
 from noiseclassifier.recording import Block, Fault, Recording
 from noiseclassifier.splitting import group_of, robot_of
 from noiseclassifier.types import Array, Index, Mask, Words
@@ -327,13 +327,6 @@ def predict(
     Raises:
         ModelsError: If the recording does not fit the model.
     """
-    if ANOMALY in classifier.classes:
-        blocks = tuple(
-            block if block.label == OK else block._replace(label=ANOMALY)
-            for block in recording.blocks
-        )
-        events = tuple(fault._replace(label=ANOMALY) for fault in recording.events)
-        recording = replace(recording, blocks=blocks, events=events)
     try:
         # Frames that are cut from blocks, as the paper does for validation.
         dataset = Dataset.of([recording], classifier.profile, training=False)

@@ -1,0 +1,233 @@
+"""Levels of a run by joint, octave and time, and the slow motion by which runs are aligned.
+
+A frame lasts 0.2 s and the next one begins 0.05 s later. Octaves go from 8 Hz to 0.45 of the rate.
+Each joint has two signals: its velocity, and its tracking error where a velocity is desired.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel import Run
+from noisemodel.ondemand import pieces
+from noisemodel.types import Array, Real
+
+HOP = 0.05
+"""From one frame to the next, in [s]."""
+BINS = 4
+"""Hops in a frame."""
+LOWEST, HIGHEST = 8.0, 0.45
+"""Lower edge of the first octave, in [Hz], and upper edge of the last as a share of the rate."""
+SIGNALS = ("velocity", "tracking error")
+LEAST_DB, STEP_DB, ABSENT = -100.0, 0.5, 255
+"""What code 0 of a stored level stands for, the step between codes, and the code of no level."""
+
+Codes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True, eq=False)
+class Levels:
+    """The levels of a run.
+
+    Attributes:
+        name: Its scenario: from its meta, or the name of its file without a number at the end.
+        run: Its file, as people read it.
+        sha256: SHA-256 of its file; empty if it has none.
+        robot: The robot that it names; empty without.
+        joints: Names of the joints.
+        rate: In [Hz].
+        start: Time of the first sample, in [s].
+        duration: In [s].
+        octaves: Lower and upper edges, in [Hz].
+        level: Shape (frames, joints, 2, octaves), in [dB re 1 rad/s]; NaN in gaps, and of tracking
+            errors that are not known.
+        guide: Slow positions, shape (frames, joints), in [rad] or [m].
+        guided_by: What these are: desired positions, or what stands in for them.
+        pace: Slow measured speed, root mean square over the joints, shape (frames,), in [rad/s].
+    """
+
+    name: str
+    run: str
+    sha256: str
+    robot: str
+    joints: tuple[str, ...]
+    rate: float
+    start: float
+    duration: float
+    octaves: tuple[tuple[float, float], ...]
+    level: NDArray[np.float32]
+    guide: NDArray[np.float32]
+    guided_by: str
+    pace: NDArray[np.float32]
+
+    @property
+    def time(self) -> Array:
+        """Middle of each frame, shape (frames,), in [s]."""
+        return np.asarray(self.start + (np.arange(len(self.guide)) + BINS / 2) * HOP)
+
+    @property
+    def speed(self) -> Array:
+        """Slow velocities, shape (frames, joints), in [rad/s] or [m/s]."""
+        if len(self.guide) < 2:
+            return np.zeros(self.guide.shape)
+        return np.asarray(np.gradient(self.guide.astype(np.float64), HOP, axis=0))
+
+
+def octaves(rate: float) -> tuple[tuple[float, float], ...]:
+    """Edges of the octaves at a rate, in [Hz]; the last one may be cut, to half of its width."""
+    top, found, low = HIGHEST * rate, [], LOWEST
+    while low * 1.5 <= top:
+        found.append((low, min(2 * low, top)))
+        low *= 2
+    return tuple(found)
+
+
+def levels(run: Run, *, name: str = "", file: str = "", sha256: str = "") -> Levels:
+    """Measure the levels of a run.
+
+    Args:
+        run: The run; what stays in its file is read piece by piece.
+        name: Its scenario.
+        file: Its file, as people read it.
+        sha256: SHA-256 of that.
+
+    Returns:
+        The levels, with no frame if the run is shorter than one, or no octave at a low rate.
+    """
+    bands = octaves(run.rate)
+    of_sample = np.floor(np.arange(len(run.time)) / (run.rate * HOP) + 1e-9).astype(np.int64)
+    count = int(of_sample[-1]) + 1
+    firsts = np.searchsorted(of_sample, np.arange(count))
+    sizes = np.diff(np.append(firsts, len(of_sample)))
+    frames = max(0, int(count - (sizes[-1] < 0.9 * run.rate * HOP)) - BINS + 1)
+    energy = _energies(run, bands, of_sample, count)
+    power = (
+        _framed(energy, frames)
+        / np.maximum(_framed(sizes.astype(float), frames), 1.0)[:, None, None, None]
+    )
+    level = np.maximum(10 * np.log10(np.maximum(power, 1e-30)), LEAST_DB).astype(np.float32)
+    lost = np.add.reduceat((~run.mask).astype(np.int64), firsts) > 0
+    # The filters still ring a frame after a gap.
+    level[_framed(np.convolve(lost, np.ones(BINS + 1))[:count], frames) > 0] = np.nan
+    level[:, ~_has_desired(run), 1] = np.nan
+    guide, guided_by = _guide(run, of_sample, count, lost)
+    moved = _means(run.velocity, of_sample, count)
+    return Levels(
+        name,
+        file,
+        sha256,
+        run.robot or "",
+        run.joint_names,
+        run.rate,
+        float(run.time[0]),
+        run.duration,
+        bands,
+        level,
+        (_framed(guide, frames) / BINS).astype(np.float32),
+        guided_by,
+        np.sqrt(np.mean(np.square(_framed(moved, frames) / BINS), axis=1)).astype(np.float32),
+    )
+
+
+def encoded(level: NDArray[np.float32]) -> Codes:
+    """Levels in steps of 0.5 dB; NaN is ``ABSENT``."""
+    codes = np.clip(np.round((level - LEAST_DB) / STEP_DB), 0, ABSENT - 1)
+    return np.where(np.isnan(codes), ABSENT, codes).astype(np.uint8)
+
+
+def decoded(codes: Codes) -> NDArray[np.float32]:
+    """Undo `encoded`."""
+    level = LEAST_DB + STEP_DB * codes.astype(np.float32)
+    return np.where(codes == ABSENT, np.float32(np.nan), level)
+
+
+def _framed(binned: Array, frames: int) -> Array:
+    """Sum over the bins of each frame."""
+    total = np.concatenate((np.zeros((1, *binned.shape[1:])), np.cumsum(binned, axis=0)))
+    return np.asarray(total[BINS : BINS + frames] - total[:frames])
+
+
+def _has_desired(run: Run) -> NDArray[np.bool_]:
+    known = () if run.velocity_desired is None else run.desired_joint_names
+    return np.array([joint in known for joint in run.joint_names], dtype=bool)
+
+
+def _energies(
+    run: Run, bands: tuple[tuple[float, float], ...], of_sample: NDArray[np.int64], count: int
+) -> Array:
+    """Energy of each bin, shape (bins, joints, 2, octaves)."""
+    from scipy.signal import butter, sosfilt
+
+    joints = len(run.joint_names)
+    filters = [butter(2, band, "bandpass", fs=run.rate, output="sos") for band in bands]
+    states = [np.zeros((len(sos), 2 * joints, 2)) for sos in filters]
+    energy = np.zeros((count, 2 * joints, len(bands)))
+    for rows, signals in _signals(run):
+        bins = of_sample[rows]
+        starts = np.flatnonzero(np.diff(bins, prepend=-1))
+        for place, sos in enumerate(filters):
+            passed, states[place] = sosfilt(sos, signals, axis=1, zi=states[place])
+            energy[bins[starts], :, place] += np.add.reduceat(passed**2, starts, axis=1).T
+    return energy.reshape(count, 2, joints, len(bands)).transpose(0, 2, 1, 3)
+
+
+def _signals(run: Run) -> Iterator[tuple[slice, Array]]:
+    """Velocities, then tracking errors, less their first values, held over gaps, by piece."""
+    has = _has_desired(run)
+    order = [run.desired_joint_names.index(run.joint_names[joint]) for joint in np.flatnonzero(has)]
+    first = last = np.empty(0)
+    for rows in pieces(run.velocity):
+        velocity = np.asarray(run.velocity[rows], dtype=np.float64)
+        error = np.zeros_like(velocity)
+        if run.velocity_desired is not None and order:
+            desired = np.asarray(run.velocity_desired[rows], dtype=np.float64)
+            error[:, has] = velocity[:, has] - desired[:, order]
+        both = np.hstack((velocity, error))
+        valid = run.mask[rows]
+        if not len(first):
+            first = last = both[valid.argmax()]
+        # In a gap all values are 0: the last valid one stands in, without a step.
+        before = np.maximum.accumulate(np.where(valid, np.arange(len(both)), -1))
+        both = np.where((before < 0)[:, None], last, both[before])
+        last = both[-1]
+        yield rows, np.ascontiguousarray((both - first).T)
+
+
+def _guide(
+    run: Run, of_sample: NDArray[np.int64], count: int, lost: NDArray[np.bool_]
+) -> tuple[Array, str]:
+    """Mean slow positions in bins, and what they are."""
+    named = ("position_desired", "velocity_desired", "position", "velocity")
+    signal = next(each for each in named if getattr(run, each) is not None)
+    values, names = getattr(run, signal), run.joint_names
+    if signal.endswith("desired"):
+        names = run.desired_joint_names
+    means = _means(values, of_sample, count)
+    known = np.flatnonzero(~lost)
+    if len(known) and lost.any():
+        every = np.arange(count)
+        means = np.stack([np.interp(every, known, column[known]) for column in means.T], axis=1)
+    if signal.startswith("velocity"):
+        means = np.cumsum(means, axis=0) * HOP
+    elif len(means):
+        means = np.unwrap(means, axis=0)
+    guide = np.zeros((count, len(run.joint_names)))
+    for place, joint in enumerate(run.joint_names):
+        if joint in names:
+            guide[:, place] = means[:, names.index(joint)]
+    words = {"position_desired": "desired positions", "position": "measured positions"}
+    words |= {"velocity_desired": "desired velocities", "velocity": "measured velocities"}
+    return guide, words[signal]
+
+
+def _means(values: Real, of_sample: NDArray[np.int64], count: int) -> Array:
+    """Means of signals in bins, shape (bins, joints)."""
+    sums = np.zeros((count, values.shape[1]))
+    for rows in pieces(values):
+        bins = of_sample[rows]
+        starts = np.flatnonzero(np.diff(bins, prepend=-1))
+        part = np.asarray(values[rows], dtype=np.float64)
+        sums[bins[starts]] += np.add.reduceat(part, starts, axis=0)
+    return np.asarray(sums / np.bincount(of_sample, minlength=count)[:, None])

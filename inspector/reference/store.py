@@ -1,0 +1,669 @@
+"""The store of accepted runs: ``reference/reference.toml``, and an .npz of levels per scenario.
+
+People read and edit the TOML in a review: what is required, wanted and waived. The levels are in
+the .npz files, whose hashes the TOML holds: a file that was changed is refused.
+"""
+
+import hashlib
+import json
+import os
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date, datetime
+from functools import lru_cache
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from inspector.errors import FileError, InspectorError
+from inspector.logs.opening import Reading, open_source, sources
+from inspector.reference.judging import (
+    Comparison,
+    Expected,
+    Scenario,
+    compare,
+    leave_one_moment_out,
+    leave_one_out,
+    margin_of,
+    share_of_motion,
+)
+from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encoded, levels, octaves
+from inspector.text import counted
+from noiseclassifier import Event
+from noiseclassifier.jsontext import from_toml, text_of, toml_shown
+from noisemodel import NoiseModelError, OutputError, Run, archive
+from noisemodel.atomic import replacing
+
+FOLDER, NAME = "reference", "reference.toml"
+FORMAT = "noise-reference/1"
+NEWEST = 10
+"""Repetitions that are kept of a scenario."""
+MOST_SCENARIOS = 5000
+CHANGED = f"was changed, or is not that of {NAME}; accept the runs again"
+OTHERS = f"its arrays are not those of {NAME}; accept the runs again"
+TOLERANCE = 0.2
+"""By how much earlier or later an accepted finding may come, in [s]."""
+CALIBRATED = 3
+"""Repetitions from which the margin beside other motions is taken."""
+REPETITION = re.compile(r"(?P<name>.+?)[-_./](?:run|rep|take|seed)?[-_.]?\d+")
+"""Name of a file that is one of several: ``walk-1``, ``walk_run2``, ``walk-seed-003``."""
+
+
+class StoreError(FileError):
+    """A store of references that is wrong."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """Accepted runs: what is normal for a robot's scenarios.
+
+    Attributes:
+        path: The store, or the folder of good runs.
+        scenarios: In order of their names.
+        stored: Whether it is a store.
+    """
+
+    path: Path
+    scenarios: tuple[Scenario, ...] = ()
+    stored: bool = False
+    remarks: tuple[str, ...] = field(default=())
+
+    @classmethod
+    def load(cls, path: str | Path, reading: Reading | None = None) -> "Reference":
+        """Read a store, or measure a folder of good runs.
+
+        Args:
+            path: A store, its ``reference.toml``, a folder of runs, or a run.
+            reading: How runs are read.
+
+        Raises:
+            StoreError: If the store is damaged or of a later version.
+            InspectorError: If a run cannot be read.
+        """
+        path = Path(path)
+        if path.name == NAME:
+            path = path.parent
+        if os.path.lexists(path / NAME):
+            return _read(path)
+        if not path.exists():
+            raise StoreError(path, "no such file or folder")
+        return cls(path, of_runs(measured([path], reading)))
+
+    def compare(self, run: Run) -> Comparison:
+        """Compare a run with what is normal.
+
+        Args:
+            run: The run.
+
+        Returns:
+            The `Comparison`: dB over the reference by joint, octave and time, and findings.
+        """
+        return compare(levels(run, name=str(run.meta.get("scenario", ""))), self.scenarios)
+
+    def named(self, name: str) -> Scenario | None:
+        """The scenario of a name, or that had it; None without."""
+        own = (each for each in self.scenarios if each.name == name)
+        former = (each for each in self.scenarios if name in each.names)
+        return next(own, None) or next(former, None)
+
+
+def find(run: Path) -> Path | None:
+    """The store that is nearest to a run: beside it, or beside a folder above it.
+
+    The search ends at the top of a repository.
+
+    Raises:
+        StoreError: If something that is no store has its name.
+    """
+    folder = run if run.is_dir() else run.parent
+    return _nearest(folder.resolve())
+
+
+@lru_cache(maxsize=4096)
+def _nearest(folder: Path) -> Path | None:
+    here = Path.cwd()
+    for each in (folder, *folder.parents):
+        beside = each / FOLDER
+        if beside.is_symlink() and not beside.exists():
+            raise StoreError(beside, "a link that leads nowhere")
+        if os.path.lexists(beside / NAME):
+            return beside.relative_to(here) if beside.is_relative_to(here) else beside
+        if (each / ".git").exists():
+            break
+    return None
+
+
+def scenario_of(run: Run, path: Path, root: Path | None = None) -> str:
+    """Name of the scenario of a run: from its meta, or its file without a number at the end.
+
+    Args:
+        run: The run.
+        path: Its file.
+        root: The folder that it was found in; names below it contain their folders.
+    """
+    known = run.meta.get("scenario")
+    if isinstance(known, str) and known.strip() and not known.strip().isdigit():
+        return known.strip()
+    inside = path.relative_to(root) if root and path.is_relative_to(root) else Path(path.name)
+    if inside == Path():
+        inside = Path(path.name)
+    name = inside.with_suffix("").as_posix()
+    match = REPETITION.fullmatch(name)
+    return match["name"] if match else name
+
+
+def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Levels]:
+    """Measure the levels of runs.
+
+    Args:
+        paths: Runs, and folders of them.
+        reading: How they are read.
+
+    Raises:
+        InspectorError: If one cannot be read.
+    """
+    found = []
+    for path in paths:
+        for source in sources([path], reading)[0]:
+            try:
+                opened = open_source(source, reading)
+            except NoiseModelError as error:
+                raise InspectorError(str(error)) from error
+            name = scenario_of(opened.run, source.shown, path if path.is_dir() else None)
+            found.append(
+                levels(opened.run, name=name, file=str(source.shown), sha256=opened.sha256)
+            )
+    return found
+
+
+def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
+    """Group runs by name and motion into scenarios, in order of their names.
+
+    Two motions of one name are two scenarios: the second one has the name of its file.
+    """
+    groups: dict[str, list[Levels]] = defaultdict(list)
+    for run in runs:
+        name = run.name
+        if groups[name] and share_of_motion(run, groups[name][-1]) < 0.5:
+            name = Path(run.run).stem or name
+        groups[name].append(replace(run, name=name))
+    return tuple(
+        calibrated(Scenario(name, tuple(sorted(each, key=_natural)[-NEWEST:])))
+        for name, each in sorted(groups.items())
+        if each
+    )
+
+
+def _natural(run: Levels) -> list[tuple[int, str]]:
+    """Sorts files by their numbers: pick-9 before pick-10."""
+    parts = re.split(r"(\d+)", run.run)
+    return [(int(each), "") if each.isdigit() else (0, each) for each in parts]
+
+
+def calibrated(scenario: Scenario) -> Scenario:
+    """Add the scores from which margins follow."""
+    return replace(
+        scenario,
+        scores=tuple(
+            round(score, 2) for score in leave_one_out(scenario.repetitions) if isfinite(score)
+        ),
+        elsewhere=tuple(
+            round(score, 2) for score in leave_one_moment_out(scenario.repetitions[-CALIBRATED:])
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class Change:
+    """What accepting does to a scenario, in a line.
+
+    Attributes:
+        name: The scenario.
+        words: What changes.
+    """
+
+    name: str
+    words: str
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.words}"
+
+
+def accepted(
+    reference: Reference,
+    runs: Sequence[Levels],
+    *,
+    wanted: Mapping[str, Sequence[Expected]],
+    reason: str,
+    by: str,
+    today: date,
+) -> tuple[Reference, list[Change]]:
+    """Accept runs: their scenarios are added or replaced, all others stay.
+
+    Runs of an accepted scenario that are as it is join its repetitions, of which the newest ten
+    stay; runs that differ replace them. A scenario whose motion has another name is renamed.
+
+    Args:
+        reference: What was accepted before.
+        runs: The runs.
+        wanted: Findings in them, by scenario.
+        reason: Why they are accepted.
+        by: Who accepts them.
+        today: When.
+
+    Returns:
+        The reference, and what changes.
+    """
+    kept = {each.name: each for each in reference.scenarios}
+    changes = []
+    for new in of_runs(runs):
+        facts: dict[str, Any] = {"accepted": today, "by": by, "reason": reason}
+        facts["wanted"] = tuple(wanted.get(new.name, ()))
+        old = kept.get(new.name)
+        if old is None:
+            given = {each.name for each in of_runs(runs)}
+            former = [
+                each
+                for each in kept.values()
+                if each.name not in given
+                and share_of_motion(new.repetitions[-1], each.repetitions[-1]) > 0.8
+                and each.robot == new.robot
+            ]
+            if former:
+                old = kept.pop(former[0].name)
+                changes.append(Change(new.name, f"renamed from {old.name}"))
+                facts["renamed_from"] = (*old.renamed_from, old.name)
+        if old is None:
+            kept[new.name] = replace(new, **facts)
+            changes.append(Change(new.name, f"new, {counted(len(new.repetitions), 'repetition')}"))
+            continue
+        known = {each.sha256 for each in old.repetitions if each.sha256}
+        fresh = [each for each in new.repetitions if each.sha256 not in known]
+        if not fresh:
+            if old.name != new.name:
+                kept[new.name] = replace(old, name=new.name, renamed_from=facts["renamed_from"])
+            else:
+                changes.append(Change(new.name, "unchanged, these runs are accepted already"))
+            continue
+        over = [compare(replace(each, name=old.name), (old,)) for each in fresh]
+        same = all(
+            not each.exceedances and each.scenarios and each.quieter <= _margin(old)
+            for each in over
+        )
+        repetitions = (*old.repetitions, *fresh)[-NEWEST:] if same else new.repetitions
+        facts["wanted"] = old.wanted if same else facts["wanted"]
+        facts["waived"] = old.waived
+        changed = replace(old, name=new.name, repetitions=repetitions, **facts)
+        kept[new.name] = calibrated(changed)
+        worst = max((each.worst for each in over if isfinite(each.worst)), default=float("nan"))
+        words = f"{counted(len(fresh), 'repetition')} {'added' if same else 'replace the accepted'}"
+        told = f", {worst:+.1f} dB over the reference at most" if isfinite(worst) else ""
+        changes.append(Change(new.name, f"{words}{told}, {len(repetitions)} kept"))
+    scenarios = tuple(kept[name] for name in sorted(kept))
+    return Reference(reference.path, scenarios, stored=True), changes
+
+
+def wanted_in(
+    runs: Sequence[Levels], events: Mapping[str, Sequence[Event]]
+) -> dict[str, list[Expected]]:
+    """Findings in runs that are accepted, as wanted from then on, by scenario.
+
+    Args:
+        runs: The runs.
+        events: Findings by file.
+    """
+    spans: dict[tuple[str, str], list[list[Any]]] = defaultdict(list)
+    for run in runs:
+        for event in events.get(run.run, ()):
+            inside = (run.time >= event.start - TOLERANCE) & (run.time <= event.stop + TOLERANCE)
+            level = np.nan_to_num(run.level[inside], nan=LEAST_DB)
+            joint, top = "", LEAST_DB
+            if level.size:
+                joint = run.joints[int(level.max(axis=(0, 2, 3)).argmax())]
+                top = float(level.max())
+            start, stop = event.start - run.start - TOLERANCE, event.stop - run.start + TOLERANCE
+            known = spans[run.name, event.label]
+            same = next((each for each in known if start < each[1] and stop > each[0]), None)
+            if same is None:
+                known.append([start, stop, {joint}, top])
+            else:
+                same[:2] = min(start, same[0]), max(stop, same[1])
+                same[2].add(joint)
+                same[3] = max(top, same[3])
+    found: dict[str, list[Expected]] = defaultdict(list)
+    for (name, label), known in spans.items():
+        for start, stop, joints, top in known:
+            span = round(start, 2), round(stop, 2)
+            found[name].append(Expected(label, *span, tuple(sorted(joints - {""})), round(top, 1)))
+    return found
+
+
+def who() -> str:
+    """The name of the user; empty if the system has none."""
+    import getpass
+
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return ""
+
+
+def _margin(scenario: Scenario) -> float:
+    return margin_of(scenario.scores, len(scenario.repetitions)).db
+
+
+def save(reference: Reference, folder: Path) -> None:
+    """Write a store: first the levels, then the TOML that names them, each whole or not at all.
+
+    Args:
+        reference: What is accepted.
+        folder: The folder, made if it does not exist.
+
+    Raises:
+        OutputError: If it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made a folder ({error.strerror})") from error
+    lines = [
+        "# What is normal for each scenario, written by `inspector accept`; the levels are in the",
+        "# .npz files. People may edit what is required, wanted and waived.",
+        f"format = {_toml(FORMAT)}",
+    ]
+    names: set[str] = set()
+    for scenario in reference.scenarios:
+        name = _file_name(scenario.name, names)
+        digest = _write_levels(folder / name, scenario)
+        lines += ["", *_scenario_lines(scenario, name, digest)]
+    with replacing(folder / NAME, overwrite=True) as temporary:
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    for path in folder.glob("*.npz"):  # of scenarios that were renamed
+        if path.name not in names and re.fullmatch(
+            r"[\w.-]+~[0-9a-f]{8}\.npz|[\w.-]+\.npz", path.name
+        ):
+            path.unlink(missing_ok=True)
+
+
+def _file_name(name: str, taken: set[str]) -> str:
+    slug = re.sub(r"[^\w.-]+", "-", name, flags=re.ASCII).strip("-.")[:80] or "scenario"
+    unique = f"{slug}.npz"
+    if slug != name or unique.lower() in {each.lower() for each in taken}:
+        unique = f"{slug}~{hashlib.sha256(name.encode()).hexdigest()[:8]}.npz"
+    taken.add(unique)
+    return unique
+
+
+def _write_levels(path: Path, scenario: Scenario) -> str:
+    """Write the levels of the repetitions, and give the SHA-256 of the file."""
+    arrays: dict[str, Any] = {}
+    for number, each in enumerate(scenario.repetitions):
+        arrays[f"level_{number}"] = encoded(each.level)
+        arrays[f"guide_{number}"] = each.guide
+        arrays[f"pace_{number}"] = each.pace
+    with replacing(path, overwrite=True) as temporary:
+        with temporary.open("wb") as stream:
+            np.savez_compressed(stream, **arrays)
+        return hashlib.sha256(temporary.read_bytes()).hexdigest()
+
+
+def _scenario_lines(scenario: Scenario, file: str, digest: str) -> Iterator[str]:
+    newest = scenario.repetitions[-1]
+    low, high = scenario.duration
+    loud = newest.level.reshape(len(newest.level), len(newest.joints), -1)
+    top = np.where(np.isnan(loud), -np.inf, loud).max(axis=(0, 2), initial=-np.inf)
+    yield "[[scenario]]"
+    facts: dict[str, Any] = {
+        "name": scenario.name,
+        "robot": newest.robot,
+        "required": scenario.required,
+        "at_least": scenario.at_least,
+        "renamed_from": list(scenario.renamed_from),
+        "accepted": scenario.accepted or date.today(),
+        "by": scenario.by,
+        "reason": scenario.reason,
+        "duration_s": [round(low, 3), round(high, 3)],
+        "margin_db": round(_margin(scenario), 1),
+        "scores_db": list(scenario.scores),
+        "elsewhere_db": list(scenario.elsewhere),
+        "joints": list(newest.joints),
+        "loudest_db": [round(float(max(each, -100.0)), 1) for each in top],
+        "levels": file,
+        "sha256": digest,
+    }
+    yield from (f"{key} = {_toml(value)}" for key, value in facts.items())
+    for each in scenario.repetitions:
+        yield "[[scenario.repetition]]"
+        facts = {
+            "run": each.run,
+            "sha256": each.sha256,
+            "rate_hz": each.rate,
+            "start_s": each.start,
+            "duration_s": each.duration,
+            "guided_by": each.guided_by,
+        }
+        if each.joints != newest.joints:
+            facts["joints"] = list(each.joints)
+        yield from (f"{key} = {_toml(value)}" for key, value in facts.items())
+    for table, entries in (("wanted", scenario.wanted), ("waive", scenario.waived)):
+        for entry in entries:
+            yield f"[[scenario.{table}]]"
+            facts = {"class": entry.label} if entry.label else {}
+            if isfinite(entry.start) or isfinite(entry.stop):
+                facts["time_s"] = [entry.start, entry.stop]
+            facts |= {"joints": list(entry.joints)} if entry.joints else {}
+            facts |= {"loudest_db": entry.loudest} if entry.loudest is not None else {}
+            facts |= {"required": True} if entry.required else {}
+            facts |= {"until": entry.until} if entry.until else {}
+            facts |= {"reason": entry.reason} if entry.reason else {}
+            yield from (f"{key} = {_toml(value)}" for key, value in facts.items())
+
+
+def _toml(value: object) -> str:
+    """A value as TOML."""
+    if isinstance(value, bool | date | float | int):
+        return toml_shown(round(value, 6) if isinstance(value, float) else value)
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    # A text of JSON is one of TOML, but for a control character that JSON takes as it is.
+    text: str = json.dumps(str(value), ensure_ascii=False)
+    return text.replace("\x7f", "\\u007f")
+
+
+def _read(folder: Path) -> Reference:
+    """Read a store."""
+    path = folder / NAME
+    try:
+        content = from_toml(text_of(path))
+    except (OSError, RuntimeError) as error:
+        told = getattr(error, "strerror", None) or str(error)
+        raise StoreError(path, f"cannot be read ({told})") from error
+    except ValueError as error:
+        raise StoreError(path, f"no store of references ({error})") from error
+    form = content.pop("format", None)
+    if form != FORMAT:
+        raise StoreError(
+            path, f"of format {toml_shown(form)}, this version reads {FORMAT!r}; update the program"
+        )
+    rows = content.pop("scenario", [])
+    if content or not isinstance(rows, list) or len(rows) > MOST_SCENARIOS:
+        raise StoreError(path, "expected a format and entries [[scenario]] alone")
+    scenarios = [
+        _Row(path, f"[[scenario]] {place}", row).scenario() for place, row in enumerate(rows, 1)
+    ]
+    names = [each.name for each in scenarios]
+    if len(set(names)) < len(names):
+        raise StoreError(path, "two scenarios have one name")
+    return Reference(folder, tuple(scenarios), stored=True)
+
+
+EXPECTED_KEYS = ("class", "time_s", "joints", "loudest_db", "required", "until", "reason")
+KEYS = (
+    *("name", "robot", "required", "at_least", "renamed_from", "accepted", "by", "reason"),
+    *("duration_s", "margin_db", "scores_db", "elsewhere_db", "joints", "loudest_db", "levels"),
+    *("sha256", "repetition", "wanted", "waive"),
+)
+REPETITION_KEYS = ("run", "sha256", "rate_hz", "start_s", "duration_s", "guided_by", "joints")
+
+
+@dataclass(frozen=True)
+class _Row:
+    """A table of the store; errors name it."""
+
+    path: Path
+    where: str
+    content: Any
+
+    def error(self, problem: str) -> StoreError:
+        return StoreError(self.path, f"{self.where}: {problem}")
+
+    def check(self, known: Sequence[str]) -> None:
+        if not isinstance(self.content, dict):
+            raise self.error("expected a table")
+        for key in self.content:
+            if key not in known:
+                raise self.error(f"no {key!r}; there are {', '.join(known)}")
+
+    def get(self, key: str, kind: type, default: Any = None) -> Any:
+        value = self.content.get(key, default)
+        if kind is float and type(value) is int:
+            value = float(value)
+        endless = isinstance(value, float) and not isfinite(value)
+        if type(value) is not kind or endless:
+            words = {str: "a text", float: "a number", int: "a whole number", bool: "true or false"}
+            told = "is missing" if key not in self.content else f"= {toml_shown(value)}"
+            raise self.error(f"{key} {told}, expected {words.get(kind, kind.__name__)}")
+        return value
+
+    def listed(self, key: str, kind: type, *, needed: bool = False) -> tuple[Any, ...]:
+        values = self.content.get(key, None if needed else [])
+        numbers = (int, float) if kind is float else (kind,)
+        if not isinstance(values, list) or not all(type(each) in numbers for each in values):
+            raise self.error(f"{key} = {toml_shown(values)}, expected a list")
+        return tuple(map(kind, values))
+
+    def day(self, key: str) -> date | None:
+        given = self.content.get(key)
+        if given is None or (isinstance(given, date) and not isinstance(given, datetime)):
+            return given
+        raise self.error(f"{key} = {toml_shown(given)}, expected a date such as 2027-01-31")
+
+    def tables(self, key: str) -> Iterator["_Row"]:
+        rows = self.content.get(key, [])
+        if not isinstance(rows, list):
+            raise self.error(f"{key}: expected entries that begin with [[scenario.{key}]]")
+        for place, row in enumerate(rows, 1):
+            yield _Row(self.path, f"{self.where}, [[scenario.{key}]] {place}", row)
+
+    def scenario(self) -> Scenario:
+        self.check(KEYS)
+        joints = self.listed("joints", str, needed=True)
+        repetitions = self.levels(joints)
+        return Scenario(
+            self.get("name", str),
+            repetitions,
+            self.listed("scores_db", float),
+            self.listed("elsewhere_db", float),
+            self.get("required", bool, True),
+            self.get("at_least", int, 1),
+            self.listed("renamed_from", str),
+            tuple(row.expected(waiver=False) for row in self.tables("wanted")),
+            tuple(row.expected(waiver=True) for row in self.tables("waive")),
+            self.day("accepted"),
+            self.get("by", str, ""),
+            self.get("reason", str, ""),
+        )
+
+    def expected(self, *, waiver: bool) -> Expected:
+        self.check(EXPECTED_KEYS)
+        until = self.day("until")
+        if waiver and (until is None or not self.content.get("reason")):
+            raise self.error("needs 'until' and 'reason'")
+        span = self.content.get("time_s", [float("-inf"), float("inf")])
+        numbers = isinstance(span, list) and all(type(each) in (int, float) for each in span)
+        if not numbers or len(span) != 2 or not span[0] < span[1]:
+            raise self.error(f"time_s = {toml_shown(span)}, expected [from, to] in seconds")
+        loudest = self.get("loudest_db", float) if "loudest_db" in self.content else None
+        return Expected(
+            self.get("class", str, ""),
+            float(span[0]),
+            float(span[1]),
+            self.listed("joints", str),
+            loudest,
+            self.get("required", bool, False),
+            self.get("reason", str, ""),
+            until,
+        )
+
+    def levels(self, joints: tuple[str, ...]) -> tuple[Levels, ...]:
+        """Levels of the repetitions, from the .npz, whose hash is checked."""
+        file = self.get("levels", str)
+        if not re.fullmatch(r"[\w.~-]+\.npz", file, re.ASCII):
+            raise self.error(f"levels = {toml_shown(file)}, expected the name of an .npz beside it")
+        path = self.path.parent / file
+        rows = list(self.tables("repetition"))
+        if not 1 <= len(rows) <= NEWEST:
+            raise self.error(f"{len(rows)} repetitions, expected 1 to {NEWEST}")
+        try:
+            if not path.is_file():
+                raise StoreError(path, "no such file, or no regular one; accept the runs again")
+            with path.open("rb") as stream:
+                digest = hashlib.file_digest(stream, "sha256").hexdigest()
+            if digest != self.get("sha256", str):
+                raise StoreError(
+                    path, f"was changed, or is not that of {NAME}; accept the runs again"
+                )
+            arrays = archive.read(path)
+        except (OSError, archive.ArchiveError) as error:
+            raise StoreError(path, f"cannot be read ({error})") from error
+        return tuple(
+            row.repetition(path, arrays, number, joints, self) for number, row in enumerate(rows)
+        )
+
+    def repetition(
+        self,
+        path: Path,
+        arrays: Mapping[str, Any],
+        number: int,
+        joints: tuple[str, ...],
+        of: "_Row",
+    ) -> Levels:
+        self.check(REPETITION_KEYS)
+        joints = self.listed("joints", str) or joints
+        rate = self.get("rate_hz", float)
+        if not 0 < rate < 1e7:
+            raise self.error(f"rate_hz = {rate:g}, expected a rate")
+        bands = octaves(rate)
+        nothing = np.empty(0)
+        named = ("level", "guide", "pace")
+        found = [np.asarray(arrays.get(f"{name}_{number}", nothing)) for name in named]
+        frames = len(found[1])
+        shapes = (
+            (frames, len(joints), len(SIGNALS), len(bands)),
+            (frames, len(joints)),
+            (frames,),
+        )
+        for each, shape, kind in zip(found, shapes, "uff", strict=True):
+            if each.shape != shape or each.dtype.kind != kind:
+                raise StoreError(path, f"its arrays are not those of {NAME}; accept the runs again")
+        if len(set(joints)) < len(joints) or not all(np.isfinite(each).all() for each in found[1:]):
+            raise StoreError(path, f"its arrays are not those of {NAME}; accept the runs again")
+        return Levels(
+            of.get("name", str),
+            self.get("run", str, ""),
+            self.get("sha256", str, ""),
+            of.get("robot", str, ""),
+            joints,
+            rate,
+            self.get("start_s", float, 0.0),
+            self.get("duration_s", float),
+            bands,
+            decoded(found[0].astype(np.uint8)),
+            found[1].astype(np.float32),
+            self.get("guided_by", str, ""),
+            found[2].astype(np.float32),
+        )

@@ -1,0 +1,70 @@
+"""Faults put into good motion: tones, band noise and blows of a known level on one joint."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from noiseclassifier.signals import NOISE
+from noiseclassifier.types import Array, Real
+
+KINDS = ("tone", "noise", "blow")
+LONG, SHORT = 1.0, 0.1
+"""How long tones and noise, and blows, last, in [s]."""
+
+
+def fault(time: Array, kind: str, frequency: float, seed: int, *, start: float) -> Array:
+    """A signal of level 1 while it lasts, 0 before.
+
+    Args:
+        time: Of each sample, uniform, shape (samples,), in [s].
+        kind: One of ``KINDS``: a tone or noise an octave wide for ``LONG``, or a blow, a decaying
+            tone of level 1 in its first ``SHORT``.
+        frequency: Of the tone, or the middle of the octave, in [Hz].
+        seed: Random seed of the noise.
+        start: When it starts, in [s].
+
+    Returns:
+        Shape (samples,).
+    """
+    since = time - start
+    if kind == "blow":
+        since = np.maximum(since, 0.0)
+        blow: Array = np.exp(-since * frequency / 3.0) * np.sin(2 * np.pi * frequency * since)
+        return blow / _level(blow[(time >= start) & (time < start + SHORT)])
+    during = (since >= 0.0) & (since < LONG)
+    if kind == "tone":
+        tone: Array = np.sqrt(2.0) * np.sin(2 * np.pi * frequency * since) * during
+        return tone
+    white = np.fft.rfft(np.random.default_rng(seed).normal(size=len(time)))
+    place = np.fft.rfftfreq(len(time), float(time[1] - time[0]))
+    white[(place < frequency / np.sqrt(2.0)) | (place > frequency * np.sqrt(2.0))] = 0.0
+    noise: Array = np.fft.irfft(white, len(time))
+    return noise / _level(noise) * during
+
+
+def with_fault(signals: Mapping[str, Real], joint: int, added: Array) -> dict[str, Real]:
+    """Signals of a motion with something added to the measured velocity of a joint.
+
+    Args:
+        signals: By name, those that go joint by joint among them.
+        joint: Its number among the joints.
+        added: Shape (samples,), in [rad/s].
+
+    Returns:
+        The same signals: measured velocities and errors, joint by joint, and their norms differ.
+    """
+    found = dict(signals)
+    for name, sign, norms in (("measured", 1.0, ("measured", NOISE)), ("error", -1.0, ("error",))):
+        if (before := signals.get(f"{name}_joints")) is None:
+            continue
+        after = np.array(before, dtype=np.float64)
+        after[joint] += sign * added
+        more = after[joint] ** 2 - before[joint] ** 2
+        found[f"{name}_joints"] = after
+        for norm in (each for each in norms if each in signals):
+            found[norm] = np.sqrt(np.maximum(signals[norm] ** 2 + more, 0.0))
+    return found
+
+
+def _level(signal: Array) -> float:
+    return float(np.sqrt(np.mean(signal**2)))

@@ -1,1 +1,0 @@
-"""Good runs alone: a baseline of them, and a general model that is adapted to them."""
