@@ -327,7 +327,7 @@ def test_a_read_only_folder_is_one_line_and_loses_nothing(own, monkeypatch):
 def test_commands_that_accept_replaces_say_so(name):
     status, _, err = call(name, "a.npz", "--output", "b.npz")
     assert status == 2
-    assert "is now `accept`" in err
+    assert "is now `inspector accept`" in err
 
 
 def test_levels_of_a_tone_are_its_root_mean_square_in_its_octave(simulate):
