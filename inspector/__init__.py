@@ -7,8 +7,8 @@ if TYPE_CHECKING:
     from inspector.analysis.status import Status, Unknown
     from inspector.library import load_library
     from inspector.live import LiveSession
-    from inspector.logs.importing import Imported
-    from inspector.logs.reading import read_log, read_logs
+    from inspector.logs.motion import Imported
+    from inspector.logs.read import read_log, read_logs
     from inspector.recording.notebook import show
 
 __all__ = [
@@ -26,14 +26,14 @@ __all__ = [
 
 _MODULES = {
     "Analysis": "inspector.analysis.analyse",
-    "Imported": "inspector.logs.importing",
+    "Imported": "inspector.logs.motion",
     "LiveSession": "inspector.live",
     "Status": "inspector.analysis.status",
     "Unknown": "inspector.analysis.status",
     "analyse": "inspector.analysis.analyse",
     "load_library": "inspector.library",
-    "read_log": "inspector.logs.reading",
-    "read_logs": "inspector.logs.reading",
+    "read_log": "inspector.logs.read",
+    "read_logs": "inspector.logs.read",
     "show": "inspector.recording.notebook",
 }
 

@@ -32,9 +32,9 @@ from inspector.audit.placeholder import without_placeholder
 from inspector.errors import InspectorError, without_path
 from inspector.hold import hold_length, without_hold
 from inspector.library import Library
-from inspector.logs.importing import Imported
-from inspector.logs.options import ReadOptions
-from inspector.logs.reading import jobs_of
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.motion import Imported
+from inspector.logs.read import jobs_of
 from inspector.text import cell, counted
 from inspector.verdict import EXPECTED
 from noisemodel import Run

@@ -30,7 +30,7 @@ from inspector.analysis.analyse import Analysis, analyse, analyse_noise
 from inspector.analysis.status import EXIT, Status, Unknown, worst
 from inspector.errors import FileError, InspectorError, without_path
 from inspector.library import Library
-from inspector.logs.opening import Reading, Source, open_source
+from inspector.logs.read import Reading, Source, open_source
 from inspector.version import program_version
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_json

@@ -20,8 +20,8 @@ from inspector.errors import InspectorError
 from inspector.library import load_library
 from inspector.localisation.order import Order
 from inspector.localisation.stage import Localisation
-from inspector.logs.opening import Reading, Source, open_source
-from inspector.logs.options import ReadOptions
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.read import Reading, Source, open_source
 from inspector.verdict import Evidence, StateError, Verdict, classify_files, digest, kept
 from inspector.version import program_version
 from noiseclassifier import Event

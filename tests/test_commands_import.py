@@ -140,7 +140,7 @@ def test_an_output_is_required(importing, bag):
 
 @pytest.mark.parametrize("missing", ["rosbags", "mcap"])
 def test_a_library_that_is_not_installed_is_named(importing, bag, tmp_path, monkeypatch, missing):
-    monkeypatch.setattr("inspector.logs.formats.find_spec", lambda name: name != missing or None)
+    monkeypatch.setattr("inspector.logs.read.find_spec", lambda name: name != missing or None)
     status, _, err = importing(bag, "-o", tmp_path / "run.npz")
     assert status == 3
     expected = f"{missing} reads such logs and is not installed; pip install 'noise-inspector[ros]'"

@@ -61,7 +61,9 @@ def test_a_known_rate_determines_the_unit_of_the_stamps(tmp_path):
     path = write(tmp_path / "log.csv", {"t": np.arange(5), "a.velocity": np.ones(5)})
     run = read_log(path, rate=1000).run
     assert run.rate == 1000.0
-    with pytest.raises(LogError, match="with the log's rate"):
+    with pytest.raises(
+        LogError, match="counts samples; give the log's rate, in samples per second: --rate HZ"
+    ):
         read_log(path)
 
 
@@ -97,7 +99,7 @@ HEAD = "time,a.velocity,b.velocity\n"
             'time,"a.velocity\n0,1\n',
             r"row 1: the name 'a.velocity\\n0,1' cannot be printed; is a q",
         ),
-        ("clock,a.velocity\n0,1\n", "no time column is named; expected one of time, timestamp, t"),
+        ("clock,a.velocity\n0,1\n1,1\n", "there are no stamps; name their column"),
         ("0.0,1.0\n0.1,1.0\n", "row 1: there is no header; .* such as --columns time,q1 "),
         ("0,00;1,0\n0,04;1,0\n", "row 1: there is no header; the first row has 2 numbers"),
         ("0.0,1.0,2.0\n\n0.1,1.0\n", "row 1: there is no header; the first row has 3 numbers"),

@@ -5,7 +5,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from inspector.logs.floatingbase import interpolated, pose_of, velocity_of
+from inspector.logs.clocks import interpolated
+from inspector.logs.mapping import pose_of, velocity_of
 
 TURNS = Rotation.random(50, rng=0)
 POSES = np.hstack((np.zeros((50, 3)), TURNS.as_quat()))

@@ -14,9 +14,8 @@ from csvlogs import TIME, log, swing, write
 import inspector
 from inspector.assets import demo_run
 from inspector.errors import InspectorError, LogError
-from inspector.logs import formats
-from inspector.logs.opening import Reading, Source, logs_in, open_run, open_source, sources
-from inspector.logs.options import ReadOptions
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.read import Reading, Source, logs_in, open_run, open_source, sources
 from noisemodel import Run, RunFileError, UnknownRobotError
 
 READ = "read as 1 joint (elbow): position, velocity; angles taken for radians; 100 Hz"
@@ -167,7 +166,7 @@ def test_two_files_of_one_recording_are_two_runs_unless_one_is_named_desired(tmp
 
 def test_a_missing_extra_is_named_with_the_line_to_type(tmp_path, monkeypatch):
     (tmp_path / "a.hdf5").write_bytes(b"\x89HDF\r\n\x1a\n" + bytes(100))
-    monkeypatch.setattr(formats, "find_spec", lambda name: None)
+    monkeypatch.setattr("inspector.logs.read.find_spec", lambda name: None)
     status, _, err = call("classify", tmp_path / "a.hdf5")
     assert status == 3
     assert "pip install 'noise-inspector[hdf5]'" in err
@@ -193,7 +192,7 @@ def test_of_a_mixed_folder_the_unreadable_is_named_and_the_rest_is_done(tmp_path
     assert runs["log.csv"]["assumed"].startswith(READ)
     assert runs["demo.npz"]["assumed"] == ""
     assert "1 other file left out: notes.md" in err
-    assert f"inspector: {tmp_path / 'broken.csv'}: no time column" in err
+    assert f"inspector: {tmp_path / 'broken.csv'}: no position or velocity" in err
 
 
 def test_a_run_too_short_for_a_frame_does_not_make_a_batch_bad_input(tmp_path):

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from inspector.errors import InspectorError
-from inspector.logs.options import UNITS, Entry, ReadOptions, parse_mapping
+from inspector.logs.mapping import UNITS, Entry, ReadOptions, parse_mapping
 
 LETTERS = st.characters(codec="utf-8", exclude_categories=("Cs", "Cc"), exclude_characters="=")
 NAMES = st.text(LETTERS, min_size=1)
@@ -64,7 +64,7 @@ def test_a_part_of_an_array_is_named_as_python_does(source, name, columns):
         ("rate = ", "not a mapping in TOML"),
         (
             'format = "noise-mapping/1"\nspeed = 3',
-            "unknown setting 'speed'; there are columns, joints, off",
+            "unknown setting 'speed'; there are columns, force, joints, off",
         ),
         ('format = "noise-mapping/1"\nrate = "fast"', "rate = 'fast' is of another type"),
         ('format = "noise-mapping/1"\nrate = -1', "the rate is -1 Hz; expected a number above 0"),

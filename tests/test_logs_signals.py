@@ -4,7 +4,7 @@ from csvlogs import TIME, log, write
 
 from inspector import read_log
 from inspector.errors import InspectorError, LogError
-from inspector.logs.options import parse_mapping
+from inspector.logs.mapping import parse_mapping
 from noisemodel import Robot
 
 

@@ -10,7 +10,8 @@ from samplelogs import motion
 
 from inspector import read_log, read_logs
 from inspector.errors import LogError
-from inspector.logs.arrays import followed, rate_of
+from inspector.logs.arrays import followed
+from inspector.logs.clocks import rate_of
 
 STEPS = 400
 TURN = [np.cos(np.pi / 4), 0.0, 0.0, np.sin(np.pi / 4)]
@@ -112,7 +113,11 @@ def test_isaac_labs_rate_is_found_from_positions_and_velocities_where_it_is_not_
     assert run.rate == pytest.approx(60.0)
     expected = "there are no stamps: 60 Hz, at which positions and velocities fit; --rate sets"
     assert remarks[0].startswith(expected)
-    assert read_log(path, episode="demo_1", rate=30).run.rate == 30.0
+    with pytest.raises(
+        LogError, match="fit a rate of 60 Hz, not 30 Hz: type --rate 60, or --force"
+    ):
+        read_log(path, episode="demo_1", rate=30)
+    assert read_log(path, episode="demo_1", rate=30, force=True).run.rate == 30.0
 
 
 @pytest.mark.parametrize("order", ["wxyz", "xyzw"])

@@ -7,7 +7,7 @@ from samplelogs import JOINTS, TIMES, Talk, joint_states, motion, numbers, write
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.synchronisation import ClockError
+from inspector.logs.clocks import ClockError
 
 
 def csv(path, time, velocity, suffix=""):

@@ -7,7 +7,7 @@ from commandline import call
 from recordings import entities, read
 
 from inspector.compare.many import Several, lay, report, shortened, write
-from inspector.logs.opening import open_run
+from inspector.logs.read import open_run
 from inspector.recording.axes import TOP
 from noiseclassifier import Event
 from noisemodel import Block, Run

@@ -16,7 +16,7 @@ import noiseclassifier as nc
 from inspector.analysis.analyse import analyse
 from inspector.hold import hold_length, without_hold
 from inspector.library import load_library, signal_names, signals_of
-from inspector.logs.opening import open_run
+from inspector.logs.read import open_run
 from inspector.verdict import Verdict
 from noisemodel import Run, RunError, RunFileError, archive, decimated, ondemand, runfile
 from noisemodel.ondemand import OnDemand, pieces

@@ -8,7 +8,7 @@ import pytest
 from commandline import call
 
 from inspector.library import load_library
-from inspector.logs.opening import open_run
+from inspector.logs.read import open_run
 from inspector.regression import measure as measuring
 from inspector.regression.difference import Verdict, difference
 from inspector.regression.measure import Measured, measure_file

@@ -13,7 +13,7 @@ from samplelogs import TIMES, Talk, cut, joint_states, numbers, write_bag
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.ros import chunks
+from inspector.logs.ros import damaged
 
 TALK, OLD = Talk(), Talk(ros1=True)
 WAYS = {
@@ -70,9 +70,9 @@ def test_frames_of_zstandard_without_a_size_are_counted_too(limit, tmp_path):
 
     compressor = zstandard.ZstdCompressor(write_content_size=False).compressobj()
     data = compressor.compress(bytes(2**25)) + compressor.flush()
-    chunks.begin(tmp_path)
+    damaged.begin(tmp_path)
     with pytest.raises(ValueError, match="unpacks to"):
-        chunks.unpack("zstd", data)
+        damaged.unpack("zstd", data)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ import noiseclassifier as nc
 from inspector.assets import model_files
 from inspector.errors import LogError
 from inspector.library import load_library
-from inspector.logs.reading import read_log
+from inspector.logs.read import read_log
 from noisemodel import Robot, RobotError, Run, RunFileError, meshes
 from noisemodel.errors import MeshError
 from noisemodel.surface import LinkSurface, fine

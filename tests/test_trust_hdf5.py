@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from inspector.errors import LogError
-from inspector.logs.options import ReadOptions
-from inspector.logs.reading import listing, read_log
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.read import listing, read_log
 
 TIME = np.arange(400) / 100
 MOTION = np.sin(TIME)[:, None] * (1.0, 0.5)

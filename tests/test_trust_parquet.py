@@ -11,9 +11,9 @@ import pytest
 
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.options import ReadOptions
+from inspector.logs.mapping import ReadOptions
 from inspector.logs.parquetpages import unpacked_size
-from inspector.logs.reading import listing
+from inspector.logs.read import listing
 
 TIME = np.arange(400) / 100
 SPEED = np.sin(TIME)

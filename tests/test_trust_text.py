@@ -13,9 +13,9 @@ from inspector.errors import InspectorError
 from inspector.labelfiles import read_labels
 from inspector.live import LiveError, LiveSession
 from inspector.live.input import reader_of
-from inspector.logs.options import ReadOptions
-from inspector.logs.reading import read_log
-from inspector.logs.signals import column_signal, time_column
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.names import column_signal, time_column
+from inspector.logs.read import read_log
 from inspector.reference import store
 from inspector.text import counted, plain
 from inspector.training import tuningfile

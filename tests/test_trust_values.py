@@ -13,7 +13,7 @@ from commandline import call
 from inspector import read_log
 from inspector.analysis.level import Estimate, noise_level
 from inspector.errors import InspectorError, LogError
-from inspector.logs.options import ReadOptions
+from inspector.logs.mapping import ReadOptions
 from noisemodel import MeshError, Robot, RobotError, Run, RunError, cache, meshes
 from noisemodel.cache import cached
 

@@ -27,8 +27,8 @@ from inspector.errors import InspectorError
 from inspector.labelfiles import read_labels
 from inspector.library import load_library
 from inspector.live import input as feeding
-from inspector.logs.options import ReadOptions, parse_mapping
-from inspector.logs.reading import listing, read_logs
+from inspector.logs.mapping import ReadOptions, parse_mapping
+from inspector.logs.read import listing, read_logs
 from inspector.reference.store import Reference
 from inspector.training import tuningfile
 from noiseclassifier import noisytest

@@ -30,7 +30,7 @@ from inspector.library import (
     load_library,
 )
 from inspector.localisation.extent import extent
-from inspector.logs.opening import Opened, open_run
+from inspector.logs.read import Opened, open_run
 from noiseclassifier import Event
 from noiseclassifier.lasting import HOP as LASTING_HOP
 from noiseclassifier.lasting import MARGIN as LASTING_MARGIN

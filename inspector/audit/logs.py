@@ -7,7 +7,7 @@ from typing import NamedTuple
 from inspector.audit.audit import Audit, audit
 from inspector.errors import InspectorError, without_path
 from inspector.library import Library
-from inspector.logs.opening import Reading, left_out, open_source, sources
+from inspector.logs.read import Reading, left_out, open_source, sources
 from noisemodel import NoiseModelError
 
 

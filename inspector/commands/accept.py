@@ -44,7 +44,7 @@ def accept(
     from inspector import assets
     from inspector.errors import InspectorError
     from inspector.library import load_library
-    from inspector.logs.opening import sources
+    from inspector.logs.read import sources
     from inspector.progress import progress
     from inspector.reference.store import (
         FOLDER,

@@ -9,7 +9,7 @@ import typer
 from inspector.commands.options import ModelFiles
 
 if TYPE_CHECKING:
-    from inspector.logs.opening import Reading
+    from inspector.logs.read import Reading
 
 
 class Format(StrEnum):

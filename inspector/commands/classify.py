@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from inspector.analysis.analyse import Analysis
     from inspector.library import Library
-    from inspector.logs.opening import Source
+    from inspector.logs.read import Source
     from inspector.reference.verdicts import References
     from inspector.verdict import Verdict
 
@@ -121,7 +121,7 @@ def classify(
     """
     from inspector import assets
     from inspector.library import load_library
-    from inspector.logs.opening import sources
+    from inspector.logs.read import sources
     from inspector.progress import progress
     from inspector.reference.verdicts import Gate, References
     from inspector.report.cases import published
@@ -240,7 +240,7 @@ def _say(
     verbose: bool,
 ) -> None:
     """Print on standard error what was left out and assumed, and which waivers expire."""
-    from inspector.logs.opening import left_out
+    from inspector.logs.read import left_out
 
     if others:
         typer.echo(f"inspector: {left_out(others)}", err=True)

@@ -10,7 +10,7 @@ from inspector.commands.options import ModelFiles, Overwrite, RunFile, opened
 from inspector.text import counted
 
 if TYPE_CHECKING:
-    from inspector.logs.opening import Reading
+    from inspector.logs.read import Reading
     from noisemodel import Run
 
 

@@ -10,7 +10,7 @@ from inspector.analysis.status import EXIT, OUTPUT_LOST, Status, worst
 from inspector.commands.options import Overwrite
 
 if TYPE_CHECKING:
-    from inspector.logs.opening import Reading
+    from inspector.logs.read import Reading
 
 
 def import_(
@@ -39,8 +39,7 @@ def import_(
     The exit status is 3 if a log cannot be read, 5 if a run file cannot be written; the others are.
     Called again after an interruption, it writes the run files that a folder lacks.
     """
-    from inspector.logs.batch import import_logs
-    from inspector.logs.reading import listing
+    from inspector.logs.read import import_logs, listing
     from inspector.text import printable
 
     reading: Reading = ctx.obj

@@ -8,7 +8,7 @@ import typer
 from inspector.commands.options import Overwrite, one_at_a_time, opened, say_warnings
 
 if TYPE_CHECKING:
-    from inspector.logs.opening import Reading
+    from inspector.logs.read import Reading
 
 
 def listen(

@@ -9,7 +9,7 @@ import typer
 from inspector.commands.options import NumberOfJobs, Overwrite, one_of, opened, say_warnings
 
 if TYPE_CHECKING:
-    from inspector.logs.opening import Reading
+    from inspector.logs.read import Reading
 
 GEOMETRIES = ("visual", "collision", "hull", "auto")
 """Those of ``noisemodel.surface``, which would take too long to import here."""

@@ -13,7 +13,7 @@ from inspector.analysis.status import Unknown
 from inspector.training.part import Part
 
 if TYPE_CHECKING:
-    from inspector.logs.opening import Opened, Reading
+    from inspector.logs.read import Opened, Reading
     from noisemodel import Run
     from noisemodel.parallel import Jobs
 
@@ -176,6 +176,9 @@ def log_options(
     rate: Annotated[
         float | None, _of_log("--rate", min=1.0, help="Rate of the log in [Hz], if it is known.")
     ] = None,
+    force: Annotated[
+        bool, _of_log("--force", help="Take --rate even if positions and velocities contradict it.")
+    ] = False,
     map_: Annotated[
         list[str] | None,
         _of_log("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
@@ -210,10 +213,10 @@ def log_options(
     """Options on reading logs, the same in all commands that read logs.
 
     They are in the help of `import` only; the others take them as well (`inspector.cli`). Returns
-    an ``inspector.logs.opening.Reading``.
+    an ``inspector.logs.read.Reading``.
     """
-    from inspector.logs.opening import Reading
-    from inspector.logs.reading import read_options
+    from inspector.logs.mapping import read_options
+    from inspector.logs.read import Reading
 
     del package_root, max_unpacked, limit  # have been set
     options = read_options(
@@ -226,6 +229,7 @@ def log_options(
         columns=columns.split(",") if columns else None,
         topics=topic,
         offset=offset,
+        force=force or None,
     )
     return Reading(options, desired, tuple(episode or ()), without_robot=robot == "none")
 
@@ -242,7 +246,7 @@ def jobs_or_dask(jobs: int, dask: str) -> "Jobs":
 
 def opened(path: Path, reading: "Reading", *, said: bool = True) -> "Opened":
     """Open a run or a log for a command, and say on standard error what was assumed."""
-    from inspector.logs.opening import open_run
+    from inspector.logs.read import open_run
 
     found = open_run(path, reading)
     if said:

@@ -83,7 +83,7 @@ def smoothness(
     from inspector import assets
     from inspector import smoothness as ranking
     from inspector.library import load_library
-    from inspector.logs.reading import read_options
+    from inspector.logs.mapping import read_options
     from inspector.progress import progress
     from noisemodel.atomic import refuse_existing
 

@@ -20,7 +20,7 @@ from inspector.commands.options import (
 
 if TYPE_CHECKING:
     from inspector.library import Library
-    from inspector.logs.opening import Opened, Reading
+    from inspector.logs.read import Opened, Reading
 
 SUFFIXES = ("", ".rrd", ".png", ".html")
 """Of what is written; without a suffix a recording."""

@@ -17,7 +17,7 @@ from inspector import colors, levels
 from inspector.analysis.analyse import Analysis, analyse
 from inspector.levels import FLOOR_DB, velocity_levels
 from inspector.library import Library
-from inspector.logs.opening import Opened
+from inspector.logs.read import Opened
 from inspector.recording import axes, panels, unstable
 from inspector.recording.axes import TIMELINE, Label, Panel
 from inspector.recording.panels import HIGH_DB, LOW_DB

@@ -15,7 +15,7 @@ import noisemodel as nm
 from inspector.analysis.analyse import Analysis, analyse, robot_known, with_links
 from inspector.errors import InspectorError
 from inspector.library import Library
-from inspector.logs.opening import Opened, open_run
+from inspector.logs.read import Opened, open_run
 from inspector.pair.alignment import Align, Alignment, align
 from noisemodel import Block, Run, decimated
 from noisemodel import robot as robots

@@ -8,7 +8,8 @@ import numpy as np
 
 from inspector.live.rows import Note, Rows
 from inspector.live.samples import SIGNALS, LiveError
-from inspector.logs.signals import (
+from inspector.logs.clocks import UNITS
+from inspector.logs.names import (
     TIME_UNITS,
     Naming,
     column_signal,
@@ -17,7 +18,6 @@ from inspector.logs.signals import (
     time_column,
     without_unit,
 )
-from inspector.logs.timestamps import UNITS
 from noisemodel.types import Array
 
 UNKNOWN = ["", "nan", "NaN", "NAN", "null"]

@@ -2,7 +2,8 @@
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from decimal import Decimal
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.floatingbase import pose_of
-from inspector.logs.log import Field, Log, Stamps
-from inspector.logs.options import Entry, ReadOptions
-from inspector.logs.signals import SIGNALS, TIMES, array_signal, listed
-from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
+from inspector.logs.clocks import counted_stamps, stamps_of
+from inspector.logs.log import SAMPLES, Field, Log, Stamps
+from inspector.logs.mapping import Entry, ReadOptions, pose_of
+from inspector.logs.names import (
+    SIGNALS,
+    TIMES,
+    Naming,
+    array_signal,
+    column_signal,
+    listed,
+    time_column,
+)
 from noisemodel.types import Array, Real
 
 COMMAND, COPY = "command", "copy"
@@ -64,8 +72,8 @@ CELLS = re.compile(
 )
 """Columns of a table that are the columns of such an array: ``qpos_0``, ``qvel[3]``, ``ctrl2``."""
 
-RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate")
-STEPS = ("dt", "timestep", "time_step", "control_dt")
+RATES = ("fps", "hz", "rate", "frequency", "control_freq", "sample_rate", "sampling_rate", "fs")
+STEPS = ("dt", "timestep", "time_step", "control_dt", "ts")
 """Names of the number that is the rate in [Hz], or the step in [s]."""
 
 MOTION = {*SIGNALS, QPOS, QVEL} - {"effort"}
@@ -80,53 +88,15 @@ PARTS: Mapping[int, Mapping[str, int]] = {
 """Names of what PyBullet's getJointStates returns, stacked to (samples, joints, numbers): with or
 without the motor's torque; nine numbers have the six reaction forces between."""
 
-COMMON_RATES = (
-    *(10, 15, 20, 24, 25, 30, 40, 50, 60, 80, 90, 100, 120, 125, 150, 200, 240, 250, 300, 333),
-    *(400, 480, 500, 600, 800, 1000, 1200, 1500, 2000, 2400, 4000, 5000, 10_000),
-)
-NEAR_RATE = 0.02
-"""A rate found from the values is one of these, in [Hz], if it differs by no more than that."""
-
-LARGEST_STEP = 1.0
-"""Larger steps of a position are a turn or a reset, in [rad] or [m]."""
-
-FITS, DISAGREE = 0.98, 0.25
-"""Least correlation of velocities with the steps of positions from which the rate is found; the
-relative difference from which it counts for more than what the file says."""
-
 FOLLOWS, SLOPES = 0.9, (0.5, 2.0)
 """Least correlation of a position with its target, and the range of its slope."""
-
 STILL, NEARBY = 1e-3, 0.1
 """What moves less does not move; largest mean distance of its target, both in [rad] or [m]."""
 
 RELATIVE_TO = "obs/joint_pos"
 RELATIVE = "obs/joint_pos may be relative to a default pose (Isaac Lab)"
 
-
-@dataclass(frozen=True, eq=False)
-class Episode:
-    """Arrays of one episode, and what its file says besides.
-
-    Attributes:
-        path: The file.
-        arrays: Numbers by name, samples along the first axis.
-        name: Name of the episode, empty for a file without.
-        rate: The rate that the format defines, if any, in [Hz].
-        numbers: Single numbers by name, among them perhaps the rate or the step.
-        joints: Names of the joints by the ending of their signals, "" or "_desired".
-        controller: What takes the actions, if the file says so.
-        not_read: Names of further arrays, of which nothing is known.
-    """
-
-    path: Path
-    arrays: Mapping[str, NDArray[Any]]
-    name: str = ""
-    rate: float | None = None
-    numbers: Mapping[str, float] = field(default_factory=dict)
-    joints: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    controller: str = ""
-    not_read: tuple[str, ...] = ()
+Arrays = Mapping[str, NDArray[Any]]
 
 
 def meaning(name: str) -> str:
@@ -136,38 +106,61 @@ def meaning(name: str) -> str:
     return found or array_signal(name) or ""
 
 
-def log_of(episode: Episode, options: ReadOptions) -> Log:
+def log_of(
+    path: Path,
+    arrays: Arrays,
+    options: ReadOptions,
+    *,
+    episode: str = "",
+    rate: float | None = None,
+    numbers: Mapping[str, float] | None = None,
+    joints: Mapping[str, tuple[str, ...]] | None = None,
+    controller: str = "",
+    not_read: Sequence[str] = (),
+) -> Log:
     """Log of the arrays of one episode.
 
     Args:
-        episode: The arrays.
+        path: The file.
+        arrays: Numbers by name, samples along the first axis.
         options: How to read them.
+        episode: Name of the episode, empty for a file without.
+        rate: The rate that the format defines, if any, in [Hz].
+        numbers: Single numbers by name, among them perhaps the rate or the step.
+        joints: Names of the joints by the ending of their signals, "" or "_desired".
+        controller: What takes the actions, if the file says so.
+        not_read: Names of further arrays, of which nothing is known.
 
     Raises:
         LogError: If none of them is known to hold motion, their lengths differ, or there are no
             stamps and no rate.
     """
-    path, arrays = episode.path, dict(_unpacked(episode.arrays))
+    arrays = dict(_unpacked(arrays))
+    options = options.for_columns(path, [*arrays])
     mapped = {entry.part()[0] for entry in options.entries if entry.signal != "time"}
     roles = _roles(arrays, mapped)
     copies = [name for name in arrays if meaning(name) == COPY]
     motion = [name for name, what in roles.items() if what in MOTION or name in mapped]
     if not motion:
         raise LogError(path, _nothing(episode, arrays))
-    time = time_name((name for name, each in arrays.items() if each.ndim == 1), options)
+    time, arrays = _time(arrays, options)
     arrays = _of_one_length(path, arrays, [*([time] if time else []), *motion], roles)
-    names = {what: name for name, what in reversed(roles.items()) if what in (QPOS, QVEL, FORCE)}
-    suggested, remarks = [*_of_mujoco(arrays, names)], list[str]()
+    states = {what: name for name, what in reversed(roles.items()) if what in (QPOS, QVEL, FORCE)}
+    suggested, remarks = [*_of_mujoco(arrays, states)], list[str]()
     place = _source("position", options, suggested, roles)
     position = _values(arrays, place)
     velocity = _values(arrays, _source("velocity", options, suggested, roles))
     samples = len(arrays[motion[0]])
+    stated = ("env_args", rate) if rate else _stated(numbers or {})
+    stamps = Stamps(Decimal(0), np.arange(samples, dtype=np.float64), unit=SAMPLES)
     if time:
         stamps = stamps_of(path, time, arrays[time], options.rate)
-    else:
-        stamps = _stamps(episode, samples, options, position, velocity, arrays)
+    if stamps.unit == SAMPLES and not any(arrays[name].ndim == 1 for name in motion):
+        stamps = counted_stamps(path, stamps, options, position, velocity, stated)
+    elif stamps.unit == SAMPLES and stated[1] and not options.rate:
+        stamps = counted_stamps(path, stamps, options, None, None, stated)
     suggested += _base_of_isaac(arrays, roles, stamps, remarks)
-    suggested += _targets(episode, arrays, roles, options, position, place.source, remarks)
+    suggested += _targets(arrays, roles, options, position, place.source, controller, remarks)
     if RELATIVE_TO in roles and not any(STATES.fullmatch(name) for name in roles):
         remarks.append(RELATIVE)
     arms = {match["arm"] for name in roles if (match := ARMS.fullmatch(name))}
@@ -176,8 +169,8 @@ def log_of(episode: Episode, options: ReadOptions) -> Log:
             name,
             _numbers(each.reshape(samples, -1)),
             stamps,
-            joints=_joints(episode, name, roles, each.size // samples, suggested, arms),
-            signal=roles[name] if roles[name] in SIGNALS else "",
+            joints=_joints(joints or {}, name, roles, each.size // samples, suggested, arms),
+            signal=roles[name] if roles[name] in SIGNALS and _is_array(name, each) else "",
             source=path.name,
             rank=0 if STATES.fullmatch(name) else 1,
         )
@@ -189,12 +182,17 @@ def log_of(episode: Episode, options: ReadOptions) -> Log:
     return Log(
         path,
         fields,
-        episode.name,
-        not_read=(*(name for name in arrays if name not in read), *episode.not_read),
+        episode,
+        not_read=(*(name for name in arrays if name not in read), *not_read),
         remarks=(*((f"taken: {taken}",) if taken else ()), *remarks),
         suggested=tuple(suggested),
         time=time,
     )
+
+
+def _is_array(name: str, each: NDArray[Any]) -> bool:
+    """Whether it is no column, whose name may tell its joint."""
+    return each.ndim == 2 or (column_signal(name) is None and array_signal(name) is None)
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
@@ -225,13 +223,14 @@ def gathered(log: Log, options: ReadOptions) -> Log:
     suggested = [*_of_mujoco(arrays, state)]
     place = _source("position", options, suggested, roles)
     position = _values(arrays, place)
-    suggested += _targets(
-        Episode(log.path, arrays), arrays, roles, options, position, place.source, remarks
-    )
+    suggested += _targets(arrays, roles, options, position, place.source, "", remarks)
     columns = {id(each) for members in groups.values() for each in members.values()}
     stamps, source = log.fields[0].stamps, log.path.name
+    if stamps.unit == SAMPLES:
+        velocity = _values(arrays, _source("velocity", options, suggested, roles))
+        stamps = counted_stamps(log.path, stamps, options, position, velocity)
     fields = (
-        *(each for each in log.fields if id(each) not in columns),
+        *(replace(each, stamps=stamps) for each in log.fields if id(each) not in columns),
         *(Field(name, each, stamps, source=source) for name, each in arrays.items()),
     )
     taken = _taken((), suggested, options)
@@ -243,7 +242,7 @@ def gathered(log: Log, options: ReadOptions) -> Log:
     )
 
 
-def episodes_of(arrays: Mapping[str, NDArray[Any]]) -> dict[str, slice]:
+def episodes_of(arrays: Arrays) -> dict[str, slice]:
     """Episodes of a file that has them one after the other, of two samples or more.
 
     Args:
@@ -271,38 +270,6 @@ def single_numbers(items: Mapping[str, Any]) -> dict[str, float]:
         for name, each in arrays.items()
         if each.size == 1 and each.dtype.kind in "iuf"
     }
-
-
-def rate_of(position: Real, velocity: Real) -> float | None:
-    """Sample rate at which velocities are the steps of positions, in [Hz].
-
-    Args:
-        position: Shape (samples, joints).
-        velocity: Shape (samples, joints).
-
-    Returns:
-        The common rate nearby, or else the rate to three digits; None if they do not fit.
-    """
-    position, velocity = position.astype(np.float64), velocity.astype(np.float64)
-    step = np.diff(position, axis=0)
-    simpson = (velocity[2:] + 4 * velocity[1:-1] + velocity[:-2]) / 6
-    correlation, rate = max(
-        _slope((position[2:] - position[:-2]) / 2, simpson),
-        _slope(step, velocity[1:]),  # of simulators, whose velocity comes first,
-        _slope(step, velocity[:-1]),  # or whose position does
-    )
-    if correlation < FITS:
-        return None
-    near = min(COMMON_RATES, key=lambda common: abs(common / rate - 1))
-    return float(near if abs(near / rate - 1) <= NEAR_RATE else f"{rate:.3g}")
-
-
-def _slope(steps: Real, speed: Real) -> tuple[float, float]:
-    """Correlation of steps and velocities, and their ratio by least squares."""
-    usable = np.isfinite(steps) & np.isfinite(speed) & (np.abs(steps) < LARGEST_STEP)
-    steps, speed = steps[usable], speed[usable]
-    both, own, other = (float(each) for each in (steps @ speed, steps @ steps, speed @ speed))
-    return (both / np.sqrt(own * other), both / own) if own * other > 0 else (0.0, 0.0)
 
 
 def followed(command: Real, position: Real) -> int:
@@ -333,9 +300,27 @@ def followed(command: Real, position: Real) -> int:
     return count if moving and 2 * count >= position.shape[1] else 0
 
 
-def _roles(arrays: Mapping[str, NDArray[Any]], mapped: set[str]) -> dict[str, str]:
+def _time(arrays: Arrays, options: ReadOptions) -> tuple[str, Arrays]:
+    """Name of the array with the stamps, empty without; a part of one is an array then."""
+    rows = [name for name, each in arrays.items() if each.ndim == 1]
+    if not options.time:
+        return time_column(rows), arrays
+    entry = next(each for each in options.entries if each.signal == "time")
+    name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
+    if name not in arrays:
+        return time_column(rows), arrays
+    values = arrays[name].reshape(len(arrays[name]), -1)[:, part]
+    return (entry.source, {**arrays, entry.source: values[:, 0]}) if values.size else ("", arrays)
+
+
+def _roles(arrays: Arrays, mapped: set[str]) -> dict[str, str]:
     """Meaning of the arrays, without those for which another one stands."""
+    naming = Naming.of(name for name, each in arrays.items() if each.ndim == 1)
     roles = {name: "" if name in mapped else meaning(name) for name in arrays}
+    for name, each in arrays.items():  # columns that name their joint
+        if name not in mapped and not roles[name] and each.ndim == 1:
+            known = column_signal(name, naming)
+            roles[name] = known[0] if known else ""
     robots = {match["robot"] for name in arrays if (match := STATES.fullmatch(name))}
     chosen = "robot" if "robot" in robots else min(robots, default="")
     dropped = []
@@ -349,7 +334,7 @@ def _roles(arrays: Mapping[str, NDArray[Any]], mapped: set[str]) -> dict[str, st
     return {n: what for n, what in roles.items() if what != COPY and n not in dropped}
 
 
-def _unpacked(arrays: Mapping[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray[Any]]]:
+def _unpacked(arrays: Arrays) -> Iterator[tuple[str, NDArray[Any]]]:
     """Arrays, those of PyBullet's joint states taken apart, and stamps in a column as a row."""
     for name, each in arrays.items():
         last = name.rpartition("/")[2].lower()
@@ -363,7 +348,7 @@ def _unpacked(arrays: Mapping[str, NDArray[Any]]) -> Iterator[tuple[str, NDArray
 
 
 def _of_one_length(
-    path: Path, arrays: Mapping[str, NDArray[Any]], names: Sequence[str], roles: Mapping[str, str]
+    path: Path, arrays: Arrays, names: Sequence[str], roles: Mapping[str, str]
 ) -> dict[str, NDArray[Any]]:
     """Arrays of as many samples as there are stamps.
 
@@ -386,33 +371,6 @@ def _of_one_length(
     return dict(arrays)
 
 
-def _stamps(
-    episode: Episode,
-    samples: int,
-    options: ReadOptions,
-    position: Real | None,
-    velocity: Real | None,
-    arrays: Mapping[str, NDArray[Any]],
-) -> Stamps:
-    """Stamps of an episode without: at a rate that is given, stated, or found from the values."""
-    if options.rate:
-        return Stamps.every(1 / options.rate, samples)
-    found = None
-    if position is not None and velocity is not None and position.shape == velocity.shape:
-        found = rate_of(position, velocity)
-    name, stated = ("env_args", episode.rate) if episode.rate else _stated(episode.numbers)
-    if stated and (found is None or abs(found / stated - 1) <= DISAGREE):
-        remark = f"there are no stamps: {stated:g} Hz, by {name}"
-        return replace(Stamps.every(1 / stated, samples), remark=remark)
-    if found is None:
-        return stamps_at_rate(
-            episode.path, samples, options, [_shape(*each) for each in arrays.items()]
-        )
-    but = f" ({name} says {stated:g} Hz)" if stated else ""
-    remark = f"there are no stamps: {found:g} Hz, at which positions and velocities fit{but}"
-    return replace(Stamps.every(1 / found, samples), remark=f"{remark}; --rate sets another")
-
-
 def _stated(numbers: Mapping[str, float]) -> tuple[str, float | None]:
     """Name of the number that states the rate, and the rate, in [Hz]."""
     for name, number in numbers.items():
@@ -422,7 +380,7 @@ def _stated(numbers: Mapping[str, float]) -> tuple[str, float | None]:
     return "", None
 
 
-def _of_mujoco(arrays: Mapping[str, NDArray[Any]], names: Mapping[str, str]) -> Iterator[Entry]:
+def _of_mujoco(arrays: Arrays, names: Mapping[str, str]) -> Iterator[Entry]:
     """Mapping of MuJoCo's state: a floating base, if there is one, then the robot's joints.
 
     Objects that float, and what follows them, are left out.
@@ -468,7 +426,7 @@ def _floating(qpos: Real, count: int) -> list[int]:
 
 
 def _base_of_isaac(
-    arrays: Mapping[str, NDArray[Any]], roles: Mapping[str, str], stamps: Stamps, remarks: list[str]
+    arrays: Arrays, roles: Mapping[str, str], stamps: Stamps, remarks: list[str]
 ) -> Iterator[Entry]:
     """Mapping of a root that moves; that of a robot on a table stands still and is left out."""
     found = {match["what"]: name for name in roles if (match := STATES.fullmatch(name))}
@@ -502,12 +460,12 @@ def _turns(pose: Array, stamps: Stamps) -> Array:
 
 
 def _targets(
-    episode: Episode,
-    arrays: Mapping[str, NDArray[Any]],
+    arrays: Arrays,
     roles: Mapping[str, str],
     options: ReadOptions,
     position: Real | None,
     source: str,
+    controller: str,
     remarks: list[str],
 ) -> Iterator[Entry]:
     """Mapping of the first command that the positions follow."""
@@ -519,18 +477,15 @@ def _targets(
         command = arrays[name]
         count = followed(command, position) if len(command) == len(position) else 0
         if count:
-            yield Entry("position_desired", "", _part(name, 0, count, command.shape[1]))
+            part = name if count == command.shape[1] else f"{name}[0:{count}]"
+            yield Entry("position_desired", "", part)
             return
     if commands:
-        to = f", they are the input of a controller of type {episode.controller}"
+        to = f", they are the input of a controller of type {controller}" if controller else ""
         remarks.append(
-            f"{listed(commands)} not taken as desired positions: {source} does not follow"
-            f"{to if episode.controller else ''}; --map position_desired={commands[0]} takes it"
+            f"{listed(commands)} not taken as desired positions: {source} does not follow{to};"
+            f" --map position_desired={commands[0]} takes it"
         )
-
-
-def _part(name: str, first: int, stop: int, width: int) -> str:
-    return name if (first, stop) == (0, width) else f"{name}[{first}:{stop}]"
 
 
 def _source(
@@ -542,12 +497,12 @@ def _source(
     return (*mapped, *(Entry(signal, "", name) for name in named), Entry(signal, "", ""))[0]
 
 
-def _values(arrays: Mapping[str, NDArray[Any]], entry: Entry) -> Real | None:
+def _values(arrays: Arrays, entry: Entry) -> Real | None:
     """Numbers of an entry; None if there is no such array."""
     name, part = (entry.source, slice(None)) if entry.source in arrays else entry.part()
-    return (
-        _numbers(arrays[name].reshape(len(arrays[name]), -1)[:, part]) if name in arrays else None
-    )
+    if name not in arrays:
+        return None
+    return _numbers(arrays[name].reshape(len(arrays[name]), -1)[:, part])
 
 
 def _numbers(values: NDArray[Any]) -> Real:
@@ -555,7 +510,7 @@ def _numbers(values: NDArray[Any]) -> Real:
 
 
 def _joints(
-    episode: Episode,
+    joints: Mapping[str, tuple[str, ...]],
     name: str,
     roles: Mapping[str, str],
     width: int,
@@ -567,8 +522,7 @@ def _joints(
         return tuple(f"{match['arm']}_joint_{number}" for number in range(width))
     parts = [entry for entry in suggested if entry.part()[0] == name]
     signal = parts[-1].signal if parts else roles[name]
-    ending = "_desired" if signal.endswith("_desired") and "_desired" in episode.joints else ""
-    names = episode.joints.get(ending, ())
+    names = joints.get("_desired" if signal.endswith("_desired") else "", joints.get("", ()))
     first, stop, _ = (parts[-1].part()[1] if parts else slice(None)).indices(width)
     if signal.endswith("_desired") and parts:
         names = names[: stop - first]
@@ -604,9 +558,9 @@ def _shape(name: str, each: NDArray[Any]) -> str:
     return f"{name} ({', '.join(map(str, each.shape))})"
 
 
-def _nothing(episode: Episode, arrays: Mapping[str, NDArray[Any]]) -> str:
+def _nothing(episode: str, arrays: Arrays) -> str:
     """Problem of a file that is not known to hold motion: what it holds, and what to type."""
-    where = episode.name or "the file"
+    where = episode or "the file"
     wide = [(n, each) for n, each in arrays.items() if each.ndim == 2 and meaning(n) != COMMAND]
     name, values = max(wide, key=lambda each: len(each[1]), default=("qpos", np.zeros((2, 7))))
     half = values.shape[1] // 2

@@ -1,4 +1,7 @@
-"""HDF5 logs, with a group for each episode (robomimic, Isaac Lab, Minari) or a row per sample."""
+"""HDF5 logs, with a group for each episode (robomimic, Isaac Lab, Minari) or a row per sample.
+
+MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are transposed.
+"""
 
 import re
 import subprocess
@@ -19,34 +22,29 @@ from inspector.logs.arrays import (
     RATES,
     STATES,
     STEPS,
-    Episode,
     episodes_of,
     log_of,
     meaning,
     single_numbers,
 )
 from inspector.logs.log import Log, LogReader
-from inspector.logs.options import ReadOptions
-from inspector.logs.signals import TIMES, listed
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.names import TIMES, listed
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json
-from noisemodel.archive import ArchiveError, check_unpacked
+from noisemodel.archive import ArchiveError, check_unpacked, one_line
 
 EPISODES = "data"
 """The group that holds the episodes of robomimic and Isaac Lab."""
-
 ARGUMENTS = "env_args"
 """The attribute of that group which tells how robomimic and Isaac Lab set up their simulator."""
-
 NUMBERED = re.compile(r"(demo|ep|episode|traj|trajectory|rollout|run)[_-]?\d+")
 """Names of episodes in a file without that group: Minari's, ManiSkill's and others."""
 
 DAMAGE = (OSError, KeyError, RuntimeError, ValueError, TypeError)
 """Errors that h5py raises for damaged files."""
-
 SMALL = 8 * 2**20
 """Bytes up to which a dataset is read whatever its name is."""
-
 NAMES = {*TIMES, *EPISODE_ENDS}
 
 # What reads a text of any length, in a process of its own, which can be ended.
@@ -62,14 +60,14 @@ TIMEOUT = 10.0
 
 CONTROLLER = re.compile(r'"type": "((?:OSC|IK|JOINT)_\w+)"')
 """Type of the controller of an arm in robosuite's arguments."""
+MATLAB = b"MATLAB 7.3"
+"""The first bytes of a file that MATLAB wrote."""
+REFERENCES = "#refs#"
+"""The group in which MATLAB keeps the cells and objects of a file."""
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an HDF5 file.
-
-    Args:
-        path: The file.
-        options: How to read it.
 
     Raises:
         LogError: If it cannot be read.
@@ -81,13 +79,18 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
     except LogError:
         raise
     except DAMAGE as error:
-        raise LogError(path, f"damaged or cut off ({_one_line(error)})") from error
+        raise LogError(path, f"damaged or cut off ({one_line(error)})") from error
     return LogReader(
-        "HDF5",
+        "MATLAB 7.3" if _is_matlab(path) else "HDF5",
         episodes,
         lambda episode, progress: _read(path, options, home, episode, about),
         lambda: _listing(path, home, episodes),
     )
+
+
+def _is_matlab(path: Path) -> bool:
+    with path.open("rb") as stream:
+        return stream.read(len(MATLAB)) == MATLAB
 
 
 def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
@@ -99,7 +102,7 @@ def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
         if isinstance(group := _own(path, file.get(home), file), h5py.Group):
             names = [name for name, each in group.items() if isinstance(each, h5py.Group)]
             found = [name for name in names if home == EPISODES or NUMBERED.fullmatch(name)]
-            if found:
+            if found and not _is_matlab(path):
                 by_number = lambda name: [int(n) for n in re.findall(r"\d+", name)]  # noqa: E731
                 return home, tuple(sorted(found, key=by_number))
     ends = ((name, _own(path, file.get(name), file)) for name in EPISODE_ENDS)
@@ -117,22 +120,24 @@ def _read(path: Path, options: ReadOptions, home: str, episode: str, about: str)
     except LogError:
         raise
     except DAMAGE as error:
-        raise LogError(path, f"{episode or 'it'} is damaged ({_one_line(error)})") from error
+        raise LogError(path, f"{episode or 'it'} is damaged ({one_line(error)})") from error
+    if _is_matlab(path):
+        from inspector.logs.matlab import log_of_variables
+
+        return log_of_variables(path, {name: each.T for name, each in arrays.items()}, options)
     if not home:
         part, samples = episodes_of(arrays)[episode], max(map(len, arrays.values()), default=0)
         arrays = {n: each[part] if len(each) == samples else each for n, each in arrays.items()}
     controller = CONTROLLER.search(about)
     return log_of(
-        Episode(
-            path,
-            {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
-            episode,
-            rate=_rate(about),
-            numbers=single_numbers(attributes | arrays),
-            controller=controller[1] if controller else "",
-            not_read=left_out,
-        ),
+        path,
+        {name: each for name, each in arrays.items() if each.dtype.kind in "iuf"},
         options,
+        episode=episode,
+        rate=_rate(about),
+        numbers=single_numbers(attributes | arrays),
+        controller=controller[1] if controller else "",
+        not_read=left_out,
     )
 
 
@@ -187,6 +192,8 @@ def _values(path: Path, datasets: Sequence[tuple[str, Any]]) -> Iterator[tuple[s
 def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     """Numeric datasets of up to two dimensions, or three of joint states, by name in the group.
 
+    A dataset that many links name is one: h5py visits it once, by one of its names.
+
     Returns:
         Those that are read, and the names of large ones that nothing is known of.
     """
@@ -195,14 +202,17 @@ def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tu
     left_out: list[str] = []
 
     def visit(name: str, each: Any) -> None:
-        if isinstance(each, h5py.Dataset) and each.dtype.kind in "iufb":
-            last = name.rpartition("/")[2].lower()
-            if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
-                known = meaning(name) not in ("", COPY) or STATES.fullmatch(name)
-                if known or name in mapped or last in NAMES or each.nbytes <= SMALL:
-                    found.append((name, each))
-                else:
-                    left_out.append(name)
+        if not isinstance(each, h5py.Dataset) or each.dtype.kind not in "iufb":
+            return
+        if name.startswith(REFERENCES) or each.attrs.get("MATLAB_class") == b"char":
+            return
+        last = name.rpartition("/")[2].lower()
+        if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
+            known = meaning(name) not in ("", COPY) or STATES.fullmatch(name)
+            if known or name in mapped or last in NAMES or each.nbytes <= SMALL:
+                found.append((name, each))
+            else:
+                left_out.append(name)
 
     group.visititems(visit)
     return found, tuple(left_out)
@@ -213,14 +223,12 @@ def _rate(env_args: str) -> float | None:
     try:
         args = from_json(env_args)
         if frequency := args.get("env_kwargs", {}).get("control_freq"):
-            return _positive(float(frequency))
-        sim = args.get("sim_args", {})
-        return _positive(1 / (float(sim["dt"]) * float(sim["decimation"])))
+            rate = float(frequency)
+        else:
+            sim = args.get("sim_args", {})
+            rate = 1 / (float(sim["dt"]) * float(sim["decimation"]))
     except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError):
         return None
-
-
-def _positive(rate: float) -> float | None:
     return rate if 0 < rate < inf else None
 
 
@@ -235,9 +243,5 @@ def _listing(path: Path, home: str, episodes: tuple[str, ...]) -> tuple[str, ...
         with h5py.File(path) as file:
             (file[f"{home}/{episodes[0]}"] if home else file).visititems(add)
     except DAMAGE as error:
-        raise LogError(path, f"{episodes[0] or 'it'} is damaged ({_one_line(error)})") from error
+        raise LogError(path, f"{episodes[0] or 'it'} is damaged ({one_line(error)})") from error
     return tuple(rows)
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())

@@ -13,8 +13,8 @@ import numpy as np
 from inspector.errors import LogError
 from inspector.logs import parquet
 from inspector.logs.log import Field, Log, LogReader, Stamps
-from inspector.logs.options import ReadOptions
-from inspector.logs.signals import listed
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.names import listed
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json, text_of
 

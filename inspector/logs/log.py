@@ -1,18 +1,59 @@
-"""What readers of logs return: fields with stamps, in a log; and tracks, with known signals."""
+"""A log as it was written: arrays with stamps; and the signals that they hold."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
+from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from inspector.errors import LogError
-from inspector.logs.options import Entry
+from inspector.errors import InspectorError, LogError
 from noisemodel import Run
+from noisemodel.checks import LONGEST, SHORTEST
 from noisemodel.types import Array, Mask, Real
+
+if TYPE_CHECKING:
+    from inspector.logs.mapping import Entry
+
+SAMPLES = "samples"
+"""The unit of stamps that count samples, of a log whose rate is not known yet."""
+
+ROUND = (1.0, 1.25, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+"""Round rates are these, times a power of ten, in [Hz]."""
+NEAR = 0.05
+"""Largest relative difference of a nominal rate to the round one that replaces it."""
+UNIFORM = 1e-3
+"""Largest relative deviation of a uniform clock's steps from their median."""
+GAP = 5.0
+"""Length of a step, in nominal ones, above which it is a gap."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Rate, jitter and gaps of timestamps.
+
+    Attributes:
+        nominal: Inverse of the median step, in [Hz].
+        rate: The rate that is used: the nominal one of uniform stamps, else the nearest round
+            one, unless it is given; in [Hz].
+        uniform: Whether the stamps are uniform.
+        jitter_rms: Root mean square deviation of the steps from that rate's, without gaps, in [s].
+        jitter_max: Largest deviation, in [s].
+        gaps: Start and end of each gap, in [s].
+        stretches: The samples between gaps.
+    """
+
+    nominal: float
+    rate: float
+    uniform: bool
+    jitter_rms: float
+    jitter_max: float
+    gaps: tuple[tuple[float, float], ...]
+    stretches: tuple[slice, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,10 +64,12 @@ class Stamps:
         start: The first stamp, in [s], exact.
         time: Time since the first stamp, as logged, shape (samples,), in [s].
         rows: Line number of each sample, if the file has lines.
-        unit: Unit of the stamps in the log.
+        unit: Unit of the stamps in the log; ``SAMPLES`` until the rate is known.
         remark: On their source, if it is not the expected one.
         held: Whether values apply between stamps however far apart, as those of a planned
             trajectory do.
+        rate: The rate that the log is said to have, in [Hz].
+        name: Their column.
     """
 
     start: Decimal
@@ -35,6 +78,8 @@ class Stamps:
     unit: str = "seconds"
     remark: str = ""
     held: bool = False
+    rate: float | None = None
+    name: str = ""
 
     @classmethod
     def of_nanoseconds(
@@ -47,9 +92,42 @@ class Stamps:
         )
 
     @classmethod
-    def every(cls, step: float, samples: int) -> "Stamps":
+    def every(cls, step: float, samples: int, remark: str = "") -> "Stamps":
         """Stamps of a log that has none, with a known step in [s]."""
-        return cls(Decimal(0), np.arange(samples, dtype=np.float64) * step)
+        return cls(Decimal(0), np.arange(samples, dtype=np.float64) * step, remark=remark)
+
+    @cached_property
+    def clock(self) -> Clock:
+        """Rate, jitter and gaps of increasing stamps."""
+        steps = np.diff(self.time)
+        step = float(np.median(steps))
+        if not SHORTEST <= step <= LONGEST:
+            raise InspectorError(
+                f"the stamps' median step is {step:g} s, expected {SHORTEST:g} s to {LONGEST:g} s"
+            )
+        nominal = float(f"{1 / step:.9g}")
+        uniform = bool((np.abs(steps - step) <= UNIFORM * step).all())
+        rate = self.rate or (nominal if uniform else _round(nominal))
+        uniform = uniform and abs(rate * step - 1) <= UNIFORM
+        wide = np.empty(0, dtype=np.int64) if self.held else np.flatnonzero(steps > GAP / rate)
+        deviations = np.delete(steps, wide) - 1 / rate
+        edges = [0, *(wide + 1), len(self.time)]
+        return Clock(
+            nominal=nominal,
+            rate=rate,
+            uniform=uniform,
+            jitter_rms=float(np.sqrt(np.mean(deviations**2))),
+            jitter_max=float(np.abs(deviations).max()),
+            gaps=tuple((float(self.time[at]), float(self.time[at + 1])) for at in wide),
+            stretches=tuple(slice(start, stop) for start, stop in pairwise(edges)),
+        )
+
+
+def _round(rate: float) -> float:
+    """The nearest round rate, or the rate itself if none is near."""
+    power = 10.0 ** np.floor(np.log10(rate))
+    near = float(power * min(ROUND, key=lambda digit: abs(digit * power / rate - 1)))
+    return near if abs(near / rate - 1) <= NEAR else rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,20 +154,70 @@ class Field:
 
 
 @dataclass(frozen=True, eq=False)
+class Track:
+    """One signal of some joints, or of the base.
+
+    Attributes:
+        signal: One of ``inspector.logs.names.SIGNALS``.
+        joints: Joints of the columns; empty for the base.
+        labels: Names of the columns in the log.
+        stamps: Its timestamps.
+        values: Shape (samples, columns).
+        missing: Samples that hold no values, where they are interpolated, shape (samples,); None
+            if there are none.
+        angles: Whether each column is an angle, which may wrap.
+    """
+
+    signal: str
+    joints: tuple[str, ...]
+    labels: tuple[str, ...]
+    stamps: Stamps
+    values: Real
+    missing: Mask | None = None
+    angles: Sequence[bool] = ()
+
+    @property
+    def is_desired(self) -> bool:
+        """Whether it holds desired motion."""
+        return self.signal.endswith("_desired")
+
+    @property
+    def quantity(self) -> str:
+        """The signal, without saying whether it is desired."""
+        return self.signal.removesuffix("_desired")
+
+    def of(self, joints: Sequence[str]) -> Real:
+        """Values of some of its joints, shape (samples, joints); no copy if these are all."""
+        if tuple(joints) == self.joints:
+            return self.values
+        return self.values[:, [self.joints.index(joint) for joint in joints]]
+
+    def fault(self, path: Path, problem: str, sample: int) -> LogError:
+        """Error that names the place of a problem in the log."""
+        if self.stamps.rows is not None:
+            return LogError(path, problem, self.stamps.rows[sample])
+        at = self.stamps.time[sample] - self.stamps.time[0]
+        return LogError(path, f"{problem} (sample {sample + 1}, {at:.6g} s into the log)")
+
+
+@dataclass(frozen=True, eq=False)
 class Log:
-    """One recording as logged, before signals are assigned to its fields.
+    """One recording, as logged, and once its signals are known.
 
     Attributes:
         path: The file or folder.
-        fields: Its arrays.
+        fields: Its arrays; none once ``tracks`` are known.
         episode: Name of the episode, where the file holds several.
         not_read: Names of what was not read.
-        remarks: What was lost or decided during reading, a sentence each.
+        remarks: What was lost or decided, a sentence each.
         units: Why the unit of angles is not known, if the format does not define it.
         urdf: Text of the URDF in the log, may be empty.
         suggested: Mapping that the format defines; that of the options takes precedence.
         meta: Further metadata of the log.
         time: Name of the column or array with the stamps, if it has one.
+        tracks: Its signals, in SI units, with increasing stamps.
+        names: Names of its columns and arrays, which a mapping may refer to.
+        in_degrees: "position" and "velocity" if these were found to be in degrees.
     """
 
     path: Path
@@ -99,43 +227,12 @@ class Log:
     remarks: tuple[str, ...] = ()
     units: str = ""
     urdf: str = ""
-    suggested: tuple[Entry, ...] = ()
+    suggested: tuple["Entry", ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
     time: str = ""
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """One signal of some joints, or of the base.
-
-    Attributes:
-        signal: One of ``inspector.logs.signals.SIGNALS``.
-        joints: Joints of the columns; empty for the base.
-        labels: Names of the columns in the log.
-        stamps: Its timestamps.
-        values: Shape (samples, columns).
-        missing: Samples without a number in a column, where values are interpolated, shape
-            (samples,); None if there are none.
-    """
-
-    signal: str
-    joints: tuple[str, ...]
-    labels: tuple[str, ...]
-    stamps: Stamps
-    values: Real
-    missing: Mask | None = None
-
-    @property
-    def is_desired(self) -> bool:
-        """Whether it holds desired motion."""
-        return self.signal.endswith("_desired")
-
-    def fault(self, path: Path, problem: str, sample: int) -> LogError:
-        """Error that names the place of a problem in the log."""
-        if self.stamps.rows is not None:
-            return LogError(path, problem, self.stamps.rows[sample])
-        at = self.stamps.time[sample] - self.stamps.time[0]
-        return LogError(path, f"{problem} (sample {sample + 1}, {at:.6g} s into the log)")
+    tracks: tuple[Track, ...] = ()
+    names: tuple[str, ...] = ()
+    in_degrees: tuple[str, ...] = ()
 
 
 class Progress(Protocol):

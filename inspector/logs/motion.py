@@ -1,76 +1,766 @@
-"""Signals of a run, assembled from resampled tracks and differentiated where missing."""
+"""A run made of logs: signals in SI units, finite and in order, on one time base.
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+Degrees are converted, samples without a value and stretches in which a log froze become gaps,
+clocks are synchronised, and missing velocities are differentiated.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from inspector.errors import LogError
+from inspector.hold import hold_length, updates
+from inspector.logs.clocks import (
+    Offset,
+    common_time,
+    counted_stamps,
+    no_overlap,
+    ordered,
+    resampled,
+    synchronise,
+)
+from inspector.logs.log import SAMPLES, UNIFORM, Log, Stamps, Track
+from inspector.logs.mapping import ReadOptions, tracks_of
+from inspector.logs.names import listed
+from inspector.text import counted, plain
+from noisemodel import Robot, Run
 from noisemodel.differentiate import METHOD, base_velocity, joint_velocity
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Indices, Mask, Real
+
+LARGEST_RATE_RATIO = 1.5
+"""Largest ratio of the specified rate to that of the stamps, or the inverse."""
+MOST_SAMPLES_PER_STAMP = 20
+"""Largest number of the run's samples per logged sample; above it most of the run is gaps."""
+NO_RANGE = "normalised to 0 to 100 of its range, left out since no robot is specified"
 
 
 @dataclass(frozen=True, eq=False)
-class ResampledTrack:
-    """One signal of some joints, or of the base, on the run's time base.
+class Imported:
+    """A run that was read from a log.
 
     Attributes:
-        signal: One of ``inspector.logs.signals.SIGNALS``.
-        joints: The joints of its columns; empty for the base.
-        values: Shape (samples, columns).
+        run: The run.
+        remarks: What was decided during the import, a sentence each.
+        name: Name of the log and of the episode.
+        urdf: Text of the URDF in the log, if no robot was specified.
     """
 
-    signal: str
-    joints: tuple[str, ...]
-    values: Real
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Signals of a run.
-
-    Attributes:
-        signals: Arguments of ``noisemodel.Run`` by name.
-        differentiated: The method by the name of each differentiated velocity.
-        remarks: What was differentiated or left out, a sentence each.
-    """
-
-    signals: Mapping[str, Any]
-    differentiated: Mapping[str, str]
+    run: Run
     remarks: tuple[str, ...]
+    name: str = ""
+    urdf: str = ""
 
 
-def motion_of(tracks: Sequence[ResampledTrack], time: Array, valid: Mask) -> Motion:
-    """Signals by joint, with missing velocities differentiated.
+def prepared(log: Log, options: ReadOptions, robot: Robot | None) -> Log:
+    """A log's signals in SI units, finite, with increasing stamps, in place of its fields.
+
+    Raises:
+        LogError: If it holds no motion, an infinite value, an angle in an unknown unit,
+            or stamps that do not increase.
+        RobotError: If the robot lacks the joints that the log names.
+    """
+    path = log.path
+    if log.units and not options.units:
+        raise LogError(path, log.units)
+    tracks, not_read, found = tracks_of(log, options, robot)
+    remarks = [*log.remarks, *found]
+    tracks = _at_rate(path, tracks, options)
+    tracks = _with_two_samples(path, tracks, remarks)
+    tracks = tuple(_finite(path, _believable(path, tracks, remarks), remarks))
+    if log.units and options.units == "degrees" and not robot:
+        left_out = {joint: None for t in tracks for joint in t.joints if _is_gripper(joint)}
+        remarks += [f"{NO_RANGE}: {listed(list(left_out))}"] if left_out else []
+    tracks, in_degrees = (tracks, ()) if options.units else from_degrees(tracks, robot)
+    tracks = in_radians(path, tracks, robot, options.units, normalised_grippers=bool(log.units))
+    if in_degrees:
+        what = " and ".join(
+            f"{each[:-1]}ies" if each[-1] == "y" else f"{each}s" for each in in_degrees
+        )
+        remarks.append(
+            f"{what} look like degrees: converted to radians (if they are not, --units radians)"
+        )
+    tracks, unordered, order = ordered(path, tracks)
+    tracks = _without_frozen(tracks, remarks)
+    return replace(
+        log,
+        fields=(),
+        tracks=tracks,
+        names=(*(each.name for each in log.fields), *log.not_read),
+        not_read=not_read,
+        remarks=((order,) if order else ()) + tuple(remarks),
+        meta={
+            **log.meta,
+            **({"units": options.units} if options.units else {}),
+            **({"stamps": unordered} if unordered else {}),
+        },
+        in_degrees=in_degrees,
+    )
+
+
+def _at_rate(path: Path, tracks: Sequence[Track], options: ReadOptions) -> tuple[Track, ...]:
+    """Tracks whose stamps are in seconds, where they counted samples."""
+    by_signal = {track.signal: track for track in reversed(tracks)}
+    position, velocity = by_signal.get("position"), by_signal.get("velocity")
+    values: tuple[Real | None, Real | None] = (None, None)
+    if position and velocity and position.stamps is velocity.stamps:
+        shared = [joint for joint in position.joints if joint in velocity.joints]
+        values = (position.of(shared), velocity.of(shared)) if shared else values
+    timed = {
+        id(stamps): counted_stamps(path, stamps, options, values[0], values[1])
+        for stamps in {id(track.stamps): track.stamps for track in tracks}.values()
+        if stamps.unit == SAMPLES
+    }
+    return tuple(replace(t, stamps=timed.get(id(t.stamps), t.stamps)) for t in tracks)
+
+
+def _with_two_samples(path: Path, tracks: Sequence[Track], remarks: list[str]) -> tuple[Track, ...]:
+    long_enough = tuple(track for track in tracks if len(track.values) > 1)
+    if not any(track.joints for track in long_enough):
+        raise LogError(path, "1 sample; a run needs at least 2")
+    once = [label for track in tracks if len(track.values) < 2 for label in track.labels]
+    if once:
+        remarks.append(f"logged once only, left out: {listed(once)}")
+    return long_enough
+
+
+# Values that are none
+
+ABSURD = 1e6
+"""Value of an angle or speed that no unit explains."""
+FEW = 0.1
+"""Largest share of samples that may hold such values; a desired motion may run away to the end."""
+
+
+def _believable(path: Path, tracks: Sequence[Track], remarks: list[str]) -> Iterator[Track]:
+    """Tracks in which nan takes the place of values that no unit explains."""
+    for track in tracks:
+        values = np.abs(track.values)
+        if (
+            track.quantity not in LARGEST
+            or not (far := np.isfinite(values) & (values > ABSURD)).any()
+        ):
+            yield track
+            continue
+        sample, column = (int(each) for each in np.argwhere(far)[0])
+        what = (
+            f"column {track.labels[column]!r} holds {track.values[sample, column]:.3g}, no"
+            f" {track.quantity} in any unit"
+        )
+        if not track.is_desired and far.any(axis=1).mean() > FEW:
+            raise track.fault(path, f"{what}; name the columns to read (--map)", sample)
+        runaway = far.any(axis=0) & (values > LARGEST[track.quantity])
+        remarks.append(
+            f"{what}: {counted(int(runaway.any(axis=1).sum()), 'sample')} of"
+            f" {track.signal.replace('_', ' ')} left out"
+        )
+        yield replace(track, values=np.where(runaway, np.nan, track.values))
+
+
+def _finite(path: Path, tracks: Iterator[Track], remarks: list[str]) -> Iterator[Track]:
+    """Tracks without columns that are nan throughout, and with gaps where others are nan."""
+    for track in tracks:
+        if np.isfinite(track.values).all():
+            yield track
+            continue
+        lacking = np.isnan(track.values)
+        infinite = np.argwhere(np.isinf(track.values))
+        if len(infinite):
+            sample, column = map(int, infinite[0])
+            value = track.values[sample, column]
+            raise track.fault(path, f"column {track.labels[column]!r} holds {value}", sample)
+        empty = np.atleast_1d(lacking.all(axis=0))
+        if empty.any():
+            names = [label for label, is_nan in zip(track.labels, empty, strict=True) if is_nan]
+            remarks.append(f"all nan, left out: {listed(names)}")
+            kept = np.flatnonzero(~empty)
+            if not len(kept) or not track.joints:
+                continue
+            track = _columns(track, kept.tolist())
+            lacking = lacking[:, kept]
+        yield _with_gaps(track, lacking, remarks) if lacking.any() else track
+
+
+def _with_gaps(track: Track, lacking: Mask, remarks: list[str]) -> Track:
+    """Track whose samples with nan are missing, and interpolated lest they spoil others."""
+    missing: Mask = np.asarray(lacking.any(axis=1))
+    some = np.atleast_1d(lacking.any(axis=0)).tolist()
+    labels = [label for label, any_ in zip(track.labels, some, strict=True) if any_]
+    first = track.stamps.time[np.argmax(missing)] - track.stamps.time[0]
+    remarks.append(
+        f"{counted(int(missing.sum()), 'sample')} without a number, marked as"
+        f" not valid: {listed(list(dict.fromkeys(labels)))}, the first at {first:.6g} s"
+    )
+    places, values = np.arange(len(missing)), np.array(track.values)
+    for column, nan in zip(values.T, lacking.T, strict=True):
+        column[nan] = np.interp(places[nan], places[~nan], column[~nan])
+    return replace(track, values=values, missing=missing)
+
+
+FROZEN = 0.2
+"""Least time for which a frozen log repeats a row, in [s]."""
+FROZEN_HOLDS = 5.0
+"""The same as a multiple of the time for which it holds values anyway."""
+FROZEN_WAY = 0.05
+"""Least way that joints should have gone in that time, in [rad] or [m]."""
+
+
+def _without_frozen(tracks: Sequence[Track], remarks: list[str]) -> tuple[Track, ...]:
+    """Tracks whose samples are missing where all rows are one, and joints should move."""
+    found = list(tracks)
+    for stamps in {id(track.stamps): track.stamps for track in tracks}.values():
+        ours = [track for track in tracks if track.stamps is stamps and track.joints]
+        measured = [track for track in ours if not track.is_desired]
+        if not any(track.quantity == "position" for track in measured):
+            continue
+        same = np.ones(len(stamps.time) - 1, dtype=bool)
+        for track in measured:
+            same &= (track.values[1:] == track.values[:-1]).all(axis=1)
+        frozen = np.zeros(len(stamps.time), dtype=bool)
+        for first, last, speed in _repeats(stamps, same, ours):
+            frozen[first + 1 : last + 1] = True
+            at = stamps.time[first] - stamps.time[0]
+            remarks.append(
+                f"{last - first} samples from {at:.6g} s on repeat one, while joints should move"
+                f" at {speed:.2g} rad/s: the log froze, marked as not valid"
+            )
+        if frozen.any():
+            found = [
+                replace(t, missing=frozen if t.missing is None else t.missing | frozen)
+                if t.stamps is stamps
+                else t
+                for t in found
+            ]
+    return tuple(found)
+
+
+def _repeats(
+    stamps: Stamps, same: Mask, tracks: Sequence[Track]
+) -> Iterator[tuple[int, int, float]]:
+    """First and last sample of each stretch that repeats a moving row, and its speed."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], same, [False]))))
+    if not len(edges):
+        return
+    firsts, lasts = edges[::2], edges[1::2]
+    lengths = stamps.time[lasts] - stamps.time[firsts]
+    changes = stamps.time[np.flatnonzero(np.concatenate(([True], ~same)))]
+    usual = float(np.median(np.diff(changes))) if len(changes) > 1 else 0.0
+    for first, last, length in zip(firsts, lasts, lengths, strict=True):
+        if length < max(FROZEN, FROZEN_HOLDS * usual):
+            continue
+        speed = 0.0
+        for track in tracks:
+            if track.signal == "velocity":
+                speed = max(speed, float(np.abs(track.values[first]).max()))
+            elif track.signal == "position_desired":
+                way = np.ptp(track.values[first : last + 1], axis=0).max()
+                speed = max(speed, float(way) / float(length))
+        if speed * length > FROZEN_WAY:
+            yield int(first), int(last), speed
+
+
+# Angles
+
+LARGEST = {"position": 4 * np.pi, "velocity": 100.0}
+"""Values above which an angle is taken for degrees, in [rad] and [rad/s]."""
+TURN = 2 * np.pi
+"""Positions beyond a turn, of half of the joints that move, are in degrees, in [rad]."""
+FARTHEST = 720.0
+"""Largest position of an arm's joint, in [deg]; wheels turn farther."""
+NORMALISED = 100.0
+"""Largest position that may be normalised as well."""
+STRAIGHT = 0.9
+"""Largest share of a joint's way that it is away from its start: wheels go on in one direction."""
+MATCHES = {1.0: ("position", "velocity"), np.pi / 180: ("position",), 180 / np.pi: ("velocity",)}
+"""What is in degrees, by the ratio of logged velocities to the slope of positions."""
+CLOSE = 0.1
+"""Largest relative deviation from such a ratio."""
+STRETCHES = 50
+"""Stretches of a log whose ways are compared."""
+TURNING = ("revolute", "continuous")
+
+HINT = (
+    "if it is in degrees, say --degrees; if in -100 to 100 of each joint's range, --units"
+    " normalised; if the joint is prismatic or continuous, name the robot (--robot)"
+)
+
+
+def in_radians(
+    path: Path,
+    tracks: Sequence[Track],
+    robot: Robot | None,
+    units: str,
+    *,
+    normalised_grippers: bool = False,
+) -> tuple[Track, ...]:
+    """Tracks with angles in radians, and which of their columns are angles.
+
+    Args:
+        path: The log, for errors.
+        tracks: Its tracks.
+        robot: The robot, if known: it has the types and the ranges of the joints.
+        units: "radians", "degrees", "normalised", or empty if not specified.
+        normalised_grippers: Whether grippers are normalised even if the other joints are in
+            degrees. They are left out if no robot gives their range.
+
+    Raises:
+        LogError: If no unit is specified and a value is too large for radians, or if the unit is
+            normalised and the range of a joint is not known.
+    """
+    found = list(tracks)
+    if units == "degrees":
+        found = [
+            _to_radians(each, robot) if is_angle else _from_normalised(path, each, robot)
+            for track in tracks
+            for each, is_angle in _by_kind(track, normalised_grippers=normalised_grippers)
+            if is_angle or robot
+        ]
+    elif units == "normalised":
+        found = [_from_normalised(path, track, robot) for track in tracks]
+    elif not units:
+        for track in tracks:
+            _refuse_degrees(path, track, robot)
+    return tuple(
+        replace(
+            track,
+            angles=[track.signal.startswith("position") and t for t in is_angular(track, robot)],
+        )
+        for track in found
+    )
+
+
+def from_degrees(
+    tracks: Sequence[Track], robot: Robot | None
+) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+    """Tracks in radians, where positions and velocities tell that they are in degrees.
+
+    Positions are if half of the joints that move reach beyond a turn, to and fro; velocities if
+    they match them. Without velocities, positions have to reach beyond ``NORMALISED``.
+
+    Returns:
+        The tracks, and "position" and "velocity" if these were in degrees.
+    """
+    found = _in_degrees(tracks, robot)
+    converted = (_to_radians(t, robot) if t.quantity in found else t for t in tracks)
+    return tuple(converted), found
+
+
+def _in_degrees(tracks: Sequence[Track], robot: Robot | None) -> tuple[str, ...]:
+    by_signal = {track.signal: track for track in reversed(tracks)}
+    for suffix in ("", "_desired"):
+        position, velocity = (by_signal.get(f"{each}{suffix}") for each in ("position", "velocity"))
+        if position is None:
+            continue
+        reach = _reach_to_and_fro(position, robot)
+        if velocity is None:
+            return ("position", "velocity") if reach > NORMALISED else ()
+        ratio = _ratio(position, velocity)
+        for known, quantities in MATCHES.items():
+            if abs(ratio / known - 1) <= CLOSE and (reach or "position" not in quantities):
+                return quantities
+        return ()
+    return ()
+
+
+def _reach_to_and_fro(track: Track, robot: Robot | None) -> float:
+    """Largest position, if half of the joints that move go beyond a turn, and back; else 0."""
+    kinds = _kinds(robot)
+    turns = [kinds.get(joint) == "continuous" for joint in track.joints]
+    angular = np.array(is_angular(track, robot)) & ~np.array(turns)
+    values = np.unwrap(track.values.astype(np.float64), axis=0, period=360.0)  # if in degrees
+    reach = np.abs(track.values).max(axis=0)
+    way = np.abs(np.diff(values, axis=0)).sum(axis=0)
+    moving = angular & (way > 0)
+    far = moving & (reach > TURN)
+    back = np.ptp(values, axis=0) < STRAIGHT * way
+    largest = float(reach.max(where=far, initial=0.0))
+    enough = 2 * far.sum() >= moving.sum() and (far.sum() > 1 or largest > LARGEST["position"])
+    return largest if enough and (far & back).any() and largest <= FARTHEST else 0.0
+
+
+def _ratio(position: Track, velocity: Track) -> float:
+    """Median over joints of velocities by the slope of positions; 0 if it is not known."""
+    if position.stamps is not velocity.stamps:
+        return 0.0
+    shared = [joint for joint in position.joints if joint in velocity.joints]
+    angle, speed = (track.of(shared).astype(np.float64) for track in (position, velocity))
+    steps = np.diff(position.stamps.time)[:, None]
+    summed = np.vstack((np.zeros(len(shared)), np.cumsum((speed[1:] + speed[:-1]) / 2 * steps, 0)))
+    places = np.unique(np.linspace(0, len(angle) - 1, STRETCHES + 1).astype(int))
+    ways, expected = np.diff(angle[places], axis=0), np.diff(summed[places], axis=0)
+    jumps = np.maximum.reduceat(np.abs(np.diff(angle, axis=0)), places[:-1], axis=0)
+    ways[jumps > np.ptp(angle, axis=0) / 2] = 0.0  # a wrapped angle, of whatever unit
+    square = np.square(ways).sum(axis=0)
+    known = square > 0
+    if not known.any():
+        return 0.0
+    return float(np.median((expected * ways).sum(axis=0)[known] / square[known]))
+
+
+def is_angular(track: Track, robot: Robot | None) -> list[bool]:
+    """Whether each column is an angle or an angular rate; True for joints of unknown type."""
+    kinds = _kinds(robot)
+    moves = track.signal.startswith(("position", "velocity"))
+    return [moves and kinds.get(joint, "revolute") in TURNING for joint in track.joints]
+
+
+def _to_radians(track: Track, robot: Robot | None) -> Track:
+    angular = is_angular(track, robot)
+    if not any(angular):
+        return track
+    return replace(track, values=np.where(angular, np.deg2rad(track.values), track.values))
+
+
+def _from_normalised(path: Path, track: Track, robot: Robot | None) -> Track:
+    """Track with -100 to 100 scaled to the range of each joint; of grippers, 0 to 100."""
+    if not track.signal.startswith(("position", "velocity")):
+        return track
+    if robot is None:
+        raise LogError(
+            path, "normalised units are shares of the joints' ranges; name the robot (--robot)"
+        )
+    joints = {joint.name: joint for joint in robot.joints}
+    scales, zeros = [], []
+    for name in track.joints:
+        place = joints[name].first_q
+        lower = float(robot.model.lowerPositionLimit[place])
+        span = float(robot.model.upperPositionLimit[place]) - lower
+        if joints[name].kind == "continuous" or not 0 < span < 1e3:
+            raise LogError(path, f"normalised units: joint {name!r} of {robot.name!r} has no range")
+        scales.append(span / (100 if _is_gripper(name) else 200))
+        zeros.append(lower if _is_gripper(name) else lower + span / 2)
+    moved = zeros if track.signal.startswith("position") else 0.0
+    return replace(track, values=track.values * np.array(scales) + moved)
+
+
+def _is_gripper(joint: str) -> bool:
+    return "gripper" in joint or "finger" in joint
+
+
+def _by_kind(track: Track, *, normalised_grippers: bool) -> Iterator[tuple[Track, bool]]:
+    """Split a track into angles and, if these are normalised, grippers; whether it is angles."""
+    for is_angle in (True, False):
+        kept = [
+            place
+            for place, joint in enumerate(track.joints)
+            if (normalised_grippers and _is_gripper(joint)) is not is_angle
+        ]
+        if kept or (is_angle and not track.joints):
+            yield _columns(track, kept) if 0 < len(kept) < len(track.joints) else track, is_angle
+
+
+def _columns(track: Track, kept: Sequence[int]) -> Track:
+    return replace(
+        track,
+        joints=tuple(track.joints[place] for place in kept),
+        labels=tuple(track.labels[place] for place in kept),
+        values=track.values[:, kept],
+    )
+
+
+def _refuse_degrees(path: Path, track: Track, robot: Robot | None) -> None:
+    if track.quantity not in LARGEST:
+        return
+    kinds = _kinds(robot)
+    for place, angular in enumerate(is_angular(track, robot)):
+        endless = kinds.get(track.joints[place]) == "continuous" and track.quantity == "position"
+        if not angular or endless:
+            continue
+        beyond = np.abs(track.values[:, place]) > LARGEST[track.quantity]
+        if beyond.any():
+            sample = int(np.argmax(beyond))
+            raise track.fault(
+                path,
+                f"column {track.labels[place]!r} holds {track.values[sample, place]:g}, too much"
+                f" for radians; {HINT}",
+                sample,
+            )
+
+
+def _kinds(robot: Robot | None) -> dict[str, str]:
+    return {joint.name: joint.kind for joint in robot.joints} if robot else {}
+
+
+# Targets that are held
+
+SLOWER = 1.5
+"""Least ratio of the targets' hold to that of the measured values."""
+
+
+def without_held_targets(tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tuple[str, ...]]:
+    """Tracks whose held desired positions are interpolated between the samples that set them.
+
+    A policy sets targets 10 to 100 times a second, and a faster log holds each until the next: its
+    velocity would be a pulse at each target, which no joint was ever told to follow. Positions
+    with a logged desired velocity are left as they are, and so are those of a log that holds its
+    measured values as long. What follows the last target is cut off.
+
+    Returns:
+        The tracks, and what was decided, a sentence each.
+    """
+    logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
+    measured = max((_hold(t) for t in tracks if t.signal in ("position", "velocity")), default=1.0)
+    found, remarks = [], []
+    for each in tracks:
+        joined = None
+        if each.signal == "position_desired" and not logged & set(each.joints):
+            joined = _joined(each, measured)
+        if joined:
+            hold = _hold(each)
+            remarks.append(
+                f"position_desired: each target is held for {hold:.3g} samples"
+                f" ({plain(each.stamps.clock.nominal / hold, 4)} Hz); interpolated from target to"
+                " target"
+            )
+        found.append(joined or each)
+    return tuple(found), tuple(remarks)
+
+
+def _joined(track: Track, measured: float) -> Track | None:
+    """The track interpolated from its first target to its last; None without a hold."""
+    from scipy.interpolate import Akima1DInterpolator
+
+    values = np.asarray(track.values, dtype=np.float64)
+    places = updates(values, np.ones(len(values), dtype=bool))
+    if places is None or _hold(track) < SLOWER * measured:
+        return None
+    places = places[places < len(values)]
+    held = values[places.clip(min=0)]
+    held = np.where(track.angles, np.unwrap(held, axis=0), held)
+    set_at = _evenly(places)
+    stamps = track.stamps
+    before = np.minimum(set_at, 0) / stamps.clock.nominal
+    known = np.interp(set_at, np.arange(len(values)), stamps.time) + before
+    time = stamps.time[: int(set_at[-1]) + 1]
+    # Akima's polynomials hardly overshoot jumps, and meet peaks better than monotone ones.
+    joined = Akima1DInterpolator(known, held, axis=0)(time)
+    missing = None if track.missing is None else track.missing[: len(time)]
+    return replace(track, stamps=replace(stamps, time=time), values=joined, missing=missing)
+
+
+def _evenly(places: Indices) -> Array:
+    """Places at even distances, in samples, if all are within a sample of theirs.
+
+    A policy whose rate does not divide the log's sets targets between samples.
+    """
+    steps = np.diff(places)
+    ticks = np.concatenate(([0.0], np.cumsum(np.round(steps / np.mean(steps)))))
+    slope, first = np.polyfit(ticks, places, 1)
+    even = first + slope * ticks
+    chosen = even if np.abs(even - places).max() < 1 else places.astype(np.float64)
+    return np.concatenate(([min(chosen[0], 0.0)], chosen[1:]))
+
+
+def _hold(track: Track) -> float:
+    values = np.asarray(track.values)
+    return hold_length(values, np.ones(len(values), dtype=bool))
+
+
+# The run
+
+
+def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str) -> Imported:
+    """Run of one log, or of one with the measured and one with the desired motion.
+
+    The run's time starts at 0; its ``meta`` has the first stamp. Samples whose stamps are not
+    uniform are resampled to the specified rate, or to the nearest round one; ``valid`` is False
+    in gaps. The run is cut to the time that all signals cover. Missing velocities are
+    differentiated from positions.
+
+    Args:
+        logs: The logs; the list is emptied, so that a long log is not held twice.
+        options: How to read them.
+        robot: The robot, if known.
+        name: Name of the run.
+
+    Raises:
+        LogError: If no run can be made of the logs.
+    """
+    _check_mapping(logs, options)
+    if len(logs) > 1:
+        logs[:] = _with_desired(*logs)
+    main = _main(logs[0], options)
+    every = [track for log in logs for track in log.tracks]
+    tracks, said, offset = synchronise(
+        logs[-1].path, every, main, rate=options.rate, offset=options.offset
+    )
+    del every
+    remarks = [*_remarks(logs, tracks)]
+    remarks += [f"{logs[-1].path.name}: {said}"] if said else []
+    own = next(t.stamps for t in tracks if t.signal == main.signal and t.joints == main.joints)
+    kept, interpolated = without_held_targets(tracks)
+    main = next(track for track in kept if track.stamps is own)
+    time, valid = common_time(kept, main)
+    if len(time) < 2 or not valid.any():
+        others = [each.stamps for each in tracks if each.stamps is not own]
+        raise LogError(logs[-1].path, no_overlap(others[-1] if others else own, own))
+    remarks += interpolated
+    meta = _meta(logs, own, own.start + Decimal(str(time[0])), offset)
+    urdf = logs[0].urdf if robot and not options.robot else ""
+    waiting, covered, slack = [*kept], float(own.time[-1]), UNIFORM / own.clock.rate
+    logs.clear()
+    del tracks, kept, main  # each signal is freed when it has been resampled
+    parts: list[tuple[str, tuple[str, ...], Real]] = []
+    while waiting:
+        track = waiting.pop(0)
+        parts.append((track.signal, track.joints, resampled(time, valid, track, slack)))
+    signals, differentiated, told = signals_of(parts, time - time[0], valid)
+    if differentiated:
+        meta["differentiated"] = differentiated
+    run = Run(time=time - time[0], valid=valid, robot=options.robot or None, meta=meta, **signals)
+    if run.duration < covered:
+        extent = "both logs" if len(meta["source"]) > 1 else "all its signals"
+        remarks.append(f"cut to the {run.duration:.6g} s that {extent} cover")
+    if Decimal(meta["start"]):
+        remarks.append(f"time starts at 0; the first stamp, {meta['start']} s, is in meta")
+    return Imported(run, (*remarks, *told), name, urdf)
+
+
+def _check_mapping(logs: Sequence[Log], options: ReadOptions) -> None:
+    """Refuse a mapping of a column that none of the logs has."""
+    names = {name for log in logs for name in log.names}
+    for entry in options.entries:
+        known = entry.is_pattern or entry.source in names or entry.part()[0] in names
+        if entry.signal == "time":
+            known = any(entry.source == log.time for log in logs)
+        if not known:
+            raise LogError(
+                logs[0].path,
+                f"there is no column {entry.source!r} to map; it has {listed(logs[0].names)}",
+            )
+
+
+def _with_desired(measured: Log, desired: Log) -> list[Log]:
+    """Both logs, with desired motion only from the second."""
+    own = [track for track in measured.tracks if not track.is_desired]
+    others = [track for track in desired.tracks if track.is_desired] or [
+        replace(track, signal=f"{track.signal}_desired")
+        for track in desired.tracks
+        if track.signal in ("position", "velocity")
+    ]
+    found = []
+    for log, tracks in ((measured, own), (desired, others)):
+        kept = {id(track.values) for track in tracks}
+        dropped = [name for t in log.tracks if id(t.values) not in kept for name in t.labels]
+        found.append(replace(log, tracks=tuple(tracks), not_read=(*log.not_read, *dropped)))
+    return found
+
+
+def _main(log: Log, options: ReadOptions) -> Track:
+    """The track whose stamps the run's time is made of: those of the most joints."""
+    moving = [track for track in log.tracks if track.signal in ("position", "velocity")]
+    if not moving:
+        raise LogError(log.path, "holds no measured motion, only desired")
+    track = max(moving, key=lambda track: len(track.joints))
+    time, nominal, rate = track.stamps.time, track.stamps.clock.nominal, options.rate
+    if rate is not None and not 1 / LARGEST_RATE_RATIO <= rate / nominal <= LARGEST_RATE_RATIO:
+        raise LogError(
+            log.path,
+            f"the rate of the stamps is {nominal:g} Hz; a run of {rate:g} Hz cannot be made of it",
+        )
+    if time[-1] * nominal > MOST_SAMPLES_PER_STAMP * len(time):
+        steps = np.diff(time)
+        jump = int(np.argmax(steps))
+        raise track.fault(
+            log.path, f"time jumps by {steps[jump]:.6g} s; most of the log is gaps", jump + 1
+        )
+    return track
+
+
+def _meta(
+    logs: Sequence[Log], own: Stamps, start: Decimal, offset: Offset | None
+) -> dict[str, Any]:
+    meta: dict[str, Any] = {
+        **{key: value for log in logs for key, value in log.meta.items() if key != "stamps"},
+        "source": [log.path.name for log in logs],
+        "start": f"{start.normalize():f}",
+        "jitter": {"rms": own.clock.jitter_rms, "max": own.clock.jitter_max},
+    }
+    unordered = [log.meta["stamps"] for log in logs if "stamps" in log.meta]
+    if unordered:
+        meta["stamps"] = {key: sum(each[key] for each in unordered) for key in unordered[0]}
+    if offset:
+        meta["offset"] = {"seconds": offset.seconds, "drift": offset.drift}
+    return meta
+
+
+def _remarks(logs: Sequence[Log], tracks: Sequence[Track]) -> Iterator[str]:
+    """What was decided about clocks and columns, a sentence each with the name of its log."""
+    places = iter(tracks)
+    for log in logs:
+        name = log.path.name
+        first: dict[int, Track] = {}
+        for track in (next(places) for _ in log.tracks):
+            first.setdefault(id(track.stamps), track)
+        for track in first.values():
+            whose = f"{name}, {track.signal}" if len(first) > 1 else name
+            yield from (f"{whose}: {remark}" for remark in _of_clock(track.stamps))
+        yield from (f"{name}: {remark}" for remark in log.remarks)
+        if log.not_read:
+            yield f"{name}: {counted(len(log.not_read), 'column')} not read: {listed(log.not_read)}"
+
+
+def _of_clock(stamps: Stamps) -> Iterator[str]:
+    clock = stamps.clock
+    if stamps.unit != "seconds":
+        yield f"stamps are in {stamps.unit}"
+    if stamps.remark:
+        yield stamps.remark
+    if not clock.uniform:
+        yield (
+            f"resampled to {clock.rate:g} Hz (the stamps' nominal rate is"
+            f" {clock.nominal:g} Hz; their jitter is {clock.jitter_rms * 1e3:.3g} ms rms,"
+            f" {clock.jitter_max * 1e3:.3g} ms at most)"
+        )
+    if clock.gaps:
+        total = sum(stop - start for start, stop in clock.gaps)
+        yield (
+            f"{counted(len(clock.gaps), 'gap')}, {total:.3g} s in all, the first at"
+            f" {clock.gaps[0][0]:.6g} s, marked as not valid"
+        )
+
+
+def signals_of(
+    parts: Sequence[tuple[str, tuple[str, ...], Real]], time: Array, valid: Mask
+) -> tuple[dict[str, Any], dict[str, str], list[str]]:
+    """Signals of a run by joint, with missing velocities differentiated.
 
     A signal that some of the joints lack, and that cannot be computed, is left out.
 
     Args:
-        tracks: The signals.
+        parts: Signals, the joints of their columns, and values, shape (samples, columns).
         time: Uniform, shape (samples,), in [s].
         valid: False in gaps, shape (samples,).
+
+    Returns:
+        Arguments of ``noisemodel.Run`` by name; the method by the name of each differentiated
+        velocity; what was differentiated or left out, a sentence each.
     """
     signals: dict[str, Any] = {}
     differentiated: dict[str, str] = {}
     remarks: list[str] = []
-    by_signal = {
-        signal: _joined([track for track in tracks if track.signal == signal])
-        for signal in dict.fromkeys(track.signal for track in tracks)
-    }
+    by_signal: dict[str, tuple[tuple[str, ...], Real]] = {}
+    for signal, joints, values in parts:
+        if signal in by_signal:
+            before = by_signal[signal]
+            joints, values = before[0] + joints, np.hstack((before[1], values))
+        by_signal[signal] = joints, values
     for suffix, names in (("", "joint_names"), ("_desired", "desired_joint_names")):
         velocity, position = f"velocity{suffix}", f"position{suffix}"
-        known = [by_signal[signal] for signal in (velocity, position) if signal in by_signal]
-        joints = tuple(dict.fromkeys(joint for track in known for joint in track.joints))
+        known = [by_signal[signal][0] for signal in (velocity, position) if signal in by_signal]
+        joints = tuple(dict.fromkeys(joint for each in known for joint in each))
         if not joints:
             continue
-        logged = by_signal[velocity].joints if velocity in by_signal else ()
+        logged = by_signal[velocity][0] if velocity in by_signal else ()
         missing = tuple(joint for joint in joints if joint not in logged)
         if missing:
             slopes = joint_velocity(time, _ordered(by_signal[position], missing), valid)
-            added = ResampledTrack(velocity, missing, slopes)
-            by_signal[velocity] = _joined(
-                [by_signal[velocity], added] if velocity in by_signal else [added]
-            )
+            if logged:
+                slopes = np.hstack((by_signal[velocity][1], slopes))
+            by_signal[velocity] = logged + missing, slopes
             of_joints = f" of {', '.join(missing)}" if logged else ""
             differentiated[velocity] = METHOD + of_joints
             remarks.append(f"{velocity}{of_joints}: differentiated from positions ({METHOD})")
@@ -78,30 +768,115 @@ def motion_of(tracks: Sequence[ResampledTrack], time: Array, valid: Mask) -> Mot
         for signal in (velocity, position) if suffix else (velocity, position, "effort"):
             if signal not in by_signal:
                 continue
-            lacking = [joint for joint in joints if joint not in by_signal[signal].joints]
-            if not lacking:
-                signals[signal] = _ordered(by_signal[signal], joints)
-            else:
+            lacking = [joint for joint in joints if joint not in by_signal[signal][0]]
+            if lacking:
                 remarks.append(f"{signal}: left out, missing for {', '.join(lacking)}")
-    signals |= {
-        name: by_signal[name].values for name in ("base_pose", "base_velocity") if name in by_signal
-    }
+            else:
+                signals[signal] = _ordered(by_signal[signal], joints)
+    for name in ("base_pose", "base_velocity"):
+        if name in by_signal:
+            signals[name] = by_signal[name][1]
     if "base_pose" in signals and "base_velocity" not in signals:
         signals["base_velocity"] = base_velocity(time, signals["base_pose"], valid)
         differentiated["base_velocity"] = METHOD
         remarks.append(f"base_velocity: differentiated from poses ({METHOD})")
-    return Motion(signals, differentiated, tuple(remarks))
+    return signals, differentiated, remarks
 
 
-def _joined(tracks: Sequence[ResampledTrack]) -> ResampledTrack:
-    if len(tracks) == 1:
-        return tracks[0]
-    joints = tuple(joint for track in tracks for joint in track.joints)
-    return ResampledTrack(tracks[0].signal, joints, np.hstack([track.values for track in tracks]))
-
-
-def _ordered(track: ResampledTrack, joints: Sequence[str]) -> Real:
+def _ordered(signal: tuple[tuple[str, ...], Real], joints: Sequence[str]) -> Real:
     """Columns of some joints; no copy if these are all, in order."""
-    if tuple(joints) == track.joints:
-        return track.values
-    return track.values[:, [track.joints.index(joint) for joint in joints]]
+    known, values = signal
+    if tuple(joints) == known:
+        return values
+    return values[:, [known.index(joint) for joint in joints]]
+
+
+# Signals that contradict each other
+
+FACTORS: Mapping[float, str] = {
+    180 / np.pi: "velocities look like degrees per second beside positions in radians",
+    np.pi / 180: "positions look like degrees beside velocities in radians per second",
+    30 / np.pi: "velocities look like turns per minute beside positions in radians",
+    1 / 6: "velocities look like turns per minute beside positions in degrees",
+    1 / (2 * np.pi): "velocities look like turns per second beside positions in radians",
+}
+"""Warnings by the ratio of velocities to the slope of positions."""
+NEAR_FACTOR = 0.02
+"""Largest relative deviation from a factor, less than half the distance of two of them."""
+STRETCH = 0.2
+"""Time over which velocities are integrated and compared with positions, in [s]."""
+AGREE = 0.2
+"""Largest relative deviation of a velocity from the slope of its position: filters attenuate."""
+RELATED, UNRELATED = 0.9, 0.3
+"""Correlation of the two from which a factor is one, and below which they have no relation."""
+WAY = 0.02
+"""Root mean square of the way in a stretch from which a joint is compared, in [rad] or [m]."""
+ENOUGH = 5
+"""Fewest stretches."""
+
+
+def contradictions(run: Run) -> Iterator[str]:
+    """Clauses on velocities that are not the slopes of their positions.
+
+    Args:
+        run: A run; velocities that were differentiated at import are not compared.
+    """
+    differentiated = run.meta.get("differentiated")
+    by_import = isinstance(differentiated, Mapping) and "velocity" in differentiated
+    ways = None if run.position is None or by_import else _ways(run)
+    if ways is None:
+        return
+    way, summed = ways
+    own, other = np.square(way).sum(axis=0), np.square(summed).sum(axis=0)
+    both, clear = (way * summed).sum(axis=0), own > 0
+    if not clear.any():
+        return
+    factor = np.where(clear, both / np.where(clear, own, 1.0), 1.0)
+    median = float(np.median(factor[clear]))
+    for known, warning in FACTORS.items():
+        if abs(median / known - 1) <= NEAR_FACTOR:
+            yield f"{warning} ({median:.4g} times their slope)"
+            return
+    if len(way) < ENOUGH:
+        return
+    moves = (own > len(way) * WAY**2) & (other > 0)
+    correlation = both / np.sqrt(np.where(own * other > 0, own * other, 1.0))
+    strange = moves & (correlation < UNRELATED)
+    wrong = moves & (correlation >= RELATED) & (np.abs(factor - 1) > AGREE)
+    if strange.any():
+        yield (
+            f"velocities of {_joints(run, strange)} have no relation to the slopes of their"
+            f" positions (correlation {float(correlation[strange].max()):.2g})"
+        )
+    if wrong.any():
+        sizes = factor[wrong]
+        alike = float(np.ptp(sizes)) <= AGREE * abs(float(sizes.mean()))
+        size = f"{float(sizes.mean()):.3g}" if alike else f"{sizes.min():.3g} to {sizes.max():.3g}"
+        yield (
+            f"velocities of {_joints(run, wrong)} are {size} times the slopes of their positions:"
+            " another unit, or another rate?"
+        )
+
+
+def _joints(run: Run, chosen: Mask) -> str:
+    names = [name for name, is_one in zip(run.joint_names, chosen, strict=True) if is_one]
+    return "all joints" if len(names) == len(run.joint_names) > 1 else listed(names)
+
+
+def _ways(run: Run) -> tuple[Array, Array] | None:
+    """Changes of positions, and integrals of velocities, over stretches without a gap."""
+    assert run.position is not None
+    length = max(2, round(STRETCH * run.rate))
+    starts = np.arange(0, len(run.time) - length, length)
+    gaps = np.concatenate(([0], np.cumsum(~run.mask)))
+    starts = starts[gaps[starts + length + 1] == gaps[starts]]
+    if not len(starts):
+        return None
+    way = run.position[starts + length].astype(np.float64) - run.position[starts]
+    whole = run.velocity[: len(run.time) // length * length]
+    sums = whole.reshape(-1, length, way.shape[1]).sum(axis=1, dtype=np.float64)[starts // length]
+    ends = (run.velocity[starts + length].astype(np.float64) - run.velocity[starts]) / 2
+    summed = (sums + ends) / run.rate  # trapezoids
+    turn = 2 * np.pi  # of an angle that wraps: it stays within a turn, and jumps
+    wraps = np.abs(np.ptp(run.position, axis=0) - turn) < 0.1 * turn
+    return np.where(wraps, way - turn * np.round((way - summed) / turn), way), summed

@@ -8,9 +8,9 @@ from numpy.lib.format import MAGIC_PREFIX
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.arrays import Episode, episodes_of, log_of, single_numbers
+from inspector.logs.arrays import episodes_of, log_of, single_numbers
 from inspector.logs.log import Log, LogReader
-from inspector.logs.options import ReadOptions
+from inspector.logs.mapping import ReadOptions
 from noisemodel import Run, RunError, archive, checks
 from noisemodel.runfile import ARRAYS, STAGE
 
@@ -18,23 +18,17 @@ OBJECTS = (
     "Python objects, such as None, or PyBullet's joint states as they are; save numbers:"
     " np.savez(path, time=times, position=positions, velocity=velocities)"
 )
-
 SAMPLE = "noise-sample/"
 SAMPLE_PROBLEM = (
     "holds the noise of a simulated run, not its motion: the folder of the data set is for"
     " `inspector train`, `tune` and `evaluate`; `inspector simulate run` writes runs"
 )
-
 ALONE = "array"
 """Name of the array in a .npy file, for a mapping."""
 
 
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of an archive.
-
-    Args:
-        path: The file.
-        options: How to read it.
 
     Raises:
         LogError: If it is not an archive of plain arrays.
@@ -59,7 +53,9 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         with path.open("rb") as stream:
             if stream.read(len(MAGIC_PREFIX)) == MAGIC_PREFIX:
                 stream.seek(0)
-                return _alone(archive.read_array(stream, "it", path.stat().st_size))
+                array = np.asarray(archive.read_array(stream, "it", path.stat().st_size))
+                names = array.dtype.names or ()
+                return {name: array[name] for name in names} if names else {ALONE: array}
         return archive.read(path)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror or error})") from error
@@ -68,13 +64,6 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         raise LogError(path, problem) from error
     except archive.ArchiveError as error:
         raise LogError(path, f"not an archive of plain arrays: {error}") from error
-
-
-def _alone(array: Any) -> dict[str, NDArray[Any]]:
-    """Arrays of a .npy file: its fields, if it has some."""
-    array = np.asarray(array)
-    names = array.dtype.names or ()
-    return {name: array[name] for name in names} if names else {ALONE: array}
 
 
 def _is_run(arrays: dict[str, NDArray[Any]]) -> bool:
@@ -92,22 +81,16 @@ def _is_run(arrays: dict[str, NDArray[Any]]) -> bool:
 def _read(path: Path, arrays: dict[str, NDArray[Any]], options: ReadOptions, episode: str) -> Log:
     part = episodes_of(arrays)[episode]
     samples = max((len(each) for each in arrays.values() if each.ndim), default=0)
-    names = {
+    joints = {
         ending: tuple(map(str, arrays[key].ravel()))
         for ending, key in (("", "joint_names"), ("_desired", "desired_joint_names"))
         if key in arrays and arrays[key].dtype.kind == "U"
     }
+    kept = {
+        name: each[part] if len(each) == samples else each
+        for name, each in arrays.items()
+        if each.ndim and each.dtype.kind in "iufM"
+    }
     return log_of(
-        Episode(
-            path,
-            {
-                name: each[part] if len(each) == samples else each
-                for name, each in arrays.items()
-                if each.ndim and each.dtype.kind in "iufM"
-            },
-            episode,
-            numbers=single_numbers(arrays),
-            joints=names,
-        ),
-        options,
+        path, kept, options, episode=episode, numbers=single_numbers(arrays), joints=joints
     )

@@ -1,6 +1,7 @@
 """Parquet logs with a row per sample, and columns of numbers or of lists of numbers."""
 
 from collections.abc import Collection, Iterator, Sequence
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,11 @@ import pyarrow.parquet
 from numpy.typing import NDArray
 
 from inspector.errors import LogError
-from inspector.logs.log import Field, Log, LogReader
-from inspector.logs.options import ReadOptions
+from inspector.logs.clocks import stamps_of
+from inspector.logs.log import SAMPLES, Field, Log, LogReader, Stamps
+from inspector.logs.mapping import ReadOptions
+from inspector.logs.names import array_signal, column_signal, listed, time_column
 from inspector.logs.parquetpages import unpacked_size
-from inspector.logs.signals import array_signal, column_signal, listed
-from inspector.logs.timestamps import stamps_at_rate, stamps_of, time_name
 from noisemodel.archive import ArchiveError, check_regular, check_unpacked
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
@@ -142,7 +143,7 @@ def listing(path: Path) -> tuple[str, ...]:
 def _read(path: Path, options: ReadOptions, episode: str) -> Log:
     names = schema_of(path).names
     mapped = {name for entry in options.entries for name in (entry.source, entry.part()[0])}
-    time = time_name(names, options)
+    time = options.time if options.time in names else time_column(names)
     wanted = [
         name
         for name in names
@@ -156,7 +157,7 @@ def _read(path: Path, options: ReadOptions, episode: str) -> Log:
             raise LogError(path, f"column {time!r} holds no stamps but {table.column(time).type}")
         stamps = stamps_of(path, time, column[:, 0], options.rate)
     else:
-        stamps = stamps_at_rate(path, len(table), options, names)
+        stamps = Stamps(Decimal(0), np.arange(len(table), dtype=np.float64), unit=SAMPLES)
 
     def fields() -> Iterator[Field]:
         for name in wanted:

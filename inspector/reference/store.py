@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from inspector.errors import FileError, InspectorError
-from inspector.logs.opening import Reading, open_source, sources
+from inspector.logs.read import Reading, open_source, sources
 from inspector.reference.judging import (
     Comparison,
     Expected,

@@ -12,7 +12,7 @@ import numpy as np
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.status import Status
 from inspector.library import Library
-from inspector.logs.opening import Reading
+from inspector.logs.read import Reading
 from inspector.reference.judging import (
     GAP,
     Comparison,

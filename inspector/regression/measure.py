@@ -13,7 +13,7 @@ from inspector.analysis.analyse import Analysis, analyse, with_links
 from inspector.analysis.status import Status, Unknown
 from inspector.errors import without_path
 from inspector.library import Library
-from inspector.logs.opening import open_run
+from inspector.logs.read import open_run
 from inspector.pair.alignment import envelope
 from inspector.regression.levels import STEP, Levels, levels
 from inspector.verdict import EXPECTED, work_of

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from inspector.errors import InspectorError
-from inspector.logs.opening import logs_in
+from inspector.logs.read import logs_in
 from inspector.regression.measure import Measured
 from noisemodel.atomic import also_reading
 

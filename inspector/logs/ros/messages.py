@@ -1,30 +1,339 @@
-"""Fields with the motion of joints and base, from the messages of each type."""
+"""Motion of joints and base, from the messages of each type.
 
+Messages are deserialised by the definitions that are known here, never by the one in a bag: that is
+code for a decoder, and may state anything.
+"""
+
+import struct
 from array import array
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 import numpy as np
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from inspector.errors import LogError
 from inspector.logs.log import Field, Stamps
-from inspector.logs.ros.bag import Topic
-from inspector.logs.ros.buffers import JointBuffer, stamps_of
-from inspector.logs.ros.decoding import STATE, Decoder, nanoseconds, stamp_of
-from inspector.logs.ros.jointstate import Layout, stamp
+
+DAMAGE = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError, MemoryError, RecursionError),
+    *(struct.error, SyntaxError, TypeError, ValueError, SerdeError),
+)
+"""Errors that rosbags lets through on messages that are damaged."""
+
+STATE = "control_msgs/msg/JointTrajectoryControllerState"
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 COMMANDED = ("command", "desired", "target", "reference", "setpoint")
 """A JointState topic with one of these in its name holds desired motion."""
-
 ARRAYS = {"position": "position", "velocity": "velocity", "effort": "effort"}
 POINT = {"positions": "position", "velocities": "velocity", "effort": "effort"}
-
+STAGES: Mapping[str, bool] = {
+    "reference": True,
+    "desired": True,
+    "feedback": False,
+    "actual": False,
+}
+"""Names of the stages of a controller's state, and whether each is desired motion."""
 
 FIXED_FRAMES = ("odom", "world", "map", "earth")
 """Frames that do not move with the robot, the smoothest first."""
-
 BASE_FRAMES = ("base_link", "base_footprint", "base", "pelvis", "torso", "trunk", "root")
 """Frames of a robot's base."""
+RECORDER = "the messages have no stamps, those of the recorder are used"
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag.
+
+    Attributes:
+        name: Its name.
+        type: Type of its messages, as ROS 2 writes it: ``sensor_msgs/msg/JointState``.
+        definition: Text of the type's definition, empty if the bag has none.
+        count: Number of messages, -1 if unknown.
+    """
+
+    name: str
+    type: str
+    definition: str = ""
+    count: int = -1
+
+
+def _state(joints: tuple[str, ...], others: tuple[str, ...] = (), last: str = "") -> str:
+    """Definition of a controller's state with these stages."""
+    point = "trajectory_msgs/JointTrajectoryPoint"
+    multi = "trajectory_msgs/MultiDOFJointTrajectoryPoint"
+    lines = ["std_msgs/Header header", "string[] joint_names"]
+    lines += [f"{point} {name}" for name in joints]
+    if others:
+        lines += ["string[] multi_dof_joint_names"]
+        lines += [f"{multi} multi_dof_{name}" for name in others]
+    return "\n".join([*lines, last])
+
+
+OLD = ("desired", "actual", "error")
+NEW = ("reference", "feedback", "error", "output")
+STATES = (
+    _state(NEW, NEW, "float64 speed_scaling_factor"),
+    _state((*NEW, *OLD[:2]), (*NEW, *OLD[:2])),
+    _state(OLD, OLD),
+    _state(OLD),
+    _state(NEW),
+    _state((*NEW, *OLD[:2])),
+    _state(NEW, (), "float64 speed_scaling_factor"),
+)
+"""Versions of a controller's state; bags from before 2023 do not contain the definition."""
+
+
+def _fields_in(definition: str) -> list[str]:
+    """Names of the fields of a definition, without those of the types in it."""
+    lines = (
+        line.partition("#")[0].split() for line in definition.partition("\n===")[0].splitlines()
+    )
+    return [words[1] for words in lines if len(words) == 2]
+
+
+class Decoder:
+    """Deserialises the messages of one topic."""
+
+    def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
+        self.path, self.topic, self.ros1 = path, topic, ros1
+
+    @cached_property
+    def _stores(self) -> list[Any]:
+        """What may deserialise the messages: several where versions of a type are known."""
+        definitions = [""]
+        if self.topic.type in TRANSFORMS:
+            definitions = ["geometry_msgs/TransformStamped[] transforms"]
+        elif self.topic.type == STATE:
+            names = _fields_in(self.topic.definition)
+            definitions = [each for each in STATES if not names or _fields_in(each) == names]
+            if not definitions:
+                raise LogError(
+                    self.path,
+                    f"{self.topic.name}: the definition of {self.topic.type} is none that is known"
+                    f" (its fields are {', '.join(names)[:200]})",
+                )
+        stores = []
+        for definition in definitions:
+            store = get_typestore(Stores.ROS1_NOETIC if self.ros1 else Stores.ROS2_HUMBLE)
+            if definition and self.topic.type not in store.types:
+                store.register(get_types_from_msg(definition, self.topic.type))
+            stores.append(store)
+        return stores
+
+    def __call__(self, data: bytes) -> Any:
+        """Deserialise a message.
+
+        Raises:
+            LogError: If the message is not of the topic's type.
+        """
+        problem: Exception | None = None
+        for store in self._stores:
+            parse = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
+            try:
+                message = parse(data, self.topic.type)
+            except DAMAGE as error:
+                problem = error
+                continue
+            self._stores[:] = [store]
+            return message
+        what = " ".join(str(problem).split()) or type(problem).__name__
+        raise LogError(
+            self.path, f"{self.topic.name}: a message is not a {self.topic.type} ({what})"
+        )
+
+
+def stamp_of(message: Any) -> int:
+    """Stamp in a message's header, in [ns]."""
+    return nanoseconds(message.header.stamp)
+
+
+def nanoseconds(time: Any) -> int:
+    """Time or duration of ROS, in [ns]."""
+    return int(time.sec) * 10**9 + int(time.nanosec)
+
+
+LITTLE = b"\x00\x01"
+"""CDR, little-endian; other encodings are deserialised by rosbags."""
+STAMP = struct.Struct("<iI")
+COUNT = struct.Struct("<I")
+BODY = 12
+"""Offset of the bytes after the stamp."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Byte offsets of the numbers of a JointState, by which they are copied without parsing.
+
+    CDR aligns a number to a multiple of its size, counted from the end of the four bytes of the
+    encapsulation header. Messages of one publisher have one layout: the bytes between their
+    numbers are equal.
+
+    Attributes:
+        names: The joints.
+        size: Length of the message in bytes.
+        arrays: Start and stop of the positions, velocities and efforts.
+        between: Bytes that all messages of this layout share, with start and stop.
+    """
+
+    names: tuple[str, ...]
+    size: int
+    arrays: tuple[tuple[int, int], ...]
+    between: tuple[tuple[int, int, bytes], ...]
+
+    @classmethod
+    def of(cls, data: bytes) -> Self | None:
+        """Layout of a message; None if it is not a JointState in little-endian CDR."""
+        if data[:2] != LITTLE:
+            return None
+        try:
+            _, place = _text(data, BODY)
+            place = _aligned(place, 4)
+            (count,) = COUNT.unpack_from(data, place)
+            place += 4
+            names = []
+            for _ in range(count):
+                name, place = _text(data, _aligned(place, 4))
+                names.append(name)
+            arrays, between, start = [], [], BODY
+            for _ in range(3):
+                place = _aligned(place, 4)
+                (count,) = COUNT.unpack_from(data, place)
+                place = _aligned(place + 4, 8) if count else place + 4
+                between.append((start, place, data[start:place]))
+                start = place + 8 * count
+                arrays.append((place, start))
+                place = start
+        except (struct.error, UnicodeDecodeError):
+            return None
+        if start > len(data):
+            return None
+        return cls(tuple(names), len(data), tuple(arrays), tuple(between))
+
+    def fits(self, data: bytes) -> bool:
+        """Whether a message has this layout."""
+        return (
+            len(data) == self.size
+            and data[:2] == LITTLE
+            and all(data[start:stop] == same for start, stop, same in self.between)
+        )
+
+
+def stamp(data: bytes) -> int:
+    """Stamp of a message that has a layout, in [ns]."""
+    seconds, fraction = STAMP.unpack_from(data, 4)
+    return int(seconds) * 10**9 + int(fraction)
+
+
+def _text(data: bytes, place: int) -> tuple[str, int]:
+    (length,) = COUNT.unpack_from(data, place)
+    stop = place + 4 + length
+    if stop > len(data):
+        raise struct.error("text runs beyond the message")
+    return data[place + 4 : stop].rstrip(b"\x00").decode(), stop
+
+
+def _aligned(place: int, size: int) -> int:
+    return place + -(place - 4) % size
+
+
+Numbers = Sequence[float] | bytes | memoryview
+"""Numbers of a message, or the bytes of its float64 numbers."""
+
+
+@dataclass
+class Group:
+    """Messages about one set of joints, as rows of float64 numbers.
+
+    Attributes:
+        joints: The joints, in the order of the first message.
+        logged: Stamps in the messages' headers, in [ns].
+        received: When the recorder received them, in [ns].
+        arrays: Numbers by the name of the array, row after row.
+    """
+
+    joints: tuple[str, ...]
+    logged: "array[int]" = field(default_factory=lambda: array("q"))
+    received: "array[int]" = field(default_factory=lambda: array("q"))
+    arrays: dict[str, "array[float]"] = field(default_factory=dict)
+
+    @property
+    def stamps(self) -> Stamps:
+        """Stamps of the messages, or if they have none, of the recorder."""
+        chosen = self.logged if any(self.logged) else self.received
+        remark = "" if any(self.logged) else RECORDER
+        return Stamps.of_nanoseconds(np.frombuffer(chosen, dtype=np.int64), remark=remark)
+
+    def rows(self, name: str, width: int) -> Any:
+        """Numbers of an array, shape (messages, width)."""
+        return np.frombuffer(self.arrays[name]).reshape(-1, width)
+
+
+class JointBuffer:
+    """Numbers of the messages of one topic, by array.
+
+    Publishers that share a topic, such as an arm's and a gripper's, have a group each.
+    """
+
+    def __init__(self, topic: str) -> None:
+        self.topic = topic
+        self.groups: dict[tuple[frozenset[str], tuple[str, ...]], Group] = {}
+
+    def add(
+        self, joints: tuple[str, ...], logged: int, received: int, parts: Mapping[str, Numbers]
+    ) -> None:
+        """Append a message; arrays whose length is not that of the joints are ignored."""
+        present = tuple(
+            name for name, numbers in parts.items() if _count(numbers) == len(joints) > 0
+        )
+        group = self.groups.get((frozenset(joints), present))
+        if group is None:
+            group = self.groups[frozenset(joints), present] = Group(joints)
+            group.arrays = {name: array("d") for name in present}
+        group.logged.append(logged)
+        group.received.append(received)
+        for name in present:
+            numbers = parts[name]
+            if joints != group.joints:
+                values = (
+                    np.frombuffer(numbers)
+                    if isinstance(numbers, bytes | memoryview)
+                    else np.asarray(numbers, dtype=np.float64)
+                )
+                numbers = values[[joints.index(joint) for joint in group.joints]].tobytes()
+            if isinstance(numbers, bytes | memoryview):
+                group.arrays[name].frombytes(numbers)
+            else:
+                group.arrays[name].extend(numbers)
+
+    def fields(self, signals: Mapping[str, tuple[str, int]]) -> Iterator[Field]:
+        """Fields of the arrays, by the signal and rank of each name."""
+        for group in self.groups.values():
+            if not group.arrays:
+                continue
+            stamps = group.stamps
+            for name in group.arrays:
+                signal, rank = signals[name]
+                yield Field(
+                    f"{self.topic}/{name}",
+                    group.rows(name, len(group.joints)),
+                    stamps,
+                    joints=group.joints,
+                    signal=signal,
+                    source=self.topic,
+                    rank=rank,
+                )
+
+
+def _count(numbers: Numbers) -> int:
+    serialised = isinstance(numbers, bytes | memoryview)
+    return len(numbers) // 8 if serialised else len(numbers)
 
 
 class TopicReader(Protocol):
@@ -45,9 +354,8 @@ class JointStates:
         self.buffer = JointBuffer(topic.name)
         self.layout: Layout | None = None
         self.ros1 = ros1
-        commanded = any(word in topic.name.lower() for word in COMMANDED)
         self.signals = {name: (signal, 0) for name, signal in ARRAYS.items()}
-        if commanded:
+        if any(word in topic.name.lower() for word in COMMANDED):
             self.signals = {
                 "position": ("position_desired", 1),
                 "velocity": ("velocity_desired", 1),
@@ -59,13 +367,13 @@ class JointStates:
         if self.layout is None or not self.layout.fits(data):
             self.layout = None if self.ros1 else Layout.of(data)
         if self.layout is not None:
-            parts = (data[start:stop] for start, stop in self.layout.arrays)
-            column_signal = dict(zip(ARRAYS, parts, strict=True))
-            self.buffer.add(self.layout.names, stamp(data), received, column_signal)
+            numbers = (data[start:stop] for start, stop in self.layout.arrays)
+            parts: dict[str, Numbers] = dict(zip(ARRAYS, numbers, strict=True))
+            self.buffer.add(self.layout.names, stamp(data), received, parts)
             return
         message = self.decode(data)
-        column_signal = {name: getattr(message, name) for name in ARRAYS}
-        self.buffer.add(tuple(message.name), stamp_of(message), received, column_signal)
+        parts = {name: getattr(message, name) for name in ARRAYS}
+        self.buffer.add(tuple(message.name), stamp_of(message), received, parts)
 
     def fields(self) -> Iterator[Field]:
         """Positions, velocities and efforts."""
@@ -75,20 +383,12 @@ class JointStates:
 class ControllerStates:
     """``control_msgs/JointTrajectoryControllerState``: measured and desired, with one stamp."""
 
-    STAGES: Mapping[str, bool] = {
-        "reference": True,
-        "desired": True,
-        "feedback": False,
-        "actual": False,
-    }
-    """Names of the stages, and whether each is desired motion."""
-
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
         self.buffer = JointBuffer(topic.name)
         self.signals = {
             f"{stage}/{name}": (f"{signal}_desired" if desired else signal, 0 if desired else 1)
-            for stage, desired in self.STAGES.items()
+            for stage, desired in STAGES.items()
             for name, signal in POINT.items()
             if not (desired and signal == "effort")
         }
@@ -98,14 +398,14 @@ class ControllerStates:
         message = self.decode(data)
         parts = {}
         for stages in (("reference", "desired"), ("feedback", "actual")):
-            present = [name for name in stages if _has_values(getattr(message, name, None))]
-            for stage in present[:1]:
-                point = getattr(message, stage)
-                for name in POINT:
-                    if f"{stage}/{name}" in self.signals:
-                        parts[f"{stage}/{name}"] = getattr(point, name, ())
-        joints = tuple(message.joint_names)
-        self.buffer.add(joints, stamp_of(message), received, parts)
+            for stage in stages:
+                point = getattr(message, stage, None)
+                if point is not None and (len(point.positions) or len(point.velocities)):
+                    for name in POINT:
+                        if f"{stage}/{name}" in self.signals:
+                            parts[f"{stage}/{name}"] = getattr(point, name, ())
+                    break
+        self.buffer.add(tuple(message.joint_names), stamp_of(message), received, parts)
 
     def fields(self) -> Iterator[Field]:
         """Measured and desired positions and velocities, and measured efforts."""
@@ -161,27 +461,23 @@ class Odometries:
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
         self.topic = topic.name
-        self.logged, self.received = array("q"), array("q")
-        self.poses, self.twists = array("d"), array("d")
+        self.group = Group((), arrays={"pose": array("d"), "twist": array("d")})
 
     def add(self, received: int, data: bytes) -> None:
         """Add a message."""
         message = self.decode(data)
-        self.logged.append(stamp_of(message))
-        self.received.append(received)
-        self.poses.extend(_pose(message.pose.pose.position, message.pose.pose.orientation))
-        twist = message.twist.twist
-        self.twists.extend(getattr(twist.linear, axis) for axis in "xyz")
-        self.twists.extend(getattr(twist.angular, axis) for axis in "xyz")
+        self.group.logged.append(stamp_of(message))
+        self.group.received.append(received)
+        pose, twist = message.pose.pose, message.twist.twist
+        self.group.arrays["pose"].extend(_pose(pose.position, pose.orientation))
+        for part in (twist.linear, twist.angular):
+            self.group.arrays["twist"].extend(getattr(part, axis) for axis in "xyz")
 
     def fields(self) -> Iterator[Field]:
         """Pose and velocity."""
-        stamps = stamps_of(self.logged, self.received)
-        for name, numbers, signal, width in (
-            ("pose", self.poses, "base_pose", 7),
-            ("twist", self.twists, "base_velocity", 6),
-        ):
-            values = np.frombuffer(numbers).reshape(-1, width)
+        stamps = self.group.stamps
+        for name, signal, width in (("pose", "base_pose", 7), ("twist", "base_velocity", 6)):
+            values = self.group.rows(name, width)
             yield Field(f"{self.topic}/{name}", values, stamps, signal=signal, source=self.topic)
 
 
@@ -191,30 +487,30 @@ class Transforms:
     def __init__(self, path: Path, topic: Topic, *, ros1: bool) -> None:
         self.decode = Decoder(path, topic, ros1=ros1)
         self.topic = topic.name
-        self.pairs: dict[tuple[str, str], tuple[array[int], array[int], array[float]]] = {}
+        self.pairs: dict[tuple[str, str], Group] = {}
 
     def add(self, received: int, data: bytes) -> None:
         """Add a message."""
         for each in self.decode(data).transforms:
             pair = each.header.frame_id.lstrip("/"), each.child_frame_id.lstrip("/")
             if pair[0] in FIXED_FRAMES and pair[1] in BASE_FRAMES:
-                logged, at, poses = self.pairs.setdefault(
-                    pair, (array("q"), array("q"), array("d"))
+                group = self.pairs.setdefault(pair, Group((), arrays={"pose": array("d")}))
+                group.logged.append(stamp_of(each))
+                group.received.append(received)
+                group.arrays["pose"].extend(
+                    _pose(each.transform.translation, each.transform.rotation)
                 )
-                logged.append(stamp_of(each))
-                at.append(received)
-                poses.extend(_pose(each.transform.translation, each.transform.rotation))
 
     def fields(self) -> Iterator[Field]:
         """Pose of the base in the smoothest of the fixed frames."""
         for world, base in sorted(
             self.pairs, key=lambda pair: (FIXED_FRAMES.index(pair[0]), BASE_FRAMES.index(pair[1]))
         )[:1]:
-            logged, at, poses = self.pairs[world, base]
+            group = self.pairs[world, base]
             yield Field(
                 f"{self.topic}/{world}/{base}",
-                np.frombuffer(poses).reshape(-1, 7),
-                stamps_of(logged, at),
+                group.rows("pose", 7),
+                group.stamps,
                 signal="base_pose",
                 source=self.topic,
                 rank=1,
@@ -244,8 +540,7 @@ TOPIC_READERS: Mapping[str, Callable[..., TopicReader]] = {
     STATE: ControllerStates,
     "trajectory_msgs/msg/JointTrajectory": Trajectories,
     "nav_msgs/msg/Odometry": Odometries,
-    "tf2_msgs/msg/TFMessage": Transforms,
-    "tf/msg/tfMessage": Transforms,
+    **dict.fromkeys(TRANSFORMS, Transforms),
 }
 """Readers by the type of messages."""
 
@@ -259,10 +554,6 @@ def topic_reader(path: Path, topic: Topic, *, ros1: bool) -> TopicReader | None:
         return Descriptions(path, topic, ros1=ros1)
     kind = TOPIC_READERS.get(topic.type)
     return kind(path, topic, ros1=ros1) if kind else None
-
-
-def _has_values(point: Any) -> bool:
-    return point is not None and bool(len(point.positions) or len(point.velocities))
 
 
 def _pose(position: Any, turn: Any) -> tuple[float, ...]:

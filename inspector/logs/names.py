@@ -1,13 +1,17 @@
-"""Signals of a log, and the names of columns and arrays that they are known by.
+"""Names of columns and arrays, and the signals and joints that they stand for.
 
-``PATTERNS`` is the table of names; docs/logs.md has the rules in words. Names are matched in any
-case, without the unit at their end.
+``PATTERNS`` is the table of names, read in any case and without the unit at their end. Names that
+leave a question open are decided beside the log's other names, by `Naming`.
 """
 
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass, field
 from math import pi
+from typing import TypeAlias
+
+Meaning: TypeAlias = tuple[str, str | int]
+"""A signal, and the name or the number of its joint."""
 
 JOINT_SIGNALS = ("position", "velocity", "effort", "position_desired", "velocity_desired")
 BASE_SIGNALS = ("base_pose", "base_velocity")
@@ -64,8 +68,11 @@ QUANTITIES = {
 }
 """Words of a quantity. ``qd`` is a velocity, ``q_d`` a desired position."""
 
-DESIRED = r"desired|des|reference|ref|target|commanded|command|cmd|setpoint|goal"
-MEASURED = r"actual|act|feedback|measured|meas|msr"
+DESIRED = (
+    r"desired|des|reference|ref|targets?|commanded|commands?|cmd|cmptd|set_?points?|sp|goal"
+    r"|demanded|planned|soll"
+)
+MEASURED = r"actual|act|feedback|fbk|measured|meas|msr|present|ist"
 JOINT_WORD = r"joints?|dof|motor|axis|actuator"
 
 GAP = r"(?:[ _./-]+|(?-i:(?<=[a-z0-9])(?=[A-Z])))"
@@ -78,9 +85,11 @@ WORD = rf"(?:(?:{JOINT_WORD}){GAP}?)?"
 RECORD = r"(?:.*?/)??(?:(?:field|state|robot_?state|joint_?states?|msg|data|robot)[._])?"
 NUMBER = r"(?:\[(?P<index>\d+)\]|\((?P<round>\d+)\)|(?P<number>\d+))"
 LIMB = r"(?P<joint>(?:left|right|l|r|arm|leg|hand)\d*(?:_(?:left|right|arm|leg|hand)\d*)?)"
+WHOSE = rf"(?:(?:output|shaft|rotor|encoder|angular|motor|joint){GAP})?"
 ALONE = (
     r"(?P<quantity>(?:joint|dof)_(?:pos|vel|positions?|velocity|velocities|efforts?|torques?)"
-    r"|position|velocity|effort|torque|applied_torque|tau|q|qd|dq|q_?dot)"
+    r"|positions?|pos|angles?|theta|velocity|velocities|vel|efforts?|torques?|applied_torque|tau"
+    r"|q|qd|dq|q_?dot)"
 )
 
 PATTERNS = {
@@ -99,7 +108,7 @@ PATTERNS = {
         ),
         (
             "a quantity of all joints, or of the only one",
-            RECORD + BEFORE + ALONE + AFTER,
+            RECORD + BEFORE + WHOSE + ALONE + AFTER,
             re.IGNORECASE,
         ),
         (
@@ -115,21 +124,54 @@ PATTERNS = {
     )
 }
 """Names of columns and arrays; the first that matches counts."""
+FIRST, WHOLE = (
+    PATTERNS["a joint, then the signal of a run file"],
+    PATTERNS["a quantity of all joints, or of the only one"],
+)
 
 NOT_JOINTS = re.compile(
-    rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps)"
+    rf"(?:.*{GAP})?(?:tcp|eef?|end_?effector|cartesian|cart|linear|angular|lin|ang|com|imu|odom|gps"
+    rf"|gravity|friction|external|ext|contact|inertia|bias|residual|disturbance)"
     rf"(?:{GAP}.*)?|base|root|body|tool|object|robot|max|min|mean|x|y|z|roll|pitch|yaw|wind",
     re.IGNORECASE,
 )
 """Things before a quantity that are no joints."""
 
 NOT_MOTION = re.compile(
-    r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*", re.IGNORECASE
+    r"(?:.*[/._ ])?(?:errors?|err)(?:[/._ \[(].*)?|(?:.*/)?output/.*"
+    r"|.*(?-i:(?<=[a-z0-9])E(?:rr|rror)s?)[_\[(]?\d*[\])]?",
+    re.IGNORECASE,
 )
-"""Names of what a controller computes: ``/state/error/positions[0]``, ``joint1_error_pos``."""
+"""Names of what a controller computes: ``/state/error/positions[0]``, ``PositionError1``."""
 
-GENERIC = re.compile(rf"(?:{JOINT_WORD}|j|a)[ _]?(?P<number>\d+)", re.IGNORECASE)
+GENERIC = re.compile(rf"(?:{JOINT_WORD}|servo|j|a)[ _]?(?P<number>\d+)", re.IGNORECASE)
 """``joint1``, ``J1``, ``axis 1``: names that number the joints."""
+
+LIMBS = r"left|right|front|rear|hind|back|l|r|fl|fr|rl|rr|lf|rf|lh|rh|hl|hr|bl|br|arm|leg|hand"
+PARTS = (
+    r"shoulder|elbow|wrist|hip|knee|ankle|thigh|calf|shank|waist|torso|neck|upper_?arm|fore_?arm"
+    r"|haa|hfe|kfe|abad|gripper|finger|thumb"
+)
+BARE = re.compile(
+    rf"(?:(?:{LIMBS}){GAP}?)*(?:(?:{JOINT_WORD}|servo|j|(?-i:A))[ _]?\d+|(?<=[a-z][ _.-])\d+)"
+    rf"|(?=.*(?:{PARTS}))(?:(?:{LIMBS}|{PARTS}|{JOINT_WORD}|lift|pan|tilt|flex|rotate|rotation"
+    rf"|roll|pitch|yaw|[xyz]|\d+)(?:{GAP}|(?=\d)|$))+",
+    re.IGNORECASE,
+)
+"""Names of joints without a quantity: ``Joint1``, ``FL_0``, ``shoulder_lift``, ``wrist_1``."""
+SIDED = re.compile(
+    rf"(?:(?P<before>{DESIRED}|{MEASURED}){GAP})?(?P<joint>.+?)"
+    rf"(?:{GAP}(?P<after>{DESIRED}|{MEASURED}))?",
+    re.IGNORECASE,
+)
+
+UNLIKELY = re.compile(
+    rf"(?:.*{GAP})?(?:errors?|err|torques?|tau|effort|currents?|cur|amps?|volt(?:age|s)?|temp\w*"
+    rf"|force|acc\w*|imu|gyro\w*|tcp|pose|end|fsm|state|status|mode|flags?|is|contact|id|index|seq"
+    rf"|{DESIRED})(?:{GAP}.*|\d*)|[xyz]|q[wxyz]|time.*|.*time|t",
+    re.IGNORECASE,
+)
+"""Names that an example of what to type leaves out."""
 
 LONGEST = 300
 """Characters of a name from which on it is that of no signal: patterns take their square."""
@@ -148,23 +190,99 @@ class Naming:
     Attributes:
         first: Number of the first joint.
         qd_is_desired: Whether ``qd`` is the desired position, since ``dq`` is the velocity.
+        bare: Meaning of columns that name a joint and no quantity.
+        remark: What was decided about these, a sentence; empty if nothing.
+        only: The joint of columns that name none: "" unless a single joint has a name, None
+            where several do.
     """
 
     first: int = 0
     qd_is_desired: bool = False
+    bare: dict[str, Meaning] = field(default_factory=dict)
+    remark: str = ""
+    only: str | int | None = ""
 
     @classmethod
-    def of(cls, columns: Iterable[str]) -> "Naming":
-        """Naming of some columns: joints count from 1 if none has number 0 and one has 1."""
+    def of(cls, columns: Iterable[str], joints: Collection[str] = ()) -> "Naming":
+        """Naming of some columns; ``joints`` are names that the robot is known to have."""
+        columns = [*columns]
+        known = {column: column_signal(column) for column in columns}
+        named = {column: what for column, what in known.items() if what}
+        bare, remark = _bare(columns, named, joints)
         numbers, words = set[int](), set[str]()
-        for column in columns:
+        for column, (_, joint) in (named | bare).items():
             name = without_unit(column)[0]
-            known, match = column_signal(column), _match(name)
-            if known and (number := number_of(known[1])) is not None and not name.endswith("]"):
+            if (number := number_of(joint)) is not None and not name.endswith("]"):
                 numbers.add(number)
+        for column in columns:
+            match = _match(without_unit(column)[0])
             if match and not any(_sides(match.groupdict())):
                 words.add(match["quantity"].lower())
-        return cls(first=int(min(numbers, default=0) == 1), qd_is_desired={"dq", "qd"} <= words)
+        moved = {
+            key_of(joint): joint
+            for signal, joint in (named | bare).values()
+            if signal.startswith(("position", "velocity"))
+        }
+        return cls(
+            first=int(min(numbers, default=0) == 1),
+            qd_is_desired={"dq", "qd"} <= words,
+            bare=bare,
+            remark=remark,
+            only=None if len(moved) > 1 else next(iter(moved.values()), ""),
+        )
+
+
+def _bare(
+    columns: Sequence[str], named: dict[str, Meaning], joints: Collection[str]
+) -> tuple[dict[str, Meaning], str]:
+    """Meaning of columns that name a joint alone, where no other column has its position."""
+    found: dict[str, tuple[str, str, str]] = {}  # signal, joint, and what says so
+    for column in columns:
+        name, unit = without_unit(column)
+        if column in named or len(name) > LONGEST or NOT_MOTION.fullmatch(name):
+            continue
+        match = SIDED.fullmatch(name)
+        joint, side = name, ""
+        if match and name not in joints:
+            joint, side = match["joint"], match["before"] or match["after"] or ""
+        if joint in joints or BARE.fullmatch(joint):
+            found[column] = (UNITS.get(unit, ("position", 1.0))[0], joint, side.lower())
+    measured = {
+        key_of(joint): joint
+        for signal, joint, side in found.values()
+        if signal != "effort" and not _is_desired(side)
+    }
+    taken = {key_of(joint) for signal, joint in named.values() if signal == "position"}
+    moving = {key_of(joint) for signal, joint in named.values() if signal == "velocity"}
+    certain = [joint for joint in measured.values() if joint in joints or GENERIC.fullmatch(joint)]
+    if taken or (moving and moving != set(measured)) or not (certain or len(measured) > 1):
+        return {}, ""
+    sided = {key_of(joint) for _, joint, side in found.values() if side and not _is_desired(side)}
+    bare: dict[str, Meaning] = {}
+    for column, (signal, joint, side) in found.items():
+        if _is_desired(side) and signal != "effort" and key_of(joint) in measured:
+            bare[column] = (f"{signal}_desired", joint)
+        elif not _is_desired(side) and (side or key_of(joint) not in sided):
+            bare[column] = (signal, joint)  # `FR_0_actual` counts more than `FR_0`
+    plain = [c for c in bare if without_unit(c)[1] not in UNITS and bare[c][0] == "position"]
+    if not plain:
+        return bare, ""
+    example = plain[0].replace(found[plain[0]][1], "{joint}")
+    which = plain[0] if len(plain) == 1 else f"{plain[0]} to {plain[-1]}"
+    return bare, (
+        f"{which}: names of joints alone, taken for positions"
+        f" (if they are velocities: --map 'velocity.{{joint}}={example}')"
+    )
+
+
+def _is_desired(side: str) -> bool:
+    return bool(re.fullmatch(DESIRED, side, re.IGNORECASE))
+
+
+def key_of(joint: str | int) -> str | int:
+    """What two names of one joint share: its number, or its name in small letters."""
+    number = number_of(joint)
+    return str(joint).lower() if number is None else number
 
 
 def without_unit(name: str) -> tuple[str, str]:
@@ -181,16 +299,19 @@ def factor_of(column: str) -> float:
     return UNITS.get(without_unit(column)[1], ("", 1.0))[1]
 
 
-def column_signal(column: str, naming: Naming | None = None) -> tuple[str, str | int] | None:
-    """Signal and joint of a column, by its name.
+def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
+    """Signal and joint of a column, by its name; None for an unknown name.
 
     Args:
         column: Its name.
         naming: What the names of the log's other columns tell.
 
     Returns:
-        The signal, and the joint's name or number; None for an unknown name.
+        The signal, and the joint's name or number.
     """
+    naming = naming or Naming()
+    if column in naming.bare:
+        return naming.bare[column]
     name, unit = without_unit(column)
     match = _match(name if unit in UNITS else column.strip())
     if match is None:
@@ -201,19 +322,32 @@ def column_signal(column: str, naming: Naming | None = None) -> tuple[str, str |
     number_text = found.get("index") or found.get("round") or found.get("number")
     if number_text is not None:
         joint = f"{joint}_{number_text}" if joint else int(number_text)
-    signal = _signal(found, naming or Naming())
+    signal = _signal(found, naming, name)
+    if isinstance(joint, str) and match.re is not FIRST:
+        joint, says_desired = _without_side(joint)
+        if says_desired and signal in ("position", "velocity", "effort"):
+            signal = None if signal == "effort" else f"{signal}_desired"
     return (signal, joint) if signal and joint != "" else None
+
+
+def _without_side(joint: str) -> tuple[str, bool]:
+    """Name of a joint without a word for desired motion in it, and whether there was one."""
+    words = re.split(f"({GAP})", joint)
+    kept = [word for word in words if not _is_desired(word)]
+    if len(kept) == len(words):
+        return joint, False
+    return "".join(kept).strip(" _./-").replace("__", "_"), True
 
 
 def array_signal(name: str) -> str | None:
     """Signal of an array by its name, without the folders in it; None for an unknown name."""
-    bare = ROBOSUITE.sub("", name.rpartition("/")[2].lower())
+    bare = ROBOSUITE.sub("", without_unit(name)[0].rpartition("/")[2].lower())
     if bare in SIGNALS:
         return bare
-    match = len(name) <= LONGEST and PATTERNS[
-        "a quantity of all joints, or of the only one"
-    ].fullmatch(bare)
-    return _signal(match.groupdict(), Naming()) if match else None
+    if len(name) > LONGEST or NOT_MOTION.fullmatch(without_unit(name)[0]):
+        return None
+    match = WHOLE.fullmatch(bare)
+    return _signal(match.groupdict(), Naming(), name) if match else None
 
 
 def number_of(joint: str | int) -> int | None:
@@ -252,24 +386,47 @@ def listed(names: Sequence[str]) -> str:
     return shown + (f" and {len(names) - 10} more" if len(names) > 10 else "")
 
 
+def pattern_for(names: Sequence[str]) -> str:
+    """An option that maps names which differ by a number or a word; empty if there are none."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        if len(name) <= LONGEST and not UNLIKELY.fullmatch(without_unit(name)[0]):
+            numbers = [*re.finditer(r"\d+", name)]
+            for each in numbers[-1:]:
+                template = f"{name[: each.start()]}{{joint}}{name[each.end() :]}"
+                groups.setdefault(template, []).append(each.group())
+    if not groups:
+        return ""
+    best = max(groups, key=lambda template: len(groups[template]))
+    if len(groups[best]) < 2 or best.startswith("{joint}"):
+        return ""
+    quantity = "velocity" if re.search(r"vel|speed|omega", best, re.IGNORECASE) else "position"
+    return f"--map '{quantity}.joint_{{joint}}={best}'"
+
+
 def _match(name: str) -> re.Match[str] | None:
     if len(name) > LONGEST or NOT_MOTION.fullmatch(name):
         return None
     found = next((match for each in PATTERNS.values() if (match := each.fullmatch(name))), None)
-    if found is None or found.re is next(iter(PATTERNS.values())):
+    if found is None or found.re is FIRST:
         return found
     joint = found.groupdict().get("joint")
-    return None if joint and NOT_JOINTS.fullmatch(joint) else found
+    side = rf"(?:(?:{DESIRED}|{MEASURED}){GAP}?)+"
+    if joint and (NOT_JOINTS.fullmatch(joint) or re.fullmatch(side, joint, re.IGNORECASE)):
+        return None
+    return found
 
 
-def _signal(found: dict[str, str | None], naming: Naming) -> str | None:
+def _signal(found: dict[str, str | None], naming: Naming, name: str) -> str | None:
     """Signal of the parts of a name; None for a desired effort, which runs do not have."""
     word = re.sub(r"^(?:joint|dof|applied)_", "", (found["quantity"] or "").lower())
     signal = next(each for each, words in QUANTITIES.items() if re.fullmatch(words, word))
     sides = _sides(found)
     if word == "qd" and naming.qd_is_desired and not any(sides):
         return "position_desired"
-    desired = any(side == "d" or re.fullmatch(DESIRED, side) for side in sides)
+    desired = any(side == "d" or _is_desired(side) for side in sides)
+    if not any(sides):  # a topic may say it: /joint_commands/elbow/position
+        desired = any(map(_is_desired, re.split(r"[/_]", name.rpartition("/")[0])))
     if not desired:
         return signal
     return None if signal == "effort" else f"{signal}_desired"

@@ -1,0 +1,705 @@
+"""CSV logs with a row per sample, as robots, tools and spreadsheets write them."""
+
+import csv
+import re
+from array import array
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from io import StringIO
+from itertools import islice
+from operator import itemgetter
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+
+from inspector.errors import LogError
+from inspector.logs.arrays import CELLS, gathered
+from inspector.logs.clocks import is_counter, stamps_since
+from inspector.logs.log import SAMPLES, Field, Log, LogReader, Progress, Stamps
+from inspector.logs.mapping import ReadOptions, no_motion
+from inspector.logs.names import (
+    JOINT_SIGNALS,
+    TIME_UNITS,
+    UNLIKELY,
+    Naming,
+    array_signal,
+    column_signal,
+    factor_of,
+    listed,
+    says_twice,
+    time_column,
+    without_unit,
+)
+from inspector.logs.names import UNITS as SIGNAL_UNITS
+from inspector.text import counted
+from noisemodel.bounds import beyond, limit
+from noisemodel.types import Array
+
+DELIMITERS = (";", "\t", ",", " ")
+"""Marks between cells."""
+COMMENTS = ("#", "%", "//")
+"""Beginnings of lines that are comments, or of a header that NumPy or rostopic wrote."""
+MISSING = frozenset(("", "nan", "na", "n/a", "#n/a", "null", "none", "-", "--"))
+"""Cells without a number, in any case."""
+HEAD = 200
+"""Lines among which the first row of numbers is looked for."""
+EXAMINED = 20_000
+"""Lines of a log without a header by which its columns are told apart."""
+SPARSE = 0.5
+"""Share of rows without a number from which a column has another clock."""
+LONGEST_LINE = 4 * 2**20
+"""Characters of a line: far more than those of so many columns as are read."""
+DIGITS = 30
+"""Stamps have at most so many digits before or after the point."""
+PIECE = 2**20
+"""Characters that are read at once."""
+LATEST_YEAR = 2200
+"""Dates lie before: in nanoseconds, they fit into 64 bits."""
+
+SECONDS = re.compile(r"(?P<record>.*?)secs?(?:onds)?", re.IGNORECASE)
+NANOSECONDS = ("nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds")
+"""Endings of the two columns of a stamp in whole seconds, and nanoseconds since."""
+NAME = "field.name"
+"""Beginning of rostopic's columns with the joints' names, which end with a number."""
+ZONE = re.compile(r"(?<=[\d:])\s*(?:Z|(?P<sign>[+-])(?P<hours>\d\d):?(?P<minutes>\d\d))$")
+"""End of a date that tells its time zone."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a file is laid out.
+
+    Attributes:
+        delimiter: Mark between cells.
+        header: Names of the columns.
+        row: Line number of the header; 0 if the options name the columns.
+        skip: Lines up to the header, and it itself.
+        remarks: What was found, a sentence each.
+    """
+
+    delimiter: str
+    header: tuple[str, ...]
+    row: int
+    skip: int
+    remarks: tuple[str, ...] = ()
+
+
+def open_log(path: Path, options: ReadOptions) -> LogReader:
+    """Reader of a CSV log, with a row per sample and, unless the options name them, a header.
+
+    The delimiter is a comma, semicolon, tab or blanks; the decimal separator a point, or a comma
+    where that is not the delimiter.
+    """
+    return LogReader(
+        "CSV",
+        ("",),
+        lambda _, progress: read(path, options, progress),
+        lambda: _listing(path, options),
+    )
+
+
+def read(path: Path, options: ReadOptions, progress: Progress) -> Log:
+    """Log with the columns whose signal is known.
+
+    Raises:
+        LogError: If the file cannot be read or has no header, a row has more or fewer cells than
+            the header, or a cell of a column that is read holds text.
+    """
+    try:
+        with path.open(newline="", encoding="utf-8-sig") as stream:
+            return _read(path, stream, options, progress)
+    except OSError as error:
+        raise LogError(path, f"cannot be read ({error.strerror})") from error
+    except UnicodeDecodeError as error:
+        raise LogError(path, "not a CSV log: not text in UTF-8") from error
+
+
+def _listing(path: Path, options: ReadOptions) -> tuple[str, ...]:
+    with path.open(newline="", encoding="utf-8-sig", errors="replace") as stream:
+        layout = _layout(path, stream, options)
+        stream.seek(0)
+        rows = sum(1 for _ in islice(_lines(path, stream), layout.skip, None))
+    time = options.time or time_column(layout.header)
+    naming = Naming.of(layout.header, options.known_joints)
+    return (
+        f"{rows} rows",
+        *(
+            f"{name}  {'stamps' if name == time else _meaning(name, naming)}"
+            for name in layout.header
+            if name
+        ),
+    )
+
+
+def _meaning(name: str, naming: Naming) -> str:
+    if known := column_signal(name, naming):
+        joint = f"joint {known[1]}" if isinstance(known[1], int) else known[1]
+        return f"{known[0]} of {joint}"
+    signal = array_signal(name)
+    return f"{signal} of the only joint" if signal in JOINT_SIGNALS else "not known"
+
+
+def _read(path: Path, stream: TextIO, options: ReadOptions, progress: Progress) -> Log:
+    layout = _layout(path, stream, options)
+    header = layout.header
+    time = _time_column(header, options)
+    rest = _nanoseconds(header, time)
+    names = [name for place, name in enumerate(header) if name and place not in (time, rest)]
+    options = options.for_columns(path, names)
+    wanted = _wanted(path, layout, time, rest, options)
+    named = {place: name for place, name in enumerate(header) if name.startswith(NAME)}
+    known = {time, rest, *wanted, *named}
+    not_read = tuple(name for place, name in enumerate(header) if name and place not in known)
+    table = _table(path, stream, layout, wanted, (time, rest), tuple(named), progress)
+    if len(table.rows) < 2:
+        raise LogError(path, f"{counted(len(table.rows), 'sample')}; a run needs at least 2")
+    values = np.frombuffer(table.numbers).reshape(len(table.rows), len(wanted))
+    if time is None:
+        count = np.arange(len(table.rows), dtype=np.float64)
+        stamps = Stamps(Decimal(0), count, table.rows, SAMPLES)
+    else:
+        stamps = _stamps(path, header[time], table.stamps, table.rows, options.rate)
+    _check_sparse(path, [header[place] for place in wanted], values, table.rows)
+    if len(table.joints) > 1:
+        raise LogError(path, f"the joints' names change ({header[min(named)]}); split the log")
+    joints = dict(zip(named.values(), next(iter(table.joints), ()), strict=True))
+    columns = {header[place]: values[:, at : at + 1] for at, place in enumerate(wanted)}
+    fields, converted = _fields(path, columns, stamps, joints, options)
+    log = Log(
+        path,
+        fields,
+        not_read=not_read,
+        remarks=(*layout.remarks, *converted),
+        time="" if time is None else header[time],
+    )
+    return gathered(log, options)
+
+
+def _wanted(
+    path: Path, layout: Layout, time: int | None, rest: int | None, options: ReadOptions
+) -> list[int]:
+    """Places of the columns that are read."""
+    header, row = layout.header, layout.row or None
+    if len(header) > limit("columns"):
+        raise LogError(path, f"{len(header)} columns, {beyond('columns')}", row=row)
+    for name in header:
+        if not name.isprintable():
+            raise LogError(
+                path,
+                f"the name {name[:40]!r} cannot be printed; is a quotation mark not closed?",
+                row=row,
+            )
+    mapped = {entry.source for entry in options.entries}
+    naming = Naming.of(header, options.known_joints)
+    wanted = [
+        place
+        for place, name in enumerate(header)
+        if place not in (time, rest)
+        and (
+            name in mapped
+            or column_signal(name, naming)
+            or (array_signal(name) in JOINT_SIGNALS and naming.only is not None)
+            or CELLS.fullmatch(name)
+        )
+    ]
+    for place in [*wanted, *([] if time is None else [time])]:
+        if header.count(header[place]) > 1:
+            raise LogError(path, f"two columns are named {header[place]!r}", row=row)
+    if not wanted:
+        joints = iter(range(1, len(header) + 1))
+        names = ",".join(
+            "time"
+            if place == time
+            else ("" if UNLIKELY.fullmatch(without_unit(name)[0]) else f"q{next(joints)}")
+            for place, name in enumerate(header)
+        )
+        example = f", or name all in their order, such as --columns {names}"
+        raise no_motion(path, header, example if next(joints, 0) > 1 else "")
+    return wanted
+
+
+@dataclass
+class _Table:
+    """What is read of the rows."""
+
+    rows: "array[int]"
+    numbers: "array[float]"
+    stamps: list[str]
+    joints: set[tuple[str, ...]]
+
+
+def _table(
+    path: Path,
+    stream: TextIO,
+    layout: Layout,
+    wanted: Sequence[int],
+    time: tuple[int | None, int | None],
+    named: tuple[int, ...],
+    progress: Progress,
+) -> _Table:
+    """Numbers, stamps and names of joints of all rows."""
+    table = _Table(array("q"), array("d"), [], set())
+    pick = itemgetter(*wanted, wanted[0])
+    names = [layout.header[place] for place in wanted]
+    for _ in range(layout.skip):
+        stream.readline(LONGEST_LINE)
+    first, at, rest = layout.skip, *time
+    while text := _piece(path, stream):
+        lines = text.count("\n")
+        found = None
+        if len(text) >= PIECE and rest is None and not named:
+            found = numbers_in(text.encode(), len(layout.header), layout.delimiter, wanted, at)
+        if found is not None:
+            table.numbers.frombytes(found[0].tobytes())
+            table.rows.extend(range(first + 1, first + 1 + lines))
+            table.stamps += found[1]
+        else:
+            for row, cells in progress(_rows(path, text, first, layout), 0):
+                picked = pick(cells)[:-1]
+                try:
+                    numbers = list(map(float, picked))
+                except ValueError:
+                    numbers = _numbers(path, row, names, picked)
+                table.numbers.extend(numbers)
+                table.rows.append(row)
+                if at is not None:
+                    part = "" if rest is None else f".{cells[rest].strip():0>9}"
+                    table.stamps.append(cells[at].strip() + part)
+                if named:
+                    table.joints.add(tuple(cells[place] for place in named))
+        first += lines
+    return table
+
+
+def _piece(path: Path, stream: TextIO) -> str:
+    """Whole lines, of which none is quoted over the end of a piece."""
+    text = stream.read(PIECE)
+    more, odd = list[str](), text.count('"') % 2
+    while text and (odd or (not text.endswith("\n") and not more)) and len(more) < HEAD:
+        line = stream.readline(LONGEST_LINE)
+        if not line:
+            break
+        more.append(line)
+        odd ^= line.count('"') % 2
+    if max(map(len, more), default=0) >= LONGEST_LINE:
+        raise _endless(path)
+    return text + "".join(more)
+
+
+def _endless(path: Path) -> LogError:
+    return LogError(path, f"not a CSV log: a line of more than {LONGEST_LINE} characters")
+
+
+def numbers_in(
+    lines: bytes, width: int, delimiter: str, wanted: Sequence[int], text: int | None = None
+) -> tuple[Array, list[str]] | None:
+    """Plain numbers of whole lines, in a tenth of the time that a row at a time takes.
+
+    Cells are converted as one array: beginning a hundred small columns costs as much again.
+
+    Args:
+        lines: The lines.
+        width: Cells of a line.
+        delimiter: Mark between them.
+        wanted: Places of the cells that are numbers.
+        text: Place of a cell that is returned as text.
+
+    Returns:
+        Numbers, shape (lines, wanted), and the text of each line; None if a line is too short or
+        too long, or a cell is empty, quoted, padded or no number.
+    """
+    import pyarrow as pa
+
+    if b"\r" in lines:
+        lines = lines.replace(b"\r\n", b"\n")
+    content = np.frombuffer(lines, dtype=np.uint8)
+    ends = content == ord("\n")
+    places = np.flatnonzero(ends | (content == ord(delimiter)))
+    rows = np.count_nonzero(ends)
+    if len(places) != rows * width or not ends[places[width - 1 :: width]].all():
+        return None
+    edges = np.zeros(len(places) + 1, dtype=np.int32)  # of cells, once the marks are gone
+    edges[1:] = places - np.arange(len(places))
+    written = lines.translate(None, b"\n" + delimiter.encode())
+    cells: Any = pa.StringArray.from_buffers(
+        len(places), pa.py_buffer(edges), pa.py_buffer(written)
+    )
+    firsts = np.arange(rows) * width
+    some = cells
+    if list(wanted) != list(range(width)):
+        some = cells.take(pa.array(np.add.outer(firsts, np.asarray(wanted)).ravel()))
+    try:
+        numbers: Array = some.cast(pa.float64()).to_numpy()
+        texts = [] if text is None else cells.take(pa.array(firsts + text)).to_pylist()
+    except pa.ArrowInvalid:
+        return None
+    return numbers.reshape(rows, len(wanted)), texts
+
+
+def _fields(
+    path: Path,
+    columns: dict[str, Array],
+    stamps: Stamps,
+    joints: dict[str, str],
+    options: ReadOptions,
+) -> tuple[tuple[Field, ...], tuple[str, ...]]:
+    """Fields of the columns, in SI units where a name has a unit, and remarks on units."""
+    fields: list[Field] = []
+    converted: dict[str, list[str]] = {}
+    for name, values in columns.items():
+        if (factor := factor_of(name)) != 1.0 and not options.units:
+            values = values * factor
+            converted.setdefault(without_unit(name)[1], []).append(name)
+        known = column_signal(name)
+        joint = joints.get(f"{NAME}{known[1]}") if known else None
+        fields.append(
+            Field(
+                name,
+                values,
+                stamps,
+                joints=(joint,) if joint else (),
+                signal=known[0] if known and joint else "",
+                source=path.name,
+                rank=int(says_twice(name)),
+            )
+        )
+    remarks = (
+        f"{listed(names)}: converted from {unit}, as the header says"
+        for unit, names in converted.items()
+    )
+    return tuple(fields), tuple(remarks)
+
+
+def _lines(path: Path, stream: TextIO) -> Iterator[str]:
+    """Lines of a log, which end."""
+    while line := stream.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise _endless(path)
+        yield line
+
+
+def _layout(path: Path, stream: TextIO, options: ReadOptions) -> Layout:
+    """Delimiter and header of a file, found by its first row of numbers."""
+    lines = list(islice(_lines(path, stream), HEAD))
+    stream.seek(0)
+    try:
+        return _layout_of(path, lines, options)
+    except csv.Error as error:
+        raise LogError(path, f"not a CSV log ({error})") from error
+
+
+def _layout_of(path: Path, lines: Sequence[str], options: ReadOptions) -> Layout:
+    if not any(line.strip() for line in lines):
+        raise LogError(path, "the log is empty; expected a header, then a row per sample")
+    delimiter, first = _first_data(lines)
+    before = [
+        (number, _split(line, delimiter))
+        for number, line in enumerate(lines[:first], start=1)
+        if line.strip()
+    ]
+    if options.columns:
+        skip = before[-1][0] if before and first is not None else 0
+        columns = tuple(name.strip() for name in options.columns)
+        return Layout(delimiter, columns, 0, skip, _skipped(before, ()))
+    if first is None:  # no numbers: the first line is the header, and rows tell what is wrong
+        rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=True)
+        return Layout(delimiter, _clean(next(filter(None, rows))), 1, rows.line_num)
+    width = len(_split(lines[first], delimiter))
+    fitting = [each for each in before if abs(len(each[1]) - width) <= 1]
+    plain = [each for each in fitting if not each[1][0].startswith(COMMENTS)]
+    candidates = plain or fitting or [each for each in before if _names_motion(each[1])]
+    if not candidates:
+        raise _no_header(path, delimiter, first, before[-1][0] + 1 if before else 1)
+    row = candidates[-1][0]
+    rows = csv.reader(lines[row - 1 :], delimiter=delimiter, skipinitialspace=True)
+    header: list[str] = next(rows)  # with an open quotation mark, it takes more lines
+    names, used = _clean(header), [row]
+    if len(candidates) > 1 and _are_units(names):
+        used.append(candidates[-2][0])
+        units = [name.strip("[]() ") for name in names]
+        names = tuple(
+            f"{name} [{unit}]" if unit else name
+            for name, unit in zip(_clean(candidates[-2][1]), units, strict=False)
+        )
+    return Layout(delimiter, names, row, first, _skipped(before, used))
+
+
+def _first_data(lines: Sequence[str]) -> tuple[str, int | None]:
+    """Delimiter, and index of the first line of numbers; None if there is none."""
+    for place, line in enumerate(lines):
+        shares = {mark: _share_of_numbers(_split(line, mark)) for mark in DELIMITERS}
+        best = max(shares, key=lambda mark: shares[mark])  # the first of equals
+        if shares[best] >= 0.5:
+            return best, place
+    head = next(line for line in lines if line.strip())
+    return next((mark for mark in DELIMITERS if mark in head), " "), None
+
+
+def _share_of_numbers(cells: Sequence[str]) -> float:
+    """Share of cells that hold a number or nothing; 0 unless it may be a row of numbers."""
+    if len(cells) < 2 or not (_is_number(cells[0]) or is_date(cells[0])):
+        return 0.0
+    return sum(_is_number(cell) or cell.strip().lower() in MISSING for cell in cells) / len(cells)
+
+
+def _split(line: str, delimiter: str) -> list[str]:
+    return next(csv.reader([line.strip()], delimiter=delimiter, skipinitialspace=True), [])
+
+
+def _clean(cells: Sequence[str]) -> tuple[str, ...]:
+    """Names of a header; NumPy writes "# time", rostopic "%time"."""
+    first = cells[0].strip().lstrip("#% ")
+    marked_alone = cells[0].strip() and not first  # as in "# time q"
+    return (*(() if marked_alone else (first,)), *(name.strip() for name in cells[1:]))
+
+
+def _names_motion(cells: Sequence[str]) -> bool:
+    names = _clean(cells)
+    return bool(time_column(names)) or any(map(column_signal, names))
+
+
+def _are_units(names: Sequence[str]) -> bool:
+    units = [name.strip("[]() ").lower() for name in names]
+    return any(units) and all(
+        not each or each in SIGNAL_UNITS or each in TIME_UNITS for each in units
+    )
+
+
+def _skipped(before: Sequence[tuple[int, list[str]]], used: Sequence[int]) -> tuple[str, ...]:
+    lines = [number for number, _ in before if number not in used]
+    if not lines:
+        return ()
+    return (f"{counted(len(lines), 'line')} before the rows not read",)
+
+
+def _no_header(path: Path, delimiter: str, skip: int, row: int) -> LogError:
+    """Error of a log without a header, with names for its columns by what they hold."""
+    rows: list[list[float]] = []
+    with path.open(newline="", encoding="utf-8-sig") as stream, suppress(ValueError, csv.Error):
+        for line in islice(stream, skip, skip + EXAMINED):
+            cells = [cell.replace(",", ".") for cell in _split(line, delimiter)]
+            rows.append([float(cell) for cell in (cells if cells[-1:] != [""] else cells[:-1])])
+    width = len(rows[0]) if rows else 0
+    table = np.array([each for each in rows if len(each) == width])
+    names, how = suggested(table.reshape(-1, width))
+    return LogError(
+        path,
+        f"there is no header; the first row has {width} numbers. Name the columns in their order,"
+        f" such as --columns {','.join(names)}{how}",
+        row,
+    )
+
+
+CLEAR = 0.8
+"""Least correlation of columns with the slopes of others that they are named after."""
+
+
+def suggested(table: Array) -> tuple[list[str], str]:
+    """Names of the columns of a table, by what they hold, and what else has to be typed.
+
+    The first is time if it rises evenly. Columns are velocities if they are the slopes of as many
+    columns before them; without such, all are positions.
+
+    Args:
+        table: Shape (samples, columns).
+    """
+    width = table.shape[1]
+    steps = np.diff(table[:, 0])
+    even = len(steps) > 0 and (steps > 0).all() and np.ptp(steps) <= 2 * float(np.mean(steps))
+    counter = bool(even) and is_counter(steps, float(table[0, 0]))
+    columns = table[:, int(even) :]
+    left = columns.shape[1]
+    best, order = CLEAR, [("q", number) for number in range(1, left + 1)]
+    for count in range(1, left // 2 + 1):
+        apart = [("q", 0), ("dq", 1)] if left == 2 * count else [("q", 0), ("dq", 1), ("tau", 2)]
+        for stride in (1, len(apart)):
+            named = _named(left, count, apart, stride)
+            places = [
+                [k for k, each in enumerate(named) if each[0] == name] for name in ("q", "dq")
+            ]
+            fit = _fit(columns[:, places[0]], columns[:, places[1]])
+            if fit > best + 0.01:
+                best, order = fit, named
+    names = [f"{name}{number}" if name else "" for name, number in order]
+    names = (["time"] if even else []) + names
+    if width and even and not counter:
+        return names, " (without stamps: no time, but --rate HZ)"
+    return names, "" if best > CLEAR else " --rate HZ (the log's samples per second)"
+
+
+def _named(
+    left: int, count: int, apart: Sequence[tuple[str, int]], stride: int
+) -> list[tuple[str, int]]:
+    """Quantity and number of each column: quantity by quantity, or joint by joint."""
+    named = [("", 0)] * left
+    for name, part in apart:
+        for number in range(count):
+            place = part + number * stride if stride > 1 else part * count + number
+            if place < left:
+                named[place] = (name, number + 1)
+    return named
+
+
+def _fit(position: Array, velocity: Array) -> float:
+    """Correlation of columns with the slopes of others; 0 if a column has no other."""
+    if position.shape != velocity.shape or len(position) < 3:
+        return 0.0
+    slopes = (position[2:] - position[:-2]) / 2
+    speed = velocity[1:-1]
+    size = float(np.sum(slopes**2) * np.sum(speed**2))
+    return float(np.sum(slopes * speed)) / size**0.5 if size > 0 and np.isfinite(size) else 0.0
+
+
+def _time_column(header: Sequence[str], options: ReadOptions) -> int | None:
+    """Place of the column with the stamps; None if there is none."""
+    if options.time and options.time in header:
+        return header.index(options.time)
+    mapped = {entry.source for entry in options.entries}
+    found = time_column([name for name in header if name not in mapped])
+    return header.index(found) if found else None
+
+
+def _nanoseconds(header: Sequence[str], time: int | None) -> int | None:
+    """Place of the nanoseconds beside stamps in whole seconds, as ROS has them; None without."""
+    if time is None or not (seconds := SECONDS.fullmatch(header[time])):
+        return None
+    whole = {name.lower(): place for place, name in enumerate(header)}
+    names = (f"{seconds['record']}{word}".lower() for word in NANOSECONDS)
+    return next((whole[name] for name in names if name in whole), None)
+
+
+def _stamps(
+    path: Path, name: str, cells: Sequence[str], rows: Sequence[int], rate: float | None
+) -> Stamps:
+    exact = _decimals(path, name, cells, rows)  # absolute stamps exceed the precision of a float
+    since = np.array([float(stamp - exact[0]) for stamp in exact])
+    return stamps_since(path, name, exact[0], since, rate, rows)
+
+
+def _decimals(
+    path: Path, name: str, cells: Sequence[str], rows: Sequence[int]
+) -> Sequence[Decimal]:
+    """Stamps, of dates in [s] since 1970."""
+    if is_date(cells[0]):
+        return [_date(path, name, cell, row) for cell, row in zip(cells, rows, strict=True)]
+    found = []
+    for row, cell in zip(rows, cells, strict=True):
+        try:
+            stamp = Decimal(cell.strip().replace(",", "."))
+        except InvalidOperation:
+            empty = not cell.strip()
+            what = "is empty" if empty else f"holds {cell[:40]!r}, which is not a number"
+            raise LogError(path, f"column {name!r} {what}", row) from None
+        if not stamp.is_finite():
+            raise LogError(path, f"column {name!r} holds {cell.strip()[:40]}", row)
+        if stamp and not -DIGITS < stamp.adjusted() < DIGITS:
+            raise LogError(path, f"the stamp {cell.strip()[:40]!r} is no time", row)
+        found.append(stamp)
+    return found
+
+
+def _date(path: Path, name: str, cell: str, row: int) -> Decimal:
+    """A date in [s] since 1970, at UTC if it tells its time zone."""
+    zone = ZONE.search(cell.strip()) if ":" in cell else None
+    try:
+        date = np.datetime64(cell.strip()[: zone.start()] if zone else cell.strip(), "ns")
+        coarse = date.astype("datetime64[Y]")
+        written = np.datetime64(cell.strip()[:4], "Y")
+    except ValueError as error:
+        raise LogError(path, f"column {name!r} holds dates and others ({error})", row) from error
+    if abs(int(coarse.astype(int) - written.astype(int))) > 1 or int(written.astype(int)) > (
+        LATEST_YEAR - 1970
+    ):
+        raise LogError(
+            path, f"the stamp {cell.strip()[:40]!r} is no date before {LATEST_YEAR}", row
+        )
+    seconds = Decimal(int(date.astype(np.int64))).scaleb(-9)
+    if zone and zone["sign"]:
+        east = 3600 * int(zone["hours"]) + 60 * int(zone["minutes"])
+        seconds -= east if zone["sign"] == "+" else -east
+    return seconds
+
+
+def _rows(path: Path, text: str, first: int, layout: Layout) -> Iterator[tuple[int, list[str]]]:
+    """Line number and cells of each row, without comments, blank lines and trailing separators."""
+    lines = csv.reader(
+        StringIO(text, newline=""), delimiter=layout.delimiter, skipinitialspace=True
+    )
+    width = len(layout.header)
+    try:
+        for cells in lines:
+            if len(cells) != width:
+                if cells in ([], [""]) or cells[0].lstrip().startswith(COMMENTS):
+                    continue
+                cells = _fitted(cells, layout.header)
+                if len(cells) != width:
+                    names = "the header names" if layout.row else "--columns names"
+                    raise LogError(
+                        path,
+                        f"{len(cells)} cells where {names} {width} columns",
+                        first + lines.line_num,
+                    )
+            elif cells[0][:1] in ("#", "%", "/") and cells[0].startswith(COMMENTS):
+                continue
+            yield first + lines.line_num, cells
+    except csv.Error as error:
+        raise LogError(path, f"not a CSV log ({error})", first + lines.line_num) from error
+
+
+def _fitted(cells: list[str], header: Sequence[str]) -> list[str]:
+    """Cells without those after a trailing separator, or with the one that the header has."""
+    width = len(header)
+    if len(cells) == width - 1 and not header[-1]:
+        return [*cells, ""]
+    return cells[:width] if not any(cell.strip() for cell in cells[width:]) else cells
+
+
+def _numbers(path: Path, row: int, names: Sequence[str], cells: Sequence[str]) -> list[float]:
+    """Numbers of cells of which some are empty, have a decimal comma, or are no numbers."""
+    found = []
+    for name, cell in zip(names, cells, strict=True):
+        if cell.strip().lower() in MISSING:
+            found.append(np.nan)
+        elif _is_number(cell):
+            found.append(float(cell.replace(",", ".")))
+        else:
+            raise LogError(path, f"column {name!r} holds {cell[:40]!r}, which is not a number", row)
+    return found
+
+
+def _check_sparse(path: Path, names: Sequence[str], table: Array, rows: Sequence[int]) -> None:
+    """Refuse columns that have numbers in some rows only, since they have another clock."""
+    lacking = np.isnan(table)
+    counts = lacking.sum(axis=0)
+    sparse = (counts >= SPARSE * len(table)) & (counts < len(table))
+    if sparse.any():
+        place = int(np.argmax(sparse))
+        raise LogError(
+            path,
+            f"column {names[place]!r} is empty; {counts[place]} of {len(table)} rows have no"
+            " number there, and columns with another clock must be in a separate log (--desired)",
+            rows[int(np.argmax(lacking[:, place]))],
+        )
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return cell.strip().lower() not in MISSING
+
+
+def is_date(cell: str) -> bool:
+    """Whether a cell holds a date, with or without a time zone."""
+    text = cell.strip()
+    zone = ZONE.search(text) if ":" in text else None
+    try:
+        return "-" in text[1:] and not np.isnat(
+            np.datetime64(text[: zone.start()] if zone else text, "us")
+        )
+    except ValueError:
+        return False

@@ -1,0 +1,696 @@
+"""Which columns and arrays hold which signal of which joint: by options, by format, or by name.
+
+The options of reading a log, with a mapping that can be saved as TOML, and the choice of one
+column for each signal of each joint.
+"""
+
+import json
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+
+from inspector.errors import InspectorError, LogError, OptionError
+from inspector.logs.log import Field, Log, Track
+from inspector.logs.names import (
+    BASE_SIGNALS,
+    JOINT_SIGNALS,
+    Naming,
+    array_signal,
+    column_signal,
+    listed,
+    number_of,
+    pattern_for,
+)
+from inspector.wrongrobot import WrongRobotError
+from noiseclassifier.jsontext import from_toml, text_of, toml_shown
+from noisemodel import Robot, RobotError
+from noisemodel.atomic import replacing
+from noisemodel.limits import joint_limits
+from noisemodel.types import Array, Mask, Real
+
+FORMAT = "noise-mapping/1"
+UNITS = ("radians", "degrees", "normalised")
+RATES = (1e-3, 1e9)
+"""Rates that a log may be said to have, in [Hz]."""
+
+CONVENTIONS = {
+    "base_pose": ("xyzw", "wxyz"),
+    "base_velocity": ("body", "world", "mujoco"),
+}
+"""Conventions of a base: the order of its quaternion; the axes of its velocity, which for MuJoCo
+are the world's for the linear part and the body's for the angular one. The first is the run's."""
+WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
+
+PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
+JOINT = "{joint}"
+"""What stands for the name of a joint in a pattern of a mapping."""
+
+NO_MOTION = (
+    "no position or velocity of a joint; name columns JOINT.velocity or JOINT.position, or map"
+    " them with --map velocity.JOINT=COLUMN or --map velocity=ARRAY"
+)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Mapping of one column or array to a signal, or of many columns by a pattern.
+
+    Attributes:
+        signal: One of ``inspector.logs.names.SIGNALS``, or "time".
+        joint: The joint, for a single column; for a base its convention; empty for an
+            array of all joints. In a pattern it holds ``{joint}``, as the source does.
+        source: The column or array, or a part of it: ``qpos[7:]``, ``qvel[6]``.
+    """
+
+    signal: str
+    joint: str
+    source: str
+
+    @property
+    def target(self) -> str:
+        """Text before the equals sign."""
+        return f"{self.signal}.{self.joint}" if self.joint else self.signal
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether it maps all columns that its source fits."""
+        return JOINT in self.joint
+
+    def part(self) -> tuple[str, slice]:
+        """Name of the array in the source, and its columns."""
+        match = PART.fullmatch(self.source)
+        if match is None or not (match["first"] or match["colon"]):
+            return self.source, slice(None)
+        first = int(match["first"] or 0)
+        if not match["colon"]:
+            return match["name"], slice(first, first + 1)
+        return match["name"], slice(first, int(match["last"]) if match["last"] else None)
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """Options of reading a log; what is not specified is taken from the log.
+
+    Attributes:
+        robot: Name, URDF or MJCF of the robot; joints are checked against it, and numbered
+            columns get its joints in order.
+        rate: The log's rate, if known, in [Hz].
+        units: "radians", "degrees" or "normalised" (-100 to 100 of each joint's range, 0 to 100
+            of a gripper's); empty for the log's own.
+        joints: Names of the columns of arrays, in order.
+        topics: The topics to read, all unless given.
+        offset: Offset added to the desired motion's stamps, in [s]; estimated unless given.
+        columns: Names of the columns of a CSV log, in order, in place of its header; "" for one
+            that is not read.
+        force: Whether a rate is taken that positions and velocities contradict.
+        entries: The mapping of columns and arrays.
+    """
+
+    robot: str = ""
+    rate: float | None = None
+    units: str = ""
+    joints: tuple[str, ...] = ()
+    topics: tuple[str, ...] = ()
+    offset: float | None = None
+    columns: tuple[str, ...] = ()
+    force: bool = False
+    entries: tuple[Entry, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Check the options."""
+        if self.rate is not None and not self.rate > 0:
+            raise OptionError(f"the rate is {self.rate:g} Hz; expected a number above 0")
+        if self.rate is not None and not RATES[0] <= self.rate <= RATES[1]:
+            raise OptionError(
+                f"the rate is {self.rate:g} Hz; expected {RATES[0]:g} to {RATES[1]:g} Hz"
+            )
+        if self.offset is not None and not np.isfinite(self.offset):
+            raise OptionError(f"the offset is {self.offset:g} s; expected a finite number")
+        if self.units and self.units not in UNITS:
+            raise OptionError(f"no units {self.units!r}; there are {', '.join(UNITS)}")
+
+    @property
+    def time(self) -> str:
+        """The column that is mapped to the stamps, or empty."""
+        return next((entry.source for entry in self.entries if entry.signal == "time"), "")
+
+    @property
+    def known_joints(self) -> tuple[str, ...]:
+        """Names that a log's joints may have: the robot's."""
+        try:
+            return tuple(joint_limits(self.robot)) if self.robot else ()
+        except RobotError:
+            return ()
+
+    def for_columns(self, path: Path, names: Sequence[str]) -> "ReadOptions":
+        """Options whose patterns are replaced by the columns that they fit.
+
+        Raises:
+            LogError: If a pattern fits no column, or two entries the same one.
+        """
+        patterns = [entry for entry in self.entries if entry.is_pattern]
+        if not patterns:
+            return self
+        single = [entry for entry in self.entries if not entry.is_pattern]
+        taken = {entry.source: entry for entry in single}
+        targets = {entry.target: entry for entry in single}
+        # `{joint}_cmd` is more specific than `{joint}`, which fits all that is left.
+        for entry in sorted(patterns, key=lambda each: -len(each.source)):
+            before, _, after = entry.source.partition(JOINT)
+            form = re.compile(f"{re.escape(before)}(?P<joint>.+){re.escape(after)}")
+            found = [(name, match["joint"]) for name in names if (match := form.fullmatch(name))]
+            free = [(name, joint) for name, joint in found if name not in taken]
+            if not found or (not free and entry.source != JOINT):
+                raise LogError(
+                    path,
+                    f"the pattern {entry.target}={entry.source} fits"
+                    f" {'columns that others map' if found else 'no column'}; columns are"
+                    f" {listed(names)}",
+                )
+            for name, joint in free:
+                new = Entry(entry.signal, entry.joint.replace(JOINT, joint), name)
+                if new.target in targets:
+                    raise LogError(
+                        path,
+                        f"{targets[new.target].source!r} and {name!r} are both mapped to"
+                        f" {new.target}; map one of them",
+                    )
+                taken[name] = targets[new.target] = new
+        return replace(self, entries=tuple(targets.values()))
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """Options from a saved mapping.
+
+        Raises:
+            InspectorError: If it cannot be read, or has unknown settings.
+        """
+        try:
+            saved = from_toml(text_of(path))
+        except OSError as error:
+            raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
+        except ValueError as error:
+            raise InspectorError(f"{path}: not a mapping in TOML ({error})") from error
+        if saved.pop("format", None) != FORMAT:
+            raise InspectorError(f'{path}: not a mapping; expected format = "{FORMAT}"')
+        entries = saved.pop("map", {})
+        known = {field.name for field in fields(cls)} - {"entries"}
+        if unknown := sorted(set(saved) - known):
+            raise InspectorError(
+                f"{path}: unknown setting {unknown[0]!r}; there are {', '.join(sorted(known))}, map"
+            )
+        try:
+            for target, source in entries.items():
+                _setting(target, source)
+            parsed = parse_mapping(f"{target}={source}" for target, source in entries.items())
+            return cls(
+                **{name: _setting(name, value) for name, value in saved.items()}, entries=parsed
+            )
+        except (InspectorError, AttributeError, TypeError) as error:
+            raise InspectorError(f"{path}: {error}") from error
+
+    def save(self, path: Path, *, overwrite: bool = False) -> None:
+        """Write the options as TOML, to be loaded again.
+
+        Raises:
+            OutputError: If the file exists or cannot be written.
+        """
+        lines = [f'format = "{FORMAT}"']
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name != "entries" and value is not False and value not in (None, "", ()):
+                lines.append(f"{field.name} = {_toml(value)}")
+        if self.entries:
+            lines += ["", "[map]"]
+            lines += [f"{_toml(each.target)} = {_toml(each.source)}" for each in self.entries]
+        with replacing(path, overwrite=overwrite) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
+    """Mapping of columns and arrays, parsed.
+
+    Args:
+        entries: ``SIGNAL.JOINT=COLUMN``, ``SIGNAL=ARRAY`` or ``time=COLUMN`` each. The column may
+            hold any character, the joint any but "="; of an array ``[3]``, ``[7:]`` or ``[:7]``
+            names a part. ``velocity.{joint}={joint}_actual`` maps all columns of that form.
+            Signals of the base may name a convention of ``CONVENTIONS``:
+            ``base_pose.wxyz=root_pose``.
+
+    Returns:
+        The entries.
+
+    Raises:
+        OptionError: If an entry is not of that form, or a column or target is named twice.
+    """
+    parsed: list[Entry] = []
+    for text in entries:
+        target, _, source = text.partition("=")
+        signal, dot, joint = target.partition(".")
+        known = signal in (*JOINT_SIGNALS, *BASE_SIGNALS) or target == "time"
+        if not source or not known or (dot and not joint):
+            raise OptionError(
+                f"mapping {text!r}: expected SIGNAL.JOINT=COLUMN, such as velocity.elbow=dq2 or"
+                f" 'velocity.{JOINT}={JOINT}_actual', SIGNAL=ARRAY, such as position=qpos[7:], or"
+                f" time=COLUMN; signals are {', '.join((*JOINT_SIGNALS, *BASE_SIGNALS))}"
+            )
+        if joint and joint not in CONVENTIONS.get(signal, (joint,)):
+            raise OptionError(
+                f"mapping {text!r}: a {signal} is written as {' or '.join(CONVENTIONS[signal])}"
+            )
+        if (JOINT in joint or JOINT in source) and not joint.count(JOINT) == source.count(
+            JOINT
+        ) == 1:
+            raise OptionError(
+                f"mapping {text!r}: a pattern has {JOINT} once on either side, such as"
+                f" 'velocity.{JOINT}={JOINT}_actual'"
+            )
+        if any(entry.source == source for entry in parsed):
+            raise OptionError(f"mapping {text!r}: column {source!r} is mapped twice")
+        if any(entry.target == target and not entry.is_pattern for entry in parsed):
+            raise OptionError(f"mapping {text!r}: {target} is mapped twice")
+        parsed.append(Entry(signal, joint, source))
+    return tuple(parsed)
+
+
+def read_options(
+    mapping: Sequence[str] = (), *, saved: str | Path | None = None, **options: Any
+) -> ReadOptions:
+    """Options of reading a log, combined with a saved mapping.
+
+    Args:
+        mapping: Signals of columns and arrays, as ``parse_mapping`` has it.
+        saved: A saved mapping; the other arguments take precedence.
+        **options: The other attributes of ``ReadOptions``; None for what is not specified.
+
+    Raises:
+        InspectorError: If one of them is not valid.
+    """
+    before = ReadOptions.load(Path(saved)) if saved else ReadOptions()
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in {"joints", "topics", "columns"} & set(given):
+        given[name] = tuple(given[name])
+    if "robot" in given:
+        given["robot"] = str(given["robot"])
+    entries = parse_mapping(mapping)
+    targets = {entry.target for entry in entries}
+    kept = tuple(entry for entry in before.entries if entry.target not in targets)
+    return replace(before, **given, entries=(*entries, *kept))
+
+
+def _setting(name: str, value: Any) -> Any:
+    """Setting of a saved mapping, its type checked."""
+    if name in ("joints", "topics", "columns"):
+        correct = isinstance(value, list) and all(isinstance(each, str) for each in value)
+        value = tuple(value) if correct else value
+    elif name in ("rate", "offset"):
+        correct = isinstance(value, int | float) and not isinstance(value, bool)
+    else:
+        correct = isinstance(value, bool if name == "force" else str)
+    if not correct:
+        raise InspectorError(f"{name} = {toml_shown(value)} is of another type than expected")
+    return value
+
+
+def _toml(value: str | float | bool | tuple[str, ...]) -> str:
+    if isinstance(value, tuple):
+        return "[" + ", ".join(map(_toml, value)) + "]"
+    if isinstance(value, str):  # JSON's strings are TOML's, but for one character
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    return "true" if value is True else repr(float(value))
+
+
+class _Choice(NamedTuple):
+    """A column chosen for a signal of a joint, or columns for one of the base."""
+
+    field: Field
+    columns: slice
+    signal: str
+    joint: str  # or the convention of a base
+    explicit: bool = False
+
+    @property
+    def label(self) -> str:
+        """Its name in the log."""
+        if self.field.joints and not self.field.stamps.rows:
+            return f"{self.field.name} of {self.field.joints[self.columns.start]}"
+        alone = self.field.values.shape[1] == 1
+        return self.field.name if alone else f"{self.field.name}[{self.columns.start}]"
+
+    @property
+    def target(self) -> tuple[str, str]:
+        """The signal and joint, for which one column is used."""
+        return self.signal, "" if self.signal in BASE_SIGNALS else self.joint
+
+    @property
+    def precedence(self) -> tuple[bool, int]:
+        """Of several columns for one target that with the lowest value is used."""
+        return not self.explicit, self.field.rank
+
+
+def tracks_of(
+    log: Log, options: ReadOptions, robot: Robot | None
+) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
+    """Tracks of a log; the mapping takes precedence over the names of columns.
+
+    Returns:
+        The tracks, the names of what is not read, and what was decided, a sentence each.
+
+    Raises:
+        LogError: If two columns hold the same signal, none is known to hold motion, or a mapping
+            does not fit the arrays.
+        UnknownJointError: If the robot has none of the joints, or lacks one of the mapping.
+    """
+    names = [field.name for field in log.fields]
+    options = options.for_columns(log.path, [name for name in names if name != log.time])
+    joints = robot.joint_names if robot else ()
+    naming = Naming.of((field.name for field in log.fields if _is_column(field)), joints)
+    found, unknown = _of_robot([*_choices(log, options, naming, joints)], robot)
+    kept = _unique(log, found)
+    if not any(choice.signal.startswith(("position", "velocity")) for choice in kept):
+        raise no_motion(log.path, [*names, *log.not_read])
+    read = {id(choice.field) for choice in kept}
+    not_read = tuple(field.name for field in log.fields if id(field) not in read)
+    remarks = [*_naming_remarks(kept, naming, options, robot)]
+    if unknown and robot:
+        remarks.append(f"left out, not joints of {robot.name!r}: {listed(unknown)}")
+    return (*_base_tracks(log, kept), *_joint_tracks(kept)), (*log.not_read, *not_read), (*remarks,)
+
+
+def no_motion(path: Path, names: Sequence[str], instead: str = "") -> LogError:
+    """Error of a log of which no column is known: what to type, and the columns that it has."""
+    example = pattern_for(names)
+    how = f", such as {example}" if example else instead
+    return LogError(path, f"{NO_MOTION}{how}; columns are {listed([n for n in names if n])}")
+
+
+def _naming_remarks(
+    kept: Sequence[_Choice], naming: Naming, options: ReadOptions, robot: Robot | None
+) -> Iterator[str]:
+    """What was decided about names that leave it open, a sentence each."""
+    found = {
+        number_of(known[1]): each.joint
+        for each in kept
+        if _is_column(each.field)
+        and (known := column_signal(each.field.name, naming))
+        and known[1] != each.joint
+    }
+    lowest = min((number for number in found if number is not None), default=0)
+    if lowest and (options.joints or robot):
+        yield f"columns count joints from {naming.first}: {lowest} is {found[lowest]}"
+    if naming.qd_is_desired:
+        yield "qd is the desired position, since dq is the velocity (else --map)"
+    if naming.remark and any(not c.explicit and c.field.name in naming.bare for c in kept):
+        yield naming.remark
+
+
+def _is_column(field: Field) -> bool:
+    """Whether it is a column, which may name its joint."""
+    return field.values.shape[1] == 1 and not field.signal
+
+
+def _of_robot(choices: list[_Choice], robot: Robot | None) -> tuple[list[_Choice], tuple[str, ...]]:
+    """Columns of joints of the robot, and the names of the others."""
+    if robot is None:
+        return choices, ()
+    unknown = [
+        choice
+        for choice in choices
+        if choice.signal in JOINT_SIGNALS and choice.joint not in robot.joint_names
+    ]
+    others = [choice for choice in choices if not any(choice is each for each in unknown)]
+    wrong = [choice for choice in unknown if choice.explicit]
+    if unknown and not any(choice.signal in JOINT_SIGNALS for choice in others):
+        wrong = unknown
+    if wrong:
+        raise WrongRobotError(wrong[0].joint, robot.name, robot.joint_names)
+    return others, tuple(dict.fromkeys(choice.joint for choice in unknown))
+
+
+def _unique(log: Log, choices: Sequence[_Choice]) -> list[_Choice]:
+    """One column for each signal of each joint, by precedence."""
+    found: dict[tuple[str, str], _Choice] = {}
+    for choice in choices:
+        other = found.setdefault(choice.target, choice)
+        if choice.precedence < other.precedence:
+            found[choice.target] = choice
+        elif other is not choice and choice.precedence == other.precedence:
+            raise _both(log, other, choice)
+    return [choice for choice in choices if found[choice.target] is choice]
+
+
+def _both(log: Log, before: _Choice, after: _Choice) -> LogError:
+    """Error of two columns that hold the same signal."""
+    old, new = before.field, after.field
+    joint = after.target[1]
+    what = f"{after.signal} of " + (f"joint {joint!r}" if joint else "the base")
+    if new.source != old.source:
+        return LogError(
+            log.path, f"{old.source} and {new.source} both hold {what}; choose with --topic"
+        )
+    if new.joints != old.joints:
+        since = float(new.stamps.start - old.stamps.start)
+        return LogError(
+            log.path,
+            f"{new.source}: the set of joints changes {since:.6g} s into the log, from"
+            f" {listed(old.joints)} to {listed(new.joints)}; split the log there",
+        )
+    row = 1 if new.stamps.rows is not None else None
+    how = "" if JOINT in joint else f"; choose with --map '{after.signal}.{joint}={after.label}'"
+    return LogError(log.path, f"{before.label!r} and {after.label!r} both hold {what}{how}", row)
+
+
+def _joint_tracks(choices: Sequence[_Choice]) -> Iterator[Track]:
+    """Tracks, each of the columns of one signal that share their stamps."""
+    together: dict[tuple[str, int], list[_Choice]] = {}
+    for choice in choices:
+        if choice.signal in JOINT_SIGNALS:
+            together.setdefault((choice.signal, id(choice.field.stamps)), []).append(choice)
+    for (signal, _), members in together.items():
+        yield Track(
+            signal,
+            tuple(choice.joint for choice in members),
+            tuple(choice.label for choice in members),
+            members[0].field.stamps,
+            _side_by_side(members),
+        )
+
+
+def _side_by_side(choices: Sequence[_Choice]) -> Real:
+    first = choices[0].field.values
+    if all(choice.field.values is first for choice in choices):
+        columns = [choice.columns.start for choice in choices]
+        if columns == list(range(first.shape[1])):
+            return first  # no copy: a long log has hundreds of megabytes
+        return first[:, columns]
+    return np.hstack([choice.field.values[:, choice.columns] for choice in choices])
+
+
+def _base_tracks(log: Log, choices: Sequence[_Choice]) -> Iterator[Track]:
+    by_signal = {choice.signal: choice for choice in choices if choice.signal in BASE_SIGNALS}
+    pose = None
+    if choice := by_signal.get("base_pose"):
+        pose = pose_of(choice.field.values[:, choice.columns], choice.joint)
+        track = Track("base_pose", (), (choice.field.name,) * 7, choice.field.stamps, pose)
+        if (wrong := not_normalised(pose)).any():
+            raise track.fault(
+                log.path,
+                f"{choice.label}: a quaternion whose norm is not 1; expected x, y, z and the"
+                " quaternion",
+                int(np.argmax(wrong)),
+            )
+        yield track
+    if choice := by_signal.get("base_velocity"):
+        stamps, values = choice.field.stamps, choice.field.values[:, choice.columns]
+        if choice.joint in ("world", "mujoco"):
+            if pose is None or by_signal["base_pose"].field.stamps is not stamps:
+                raise LogError(
+                    log.path,
+                    f"{choice.label}: a velocity in world axes needs a base_pose of the same"
+                    " samples, and there is none (--map base_pose=ARRAY)",
+                )
+            values = velocity_of(values, choice.joint, pose)
+        yield Track("base_velocity", (), (choice.field.name,) * 6, stamps, np.asarray(values))
+
+
+def pose_of(values: Real, convention: str) -> Array:
+    """Pose of a base in the run's order: x, y, z and the quaternion x, y, z, w.
+
+    Args:
+        values: x, y, z and a quaternion, shape (samples, 7), in [m].
+        convention: "wxyz" or "xyzw", the order of the quaternion.
+    """
+    order = [0, 1, 2, 4, 5, 6, 3] if convention == "wxyz" else slice(None)
+    return np.asarray(values, dtype=np.float64)[:, order]
+
+
+def not_normalised(pose: Array) -> Mask:
+    """Whether the norm of each sample's quaternion is not near 1, shape (samples,)."""
+    return np.asarray(np.abs(np.linalg.norm(pose[:, 3:], axis=1) - 1) > 0.01)
+
+
+def velocity_of(values: Real, convention: str, pose: Array) -> Array:
+    """Velocity of the base in body axes, linear, then angular, as Pinocchio has it.
+
+    Args:
+        values: Linear, then angular velocity, shape (samples, 6).
+        convention: "world" for world axes, "mujoco" for a linear velocity in world axes and an
+            angular one in body axes (``qvel`` of a free joint), "body" for body axes.
+        pose: The base's pose at the same samples, as the run has it, shape (samples, 7).
+    """
+    linear, angular = np.hsplit(np.asarray(values, dtype=np.float64), 2)
+    if convention in ("world", "mujoco"):
+        linear = _into_body(linear, pose)
+    if convention == "world":
+        angular = _into_body(angular, pose)
+    return np.hstack((linear, angular))
+
+
+def _into_body(vectors: Array, pose: Array) -> Array:
+    """Vectors rotated from world to body axes: v' = R(q)^T v."""
+    axis, scalar = -pose[:, 3:6], pose[:, 6:]
+    cross = 2 * np.cross(axis, vectors)
+    rotated: Array = vectors + scalar * cross + np.cross(axis, cross)
+    return rotated
+
+
+def _choices(
+    log: Log, options: ReadOptions, naming: Naming, joints: Sequence[str]
+) -> Iterator[_Choice]:
+    """Columns and their signals: by the options, then by the format, then by their names."""
+    joints = options.joints or joints
+    signals = {entry.signal for entry in options.entries if not entry.joint}
+    sources = {entry.part()[0] for entry in options.entries}
+    suggested = (
+        entry
+        for entry in log.suggested
+        if entry.signal not in signals and entry.part()[0] not in sources
+    )
+    mapped = set()
+    for entry in (*options.entries, *suggested):
+        if found := _part_of(log, entry):
+            mapped.add(id(found[0]))
+            yield from _by_mapping(log, *found, entry, options, joints)
+    known = [column_signal(each.name, naming) for each in log.fields if _is_column(each)]
+    named = [joint for _, joint in filter(None, known) if isinstance(joint, str)]
+    numbered = {number_of(joint): joint for joint in reversed(named)}
+    for each in log.fields:
+        if id(each) not in mapped and each.name != options.time:
+            yield from _by_name(log, each, naming, numbered, options, joints)
+
+
+def _part_of(log: Log, entry: Entry) -> tuple[Field, slice] | None:
+    """The field and the columns that an entry names; None if the log has no such field."""
+    by_name = {field.name: field for field in log.fields}
+    if field := by_name.get(entry.source):
+        return field, slice(0, field.values.shape[1])
+    name, part = entry.part()
+    if name not in by_name:
+        return None
+    width = by_name[name].values.shape[1]
+    start, stop, _ = part.indices(width)
+    if start >= stop or (part.stop or 0) > width:
+        raise LogError(log.path, f"{entry.source!r}: {name!r} has {width} columns")
+    return by_name[name], slice(start, stop)
+
+
+def _by_name(
+    log: Log,
+    field: Field,
+    naming: Naming,
+    numbered: Mapping[int | None, str],
+    options: ReadOptions,
+    joints: Sequence[str],
+) -> Iterator[_Choice]:
+    """Choices by the format or by the field's name."""
+    whole = slice(0, field.values.shape[1])
+    known = column_signal(field.name, naming) if _is_column(field) else None
+    signal = field.signal or array_signal(field.name) or ""
+    if known is None and _is_column(field) and signal in JOINT_SIGNALS and naming.only != "":
+        known = None if naming.only is None else (signal, naming.only)
+        signal = ""
+    if known:
+        signal, joint = known
+        number = number_of(joint)
+        if number is not None and joints and joint not in joints:
+            joint = _numbered(log, field, number, naming.first, joints)
+        elif isinstance(joint, int):
+            joint = numbered.get(joint, f"joint_{joint}")
+        yield _Choice(field, whole, signal, joint)
+    elif signal in BASE_SIGNALS:
+        yield _base(log, field, signal, "", whole, explicit=False)
+    elif signal:
+        yield from _array(log, field, signal, whole, options, joints, explicit=False)
+
+
+def _by_mapping(
+    log: Log, field: Field, part: slice, entry: Entry, options: ReadOptions, joints: Sequence[str]
+) -> Iterator[_Choice]:
+    explicit, width = entry in options.entries, part.stop - part.start
+    if entry.signal == "time":
+        return
+    if entry.signal in BASE_SIGNALS:
+        yield _base(log, field, entry.signal, entry.joint, part, explicit=explicit)
+    elif not entry.joint:
+        yield from _array(log, field, entry.signal, part, options, joints, explicit=explicit)
+    elif width != 1:
+        raise LogError(
+            log.path,
+            f"{entry.source!r} has {width} columns, {entry.target} is one; name it as"
+            f" {field.name}[0]",
+        )
+    else:
+        yield _Choice(field, part, entry.signal, entry.joint, explicit)
+
+
+def _base(
+    log: Log, field: Field, signal: str, convention: str, part: slice, *, explicit: bool
+) -> _Choice:
+    width = part.stop - part.start
+    if width != WIDTHS[signal]:
+        raise LogError(
+            log.path, f"{field.name!r} has {width} columns, a {signal} has {WIDTHS[signal]}"
+        )
+    return _Choice(field, part, signal, convention, explicit)
+
+
+def _array(
+    log: Log,
+    field: Field,
+    signal: str,
+    part: slice,
+    options: ReadOptions,
+    joints: Sequence[str],
+    *,
+    explicit: bool,
+) -> Iterator[_Choice]:
+    """Choices of the columns of an array, one by one."""
+    width = part.stop - part.start
+    names: Sequence[str] = field.joints[part]
+    if not names or len(options.joints) == width:
+        names = joints
+        other = options.joints and len(names) != width and not signal.endswith("_desired")
+        if names and (len(names) < width or other):
+            whose = "--joints names" if options.joints else f"robot {options.robot!r} has"
+            raise LogError(
+                log.path,
+                f"{field.name!r} has {width} columns, {whose} {len(names)}; take a part of it"
+                f" (--map {signal}={field.name}[0:{len(names)}]) or name all (--joints)",
+            )
+    names = names or [f"joint_{number}" for number in range(width)]
+    for column, joint in zip(range(part.start, part.stop), names[:width], strict=True):
+        yield _Choice(field, slice(column, column + 1), signal, joint, explicit)
+
+
+def _numbered(log: Log, field: Field, number: int, first: int, joints: Sequence[str]) -> str:
+    if not first <= number < first + len(joints):
+        raise LogError(
+            log.path,
+            f"column {field.name!r} has number {number}, the robot's joints are {first} to"
+            f" {len(joints) - 1 + first} ({', '.join(joints)}); map it with --map",
+        )
+    return joints[number - first]
