@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from inspector.errors import LogError
 from inspector.logs.clocks import counted_stamps, stamps_of
-from inspector.logs.log import SAMPLES, Field, Log, Stamps
-from inspector.logs.mapping import Entry, ReadOptions, pose_of
+from inspector.logs.log import SAMPLES, Entry, Field, Log, Stamps
+from inspector.logs.mapping import ReadOptions, pose_of
 from inspector.logs.names import (
     SIGNALS,
     TIMES,

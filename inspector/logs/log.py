@@ -1,12 +1,13 @@
 """A log as it was written: arrays with stamps; and the signals that they hold."""
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,6 @@ from inspector.errors import InspectorError, LogError
 from noisemodel import Run
 from noisemodel.checks import LONGEST, SHORTEST
 from noisemodel.types import Array, Mask, Real
-
-if TYPE_CHECKING:
-    from inspector.logs.mapping import Entry
 
 SAMPLES = "samples"
 """The unit of stamps that count samples, of a log whose rate is not known yet."""
@@ -30,6 +28,10 @@ UNIFORM = 1e-3
 """Largest relative deviation of a uniform clock's steps from their median."""
 GAP = 5.0
 """Length of a step, in nominal ones, above which it is a gap."""
+
+PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
+JOINT = "{joint}"
+"""What stands for the name of a joint in a pattern of a mapping."""
 
 
 @dataclass(frozen=True)
@@ -200,6 +202,42 @@ class Track:
         return LogError(path, f"{problem} (sample {sample + 1}, {at:.6g} s into the log)")
 
 
+@dataclass(frozen=True)
+class Entry:
+    """Mapping of one column or array to a signal, or of many columns by a pattern.
+
+    Attributes:
+        signal: One of ``inspector.logs.names.SIGNALS``, or "time".
+        joint: The joint, for a single column; for a base its convention; empty for an
+            array of all joints. In a pattern it holds ``{joint}``, as the source does.
+        source: The column or array, or a part of it: ``qpos[7:]``, ``qvel[6]``.
+    """
+
+    signal: str
+    joint: str
+    source: str
+
+    @property
+    def target(self) -> str:
+        """Text before the equals sign."""
+        return f"{self.signal}.{self.joint}" if self.joint else self.signal
+
+    @property
+    def is_pattern(self) -> bool:
+        """Whether it maps all columns that its source fits."""
+        return JOINT in self.joint
+
+    def part(self) -> tuple[str, slice]:
+        """Name of the array in the source, and its columns."""
+        match = PART.fullmatch(self.source)
+        if match is None or not (match["first"] or match["colon"]):
+            return self.source, slice(None)
+        first = int(match["first"] or 0)
+        if not match["colon"]:
+            return match["name"], slice(first, first + 1)
+        return match["name"], slice(first, int(match["last"]) if match["last"] else None)
+
+
 @dataclass(frozen=True, eq=False)
 class Log:
     """One recording, as logged, and once its signals are known.
@@ -227,7 +265,7 @@ class Log:
     remarks: tuple[str, ...] = ()
     units: str = ""
     urdf: str = ""
-    suggested: tuple["Entry", ...] = ()
+    suggested: tuple[Entry, ...] = ()
     meta: Mapping[str, Any] = field(default_factory=dict)
     time: str = ""
     tracks: tuple[Track, ...] = ()

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from inspector.errors import InspectorError, LogError, OptionError
-from inspector.logs.log import Field, Log, Track
+from inspector.logs.log import JOINT, Entry, Field, Log, Track
 from inspector.logs.names import (
     BASE_SIGNALS,
     JOINT_SIGNALS,
@@ -45,50 +45,11 @@ CONVENTIONS = {
 are the world's for the linear part and the body's for the angular one. The first is the run's."""
 WIDTHS: Mapping[str, int] = {"base_pose": 7, "base_velocity": 6}
 
-PART = re.compile(r"(?P<name>.+)\[(?P<first>\d*)(?P<colon>:?)(?P<last>\d*)\]")
-JOINT = "{joint}"
-"""What stands for the name of a joint in a pattern of a mapping."""
 
 NO_MOTION = (
     "no position or velocity of a joint; name columns JOINT.velocity or JOINT.position, or map"
     " them with --map velocity.JOINT=COLUMN or --map velocity=ARRAY"
 )
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Mapping of one column or array to a signal, or of many columns by a pattern.
-
-    Attributes:
-        signal: One of ``inspector.logs.names.SIGNALS``, or "time".
-        joint: The joint, for a single column; for a base its convention; empty for an
-            array of all joints. In a pattern it holds ``{joint}``, as the source does.
-        source: The column or array, or a part of it: ``qpos[7:]``, ``qvel[6]``.
-    """
-
-    signal: str
-    joint: str
-    source: str
-
-    @property
-    def target(self) -> str:
-        """Text before the equals sign."""
-        return f"{self.signal}.{self.joint}" if self.joint else self.signal
-
-    @property
-    def is_pattern(self) -> bool:
-        """Whether it maps all columns that its source fits."""
-        return JOINT in self.joint
-
-    def part(self) -> tuple[str, slice]:
-        """Name of the array in the source, and its columns."""
-        match = PART.fullmatch(self.source)
-        if match is None or not (match["first"] or match["colon"]):
-            return self.source, slice(None)
-        first = int(match["first"] or 0)
-        if not match["colon"]:
-            return match["name"], slice(first, first + 1)
-        return match["name"], slice(first, int(match["last"]) if match["last"] else None)
 
 
 @dataclass(frozen=True)
