@@ -23,12 +23,11 @@ from scipy.signal import butter, sosfilt, welch
 from benchmarks.orders import ORDERS, order_spectra
 from inspector import read_log
 from inspector.sound import common_gain, save, sonify
-from noiseclassifier.scenarios.domains import GOOD
-from noiseclassifier.scenarios.domains.drives import ORDERS as GEAR_ORDERS
-from noiseclassifier.scenarios.domains.logs import HARMONICS
-from noiseclassifier.scenarios.domainset import logs
-from noiseclassifier.scenarios.folder import FALLEN, Folder
+from noiseclassifier.scenarios.dataset import FALLEN, Folder, logs
+from noiseclassifier.scenarios.drives import ORDERS as GEAR_ORDERS
+from noiseclassifier.scenarios.logs import HARMONICS
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
+from noiseclassifier.scenarios.simulation import GOOD
 from noisemodel import Run
 from noisemodel.types import Array
 
@@ -100,7 +99,7 @@ def main() -> None:
     arguments.add_argument("--sound", type=Path, help="folder of WAV files to write")
     arguments.add_argument("--real", type=Path, default=PANDA, help="log of a real Panda")
     given = arguments.parse_args()
-    shown = examined(Folder.opened(given.data, format_name="domains", any_recipe=True))
+    shown = examined(Folder.opened(given.data, wide=True, any_recipe=True))
     compared = {HOME: home()} | real(given.real)
     print("\n".join(table(shown.robots, compared)))
     if given.picture:

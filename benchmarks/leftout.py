@@ -57,7 +57,7 @@ from noiseclassifier.framefeatures import frame_features
 from noiseclassifier.general import LEARNT, UNBOUNDED, kept
 from noiseclassifier.logbands import ANY, HIGHEST, LOWEST
 from noiseclassifier.pooling import RELATIVE, columns
-from noiseclassifier.scenarios.domains.domain import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
+from noiseclassifier.scenarios.domains import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
 from noiseclassifier.scenarios.robots import ROBOTS, TARGETS, WIDE
 from noiseclassifier.signals import EFFORT, JOINTS, NOISE, feeds, named
 from noiseclassifier.splitting import folds

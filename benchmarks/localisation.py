@@ -23,7 +23,7 @@ import noisemodel as nm
 from inspector.localisation.links import fault_links
 from inspector.localisation.localise import Localisation, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
-from noiseclassifier.scenarios.limbs import limbs
+from noiseclassifier.scenarios.robots import limbs
 from noisemodel.links import LinkNoise, link_noise
 
 SCENARIOS = (

@@ -21,7 +21,7 @@ together, since front and hind legs are similar. Failures at a foot that is left
 import argparse
 import os
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple, NoReturn
@@ -35,8 +35,8 @@ from inspector.training import recordings, training
 from inspector.training.part import Part
 from noiseclassifier.evaluation.assessment import measure, number, percent
 from noiseclassifier.evaluation.matching import Predictions, predict
-from noiseclassifier.scenarios.sample import Sample
-from noiseclassifier.scenarios.signals import WHOLE
+from noiseclassifier.scenarios.robots import limbs
+from noisemodel import Run
 from noisemodel.parallel import DIED, in_order
 
 SHIPPED = Path(__file__).parents[1] / "models"
@@ -201,16 +201,23 @@ def trained(profile: str, paths: Sequence[Path], folder: Path) -> Path:
 
 
 def halved(paths: Sequence[Path], rate: float) -> Iterator[nc.Recording]:
-    """Recordings of half of the limbs of samples."""
+    """Recordings of half of the limbs of runs."""
     for path in paths:
-        sample = Sample.load(path).at(rate)
-        limbs = {
-            name: [sample.signals[f"{name}_{limb}"] for limb in HALF[sample.robot]]
-            for name in WHOLE
-        }
-        # A norm over several limbs is the root of the sum of the squares of theirs.
-        signal = {name: np.linalg.norm(norms, axis=0) for name, norms in limbs.items()}
-        yield replace(recordings.of_sample(path, rate), signal=signal)
+        run = Run.load(path)
+        robot = str(run.robot)
+        assert run.velocity_desired is not None
+        names = [joint for limb in HALF[robot] for joint in limbs(robot)[limb]]
+        mine = [run.joint_names.index(joint) for joint in names]
+        half = Run(
+            time=run.time,
+            joint_names=tuple(names),
+            velocity=run.velocity[:, mine],
+            velocity_desired=run.velocity_desired[:, mine],
+            robot=robot,
+            blocks=run.blocks,
+            meta=run.meta,
+        )
+        yield recordings.of_run(path, half, rate)
 
 
 def tables(found: Sequence[Measured]) -> str:

@@ -14,11 +14,11 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-
 from noiseclassifier.scenarios.case import Case
 from noiseclassifier.scenarios.clock import RATE, STEP, times
 from noiseclassifier.scenarios.contacts import unplanned
 from noiseclassifier.scenarios.imperfections import Imperfections
+
 from noiseclassifier.scenarios.labels import annotate
 from noiseclassifier.scenarios.robots import ROBOTS
 from noiseclassifier.scenarios.simulation import _record

@@ -10,6 +10,7 @@ Times are those of the run, in [s]; numbers are written with all digits.
 
 import csv
 import io
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import pairwise
 from math import inf, isfinite
@@ -217,9 +218,10 @@ def _render_noisytest(spans: Sequence[Span], path: Path) -> str:
                 f"{path}: label {span.label!r} stops at -1 s, the end of the recording in"
                 " NoisyTest; use another format"
             )
-    from noiseclassifier.scenarios.noisytest import annotations  # brings all scenarios
-
-    return annotations([Block(span.start, span.stop, span.label) for span in spans])
+    # Both numbers of a range have a decimal point: NoisyTest's TOML reader takes no mixed ones.
+    ranges = "".join(f"    [{float(each.start)!r}, {float(each.stop)!r}],\n" for each in spans)
+    labels = "".join(f"    {json.dumps(each.label, ensure_ascii=False)},\n" for each in spans)
+    return f"[data]\nchunk_ranges = [\n{ranges}]\nchunk_labels = [\n{labels}]\n"
 
 
 def _parse_noisytest(text: str, _path: Path) -> Iterator[Entry]:

@@ -18,14 +18,22 @@ from inspector.training.evaluation import evaluate
 from inspector.training.part import Part
 from inspector.training.training import ANY_RATE, train
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios import domainset
-from noiseclassifier.scenarios.dataset import make
-from noiseclassifier.scenarios.domains.added import with_faults
-from noiseclassifier.scenarios.domains.simulation import GOOD
-from noiseclassifier.scenarios.folder import Folder
+from noiseclassifier.scenarios.dataset import (
+    DatasetSpec,
+    Folder,
+    Side,
+    Task,
+    choose,
+    make,
+    wide_tasks,
+    write_logs,
+)
+from noiseclassifier.scenarios.dataset import (
+    logs as logs_of,
+)
+from noiseclassifier.scenarios.logs import with_faults
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
-from noiseclassifier.scenarios.simulation import RECIPE
-from noiseclassifier.scenarios.tasks import DatasetSpec, Task, choose
+from noiseclassifier.scenarios.simulation import GOOD, RECIPE
 from noisemodel import Run
 
 HERE = Path(__file__).parent
@@ -73,7 +81,7 @@ def main() -> None:
     arguments.add_argument("--jobs", type=int, default=2)
     options = arguments.parse_args()
     build: Path = options.folder
-    wide = simulate(build / "domains", wide_tasks(), options.jobs, "domains")
+    wide = simulate(build / "domains", source_tasks(), options.jobs, wide=True)
     home = simulate(build / "home", home_tasks(), options.jobs)
     test = simulate(build / "home-test", test_tasks(), options.jobs)
     sources = [logs(wide, build, rate, "source") for rate in RATES]
@@ -92,10 +100,10 @@ def main() -> None:
     demo().save(HERE.parent / "assets" / "runs" / "demo.npz", overwrite=True)
 
 
-def wide_tasks() -> list[Task]:
+def source_tasks() -> list[Task]:
     """Runs of wide domains, of sources and of targets."""
-    seeds = (domainset.tasks(first=seed, seeds=1) for seed in FAST)
-    return [*domainset.tasks(seeds=DOMAINS), *(task for tasks in seeds for task in tasks)]
+    seeds = (wide_tasks(first=seed, seeds=1) for seed in FAST)
+    return [*wide_tasks(seeds=DOMAINS), *(task for tasks in seeds for task in tasks)]
 
 
 def home_tasks() -> list[Task]:
@@ -108,23 +116,23 @@ def test_tasks() -> list[Task]:
     return DatasetSpec(choice=choose(TEST), first=FIRST, seeds=LAST - FIRST).tasks()
 
 
-def simulate(path: Path, tasks: list[Task], jobs: int, form: str = "samples") -> Folder:
-    """Simulate what is missing of a data set."""
-    folder = Folder.opened(path, format_name=form)
+def simulate(path: Path, tasks: list[Task], jobs: int, *, wide: bool = False) -> Folder:
+    """Simulate what is missing of a data set; runs of the scenarios are kept at 1 kHz."""
+    folder = Folder.opened(path, wide=wide, rate=1000.0)
     missing = folder.missing(tasks)
     for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
         pass
     return folder
 
 
-def logs(wide: Folder, build: Path, rate: float, side: domainset.Side) -> Path:
+def logs(wide: Folder, build: Path, rate: float, side: Side) -> Path:
     """Logs of one rate of sources or of targets, written unless they are there."""
     path = build / f"{side}-{rate:g}"
     if not path.exists():
         part = path.with_suffix(".part")
         copies = COPIES if rate >= 1000.0 else 1
-        found = domainset.logs(wide, copies=copies, rate=rate, side=side)
-        for _ in domainset.write(found, part):
+        found = logs_of(wide, copies=copies, rate=rate, side=side)
+        for _ in write_logs(found, part):
             pass
         part.rename(path)
     return path

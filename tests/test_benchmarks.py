@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.limbs import limbs
-from noiseclassifier.scenarios.sample import Sample
-from noisemodel import Block
+from noiseclassifier.scenarios.robots import ROBOTS, limbs
+from noisemodel import Block, Run
 
 ROOT = Path(__file__).parents[1]
 RATE = 10_000.0
@@ -30,37 +29,34 @@ def paper():
         yield paper
 
 
-def sample(robot, scenario, seed):
-    """A sample of good motion, and of obvious failures."""
+def run(robot, scenario, seed):
+    """A run of good motion, and of obvious failures."""
     random = np.random.default_rng([seed, len(scenario), len(robot)])
     time = np.arange(40_000) / RATE
     part = (time // 1.0).astype(int)
     loud = {1: 5.0 * (time % 0.4 < 0.02), 2: time % 0.2, 3: np.sin(1900.0 * time)}
     failure = np.select([part == label for label in loud], list(loud.values()))
-    names = ["measured", "desired", "error"]
-    signals = {
-        name: np.abs(2.0 + 0.01 * random.normal(size=time.shape) + failure).astype(np.float32)
-        for name in [*names, *(f"{name}_{limb}" for name in names for limb in limbs(robot))]
-    }
-    meta = {"scenario": scenario, "seed": seed, "duration": 4.0}
-    return Sample(
+    joints = ROBOTS[robot].drives.joints
+    speed = 2.0 + 0.01 * random.normal(size=(len(time), len(joints))) + failure[:, None]
+    return Run(
+        time=time,
+        joint_names=joints,
+        velocity=speed.astype(np.float32),
+        velocity_desired=np.zeros((len(time), len(joints)), dtype=np.float32),
         robot=robot,
-        rate=RATE,
-        signals=signals,
-        decimated={name: signal[::10] for name, signal in signals.items()},
         blocks=tuple(Block(float(t), t + 1.0, label) for t, label in enumerate(CLASSES)),
-        meta={**meta, "sha256": f"{robot}{scenario}{seed}"},
+        meta={"scenario": scenario, "seed": seed, "duration": 4.0},
     )
 
 
 @pytest.fixture(scope="module")
 def data(tmp_path_factory):
-    """Samples of three robots and ten seeds, some of which are held out."""
+    """Runs of three robots and ten seeds, some of which are held out."""
     folder = tmp_path_factory.mktemp("data")
     for robot in ("go2", "panda", "talos"):
         (folder / robot).mkdir()
         for seed in range(10):
-            sample(robot, "straight", seed).save(folder / robot / f"straight-{seed:03d}.npz")
+            run(robot, "straight", seed).save(folder / robot / f"straight-{seed:03d}.npz")
     return folder
 
 
@@ -75,9 +71,12 @@ def test_the_papers_shares_of_all_frames_become_recalls_of_failures(paper, title
 def test_half_of_the_limbs_has_their_norm(paper, data):
     path = data / "go2" / "straight-000.npz"
     (recording,) = paper.halved([path], RATE)
-    kept = Sample.load(path).signals
-    both = np.hypot(kept["error_FL_foot"], kept["error_RR_foot"])
-    np.testing.assert_allclose(recording.signal["error"], both, rtol=1e-6)
+    whole = Run.load(path)
+    mine = [
+        whole.joint_names.index(j) for foot in ("FL_foot", "RR_foot") for j in limbs("go2")[foot]
+    ]
+    wanted = np.linalg.norm(whole.velocity[:, mine], axis=1)
+    np.testing.assert_allclose(recording.signal["error"], wanted, rtol=1e-5)
     assert recording.name == "go2/straight-000"
 
 
@@ -95,7 +94,7 @@ def test_the_three_tables_are_filled(paper, data, tmp_path, monkeypatch, capsys)
     profiles = ("paper-linear", "noisytest-rbf")
     good = tmp_path / "good" / "panda"
     good.mkdir(parents=True)
-    sample("panda", "straight", 1000).save(good / "straight-1000.npz")
+    run("panda", "straight", 1000).save(good / "straight-1000.npz")
     given = ["--training", data, "--test", data, "--from", 5, "--good", tmp_path / "good"]
     given += ["--output", tmp_path, "--seeds", 2]
     monkeypatch.setattr(sys, "argv", ["", *map(str, given), "--models", "--profiles", *profiles])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.domains.added import APART, KINDS, LEVELS, fault, with_faults
+from noiseclassifier.scenarios.logs import ADDED, APART, LEVELS, fault, with_faults
 from noisemodel import Block, Run
 
 
@@ -18,7 +18,7 @@ def log(rate=500.0, seconds=7.0, noise=1e-4):
     )
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ADDED)
 @pytest.mark.parametrize("rate", [80.0, 1000.0])
 def test_a_fault_has_level_one(kind, rate):
     signal = fault(kind, round(rate), 30.0, rate, np.random.default_rng(1))

@@ -1,13 +1,16 @@
 """Domains are drawn by seed, within the distribution and what a family bears."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.domains import DISTRIBUTION, Distribution
-from noiseclassifier.scenarios.domains.distribution import RATES, DistributionError
-from noiseclassifier.scenarios.limits import Limits
+from noiseclassifier.scenarios import ScenarioError
+from noiseclassifier.scenarios.domains import (
+    DISTRIBUTION,
+    RATES,
+    Limits,
+)
 
 FREE = Limits()
 
@@ -30,13 +33,13 @@ def test_equal_seeds_draw_equal_domains():
 
 def test_values_lie_between_the_ends():
     for name in ("payload", "gear", "torque_limit", "torque_rise", "encoder_bandwidth"):
-        ends = getattr(DISTRIBUTION, {"encoder_bandwidth": "loop_bandwidth"}.get(name, name))
+        ends = DISTRIBUTION.ends[{"encoder_bandwidth": "loop_bandwidth"}.get(name, name)]
         values = [getattr(domain, name) for domain in domains()]
         assert min(ends) <= min(values) <= max(values) <= max(ends), name
     for name in ("noise", "jitter", "gear"):
         values = [getattr(logger, name) for logger in loggers()]
-        assert min(getattr(DISTRIBUTION, name)) <= min(values)
-        assert max(values) <= max(getattr(DISTRIBUTION, name)), name
+        assert min(DISTRIBUTION.ends[name]) <= min(values)
+        assert max(values) <= max(DISTRIBUTION.ends[name]), name
 
 
 def test_the_far_ends_are_drawn_by_wild_runs_only():
@@ -66,8 +69,8 @@ def test_some_logs_have_efforts_and_of_these_half_are_currents():
 
 
 def test_what_is_drawn_of_efforts_changes_nothing_else():
-    other = replace(
-        DISTRIBUTION, effort_share=(1.0, 1.0), current=(5.0, 6.0), effort_bits=(12.0, 11.0)
+    other = DISTRIBUTION.changed(
+        effort_share=(1.0, 1.0), current=(5.0, 6.0), effort_bits=(12.0, 11.0)
     )
     ours = {"effort": "missing", "current": 0.0, "effort_noise": 0.0, "effort_bits": 16}
     for seed, domain in enumerate(domains(50)):
@@ -97,7 +100,7 @@ def test_a_part_of_the_domains_is_never_learnt_from():
 
 def test_it_prints_each_range_with_its_source():
     lines = str(DISTRIBUTION).splitlines()
-    assert len(lines) == 1 + len(fields(Distribution))
+    assert len(lines) == 1 + len(DISTRIBUTION.ends)
     row = next(line for line in lines if line.startswith("gear"))
     assert row.split()[:3] == ["gear", "30", "160"]
     assert "real Panda" in row
@@ -117,5 +120,5 @@ def test_it_prints_each_range_with_its_source():
     ],
 )
 def test_a_distribution_out_of_range_is_refused(change, problem):
-    with pytest.raises(DistributionError, match=problem):
-        replace(DISTRIBUTION, **change)
+    with pytest.raises(ScenarioError, match=problem):
+        DISTRIBUTION.changed(**change)

@@ -5,14 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.clock import RATE, STEP, STEPS, TICK
-from noiseclassifier.scenarios.domains.domain import Domain
-from noiseclassifier.scenarios.domains.drives import DomainDrives
-from noiseclassifier.scenarios.domains.faults import FAULTS, NONE, DriveFault, Held, Lost, Step
-from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.drivetrain import Drivetrain
-from noiseclassifier.scenarios.events import Event
-from noiseclassifier.scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.domains import Domain
+from noiseclassifier.scenarios.drives import DomainDrives, Drives
+from noiseclassifier.scenarios.faults import (
+    NO_DRIVE_FAULT,
+    ON_DRIVES,
+    DriveFault,
+    Held,
+    Imperfections,
+    Lost,
+    TargetJump,
+)
+from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Event
+from noiseclassifier.scenarios.robots import Drivetrain
 
 NOMINAL = Domain(
     wildness=0.0, length=1.0, mass=1.0, payload=0.0, gear=100.0, ripple=0.0, flexibility=0.0,
@@ -36,7 +41,7 @@ HEALTHY = replace(
 START = np.array([0.1, -0.2])
 
 
-def drives(domain=NOMINAL, fault=NONE):
+def drives(domain=NOMINAL, fault=NO_DRIVE_FAULT):
     return DomainDrives(
         START,
         domain=domain,
@@ -68,12 +73,9 @@ def followed(some, seconds=0.2, positions=None):
 def test_drives_of_a_nominal_domain_equal_those_at_home():
     home = Drives(
         START,
-        stiffness=np.array(TWO.stiffness) * HEALTHY.stiffness,
-        damping=np.array(TWO.damping) * HEALTHY.damping,
-        limit=np.array(TWO.torque),
+        drivetrain=TWO,
         offset=np.zeros(2),
         imperfections=HEALTHY,
-        step=STEP,
     )
     np.testing.assert_allclose(followed(drives()), followed(home), atol=1e-9)
 
@@ -123,21 +125,21 @@ def test_a_policy_holds_its_targets():
     assert not np.any([rates for _, rates, _ in targets])
 
 
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", ON_DRIVES)
 def test_faults_begin_and_end_within_the_run(name):
     for seed in range(30):
-        fault = FAULTS[name](np.random.default_rng(seed), TWO, 6.0)
+        fault = ON_DRIVES[name].kind(np.random.default_rng(seed), TWO, 6.0)
         assert fault.event is not None
         assert 0.5 < fault.event.start < fault.event.stop <= 6.02
         assert fault.event.label in ("impact", "highaccelerations", "oscillations")
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", FAULTS)
+@pytest.mark.parametrize("name", ON_DRIVES)
 def test_drives_are_nominal_until_the_fault_begins(name):
-    fault = FAULTS[name](np.random.default_rng(3), TWO, 3.0)
+    fault = ON_DRIVES[name].kind(np.random.default_rng(3), TWO, 3.0)
     first = round(fault.event.start * RATE)
-    good, faulty = (followed(drives(fault=each), 3.0) for each in (NONE, fault))
+    good, faulty = (followed(drives(fault=each), 3.0) for each in (NO_DRIVE_FAULT, fault))
     np.testing.assert_array_equal(good[:first], faulty[:first])
     assert np.abs(good - faulty).max() > 0 or name == "latency"
 
@@ -159,7 +161,7 @@ def test_commands_are_held_lost_or_moved():
     always = Lost(0.01, 1.0, share=1.0, seed=1)
     always(time, targets, targets)
     assert (always(time + 0.5, targets + 5, targets)[0] == targets[-1]).all()
-    jump = Step(0.5, 0.6, np.array([0.1, 0.0]))
+    jump = TargetJump(0.5, 0.6, np.array([0.1, 0.0]))
     assert (jump(time, targets, targets)[0] == targets).all()
     np.testing.assert_allclose(jump(time + 0.55, targets, targets)[0] - targets, [[0.1, 0]] * STEPS)
     np.testing.assert_allclose(jump(time + 2.0, targets, targets)[0], targets)

@@ -7,18 +7,24 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios.arm.scene import bodies
-from noiseclassifier.scenarios.clock import RATE
-from noiseclassifier.scenarios.domains import GOOD, RECIPE, logged, simulate, simulation
-from noiseclassifier.scenarios.domains.domain import Logger
-from noiseclassifier.scenarios.domains.logs import visible
+from noiseclassifier import scenarios
+from noiseclassifier.scenarios.arm import bodies
+from noiseclassifier.scenarios.dataset import Folder, Task
+from noiseclassifier.scenarios.domains import DISTRIBUTION, Logger
 from noiseclassifier.scenarios.errors import DatasetError
-from noiseclassifier.scenarios.folder import Folder
-from noiseclassifier.scenarios.imperfections import real_model
-from noiseclassifier.scenarios.loads import PUSH
-from noiseclassifier.scenarios.reduced import configuration, reduced_model
+from noiseclassifier.scenarios.logs import logged, visible
+from noiseclassifier.scenarios.motions import PUSH, RATE
 from noiseclassifier.scenarios.robots import WIDE
-from noiseclassifier.scenarios.tasks import Task
+from noiseclassifier.scenarios.simulation import (
+    GOOD,
+    WIDE_RECIPE,
+    Start,
+    _imperfections,
+    _setup,
+    _twin,
+)
+from noiseclassifier.scenarios.table import FAULTS
+from noiseclassifier.scenarios.world import configuration, real_model, reduced_model
 from noisemodel import Run
 
 SECONDS = 1.5
@@ -33,20 +39,18 @@ PLAIN = Logger(
 
 @pytest.fixture(scope="module")
 def twin():
-    return simulate("panda", GOOD, STANDS, duration=SECONDS)
+    return scenarios.simulate("panda", GOOD, STANDS, duration=SECONDS, wide=True)
 
 
 @pytest.fixture(scope="module")
 def pushed():
-    return simulate("panda", "push", STANDS, duration=SECONDS)
+    return scenarios.simulate("panda", "push", STANDS, duration=SECONDS, wide=True)
 
 
 def real_panda():
     """The Panda of the seed with its real masses, and the Coulomb friction of its joints."""
-    drawn = simulation._draw(WIDE["panda"], STANDS)
-    imperfections = simulation._imperfections(
-        drawn.robot, drawn.domain, drawn.streams[1], bodies=bodies(drawn.robot)
-    )
+    drawn = _setup(Start("panda", STANDS, distribution=DISTRIBUTION))
+    imperfections = _imperfections(drawn, len(drawn.robot.drives.joints), bodies(drawn.robot))
     tool = drawn.robot.tool
     model = real_model(reduced_model(drawn.robot), tool.frame, np.array(tool.point), imperfections)
     friction = np.array(drawn.robot.drives.friction) * imperfections.friction
@@ -87,12 +91,11 @@ def test_a_push_shows_in_the_efforts_as_the_torque_that_holds_its_force(twin, pu
 
 
 def pushes(run):
-    drawn = simulation._draw(WIDE["panda"], STANDS)
-    from noiseclassifier.scenarios.arm.domains import DEFECTS
-    from noiseclassifier.scenarios.arm.scene import plan
+    from noiseclassifier.scenarios.arm import plan
 
-    planned = plan(drawn.robot, drawn.motion, drawn.streams[0], SECONDS)
-    return DEFECTS["push"].draw(drawn.streams[4], planned).loads
+    drawn = _setup(Start("panda", STANDS, distribution=DISTRIBUTION))
+    planned = plan(drawn.robot, drawn.motion, drawn.planned, SECONDS)
+    return FAULTS["arm"]["push"].draw(drawn.faulty, planned).loads
 
 
 def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
@@ -100,7 +103,7 @@ def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
     assert twin.effort.shape == twin.velocity.shape
     drives, scale = WIDE["panda"].drives, twin.meta["domain"]["torque_limit"]
     assert twin.meta["effort_limit"] == pytest.approx(np.array(drives.torque) * scale)
-    trial = simulation._twin("panda", STANDS, SECONDS, simulation.DISTRIBUTION)
+    trial = _twin(Start("panda", STANDS, distribution=DISTRIBUTION), SECONDS)
     step = round(RATE / twin.rate)
     steady = slice(200, -200)
     np.testing.assert_allclose(twin.effort[steady], trial.motion.torque[::step][steady], atol=0.5)
@@ -108,8 +111,8 @@ def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
 
 @pytest.mark.slow
 def test_a_blow_from_outside_is_not_among_the_torques_of_the_drives():
-    blow = simulate("panda", "blow", STANDS, duration=3.0)
-    twin = simulate("panda", GOOD, STANDS, duration=3.0)
+    blow = scenarios.simulate("panda", "blow", STANDS, duration=3.0, wide=True)
+    twin = scenarios.simulate("panda", GOOD, STANDS, duration=3.0, wide=True)
     (event,) = blow.meta["events"]
     size = event["facts"]["share"] * np.array(blow.meta["effort_limit"])
     begun = (blow.time > event["start"]) & (blow.time < event["start"] + 1e-3)
@@ -191,14 +194,16 @@ def test_a_slow_change_is_visible_beside_a_weight_only_where_means_are_left_out(
 
 
 def test_folders_of_older_recipes_are_read_and_not_added_to(tmp_path, twin):
-    folder = Folder.opened(tmp_path / "data", format_name="domains")
+    folder = Folder.opened(tmp_path / "data", wide=True)
     folder.save(Task("panda", GOOD, STANDS), replace(twin, effort=None))
     manifest = folder.path / "dataset.json"
     settings = json.loads(manifest.read_text())
-    assert settings["recipe"] == RECIPE
-    manifest.write_text(json.dumps({**settings, "recipe": RECIPE - 1}))
-    with pytest.raises(DatasetError, match=f"made with recipe {RECIPE - 1}, now it is {RECIPE}"):
-        Folder.opened(folder.path, format_name="domains")
-    old = Folder.opened(folder.path, format_name="domains", any_recipe=True)
+    assert settings["recipe"] == WIDE_RECIPE
+    manifest.write_text(json.dumps({**settings, "recipe": WIDE_RECIPE - 1}))
+    with pytest.raises(
+        DatasetError, match=f"made with recipe {WIDE_RECIPE - 1}, now it is {WIDE_RECIPE}"
+    ):
+        Folder.opened(folder.path, wide=True)
+    old = Folder.opened(folder.path, wide=True, any_recipe=True)
     (task,) = old.kept()
     assert Run.load(old.file(task)).effort is None

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.domains import Logger, logged
-from noiseclassifier.scenarios.domains.logs import visible
+from noiseclassifier.scenarios.domains import Logger
+from noiseclassifier.scenarios.logs import logged, visible
 from noisemodel import Block, Run
 
 RATE = 2000.0

@@ -9,10 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.domains import DISTRIBUTION
-from noiseclassifier.scenarios.folder import Folder
-from noiseclassifier.scenarios.limits import Limits
-from noiseclassifier.scenarios.tasks import Task
+from noiseclassifier.scenarios.dataset import Folder, Task
+from noiseclassifier.scenarios.domains import DISTRIBUTION, Limits
 from noisemodel import Block, Run
 
 RATE = 2000.0
@@ -97,7 +95,7 @@ def run_with(scenario, robot="panda"):
 
 @pytest.fixture
 def data(tmp_path):
-    folder = Folder.opened(tmp_path / "data", format_name="domains")
+    folder = Folder.opened(tmp_path / "data", wide=True)
     for robot in ("panda", "go2"):
         (folder.path / robot).mkdir()
         for scenario in ("good", "tone"):

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from functools import partial
 
 import mujoco
 import numpy as np
@@ -10,18 +11,29 @@ import pinocchio
 import pytest
 
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios.dataset import make
-from noiseclassifier.scenarios.domains import DISTRIBUTION, GOOD, faults_of, simulate, simulation
-from noiseclassifier.scenarios.domains.domain import Domain, Logger
-from noiseclassifier.scenarios.domainset import logs, side_of, tasks, write
+from noiseclassifier.scenarios.dataset import (
+    Folder,
+    Statistics,
+    Task,
+    logs,
+    make,
+    side_of,
+    wide_tasks,
+    write_logs,
+)
+from noiseclassifier.scenarios.domains import DISTRIBUTION, Domain, Limits, Logger
 from noiseclassifier.scenarios.errors import DivergedError
-from noiseclassifier.scenarios.folder import Folder
-from noiseclassifier.scenarios.limits import Limits
-from noiseclassifier.scenarios.quadruped.robots import GO2
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
-from noiseclassifier.scenarios.statistics import Statistics
-from noiseclassifier.scenarios.tasks import Task
+from noiseclassifier.scenarios.simulation import (
+    GOOD,
+    _changed,
+    _refuse_rattling,
+    faults_of,
+)
 from noisemodel import Block, Run
+
+simulate = partial(scenarios.simulate, wide=True)
+GO2 = WIDE["go2"]
 
 SECONDS = 3.0
 
@@ -72,7 +84,7 @@ def test_a_good_run_has_no_event_and_nothing_but_ok(good):
 def test_a_run_and_a_data_set_name_the_software_that_they_depend_on(good, tmp_path):
     versions = {each.__name__: each.__version__ for each in (mujoco, pinocchio, np)}
     assert good.meta["versions"] == versions
-    path = Folder.opened(tmp_path / "set", format_name="domains").path
+    path = Folder.opened(tmp_path / "set", wide=True).path
     assert json.loads((path / "dataset.json").read_text())["versions"] == versions
 
 
@@ -109,28 +121,28 @@ def test_unknown_names_and_seeds_are_refused(arguments, problem):
 def test_a_robot_that_rattles_without_a_fault_is_no_good_run():
     time = np.arange(20_000) / 10_000
     smooth = np.sin(2 * np.pi * 0.5 * time)[:, None] * np.ones(3)
-    simulation._refuse_rattling(smooth)
+    _refuse_rattling(smooth)
     with pytest.raises(DivergedError, match="it rattles without a fault, at .* rad/s"):
-        simulation._refuse_rattling(smooth + np.sin(2 * np.pi * 90 * time)[:, None])
+        _refuse_rattling(smooth + np.sin(2 * np.pi * 90 * time)[:, None])
 
 
 def test_delays_are_no_longer_than_the_gains_bear():
     late = drawn(delay=0.05, stiffness=1.0, damping=1.0, encoder_bandwidth=700.0)
     soft = replace(late, stiffness=0.1, damping=0.3)
-    delays = [simulation._changed(GO2, domain)[1].delay for domain in (late, soft)]
+    delays = [_changed(GO2, domain)[1].delay for domain in (late, soft)]
     assert 0 <= delays[0] < delays[1] < 0.05
 
 
 def test_gains_are_lower_where_filters_leave_no_margin():
     slow = drawn(stiffness=1.0, damping=1.0, encoder_bandwidth=30.0)
     fast = replace(slow, encoder_bandwidth=700.0)
-    damping = [simulation._changed(GO2, domain)[0].drives.damping[0] for domain in (slow, fast)]
+    damping = [_changed(GO2, domain)[0].drives.damping[0] for domain in (slow, fast)]
     assert damping[0] < 0.5 * damping[1]
 
 
 def test_tasks_are_drawn_by_seed_and_share_their_twin():
-    chosen = tasks(["ur5", "go2"], seeds=3, faults=2)
-    assert chosen == tasks(["ur5", "go2"], seeds=3, faults=2)
+    chosen = wide_tasks(["ur5", "go2"], seeds=3, faults=2)
+    assert chosen == wide_tasks(["ur5", "go2"], seeds=3, faults=2)
     assert len(chosen) == 2 * 3 * 3
     assert sum(task.scenario == GOOD for task in chosen) == 6
     for task in chosen:
@@ -138,7 +150,9 @@ def test_tasks_are_drawn_by_seed_and_share_their_twin():
 
 
 def test_a_fault_may_be_of_every_seed_besides_those_that_are_drawn():
-    plain, more = (tasks(["ur5", "go2"], seeds=2, faults=1, always=some) for some in ((), ["push"]))
+    plain, more = (
+        wide_tasks(["ur5", "go2"], seeds=2, faults=1, always=some) for some in ((), ["push"])
+    )
     pushes = [task for task in more if task.scenario == "push"]
     assert {(task.robot, task.seed) for task in pushes} == {("ur5", 10_000), ("ur5", 10_001)}
     assert len(more) == len(plain) + 2
@@ -156,7 +170,7 @@ def test_a_fault_may_be_of_every_seed_besides_those_that_are_drawn():
 )
 def test_bad_requests_are_refused(arguments, problem):
     with pytest.raises(scenarios.ScenarioError, match=problem):
-        tasks(**arguments)
+        wide_tasks(**arguments)
 
 
 def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypatch, tmp_path):
@@ -177,20 +191,20 @@ def test_what_fell_is_counted_by_robot_and_its_faulty_runs_have_no_log(monkeypat
             meta={"domain": drawn(control="pd").as_dict(), "events": []},
         )
 
-    monkeypatch.setattr("noiseclassifier.scenarios.domains.simulate", fall)
-    folder = Folder.opened(tmp_path / "data", format_name="domains")
+    monkeypatch.setattr("noiseclassifier.scenarios.dataset.simulate", fall)
+    folder = Folder.opened(tmp_path / "data", wide=True)
     wanted = [Task("ur5", name, seed) for seed in (10_000, 10_001) for name in (GOOD, "tone")]
     assert sorted(make(folder, wanted)) == sorted(wanted)
     assert folder.missing(wanted) == []
     text = str(Statistics.of(folder))
     assert "4 runs, 1 of which fell" in text
-    names = [name for name, _ in write(logs(folder, rate=500.0), tmp_path / "logs")]
+    names = [name for name, _ in write_logs(logs(folder, rate=500.0), tmp_path / "logs")]
     assert names == ["ur5/good-10000", "ur5/tone-10000"]
     assert Run.load(tmp_path / "logs/ur5/tone-10000.npz").rate == pytest.approx(500.0)
 
 
 def test_a_folder_without_runs_has_no_logs(tmp_path):
-    folder = Folder.opened(tmp_path, format_name="domains")
+    folder = Folder.opened(tmp_path, wide=True)
     with pytest.raises(scenarios.DatasetError, match="holds no run; `inspector simulate domains`"):
         next(logs(folder))
 

@@ -3,13 +3,18 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.defects import Obstacles, Overhang
-from noiseclassifier.scenarios.humanoid.cases import HUMANOID
-from noiseclassifier.scenarios.humanoid.footsteps import footsteps
-from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
-from noiseclassifier.scenarios.humanoid.walking import walk
+from noiseclassifier.scenarios.faults import Obstacles, Overhang
+from noiseclassifier.scenarios.humanoid_plan import footsteps, walk
 from noiseclassifier.scenarios.motions import Walk
+from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.table import SCENARIOS
+
+HUMANOID = {
+    name: each.cases["humanoid"] for name, each in SCENARIOS.items() if "humanoid" in each.cases
+}
+
+G1 = WIDE["g1"]
+TALOS = WIDE["talos"]
 
 
 def plan_of(robot=TALOS, seed=1, **changes):
@@ -22,7 +27,7 @@ def drawn(name, robot=TALOS):
 
 
 def test_humanoids_have_all_scenarios():
-    assert set(HUMANOID) == set(SCENARIOS)
+    assert {n for n, each in SCENARIOS.items() if "humanoid" in each.cases} == set(SCENARIOS)
 
 
 def test_faults_of_talos_have_the_sizes_of_the_paper():

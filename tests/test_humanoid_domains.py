@@ -7,27 +7,25 @@ import pinocchio as pin
 import pytest
 
 import noisemodel
-from noiseclassifier.scenarios.clock import STEPS, TICK
-from noiseclassifier.scenarios.contacts import unplanned
+from noiseclassifier.scenarios.domains import HUMANOID_LIMITS, WALKS, humanoid_motion
 from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.faults import Faults
-from noiseclassifier.scenarios.humanoid.domains import DEFECTS, GAITS, LIMITS, motion, scaled
-from noiseclassifier.scenarios.humanoid.footsteps import stopping
-from noiseclassifier.scenarios.humanoid.motions import Gesture, Stand, Stroll
-from noiseclassifier.scenarios.humanoid.robots import (
-    G1,
-    G1_MOVING,
-    HUMANOIDS,
-    LEGS,
-    ROMEO,
-    TALOS,
-    TALOS_MASS,
-    similar,
-)
-from noiseclassifier.scenarios.humanoid.scene import bodies, plan, scene, standing
-from noiseclassifier.scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.faults import ON_DRIVES, Faults, Imperfections
+from noiseclassifier.scenarios.humanoid import bodies, plan, scene, standing
+from noiseclassifier.scenarios.humanoid_plan import stopping
+from noiseclassifier.scenarios.labels import unplanned
 from noiseclassifier.scenarios.loop import record
-from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.motions import STEPS, TICK, Gesture, Stand, Stroll
+from noiseclassifier.scenarios.robots import LEGS, WIDE, _similar
+from noiseclassifier.scenarios.table import FAULTS
+from noiseclassifier.scenarios.world import reduced_model
+
+OWN = {n: each for n, each in FAULTS["humanoid"].items() if n not in ON_DRIVES}
+
+G1 = WIDE["g1"]
+G1_MOVING = WIDE["g1_with_hands"]
+HUMANOIDS = tuple(robot for robot in WIDE.values() if robot.family == "humanoid")
+ROMEO = WIDE["romeo_small"]
+TALOS = WIDE["talos"]
 
 WAVE = Gesture(way="sines", size=(1.0, 1.0), period=(0.8, 2.0))
 SQUAT = Stand(sway=(0.5, 0.5), squat=(0.1, 0.1), period=(1.5, 2.5), upper=WAVE)
@@ -47,14 +45,12 @@ def simulated(robot, wanted, seed=1, duration=4.0, stiffness=1.0, damping=1.0, d
     )
     like = replace(like, torque_delay=like.torque_delay + round(delay * STEPS / TICK))
     scenery = scene(robot, way, Faults(), like)
+    exact = replace(like, stiffness=stiffness, damping=damping)
     drives = Drives(
         scenery.start[-joints:],
-        stiffness=stiffness * np.array(robot.drives.stiffness),
-        damping=damping * np.array(robot.drives.damping),
-        limit=np.array(robot.drives.torque),
+        drivetrain=robot.drives,
         offset=np.zeros(joints),
-        imperfections=like,
-        step=TICK / STEPS,
+        imperfections=exact,
     )
     ticks = scenery.settling + len(way.time)
     error = np.zeros((ticks * STEPS, joints))
@@ -63,7 +59,7 @@ def simulated(robot, wanted, seed=1, duration=4.0, stiffness=1.0, damping=1.0, d
 
 
 def walks_well(robot, gait, seed=1):
-    way, run = simulated(robot, Stroll(walk=GAITS[gait], stops=1, upper=WAVE), seed)
+    way, run = simulated(robot, Stroll(walk=WALKS[gait], stops=1, upper=WAVE), seed)
     moved = run.base_pose[-1, :2] - run.base_pose[0, :2]
     assert np.linalg.norm(moved - (way.centre[-1] - way.centre[0])[:2]) < 0.05
     assert (np.abs(run.torque) < robot.drives.torque).mean() > 0.999
@@ -109,7 +105,7 @@ def test_it_walks_while_its_arms_move():
 
 @pytest.mark.slow
 @EACH
-@pytest.mark.parametrize("gait", GAITS)
+@pytest.mark.parametrize("gait", WALKS)
 def test_every_robot_walks_in_every_gait(robot, gait):
     walks_well(robot, gait)
 
@@ -125,7 +121,7 @@ def test_gaits_differ_in_their_time_on_both_feet():
     def share(name):
         rng = np.random.default_rng(0)
         steps = [
-            step for _ in range(20) for step in stopping(TALOS, Stroll(walk=GAITS[name]), rng, 8.0)
+            step for _ in range(20) for step in stopping(TALOS, Stroll(walk=WALKS[name]), rng, 8.0)
         ]
         return np.mean([(step.start - step.shift) / (step.stop - step.shift) for step in steps])
 
@@ -134,7 +130,7 @@ def test_gaits_differ_in_their_time_on_both_feet():
 
 
 def test_the_weight_is_between_both_feet_at_a_stop():
-    walk = GAITS["brisk"]
+    walk = WALKS["brisk"]
     straight = planned(TALOS, Stroll(walk=walk), duration=9.0)
     stopping = planned(TALOS, Stroll(walk=walk, stops=1, pause=(2.0, 2.0)), duration=9.0)
 
@@ -169,26 +165,19 @@ def test_the_centre_of_mass_stays_where_it_is_while_only_arms_move():
         np.testing.assert_allclose(centre, way.centre[tick], atol=1e-3)
 
 
-def test_a_robot_of_the_size_of_talos_has_its_drives_and_gains():
-    like = {
-        name: getattr(TALOS, name) for name in ("effectors", "rest", "apart", "carrier", "held")
-    }
-    assert similar("talos", TALOS_MASS, TALOS.drives.joints, TALOS.centre, **like) == TALOS
-
-
 def test_a_pendulum_of_a_quarter_of_the_height_steps_twice_as_fast():
-    like = {name: getattr(TALOS, name) for name in ("effectors", "rest", "apart", "carrier")}
-    small = similar("talos", TALOS_MASS / 64, TALOS.drives.joints, TALOS.centre / 4, **like)
-    assert small.pace == pytest.approx(0.5)
-    assert small.drives.stiffness[0] == pytest.approx(TALOS.drives.stiffness[0] / 256)
+    small = _similar(TALOS, 1 / 64, TALOS.centre / 4, TALOS.drives.joints)
+    assert small["pace"] == pytest.approx(0.5)
+    assert small["drives"].stiffness[0] == pytest.approx(TALOS.drives.stiffness[0] / 256)
+    assert _similar(TALOS, 1.0, TALOS.centre, TALOS.drives.joints)["drives"] == TALOS.drives
 
 
 @pytest.mark.parametrize("wildness", [0.0, 0.5, 1.0])
 def test_every_defect_is_drawn_for_every_motion(wildness):
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        way = planned(HUMANOIDS[seed % len(HUMANOIDS)], motion(rng, wildness), seed)
-        for name, defect in DEFECTS.items():
+        way = planned(HUMANOIDS[seed % len(HUMANOIDS)], humanoid_motion(rng, wildness), seed)
+        for name, defect in OWN.items():
             faults = defect.draw(rng, way)
             if "obstacle" in name or name == "edge":
                 assert not faults.boxes or len(way.contacts) > 2
@@ -196,28 +185,29 @@ def test_every_defect_is_drawn_for_every_motion(wildness):
 
 
 def test_motions_of_a_seed_are_equal_and_both_kinds_are_drawn():
-    drawn = [motion(np.random.default_rng(seed), 1.0) for seed in range(40)]
-    assert drawn == [motion(np.random.default_rng(seed), 1.0) for seed in range(40)]
+    drawn = [humanoid_motion(np.random.default_rng(seed), 1.0) for seed in range(40)]
+    assert drawn == [humanoid_motion(np.random.default_rng(seed), 1.0) for seed in range(40)]
     assert {type(one) for one in drawn} == {Stand, Stroll}
     gaits = {one.walk.single for one in drawn if isinstance(one, Stroll)}
-    assert len(gaits) == len(GAITS)
+    assert len(gaits) == len(WALKS)
 
 
 def test_lengths_are_scaled_and_nothing_else():
-    small = scaled(G1, 0.9)
+    small = G1.scaled(0.9)
     assert small.length_scale == pytest.approx(0.9)
     assert small.centre == pytest.approx(0.9 * G1.centre)
     assert small.effectors[0].point == pytest.approx(np.multiply(0.9, G1.effectors[0].point))
     assert small.stride == pytest.approx((0.9 * 0.24, 0.9 * 0.06, 0.15))
     assert small.drives == G1.drives
-    again = scaled(small, 1 / 0.9)
+    again = small.scaled(1 / 0.9)
     assert again.apart == pytest.approx(G1.apart)
 
 
 def test_a_soft_and_late_robot_walks_on():
     _, run = simulated(
-        G1, Stroll(walk=GAITS["walk"]), duration=3.0,
-        stiffness=LIMITS.stiffness[0], damping=LIMITS.damping[1], delay=LIMITS.delay / 2,
+        G1, Stroll(walk=WALKS["walk"]), duration=3.0,
+        stiffness=HUMANOID_LIMITS.stiffness[0], damping=HUMANOID_LIMITS.damping[1],
+        delay=HUMANOID_LIMITS.delay / 2,
     )  # fmt: skip
     error = np.abs(run.position - run.position_desired).max()
     assert 0.01 < error < 0.3

@@ -1,22 +1,24 @@
 """Humanoids in simulation stand, carry their weight, walk, and have impacts on obstacles."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
 
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios.clock import STEPS, TICK
 from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.faults import Faults
-from noiseclassifier.scenarios.humanoid.footsteps import footsteps
-from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
-from noiseclassifier.scenarios.humanoid.scene import SETTLING, bodies, plan, scene, standing
-from noiseclassifier.scenarios.humanoid.walking import walk
-from noiseclassifier.scenarios.imperfections import Imperfections, real_model
+from noiseclassifier.scenarios.faults import Faults, Imperfections
+from noiseclassifier.scenarios.humanoid import SETTLING, bodies, plan, scene, standing
+from noiseclassifier.scenarios.humanoid_plan import footsteps, walk
 from noiseclassifier.scenarios.loop import record
-from noiseclassifier.scenarios.motions import Walk
-from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.motions import STEPS, TICK, Walk
+from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.world import real_model, reduced_model
+
+G1 = WIDE["g1"]
+TALOS = WIDE["talos"]
 
 SEED, SHORT = 1, 4.0
 HUMANOIDS = pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robot.name)
@@ -33,15 +35,9 @@ def stood(robot, duration=0.3):
     """A robot that does nothing but stand, and what it is like."""
     like = imperfect(robot)
     scenery = scene(robot, walk(robot, (), duration), Faults(), like)
-    given = robot.drives
+    exact = replace(like, stiffness=1.0, damping=1.0)
     drives = Drives(
-        scenery.start[-12:],
-        stiffness=np.array(given.stiffness),
-        damping=np.array(given.damping),
-        limit=np.array(given.torque),
-        offset=np.zeros(12),
-        imperfections=like,
-        step=TICK / STEPS,
+        scenery.start[-12:], drivetrain=robot.drives, offset=np.zeros(12), imperfections=exact
     )
     ticks = SETTLING + round(duration / TICK)
     quiet = np.zeros((ticks * STEPS, 12))

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.clock import TICK
-from noiseclassifier.scenarios.humanoid.footsteps import footsteps
-from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
-from noiseclassifier.scenarios.humanoid.walking import centre_of_mass, walk
-from noiseclassifier.scenarios.motions import Walk
+from noiseclassifier.scenarios.humanoid_plan import footsteps, walk
+from noiseclassifier.scenarios.motions import TICK, Walk
+from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.world import centre_of_mass
+
+G1 = WIDE["g1"]
+TALOS = WIDE["talos"]
 
 WAYS = ("straight", "curve", "directions", "spot")
 DURATION = 8.0

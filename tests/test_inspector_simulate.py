@@ -15,9 +15,9 @@ import pytest
 from inspector.cli import main
 from inspector.training.recordings import recordings
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios import formats
-from noiseclassifier.scenarios.sample import Sample, is_sample
-from noisemodel import Block, Run
+from noiseclassifier.scenarios import dataset
+from noiseclassifier.scenarios.simulation import digest, look_up
+from noisemodel import Block, Run, decimated
 
 ROOT = Path(__file__).parents[1]
 JOINTS = scenarios.ROBOTS["panda"].drives.joints
@@ -43,14 +43,14 @@ def simulated(monkeypatch):
     calls, falls = [], set()
 
     def simulate(robot, scenario, seed, *, duration=None):
-        line, _ = scenarios.simulation.look_up(robot, scenario)
+        line, _ = look_up(robot, scenario)
         calls.append((robot, line.name, seed))
         if (line.name, seed) in falls:
             raise scenarios.SimulationError(robot, line.name, seed, 1.25, "it fell")
         return stub(robot, line.name, seed, duration or 7.0)
 
     simulate.calls, simulate.falls = calls, falls
-    monkeypatch.setattr(formats, "simulate", simulate)
+    monkeypatch.setattr(dataset, "simulate", simulate)
     monkeypatch.setattr(scenarios, "simulate", simulate)
     return simulate
 
@@ -67,10 +67,10 @@ def stub(robot: str, scenario: str, seed: int, duration: float) -> Run:
         joint_names=JOINTS,
         velocity=speed,
         position=speed,
-        velocity_desired=speed,
+        velocity_desired=np.ones_like(speed),
         robot="panda",
         blocks=(Block(0.0, 1.0, "ok"), Block(1.0, 2.0, "oscillations")),
-        meta={"scenario": scenario, "seed": seed, "duration": duration},
+        meta={"scenario": scenario, "seed": seed, "duration": duration, "events": []},
     )
 
 
@@ -136,16 +136,6 @@ def test_hours_of_ok_motion_are_reached_in_spite_of_falls(inspector, simulated, 
     assert upright["curve"] == {"upright": 5, "runs": 6}
 
 
-def test_the_format_of_noisytest_names_its_missing_classes(inspector, simulated, tmp_path):
-    status, _, err = inspector(
-        *many("--seeds", 4, "--scenarios", 1, "--format", "noisytest", "-o", tmp_path)
-    )
-    assert status == 0
-    assert err == "NoisyTest cannot train without blocks of impact, highaccelerations\n"
-    assert (tmp_path / "noisytest-config.json").exists()
-    assert len(list(recordings([tmp_path / "training"], 10_000.0))) == 3
-
-
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
@@ -182,13 +172,13 @@ def test_wrong_outputs_are_one_line(inspector, simulated, tmp_path):
     assert (tmp_path / "file").read_text() == "precious"
 
 
-def test_a_damaged_sample_is_named_and_replaced_with_overwrite(inspector, simulated, tmp_path):
+def test_a_damaged_run_is_named_and_replaced_with_overwrite(inspector, simulated, tmp_path):
     call = many("--seeds", 2, "--scenarios", 1, "-o", tmp_path)
     inspector(*call)
     (tmp_path / "panda/straight-001.npz").write_bytes(b"PK")
     status, _, err = inspector(*call)
     assert (status, err.count("\n")) == (3, 1)
-    assert "straight-001.npz: not a sample, or truncated" in err
+    assert "straight-001.npz: not a run file" in err
     status, out, _ = inspector(*call, "--overwrite")
     assert status == 0
     assert "2 runs" in out
@@ -204,7 +194,7 @@ def test_without_the_simulator_one_line_names_what_to_install(inspector, tmp_pat
     assert not (tmp_path / "r.npz").exists()
 
 
-def test_a_model_is_trained_on_a_folder_of_samples(inspector, simulated, tmp_path):
+def test_a_model_is_trained_on_a_folder_of_runs(inspector, simulated, tmp_path):
     data, model = tmp_path / "data", tmp_path / "m.npz"
     inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
     status, out, _ = inspector("train", data, "-o", model, "--profile", "norms")
@@ -219,11 +209,11 @@ def test_a_model_is_trained_on_a_folder_of_samples(inspector, simulated, tmp_pat
     assert np.array(json.loads(out)["confusion"]).sum() == 2 * 7
 
 
-def test_a_sample_without_a_block_is_skipped(simulated, inspector, tmp_path):
+def test_a_run_without_a_block_is_skipped(simulated, inspector, tmp_path):
     data, model = tmp_path / "data", tmp_path / "m.npz"
     inspector(*many("--seeds", 3, "--scenarios", "1", "-o", data))
     one = data / "panda/straight-002.npz"
-    replace(Sample.load(one), blocks=()).save(one, overwrite=True)
+    replace(Run.load(one), blocks=()).save(one, overwrite=True)
     status, out, _ = inspector("train", data, "-o", model, "--profile", "norms")
     assert (status, "Subset accuracy" in out) == (0, True)
     status, out, _ = inspector("evaluate", model, data / "panda", "--json", "--seen-too")
@@ -231,23 +221,19 @@ def test_a_sample_without_a_block_is_skipped(simulated, inspector, tmp_path):
     assert (status, found["runs"], np.array(found["confusion"]).sum()) == (0, 3, 2 * 2 * 7)
 
 
-def test_samples_and_their_runs_have_equal_signals(simulated, inspector, tmp_path):
-    inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
-    stub("panda", "straight", 0, 7.0).save(tmp_path / "run.npz")
-    sample, run = recordings([tmp_path / "data", tmp_path / "run.npz"], 10_000.0)
-    for name, norm in sample.signal.items():
-        np.testing.assert_allclose(norm, run.signal[name], rtol=2e-7)
-    assert sample.blocks == run.blocks
-    assert sample.name == "panda/straight-000"
-    assert sample.sha256 == Sample.load(tmp_path / "data/panda/straight-000.npz").meta["sha256"]
-
-
-def test_samples_cannot_be_decimated_to_another_rate(simulated, inspector, tmp_path):
-    inspector(*many("--seeds", 1, "--scenarios", "1", "-o", tmp_path / "data"))
-    call = ("train", tmp_path / "data", "--rate", 500, "-o", tmp_path / "m.npz")
-    status, _, err = inspector(*call, "--profile", "norms")
-    assert (status, err.count("\n")) == (3, 1)
-    assert "keeps its noise at 10000 Hz and 1000 Hz and no velocities" in err
+def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, inspector, tmp_path):
+    run = stub("panda", "straight", 0, 7.0)
+    for rate in (10_000, 1000):
+        data = tmp_path / str(rate)
+        inspector(*many("--seeds", 1, "--scenarios", "1", "--rate", rate, "-o", data))
+        kept = Run.load(data / "panda/straight-000.npz")
+        wanted = decimated(run, rate) if rate < run.rate else run
+        np.testing.assert_allclose(kept.velocity, wanted.velocity, rtol=1e-6)
+        assert kept.velocity.dtype == np.float32
+        assert kept.rate == pytest.approx(rate)
+        assert kept.meta["sha256"] == digest(run)
+        (recording,) = recordings([data], rate)
+        assert recording.name == "panda/straight-000"
 
 
 @pytest.mark.slow
@@ -267,7 +253,7 @@ def test_a_data_set_that_is_killed_resumes(tmp_path):
     killed.wait(timeout=60)
     there = {path: path.stat().st_mtime_ns for path in data.glob("panda/*.npz")}
     assert 1 <= len(there) < 4
-    assert all(is_sample(path) and Sample.load(path) for path in there)
+    assert all(Run.load(path) for path in there)
     done = subprocess.run(call, capture_output=True, check=True, timeout=300, **settings)
     upright = json.loads(done.stdout)["upright"]["panda"]
     assert all(runs == {"upright": 1, "runs": 1} for runs in upright.values())

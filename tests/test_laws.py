@@ -24,7 +24,7 @@ from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
 from noiseclassifier import scenarios
 from noiseclassifier.faults import KINDS, fault
-from noiseclassifier.scenarios.domains.added import LEVELS
+from noiseclassifier.scenarios.logs import LEVELS
 
 FLOOR = 0.3
 """Level from which the law holds, as a root mean square in [rad/s]: ten times what the labelling

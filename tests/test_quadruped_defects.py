@@ -3,20 +3,27 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.defects import Obstacles, Scaled, SensorJumps, StepDown
+from noiseclassifier.scenarios.faults import Obstacles, Scaled, SensorJumps, StepDown
 from noiseclassifier.scenarios.motions import Trot
-from noiseclassifier.scenarios.quadruped import scene
-from noiseclassifier.scenarios.quadruped.cases import QUADRUPED
-from noiseclassifier.scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
+from noiseclassifier.scenarios.quadruped import plan as planned
+from noiseclassifier.scenarios.robots import WIDE
 from noiseclassifier.scenarios.table import SCENARIOS
+
+QUADRUPED = {
+    name: each.cases["quadruped"] for name, each in SCENARIOS.items() if "quadruped" in each.cases
+}
+
+ANYMAL = WIDE["anymal"]
+GO2 = WIDE["go2"]
+SOLO12 = WIDE["solo12"]
 
 
 def plan(robot=GO2, seed=2, **motion):
-    return scene.plan(robot, Trot(**motion), np.random.default_rng(seed), 5.0)
+    return planned(robot, Trot(**motion), np.random.default_rng(seed), 5.0)
 
 
 def test_quadrupeds_have_every_scenario_of_the_table():
-    assert set(SCENARIOS) == set(QUADRUPED)
+    assert set(SCENARIOS) == {n for n, each in SCENARIOS.items() if "quadruped" in each.cases}
 
 
 @pytest.mark.parametrize("robot", [GO2, SOLO12, ANYMAL])

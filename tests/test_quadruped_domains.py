@@ -4,25 +4,42 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios import drives, simulation
-from noiseclassifier.scenarios.case import Case
-from noiseclassifier.scenarios.errors import DivergedError, UnknownGaitError
+from noiseclassifier.scenarios import simulation
+from noiseclassifier.scenarios.domains import (
+    GAITS,
+    QUADRUPED_LIMITS,
+    QUICK,
+    quadruped_motion,
+    steady,
+)
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.errors import DivergedError, ScenarioError
+from noiseclassifier.scenarios.faults import NO_DEFECT, ON_DRIVES
 from noiseclassifier.scenarios.motions import Trot
-from noiseclassifier.scenarios.quadruped import domains, scene
-from noiseclassifier.scenarios.quadruped.posing import SHIFT, TILT, poses
-from noiseclassifier.scenarios.quadruped.robots import A1, ANYMAL_C, GO2, HYQ, QUADRUPEDS
-from noiseclassifier.scenarios.quadruped.standing import GRAVITY, stand
-from noiseclassifier.scenarios.reduced import reduced_model
+from noiseclassifier.scenarios.quadruped import plan as planned
+from noiseclassifier.scenarios.quadruped_plan import SHIFT, TILT, poses, stand
+from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.simulation import Start, _trial
+from noiseclassifier.scenarios.table import FAULTS
+from noiseclassifier.scenarios.world import GRAVITY, reduced_model
+
+OWN = {n: each for n, each in FAULTS["quadruped"].items() if n not in ON_DRIVES}
+
+A1 = WIDE["a1"]
+ANYMAL_C = WIDE["anymal_c"]
+GO2 = WIDE["go2"]
+HYQ = WIDE["hyq"]
+QUADRUPEDS = tuple(robot for robot in WIDE.values() if robot.family == "quadruped")
 
 SIMILAR = [robot for robot in QUADRUPEDS if robot.name not in ("go2", "solo12", "anymal")]
 
 
 def plan(robot=GO2, seed=1, duration=5.0, **motion):
-    return scene.plan(robot, Trot(**motion), np.random.default_rng(seed), duration)
+    return planned(robot, Trot(**motion), np.random.default_rng(seed), duration)
 
 
 def run(robot, motion, seed=1, duration=3.0):
-    return simulation._trial(robot, Case(motion), seed, duration)
+    return _trial(Start(robot.name, seed, motion), NO_DEFECT, duration)
 
 
 def upright(trial):
@@ -74,11 +91,11 @@ def test_a_target_robot_walks_upright_and_where_it_is_planned(robot, gait):
     motion = Trot(gait=gait)
     trial = run(robot, motion)
     assert upright(trial)
-    assert trial.events == ()
+    assert (*trial.events, *trial.contacts) == ()
     rng = np.random.default_rng(np.random.SeedSequence(1).spawn(1)[0])
-    planned = scene.plan(robot, motion, rng, 3.0)
+    way_of = planned(robot, motion, rng, 3.0)
     way = trial.motion.base_pose[::10, :2] - trial.motion.base_pose[0, :2]
-    assert np.abs(way - planned.centre[:, :2]).max() < 0.12 * planned.size
+    assert np.abs(way - way_of.centre[:, :2]).max() < 0.12 * way_of.size
     speeds = touchdowns(trial, robot)
     assert len(speeds) >= 4
     assert max(speeds) < 1.5  # m/s; a foot that falls from its lift lands at 1 m/s
@@ -110,7 +127,7 @@ def test_a_standing_robot_lifts_no_foot_and_moves_its_body():
 
 
 def test_an_unknown_gait_is_refused():
-    with pytest.raises(UnknownGaitError, match="no gait 'gallop'; there are trot, walk, pace, bo"):
+    with pytest.raises(ScenarioError, match="no gait 'gallop'; there are trot, walk, pace, bo"):
         plan(gait="gallop")
 
 
@@ -135,12 +152,12 @@ def test_a_pause_is_without_steps_and_a_short_run_has_none():
 
 
 def test_a_robot_of_another_size_is_similar():
-    large = domains.scaled(GO2, 1.15)
+    large = GO2.scaled(1.15)
     one, other = stand(GO2), stand(large)
     assert other.height == pytest.approx(1.15 * one.height)
     assert other.weight == pytest.approx(one.weight)
     np.testing.assert_allclose(other.feet, 1.15 * one.feet, atol=1e-9)
-    small, model = reduced_model(domains.scaled(GO2, 0.85)), reduced_model(GO2)
+    small, model = reduced_model(GO2.scaled(0.85)), reduced_model(GO2)
     turned = pin.neutral(model)
     turned[7:] = one.configuration[7:]
     inertia = [pin.crba(m, m.createData(), turned)[3:6, 3:6] for m in (small, model)]
@@ -149,9 +166,9 @@ def test_a_robot_of_another_size_is_similar():
 
 def test_motions_of_the_domain_are_wider_the_wilder():
     rng = np.random.default_rng(0)
-    mild = [domains.motion(rng, 0.0) for _ in range(200)]
-    wild = [domains.motion(rng, 1.0) for _ in range(200)]
-    assert {motion.gait for motion in wild} == set(domains.GAITS)
+    mild = [quadruped_motion(rng, 0.0) for _ in range(200)]
+    wild = [quadruped_motion(rng, 1.0) for _ in range(200)]
+    assert {motion.gait for motion in wild} == set(GAITS)
     assert {motion.pauses for motion in mild} == {0}
     assert {motion.pauses for motion in wild} == {0, 1, 2}
     for name in ("period", "height"):
@@ -159,40 +176,40 @@ def test_motions_of_the_domain_are_wider_the_wilder():
         assert np.ptp(narrow) < 0.21 < 0.5 < np.ptp(wide)
     periods = [GO2.period * motion.period[0] for motion in wild]
     assert min(periods) < 0.35
-    assert domains.motion(np.random.default_rng(3), 0.5) == domains.motion(
+    assert quadruped_motion(np.random.default_rng(3), 0.5) == quadruped_motion(
         np.random.default_rng(3), 0.5
     )
 
 
 def test_steps_on_soft_drives_are_quick_trots_or_walks():
     for gait, wanted in (("trot", "trot"), ("pace", "trot"), ("walk", "walk")):
-        quick = domains.QUICK[wanted]
-        assert domains.steady(Trot(gait=gait)) == Trot(gait=wanted, period=(quick, quick))
-    assert domains.steady(Trot(gait="stand")) == Trot(gait="stand")
+        quick = QUICK[wanted]
+        assert steady(Trot(gait=gait)) == Trot(gait=wanted, period=(quick, quick))
+    assert steady(Trot(gait="stand")) == Trot(gait="stand")
     fast = Trot(period=(0.5, 0.6))
-    assert domains.steady(fast) == fast
+    assert steady(fast) == fast
 
 
-@pytest.mark.parametrize("name", domains.DEFECTS)
+@pytest.mark.parametrize("name", OWN)
 def test_a_defect_can_be_drawn_for_every_motion(name):
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        motion = domains.motion(rng, seed / 11)
-        planned = scene.plan(ANYMAL_C, motion, rng, 3.0)
-        faults = domains.DEFECTS[name].draw(rng, planned)
+        motion = quadruped_motion(rng, seed / 11)
+        steps = planned(ANYMAL_C, motion, rng, 3.0)
+        faults = OWN[name].draw(rng, steps)
         assert all(event.start < event.stop for event in faults.events)
-        lift = np.ptp(planned.feet[..., 2])
+        lift = np.ptp(steps.feet[..., 2])
         assert all(box.top <= 0.65 * lift for box in faults.boxes)
 
 
 @pytest.mark.parametrize("name", ["obstacle-full", "platform", "force-jump"])
 def test_a_defect_of_steps_draws_nothing_where_the_robot_stands(name):
-    faults = domains.DEFECTS[name].draw(np.random.default_rng(1), plan(gait="stand"))
+    faults = OWN[name].draw(np.random.default_rng(1), plan(gait="stand"))
     assert (faults.boxes, faults.ground, faults.events) == ((), None, ())
 
 
 def test_a_step_down_is_not_drawn_for_a_robot_on_the_spot():
-    step = domains.DEFECTS["platform"]
+    step = OWN["platform"]
     assert step.draw(np.random.default_rng(1), plan(way="spot")).ground is None
     assert step.draw(np.random.default_rng(1), plan(way="straight")).ground is not None
 
@@ -200,15 +217,12 @@ def test_a_step_down_is_not_drawn_for_a_robot_on_the_spot():
 def soften(monkeypatch, **scales):
     """Replace the drives by soft ones that hold targets, with a delay."""
 
-    class Soft(drives.Drives):
-        def __init__(self, start, *, stiffness, damping, **others):
+    class Soft(Drives):
+        def __init__(self, start, **others):
             self._targets, self._number = (), 0
-            super().__init__(
-                start,
-                stiffness=scales["stiffness"] * stiffness,
-                damping=scales["damping"] * damping,
-                **others,
-            )
+            super().__init__(start, **others)
+            self._stiffness = scales["stiffness"] * self._stiffness
+            self._damping = scales["damping"] * self._damping
 
         def torque(self, position, velocity, desired, rate, feedforward):
             if self._number % round(scales["hold"] * 1e4) == 0:
@@ -216,11 +230,11 @@ def soften(monkeypatch, **scales):
             self._number += 1
             return super().torque(position, velocity, *self._targets)
 
-    monkeypatch.setattr(drives, "Drives", Soft)
+    monkeypatch.setattr(simulation, "Drives", Soft)
 
 
 def at_the_limits(robot, monkeypatch, gait):
-    limits = domains.LIMITS
+    limits = QUADRUPED_LIMITS
     soften(
         monkeypatch,
         stiffness=limits.stiffness[0],
@@ -228,7 +242,7 @@ def at_the_limits(robot, monkeypatch, gait):
         hold=limits.hold,
         feedforward=limits.feedforward,
     )
-    return run(robot, domains.steady(Trot(gait=gait)))
+    return run(robot, steady(Trot(gait=gait)))
 
 
 def test_go2_trots_on_the_softest_drives(monkeypatch):

@@ -5,11 +5,26 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.clock import TICK, times
-from noiseclassifier.scenarios.quadruped import steps
-from noiseclassifier.scenarios.quadruped.gait import GAITS, TROT, beats, loads, swings
-from noiseclassifier.scenarios.quadruped.robots import GO2
-from noiseclassifier.scenarios.quadruped.steering import CHANGE, steer
+from noiseclassifier.scenarios.motions import TICK, times
+from noiseclassifier.scenarios.quadruped_plan import (
+    ACROSS,
+    CHANGE,
+    GAITS,
+    LANDING,
+    NEAR,
+    TOP,
+    TROT,
+    beats,
+    footholds,
+    height_of,
+    loads,
+    progress_of,
+    steer,
+    swings,
+)
+from noiseclassifier.scenarios.robots import WIDE
+
+GO2 = WIDE["go2"]
 
 TIME = times(6000, TICK)
 
@@ -49,26 +64,26 @@ def test_the_feet_share_the_weight_and_feet_in_the_air_bear_none(timing):
 
 def test_a_foot_goes_up_and_comes_down_softly():
     share = np.linspace(0, 1, 10001)
-    height = steps.height(share)
+    height = height_of(share)
     slope = np.gradient(height, share)
     assert height[[0, -1]] == pytest.approx([0, 0], abs=1e-12)
     assert height.max() == pytest.approx(1, abs=1e-12)
-    assert np.argmax(height) == pytest.approx(steps.TOP * 10000, abs=1)
-    assert slope[-1] == pytest.approx(-steps.LANDING / (1 - steps.TOP), rel=1e-2)
+    assert np.argmax(height) == pytest.approx(TOP * 10000, abs=1)
+    assert slope[-1] == pytest.approx(-LANDING / (1 - TOP), rel=1e-2)
     assert slope.min() < 10 * slope[-1]
     assert np.abs(np.diff(slope)).max() < 0.01
 
 
 def test_a_foot_is_over_its_place_before_it_may_touch():
-    assert steps.progress(np.array([0.0, steps.ACROSS, 1.0])) == pytest.approx([0, 1, 1])
-    assert steps.height(np.array([steps.NEAR]))[0] < 0.35
+    assert progress_of(np.array([0.0, ACROSS, 1.0])) == pytest.approx([0, 1, 1])
+    assert height_of(np.array([NEAR]))[0] < 0.35
 
 
 def test_feet_come_down_at_the_neutral_point(timing):
     speed, hip = 0.4, np.array([0.2, 0.1])
     way = np.column_stack((speed * TIME, np.zeros_like(TIME)))
     own = [beat for beat in timing if beat.group == 0]
-    places = steps.footholds(own, hip, way=way, yaw=np.zeros_like(TIME), stop=6.0 - TICK)
+    places = footholds(own, hip, way=way, yaw=np.zeros_like(TIME), stop=6.0 - TICK)
     assert places[0] == (*hip, 0.0)
     for (beat, following), place in zip(pairwise(own), places[1:-1], strict=True):
         standing = following.lift - beat.touch  # Raibert: half a stance ahead of the hip
@@ -80,7 +95,7 @@ def test_feet_come_down_at_the_neutral_point(timing):
 def test_feet_turn_with_the_body(timing):
     yaw = 0.3 * TIME
     own = [beat for beat in timing if beat.group == 1]
-    places = steps.footholds(own, np.array([0.2, 0.1]), way=np.zeros((6000, 2)), yaw=yaw, stop=5.5)
+    places = footholds(own, np.array([0.2, 0.1]), way=np.zeros((6000, 2)), yaw=yaw, stop=5.5)
     for place in places:
         turned = (0.2 + 0.1j) * np.exp(1j * place.yaw)
         assert (place.x, place.y) == pytest.approx((turned.real, turned.imag))

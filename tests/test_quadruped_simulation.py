@@ -6,18 +6,24 @@ import pinocchio as pin
 import pytest
 
 from noiseclassifier import scenarios
-from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.case import Case
-from noiseclassifier.scenarios.faults import Faults
-from noiseclassifier.scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.faults import NO_DEFECT, Faults, Imperfections
 from noiseclassifier.scenarios.labels import annotate
 from noiseclassifier.scenarios.motions import Trot
-from noiseclassifier.scenarios.quadruped import scene
-from noiseclassifier.scenarios.quadruped.cases import QUADRUPED
-from noiseclassifier.scenarios.quadruped.robots import ANYMAL, GO2, SOLO12
-from noiseclassifier.scenarios.quadruped.standing import stand
-from noiseclassifier.scenarios.reduced import reduced_model
-from noiseclassifier.scenarios.sensing import sensors_of
+from noiseclassifier.scenarios.quadruped import bodies, scene
+from noiseclassifier.scenarios.quadruped import plan as planned
+from noiseclassifier.scenarios.quadruped_plan import stand
+from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.simulation import Start, _trial
+from noiseclassifier.scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.world import reduced_model, sensors_of
+
+QUADRUPED = {
+    name: each.cases["quadruped"] for name, each in SCENARIOS.items() if "quadruped" in each.cases
+}
+
+ANYMAL = WIDE["anymal"]
+GO2 = WIDE["go2"]
+SOLO12 = WIDE["solo12"]
 
 SHORT = 3.0
 SEED = 2
@@ -39,15 +45,15 @@ FAILURE = {
 def trot():
     """A healthy trot of Go2, and its plan."""
     rng = np.random.default_rng(np.random.SeedSequence(SEED).spawn(1)[0])
-    plan = scene.plan(GO2, Trot(), rng, SHORT)
-    return simulation._trial(GO2, Case(Trot()), SEED, SHORT), plan
+    plan = planned(GO2, Trot(), rng, SHORT)
+    return _trial(Start("go2", SEED, Trot()), NO_DEFECT, SHORT), plan
 
 
 @pytest.fixture(scope="module")
 def stumble():
     """The same trot over an obstacle."""
     case = QUADRUPED["obstacle-full"]
-    return simulation._trial(GO2, case, SEED, SHORT)
+    return _trial(Start("go2", SEED, case.motion), case.defect, SHORT)
 
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
@@ -64,7 +70,7 @@ def test_a_robot_stands_with_its_mass_over_the_middle_of_its_feet(robot):
 
 @pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 def test_a_trot_begins_as_it_stands_and_never_steps_beyond_its_legs(robot):
-    plan = scene.plan(robot, Trot(way="curve"), np.random.default_rng(1), 5.0)
+    plan = planned(robot, Trot(way="curve"), np.random.default_rng(1), 5.0)
     standing = stand(robot)
     np.testing.assert_allclose(plan.feet[0], standing.feet, atol=1e-12)
     np.testing.assert_allclose(plan.centre[0], [0, 0, standing.height], atol=1e-12)
@@ -75,7 +81,7 @@ def test_a_trot_begins_as_it_stands_and_never_steps_beyond_its_legs(robot):
 
 
 def test_the_beginning_of_a_trot_does_not_depend_on_its_duration():
-    long, short = (scene.plan(GO2, Trot(), np.random.default_rng(7), end) for end in (6.0, 4.0))
+    long, short = (planned(GO2, Trot(), np.random.default_rng(7), end) for end in (6.0, 4.0))
     np.testing.assert_array_equal(long.feet[:2000], short.feet[:2000])
 
 
@@ -121,7 +127,7 @@ def test_mujoco_and_pinocchio_agree_on_where_and_how_fast_the_feet_are(trot):
     motion, model = trial.motion, reduced_model(GO2)
     perfect = Imperfections.draw(np.random.default_rng(0), 12, bodies=13, payload=0.0, force=0.0)
     perfect = type(perfect)(**{**vars(perfect), "mass": (1.0,) * 13, "payload": 0.0})
-    built = scene.scene(GO2, plan, Faults(), perfect).model
+    built = scene(GO2, plan, Faults(), perfect).model
     theirs, ours, where = mujoco.MjData(built), model.createData(), sensors_of(built)
     for sample in range(0, len(motion.position), 1499):
         pose, velocity = motion.base_pose[sample], motion.base_velocity[sample]
@@ -151,7 +157,7 @@ def test_mujoco_and_pinocchio_agree_on_where_and_how_fast_the_feet_are(trot):
 
 def test_an_obstacle_is_an_impact_and_the_run_is_healthy_before(trot, stumble):
     healthy, _ = trot
-    first = stumble.events[0]
+    first = stumble.contacts[0]
     assert first.label == "impact"
     assert first.facts["force"] > 100
     assert first.facts["effector"] in range(4)
@@ -160,17 +166,17 @@ def test_an_obstacle_is_an_impact_and_the_run_is_healthy_before(trot, stumble):
         stumble.motion.velocity[:before], healthy.motion.velocity[:before]
     )
     blocks, _ = annotate(
-        stumble.motion.velocity, healthy.motion.velocity, stumble.events, rate=10000
+        stumble.motion.velocity, healthy.motion.velocity, stumble.contacts, rate=10000
     )
     assert {"ok", "impact"} <= {block.label for block in blocks}
 
 
 def test_a_robot_that_lies_or_leans_has_fallen():
-    plan = scene.plan(GO2, Trot(), np.random.default_rng(1), SHORT)
+    plan = planned(GO2, Trot(), np.random.default_rng(1), SHORT)
     perfect = Imperfections.draw(
-        np.random.default_rng(0), 12, bodies=scene.bodies(GO2), payload=0.0, force=0.0
+        np.random.default_rng(0), 12, bodies=bodies(GO2), payload=0.0, force=0.0
     )
-    ready = scene.scene(GO2, plan, Faults(), perfect)
+    ready = scene(GO2, plan, Faults(), perfect)
     where = sensors_of(ready.model)
     for height, tilt, fallen in ((0.3, 0.0, False), (0.1, 0.0, True), (0.3, 0.9, True)):
         sensors = np.zeros(ready.model.nsensordata)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.arm.cases import ARM
-from noiseclassifier.scenarios.arm.picking import pick
-from noiseclassifier.scenarios.defects import (
+from noiseclassifier.scenarios.arm import pick
+from noiseclassifier.scenarios.faults import (
     Decalibration,
     ForceGain,
     GivingWay,
@@ -14,11 +13,15 @@ from noiseclassifier.scenarios.defects import (
     Obstacles,
     ReferenceJumps,
     SensorJumps,
+    pulses,
+    ramps,
+    sines,
+    step,
 )
-from noiseclassifier.scenarios.faults import pulses, ramps, sines, step
-from noiseclassifier.scenarios.motions import Picks
-from noiseclassifier.scenarios.shapes import Rod
+from noiseclassifier.scenarios.motions import Picks, Rod
 from noiseclassifier.scenarios.table import SCENARIOS
+
+ARM = {name: each.cases["arm"] for name, each in SCENARIOS.items() if "arm" in each.cases}
 
 TIME = np.arange(70_000) * 1e-4
 

@@ -3,12 +3,24 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.arm.control import ToolControl
-from noiseclassifier.scenarios.arm.picking import Plan
-from noiseclassifier.scenarios.arm.robots import PANDA
-from noiseclassifier.scenarios.clock import STEP, TICK
+from noiseclassifier.scenarios.arm import Plan, ToolControl
 from noiseclassifier.scenarios.drives import Drives
-from noiseclassifier.scenarios.imperfections import Imperfections, real_model
+from noiseclassifier.scenarios.faults import Imperfections
+from noiseclassifier.scenarios.motions import STEP, TICK
+from noiseclassifier.scenarios.robots import WIDE, Drivetrain
+from noiseclassifier.scenarios.world import real_model
+
+ONE = Drivetrain(
+    joints=("elbow",),
+    stiffness=(100.0,),
+    damping=(2.0,),
+    torque=(5.0,),
+    armature=(0.0,),
+    friction=(0.0,),
+    viscous=(0.0,),
+)
+
+PANDA = WIDE["panda"]
 
 
 def imperfections(**changes: float) -> Imperfections:
@@ -32,12 +44,9 @@ def imperfections(**changes: float) -> Imperfections:
 def drives(offset: float = 0.0, **changes: float) -> Drives:
     return Drives(
         np.zeros(1),
-        stiffness=np.array([100.0]),
-        damping=np.array([2.0]),
-        limit=np.array([5.0]),
+        drivetrain=ONE,
         offset=np.array([offset]),
         imperfections=imperfections(**changes),
-        step=STEP,
     )
 
 
@@ -98,7 +107,7 @@ def test_a_robot_has_the_mass_of_its_imperfections():
 
 
 def tool_control(plan: Plan) -> tuple[ToolControl, object]:
-    from noiseclassifier.scenarios.reduced import reduced_model
+    from noiseclassifier.scenarios.world import reduced_model
 
     model = reduced_model(PANDA)
     control = ToolControl(

@@ -5,8 +5,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.events import Event
 from noiseclassifier.scenarios.labels import annotate, deviation
+from noiseclassifier.scenarios.motions import Event
 
 RATE = 10_000
 TIME = np.arange(4 * RATE) / RATE

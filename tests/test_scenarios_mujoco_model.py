@@ -5,13 +5,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios.collision import box_changes, set_collision
-from noiseclassifier.scenarios.errors import UnsupportedModelError
-from noiseclassifier.scenarios.floatingbase import pinocchio_base
-from noiseclassifier.scenarios.mujoco_model import build
-from noiseclassifier.scenarios.physics import Physics
-from noiseclassifier.scenarios.sensing import sensors_of
-from noiseclassifier.scenarios.shapes import Ball, Box, Rod, Sole
+from noiseclassifier.scenarios.errors import ScenarioError
+from noiseclassifier.scenarios.motions import Ball, Box, Rod, Sole
+from noiseclassifier.scenarios.world import (
+    Physics,
+    box_changes,
+    build,
+    pinocchio_base,
+    sensors_of,
+    set_collision,
+)
 from noisemodel import Robot
 
 ODD = """<robot name="odd"><link name="base"/>
@@ -204,14 +207,12 @@ def test_boxes_appear_and_vanish():
 
 def test_an_effector_without_its_frame_is_refused_with_the_known_frames():
     model = pin.buildModelFromXML(ODD)
-    with pytest.raises(
-        UnsupportedModelError, match="no frame 'sole' for an effector; it has .*slide"
-    ):
+    with pytest.raises(ScenarioError, match="no frame 'sole' for an effector; it has .*slide"):
         build(model, physics(model.nv), effectors=(Ball("sole", radius=0.01),))
 
 
 def test_a_body_without_mass_is_refused():
     model = pin.buildModelFromXML(ODD)
     model.inertias[2] = pin.Inertia.Zero()
-    with pytest.raises(UnsupportedModelError, match="MuJoCo refuses the robot: .*slide"):
+    with pytest.raises(ScenarioError, match="MuJoCo refuses the robot: .*slide"):
         build(model, physics(model.nv))

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.arm.picking import Plan, pick
-from noiseclassifier.scenarios.clock import TICK
-from noiseclassifier.scenarios.motions import Picks
-from noiseclassifier.scenarios.paths import bump, minimum_jerk
-from noiseclassifier.scenarios.shapes import Rod
+from noiseclassifier.scenarios.arm import Plan, pick
+from noiseclassifier.scenarios.motions import TICK, Picks, Rod, bump, minimum_jerk
 
 START = np.array([0.46, 0.0, 0.43])
 REACH = ((0.4, 0.58), (-0.2, 0.2))

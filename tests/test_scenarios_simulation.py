@@ -10,10 +10,10 @@ import pytest
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import simulation
-from noiseclassifier.scenarios.case import Case
-from noiseclassifier.scenarios.defects import Multisine, Obstacles
+from noiseclassifier.scenarios.faults import Multisine, Obstacles
 from noiseclassifier.scenarios.labels import deviation
 from noiseclassifier.scenarios.motions import Picks
+from noiseclassifier.scenarios.table import Case
 from noisemodel import Run
 
 SEEDS = (5, 10)
@@ -221,12 +221,12 @@ def test_a_run_that_diverges_is_refused(monkeypatch, tmp_path):
 
 def test_unknown_names_are_refused_with_the_known_ones():
     with pytest.raises(
-        scenarios.UnknownScenarioError,
+        scenarios.ScenarioError,
         match=r"no scenario 'sport' \(did you mean 'spot'\?\); there are straight, curve",
     ):
         scenarios.simulate("panda", "sport", 0)
     with pytest.raises(
-        scenarios.UnsimulatedRobotError,
+        scenarios.ScenarioError,
         match="robot 'baxter' cannot be simulated; there are .*panda",
     ):
         scenarios.simulate("baxter", "straight", 0)
@@ -236,7 +236,7 @@ def test_a_scenario_of_another_family_is_refused(monkeypatch):
     lame = replace(scenarios.SCENARIOS["straight"], name="lame", cases={})
     monkeypatch.setattr(simulation, "SCENARIOS", {**scenarios.SCENARIOS, "lame": lame})
     with pytest.raises(
-        scenarios.UnsuitedScenarioError,
+        scenarios.ScenarioError,
         match="scenario 'lame' does not exist for 'panda'; it has straight, curve",
     ):
         scenarios.simulate("panda", "lame", 0)
@@ -251,9 +251,7 @@ def test_numbers_out_of_range_are_refused():
 
 def test_without_mujoco_the_error_names_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "mujoco", None)
-    with pytest.raises(
-        scenarios.MissingSimulatorError, match=r"pip install 'noise-inspector\[sim\]'"
-    ):
+    with pytest.raises(scenarios.ScenarioError, match=r"pip install 'noise-inspector\[sim\]'"):
         scenarios.simulate("panda", "straight", 0)
 
 

@@ -4,11 +4,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from noiseclassifier.scenarios.errors import UnsupportedModelError
-from noiseclassifier.scenarios.humanoid.robots import G1, TALOS
-from noiseclassifier.scenarios.reduced import reduced_model
-from noiseclassifier.scenarios.shapes import Sole
-from noiseclassifier.scenarios.wholebody import WholeBody
+from noiseclassifier.scenarios.errors import ScenarioError
+from noiseclassifier.scenarios.motions import Sole
+from noiseclassifier.scenarios.robots import WIDE
+from noiseclassifier.scenarios.world import WholeBody, reduced_model
+
+G1 = WIDE["g1"]
+TALOS = WIDE["talos"]
 
 LEVEL = np.eye(3)
 
@@ -109,12 +111,12 @@ def test_the_torques_of_a_robot_that_stands_leave_nothing_for_its_base(robot):
 def test_too_many_joints_are_refused():
     model = pin.buildSampleModelHumanoidRandom()
     with pytest.raises(
-        UnsupportedModelError, match="1 effectors make 12 equations, the robot has .*; lock all"
+        ScenarioError, match="1 effectors make 12 equations, the robot has .*; lock all"
     ):
         WholeBody(model, [Sole("rleg6_body", (0.1, 0.05))], pin.neutral(model))
 
 
 def test_a_missing_frame_is_named():
     model = reduced_model(TALOS)
-    with pytest.raises(UnsupportedModelError, match="no frame 'paw' to stand on; it has .*sole"):
+    with pytest.raises(ScenarioError, match="no frame 'paw' to stand on; it has .*sole"):
         WholeBody(model, [Sole("paw", (0.1, 0.05))], pin.neutral(model))

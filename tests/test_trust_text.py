@@ -21,12 +21,9 @@ from inspector.text import counted, plain
 from inspector.training import tuningfile
 from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
-from noiseclassifier.scenarios import DatasetError, SampleError
-from noiseclassifier.scenarios import noisytest as simulated
-from noiseclassifier.scenarios.folder import Folder
-from noiseclassifier.scenarios.sample import Sample, is_sample
-from noiseclassifier.scenarios.signals import WHOLE
-from noisemodel import Block, Run
+from noiseclassifier.scenarios import DatasetError
+from noiseclassifier.scenarios.dataset import Folder
+from noisemodel import Run
 
 TIME = np.arange(40) / 100
 RUN = Run(time=TIME, velocity=np.ones((40, 1)), joint_names=("a",))
@@ -53,10 +50,9 @@ READERS = {
     "noisytest.toml": noisytest.read_annotations,
     "noisytest.log": nc.read_log,
     "noisytest-config.json": noisytest.profile_from_config,
-    "simulated.toml": simulated.read,
     "dataset.json": lambda path: Folder.opened(path.parent),
 }
-EXPECTED = (InspectorError, nc.ModelsError, DatasetError, SampleError)
+EXPECTED = (InspectorError, nc.ModelsError, DatasetError)
 
 
 @pytest.mark.parametrize("name", READERS)
@@ -111,7 +107,6 @@ def test_toml_that_takes_much_memory_or_stack_is_one_line(tmp_path, name, text):
 def test_keys_and_numbers_that_people_write_are_no_long_keys():
     text = "a.b.c = 1\nranges = [" + ", ".join(f"[{n}.0, {n}.5]" for n in range(5000)) + "]\n"
     assert jsontext.from_toml(text)["a"] == {"b": {"c": 1}}
-    assert simulated.LONG_KEY.search(text) is None
 
 
 @pytest.mark.parametrize("sign", ["", "-"])
@@ -191,52 +186,6 @@ def test_a_live_row_of_more_joints_than_a_run_may_have_is_refused(tmp_path):
         LiveSession(100.0, save=tmp_path / "a.rrd", library={}) as session,
     ):
         session.push(velocity=np.ones(100_000))
-
-
-META = {"scenario": "straight", "seed": 1, "duration": 0.4, "sha256": ""}
-
-
-def sample(**changes):
-    signals = {name: np.sin(TIME, dtype=np.float32) for name in WHOLE}
-    fields = {"robot": "panda", "rate": 100.0, "signals": signals, "decimated": {}, "meta": META}
-    return Sample(blocks=(Block(0.0, 0.4, "ok"),), **fields | changes)
-
-
-@pytest.mark.parametrize(
-    ("changes", "problem"),
-    [
-        ({"meta": META | {"seed": "1"}}, "scenario and seed"),
-        ({"meta": META | {"scenario": 1}}, "scenario and seed"),
-        ({"signals": dict.fromkeys(WHOLE, np.array(["a"] * 40))}, "no row of finite numbers"),
-        ({"signals": dict.fromkeys(WHOLE, np.full(40, np.nan))}, "no row of finite numbers"),
-        ({"signals": dict.fromkeys(WHOLE, np.ones((2, 2)))}, "no row of finite numbers"),
-    ],
-)
-def test_a_sample_of_other_contents_is_refused(tmp_path, changes, problem):
-    sample(**changes).save(tmp_path / "a.npz")
-    with pytest.raises(SampleError, match=problem):
-        Sample.load(tmp_path / "a.npz")
-
-
-def test_a_sample_without_the_noise_of_a_slower_logger_says_so(tmp_path):
-    fast = sample(rate=10_000.0, decimated={"measured": np.ones(4)})
-    with pytest.raises(ValueError, match="has no desired, error at 1000 Hz"):
-        fast.at(1000.0)
-
-
-def test_a_pipe_is_no_sample(tmp_path):
-    os.mkfifo(tmp_path / "a.npz")
-    assert not is_sample(tmp_path / "a.npz")
-
-
-@pytest.mark.parametrize("name", ["format", "robot", "meta"])
-def test_a_sample_whose_texts_are_arrays_is_refused_before_they_are_printed(tmp_path, name):
-    sample().save(tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as archive:
-        arrays = dict(archive) | {name: np.zeros((2,) * 20, dtype="u1")}
-    np.savez(tmp_path / "a.npz", **arrays)
-    with pytest.raises(SampleError, match=f"{name} is no text"):
-        Sample.load(tmp_path / "a.npz")
 
 
 def test_a_pipe_is_no_log_of_two_columns(tmp_path):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.elsewhere.faults import Push, Throw
-from noiseclassifier.scenarios.events import Event
+from noiseclassifier.scenarios.motions import Event
 from noisemodel.types import Array
 
 FLIGHT = 0.08

@@ -8,7 +8,7 @@ from typing import TypeAlias
 import numpy as np
 
 from benchmarks.elsewhere.references import Reference
-from noiseclassifier.scenarios.events import Event
+from noiseclassifier.scenarios.motions import Event
 from noisemodel.types import Array
 
 Range: TypeAlias = tuple[float, float]

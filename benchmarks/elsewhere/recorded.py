@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from noiseclassifier.scenarios.events import Event
+from noiseclassifier.scenarios.motions import Event
 from noisemodel.types import Array
 
 FASTEST = 60.0

@@ -33,12 +33,8 @@ from inspector.reference.store import Reference
 from inspector.training import tuningfile
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
-from noiseclassifier.scenarios import noisytest as simulated_noisytest
-from noiseclassifier.scenarios.folder import Folder
-from noiseclassifier.scenarios.sample import RECIPE, Sample
-from noiseclassifier.scenarios.signals import WHOLE
+from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.simulation import SHORTEST
-from noiseclassifier.scenarios.tasks import Task
 from noisemodel import meshes, runfile
 from noisemodel.surface import triangles
 
@@ -275,18 +271,6 @@ def _by_command(name: str, *arguments: str) -> Callable[[Path], Path]:
     return make
 
 
-def _sample(folder: Path) -> Path:
-    signal = {name: np.random.default_rng(0).normal(size=4000) for name in WHOLE}
-    meta = dict.fromkeys(RECIPE, 1) | {"duration": 4.0, "scenario": "own"}
-    blocks = (nm.Block(0.0, 4.0, "ok"),)
-    sample = Sample(
-        robot="panda", rate=1000.0, signals=signal, decimated={}, blocks=blocks, meta=meta
-    )
-    (folder / "data").mkdir()
-    sample.save(folder / "data" / "sample.npz")
-    return folder / "data" / "sample.npz"
-
-
 def _noisytest(folder: Path) -> Path:
     (folder / "data").mkdir()
     rows = np.column_stack((TIME, np.hypot(*VELOCITY.T)))
@@ -294,13 +278,6 @@ def _noisytest(folder: Path) -> Path:
     text = "[data]\nchunk_ranges = [[0.0, 0.5], [0.6, -1.0]]\nchunk_labels = ['ok', 'impact']\n"
     (folder / "data" / "a.toml").write_text(text)
     return folder / "data" / "a.toml"
-
-
-def _simulated(folder: Path) -> Path:
-    path = _noisytest(folder)
-    recipe = json.dumps(json.dumps({"duration": 2.0}))
-    path.write_text(f"{path.read_text()}\n[simulation]\nrecipe = {recipe}\n")
-    return path
 
 
 def _dataset(folder: Path) -> Path:
@@ -362,7 +339,7 @@ def _read_rows(path: Path) -> None:
     """Read rows as `inspector live` does, without a viewer."""
     head, _, rest = path.read_bytes().partition(b"\n")
     reader, is_header = feeding.reader_of(head, ())
-    for chunk, number, _ in input.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
+    for chunk, number, _ in feeding.chunks(BytesIO(rest if is_header else head + b"\n" + rest)):
         for _ in reader.read(chunk, number, lambda kind, line, count=1: None):
             pass
 
@@ -452,7 +429,6 @@ READERS: Mapping[str, Reader] = MappingProxyType(
             _read_model,
             WITH_MODEL,
         ),
-        "sample": Reader("arrays", _sample, Sample.load, EVALUATE),
         "labels, NoisyTest": _labels(
             "labels.toml",
             "[data]\nchunk_ranges = [[0.0, 0.5], [0.6, -1.0]]\nchunk_labels = ['ok', 'impact']\n",
@@ -559,12 +535,6 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         ),
         "NoisyTest, two columns": Reader(
             "text", lambda folder: _noisytest(folder).with_suffix(".log"), nc.read_log, CLASSIFY
-        ),
-        "simulated labels": Reader(
-            "text",
-            _simulated,
-            lambda path: simulated_noisytest.read(path.with_suffix(".log")),
-            EVALUATE,
         ),
         "dataset.json": Reader(
             "text",

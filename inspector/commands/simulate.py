@@ -1,8 +1,10 @@
 """`inspector simulate`: one simulated run, or a data set of them."""
 
+import json
+from collections import Counter
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from typer.core import TyperGroup
@@ -10,42 +12,16 @@ from typer.core import TyperGroup
 from inspector.commands.options import Dask, Overwrite, jobs_or_dask
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from noiseclassifier.scenarios import Scenario
+    from noiseclassifier.scenarios.dataset import Folder
 
 
 class OneRunUnlessNamed(TyperGroup):
     """A group of commands that calls ``run`` if no command is named."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Insert ``run``, unless the first argument is a command or ``--help``."""
-        named = not args or args[0] in (*self.commands, "--help")
+        """Insert ``run``, unless the first argument is a command or asks for help."""
+        named = not args or args[0] in (*self.commands, "--help", "-h")
         return super().parse_args(ctx, args if named else ["run", *args])
-
-
-app = typer.Typer(
-    cls=OneRunUnlessNamed,
-    no_args_is_help=True,
-    help="""Simulate labelled runs of robots with defects.
-
-    Needs the extra `sim`. The default command is `run`.
-    `inspector simulate --list` prints scenarios and robots.""",
-    epilog="Example: inspector simulate talos --scenario 7 --seed 1 -o run.npz",
-)
-
-
-class Only(StrEnum):
-    """The scenarios to keep."""
-
-    OK = "ok"
-
-
-class Form(StrEnum):
-    """The file formats of a data set."""
-
-    SAMPLES = "samples"
-    NOISYTEST = "noisytest"
 
 
 class Side(StrEnum):
@@ -57,22 +33,31 @@ class Side(StrEnum):
     LOGGER = "logger"
 
 
+app = typer.Typer(
+    cls=OneRunUnlessNamed,
+    no_args_is_help=True,
+    help="""Simulate labelled runs of robots with defects.
+
+    Needs the extra `sim`. The default command is `run`.
+    `inspector simulate --list` prints scenarios and robots.""",
+    epilog="Example: inspector simulate talos --scenario 7 --seed 1 -o run.npz",
+)
+List = Annotated[bool, typer.Option("--list", help="Print what there is, simulate nothing.")]
+To = Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")]
+Jobs = Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")]
+Seconds = Annotated[float | None, typer.Option(help="In seconds; by default that of the motion.")]
+Names = Annotated[str, typer.Option(help="Names of robots, talos,go2,panda; by default all.")]
+First = Annotated[int, typer.Option(help="The first random seed.")]
+
+
 @app.command(epilog="Example: inspector simulate run talos --scenario 7 --seed 1 -o run.npz")
 def run(
-    robot: Annotated[
-        str | None, typer.Argument(help="A robot that --list prints.", show_default=False)
-    ] = None,
+    robot: Annotated[str, typer.Argument(help="A robot that --list prints.")] = "",
     scenario: Annotated[str, typer.Option(help="Name or number of a scenario.")] = "straight",
     seed: Annotated[int, typer.Option(help="Random seed, at least 0.")] = 0,
-    duration: Annotated[
-        float | None, typer.Option(help="In seconds; by default that of the motion.")
-    ] = None,
-    output: Annotated[Path, typer.Option("--output", "-o", help="The file to write.")] = Path(
-        "run.npz"
-    ),
-    list_: Annotated[
-        bool, typer.Option("--list", help="Print scenarios and robots, simulate nothing.")
-    ] = False,
+    duration: Seconds = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="The file.")] = Path("run.npz"),
+    list_: List = False,
     overwrite: Overwrite = False,
 ) -> None:
     """Simulate one run, with its failures annotated."""
@@ -80,11 +65,12 @@ def run(
     from noisemodel.atomic import refuse_existing
 
     if list_:
-        typer.echo(_table(scenarios.SCENARIOS))
-        typer.echo(f"robots: {', '.join(scenarios.ROBOTS)}")
-        return
-    if robot is None:
-        raise typer.BadParameter(f"name a robot: {', '.join(scenarios.ROBOTS)}")
+        for name, line in scenarios.SCENARIOS.items():
+            families = ", ".join(line.families)
+            typer.echo(f"{line.number:>2} {name:23} {families:26} {line.description}")
+    if list_ or not robot:
+        typer.echo(f"robots: {', '.join(scenarios.ROBOTS)}", err=not list_)
+        raise typer.Exit(0 if list_ else 2)
     refuse_existing(output, overwrite=overwrite)
     made = scenarios.simulate(robot, scenario, seed, duration=duration)
     made.save(output, overwrite=overwrite)
@@ -96,147 +82,100 @@ def run(
 @app.command(epilog="Example: inspector simulate dataset --robots talos,go2 --seeds 8 -o data/")
 def dataset(
     robots: Annotated[str, typer.Option(help="Names of robots: talos,go2,panda.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")],
-    seeds: Annotated[
-        int | None,
-        typer.Option(help="Seeds per robot and scenario; 8 by default."),
-    ] = None,
-    first_seed: Annotated[int, typer.Option(help="The first random seed, at least 0.")] = 0,
+    output: To,
+    seeds: Annotated[int | None, typer.Option(help="Per robot and scenario; 8 by default.")] = None,
+    first_seed: First = 0,
     hours: Annotated[
-        float | None,
-        typer.Option(
-            help="Instead of --seeds: total duration in hours, divided evenly between the robots."
-        ),
+        float | None, typer.Option(help="Instead of --seeds: in all, split between robots.")
     ] = None,
-    scenarios: Annotated[
-        str, typer.Option(help="Names or numbers: 1,7,obstacle-toe; by default all.")
-    ] = "",
-    only: Annotated[Only | None, typer.Option(help="Only scenarios without a failure.")] = None,
-    form: Annotated[
-        Form, typer.Option("--format", help="Samples (.npz), or the files of NoisyTest.")
-    ] = Form.SAMPLES,
-    duration: Annotated[
-        float | None, typer.Option(help="Of each run, in seconds; by default that of its motion.")
+    scenarios: Annotated[str, typer.Option(help="Names or numbers; by default all.")] = "",
+    only: Annotated[
+        Literal["ok"] | None, typer.Option(help="Only scenarios without a failure.")
     ] = None,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    rate: Annotated[float, typer.Option(help="At which runs are kept, in Hz.")] = 10_000.0,
+    duration: Seconds = None,
+    jobs: Jobs = 1,
     dask: Dask = "",
-    overwrite: Annotated[
-        bool, typer.Option("--overwrite", help="Replace damaged files; intact files stay.")
-    ] = False,
+    overwrite: Annotated[bool, typer.Option(help="Replace damaged files; others stay.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Simulate a data set; resumes if killed: only missing runs are made."""
-    from json import dumps
-
-    from inspector.progress import progress
-    from noiseclassifier.scenarios import noisytest
-    from noiseclassifier.scenarios.dataset import make
-    from noiseclassifier.scenarios.folder import Folder
-    from noiseclassifier.scenarios.statistics import Statistics
-    from noiseclassifier.scenarios.tasks import DatasetSpec, choose
+    from noiseclassifier.scenarios.dataset import DatasetSpec, Folder, Statistics, choose
 
     where = jobs_or_dask(jobs, dask)
-    choice = choose(_listed(robots), _listed(scenarios), healthy=only is Only.OK)
+    choice = choose(_listed(robots), _listed(scenarios), healthy=only is not None)
     spec = DatasetSpec(choice=choice, first=first_seed, seeds=seeds, hours=hours)
-    folder = Folder.opened(output, format_name=form, duration=duration)
+    folder = Folder.opened(output, duration=duration, rate=rate)
     folder.clear(overwrite=overwrite)
     while missing := folder.missing(spec.tasks(duration=duration, fallen=folder.fallen())):
-        for _ in progress(make(folder, missing, jobs=where), "simulate", total=len(missing)):
-            pass
-    if form is Form.NOISYTEST:
-        noisytest.write_config(output)
-        if lacking := noisytest.missing_classes(output):
-            typer.echo(f"NoisyTest cannot train without blocks of {', '.join(lacking)}", err=True)
-    statistics = Statistics.of(folder)
-    typer.echo(dumps(statistics.as_dict(), indent=2) if as_json else f"{output}: {statistics}")
+        _make(folder, missing, where)
+    found = Statistics.of(folder)
+    typer.echo(json.dumps(found.as_dict(), indent=2) if as_json else f"{output}: {found}")
 
 
 @app.command(epilog="Example: inspector simulate domains --seeds 8 -o data/ -j 2")
 def domains(
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="The folder to write.")
-    ] = None,
-    robots: Annotated[str, typer.Option(help="Names of robots; by default all.")] = "",
+    output: To = Path(),
+    robots: Names = "",
     seeds: Annotated[int, typer.Option(help="Seeds per robot; each draws a domain.")] = 8,
-    first_seed: Annotated[int, typer.Option(help="The first random seed.")] = 10_000,
+    first_seed: First = 10_000,
     faults: Annotated[int, typer.Option(help="Faulty runs per robot and seed.")] = 2,
-    always: Annotated[
-        str, typer.Option(help="Faults of each robot and seed besides, where they can act: push.")
-    ] = "",
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
-    list_: Annotated[
-        bool, typer.Option("--list", help="Print robots and distribution, simulate nothing.")
-    ] = False,
+    always: Annotated[str, typer.Option(help="Faults of every robot that can have them.")] = "",
+    jobs: Jobs = 1,
+    list_: List = False,
 ) -> None:
     """Simulate wide domains: many robots, drives, controllers, motions; resumes if killed."""
-    from inspector.progress import progress
-    from noiseclassifier.scenarios.dataset import make
+    from noiseclassifier.scenarios.dataset import Folder, Statistics, wide_tasks
     from noiseclassifier.scenarios.domains import DISTRIBUTION
-    from noiseclassifier.scenarios.domainset import tasks
-    from noiseclassifier.scenarios.folder import Folder
     from noiseclassifier.scenarios.robots import TARGETS, WIDE
-    from noiseclassifier.scenarios.statistics import Statistics
 
-    if list_ or output is None:
+    if list_ or output == Path():
         sources = [robot for robot in WIDE if robot not in TARGETS]
         typer.echo(f"{len(sources)} robots to learn from: {', '.join(sources)}")
         typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{DISTRIBUTION}")
         return
-    chosen = tasks(
+    chosen = wide_tasks(
         _listed(robots), first=first_seed, seeds=seeds, faults=faults, always=_listed(always)
     )
-    folder = Folder.opened(output, format_name="domains")
-    missing = folder.missing(chosen)
-    for _ in progress(make(folder, missing, jobs=jobs), "simulate", total=len(missing)):
-        pass
+    folder = Folder.opened(output, wide=True)
+    _make(folder, folder.missing(chosen), jobs)
     typer.echo(f"{output}: {Statistics.of(folder)}")
 
 
 @app.command(epilog="Example: inspector simulate logs data/ -o logs/ --copies 2")
 def logs(
     data: Annotated[Path, typer.Argument(help="A folder of `inspector simulate domains`.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")],
+    output: To,
     copies: Annotated[int, typer.Option(min=1, help="Logs of each run.")] = 1,
-    rate: Annotated[
-        float | None, typer.Option(help="Of all logs, in Hz; drawn by default.")
-    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Of all, in Hz; drawn by default.")] = None,
     side: Annotated[
-        Side,
-        typer.Option(
-            help="All logs; those to learn from; robots and domains to measure on only; loggers to"
-            " measure on only."
-        ),
+        Side, typer.Option(help="What to learn from, or to measure on only.")
     ] = Side.ALL,
 ) -> None:
     """Write logs of wide domains: ripple, sensing and sampling, with labels decided anew."""
-    from collections import Counter
-
-    from noiseclassifier.scenarios.domainset import logs as logs_of
-    from noiseclassifier.scenarios.domainset import write
-    from noiseclassifier.scenarios.folder import Folder
+    from noiseclassifier.scenarios.dataset import Folder, write_logs
+    from noiseclassifier.scenarios.dataset import logs as logs_of
 
     if not data.is_dir():
         raise typer.BadParameter(f"{data}: there is no such folder")
-    folder = Folder.opened(data, format_name="domains", any_recipe=True)
+    folder = Folder.opened(data, wide=True, any_recipe=True)
     rates, labelled, lost = Counter[float](), 0, 0
-    for _, run in write(logs_of(folder, copies=copies, rate=rate, side=side.value), output):
+    for _, run in write_logs(logs_of(folder, copies=copies, rate=rate, side=side.value), output):
         rates[run.rate] += 1
-        for event in run.meta["events"]:
-            labelled += event["labelled"] > 0
-            lost += not event["labelled"]
+        labelled += sum(event["labelled"] > 0 for event in run.meta["events"])
+        lost += sum(not event["labelled"] for event in run.meta["events"])
     counts = ", ".join(f"{count} at {rate:g} Hz" for rate, count in sorted(rates.items()))
-    typer.echo(
-        f"{output}: {rates.total()} logs ({counts}); {labelled} events with a label, {lost} that"
-        " cannot be seen"
-    )
+    seen = f"{labelled} events with a label, {lost} that cannot be seen"
+    typer.echo(f"{output}: {rates.total()} logs ({counts}); {seen}")
+
+
+def _make(folder: "Folder", tasks: list[Any], jobs: Any) -> None:
+    from inspector.progress import progress
+    from noiseclassifier.scenarios.dataset import make
+
+    for _ in progress(make(folder, tasks, jobs=jobs), "simulate", total=len(tasks)):
+        pass
 
 
 def _listed(names: str) -> list[str]:
     return [name.strip() for name in names.split(",") if name.strip()]
-
-
-def _table(scenarios: "Mapping[str, Scenario]") -> str:
-    return "\n".join(
-        f"{line.number:>2} {name:23} {', '.join(line.families):26} {line.description}"
-        for name, line in scenarios.items()
-    )

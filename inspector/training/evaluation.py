@@ -36,7 +36,7 @@ def evaluate(
 
     Args:
         model: A model file.
-        inputs: Annotated runs, samples or NoisyTest folders that it was not trained on.
+        inputs: Annotated runs or NoisyTest folders that it was not trained on.
         part: The part of the recordings to measure it on.
         seen_too: Whether to accept runs that it was trained on, or that share their motion with
             such.

@@ -1,4 +1,4 @@
-"""Recordings of run files, samples and NoisyTest folders, at the rate of a model."""
+"""Recordings of run files and NoisyTest folders, at the rate of a model."""
 
 import hashlib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -15,14 +15,10 @@ from inspector.training.part import Part
 from inspector.wrongrobot import check_joints
 from noiseclassifier.logbands import HIGHEST, LOWEST
 from noiseclassifier.profile import NOMINAL
-from noiseclassifier.scenarios.sample import DECIMATED, Sample, is_sample
-from noiseclassifier.scenarios.signals import WHOLE
 from noisemodel.atomic import also_reading
 
 SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}
 """Software whose versions in the ``meta`` of a run go into the manifest of a model."""
-SLOWER = 1e-3
-"""Relative difference below which the rate of a sample is not lower."""
 
 
 Model = TypeVar("Model", nc.Classifier, nc.General)
@@ -50,7 +46,7 @@ Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
 def recordings(
     inputs: Sequence[Path], rate: float, part: Part = Part.ALL
 ) -> Iterator[nc.Recording]:
-    """Annotated noise of runs, samples and NoisyTest folders.
+    """Annotated noise of runs and NoisyTest folders.
 
     Args:
         inputs: Files, and folders of them, however deep.
@@ -58,8 +54,8 @@ def recordings(
         part: The part of these recordings to read.
 
     Yields:
-        One recording per run, sample or log. A sample may have no annotated block: its failures
-        were too faint to be labelled either way.
+        One recording per run or log. A simulated run may have no annotated block: its failures were
+        too faint to be labelled either way.
     """
     for recording in _recordings(inputs, rate):
         if in_part(recording, part):
@@ -77,13 +73,12 @@ def classified(
     """Annotated noise as `inspector classify` takes it, and the runs that it cannot take.
 
     A desired velocity that is a placeholder, and an error of zero throughout, are left out of run
-    files, and values that are held count once (`hold.without_hold`); samples have a desired motion
-    of their own.
+    files, and values that are held count once (`hold.without_hold`).
 
     Args:
         inputs: Files, and folders of them, however deep.
         rate: The rate to decimate runs to, in [Hz]; slower ones have no verdict. None: each at its
-            own, as a general model takes it; samples at that of their joints.
+            own, as a general model takes it.
         part: The part of these recordings to read.
         bare_too: Whether to yield run files without any annotation, in place of an error.
 
@@ -104,7 +99,7 @@ def classified(
 
 def _recordings(inputs: Sequence[Path], rate: float) -> Iterator[nc.Recording]:
     def read(path: Path) -> Read:
-        return of_sample(path, rate) if is_sample(path) else of_annotated_run(path, rate), None
+        return of_annotated_run(path, rate), None
 
     for recording, _ in _read(inputs, read, rate):
         if isinstance(recording, nc.Recording):
@@ -129,8 +124,6 @@ def _read(
 
 def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
     try:
-        if is_sample(path):
-            return of_sample(path, DECIMATED if rate is None else rate), None
         run, _ = without_placeholder(nm.Run.load(path))
         slower = without_hold(run)
         if rate is None:
@@ -140,7 +133,7 @@ def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
     except SlowRunError as error:
         reason = f"rate {error.own:g} Hz < {error.wanted:g} Hz"
         return nc.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
-    if not (found.blocks or found.events or bare_too):
+    if not (found.blocks or "events" in run.meta or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
     signals = nc.signals.without_zero_error(nc.signals.named(found.signal))
     return replace(found, signal=signals), run
@@ -151,7 +144,7 @@ def _apart(
 ) -> nc.Recording | nc.Unanswered:
     """Name a recording apart from others of its name, by as much of its folder as it takes.
 
-    A sample keeps its robot, scenario and seed, which tell the group.
+    A simulated run keeps its robot, scenario and seed, which tell the group.
     """
     name, depth = one.name, 0
     robot, _, rest = name.partition("/")
@@ -179,8 +172,9 @@ def of_annotated_run(path: Path, rate: float) -> nc.Recording:
         SlowRunError: If the run's rate is lower.
         InspectorError: If it has no blocks.
     """
-    found = of_run(path, nm.Run.load(path), rate)
-    if not found.blocks:
+    run = nm.Run.load(path)
+    found = of_run(path, run, rate)
+    if not (found.blocks or "events" in run.meta):
         raise InspectorError(f"{path}: has no annotated blocks")
     return found
 
@@ -218,38 +212,6 @@ def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> nc.Reco
         valid=decimated.mask,
         sha256=sha256 or hashlib.sha256(path.read_bytes()).hexdigest(),
         events=faults(path, run.meta, run.blocks),
-        facts=known,
-    )
-
-
-def of_sample(path: Path, rate: float) -> nc.Recording:
-    """Annotated noise of a sample.
-
-    Args:
-        path: A sample, as `inspector simulate dataset` makes it.
-        rate: A rate at which the sample has its noise, in [Hz]: noise cannot be decimated as
-            velocities can.
-
-    Returns:
-        Its norms, and joints if it has any at that rate, with its blocks, named by robot, scenario
-        and seed, with the hash of the run that it was made of.
-
-    Raises:
-        SlowRunError: If its rate is lower.
-        ScenarioError: If it cannot be read, or has no noise of that rate.
-    """
-    sample = Sample.load(path, only=WHOLE)
-    known = facts(sample.robot, sample.meta)
-    if sample.rate < rate * (1 - SLOWER):
-        raise SlowRunError(path, sample.rate, rate, known)
-    sample = sample.at(rate)
-    return nc.Recording(
-        name=sample.name,
-        signal={**{name: sample.signals[name] for name in WHOLE}, **sample.joints},
-        rate=rate,
-        blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in sample.blocks),
-        sha256=str(sample.meta["sha256"]),
-        events=faults(path, sample.meta, sample.blocks),
         facts=known,
     )
 
@@ -330,13 +292,6 @@ def faults(path: Path, meta: Mapping[str, Any], blocks: Sequence[nm.Block]) -> t
             ) from error
         found.append(nc.Fault(start, stop, label, felt))
     return tuple(found)
-
-
-def samples(inputs: Sequence[Path]) -> Iterator[Path]:
-    """Samples among files, and in folders of them."""
-    for path in inputs:
-        files = sorted(path.rglob("*.npz")) if path.is_dir() else [path]
-        yield from (file for file in files if is_sample(file))
 
 
 def count(inputs: Sequence[Path]) -> int:

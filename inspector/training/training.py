@@ -8,8 +8,8 @@ import noiseclassifier as nc
 from inspector.errors import InspectorError, OptionError
 from inspector.progress import progress
 from inspector.training.part import Part
-from inspector.training.recordings import Simulators, classified, count, samples
-from noiseclassifier.logbands import HIGHEST, LOWEST
+from inspector.training.recordings import Simulators, classified, count
+from noiseclassifier.logbands import LOWEST
 from noisemodel.atomic import refuse_existing
 
 ANY_RATE = "general"
@@ -104,7 +104,7 @@ def train(
     are left out; a desired velocity that is a placeholder is none, as in `inspector classify`.
 
     Args:
-        inputs: Annotated run files, samples, folders of them, or NoisyTest folders.
+        inputs: Annotated run files, folders of them, or NoisyTest folders.
         profile: ``ANY_RATE``, or one of ``PROFILES``.
         rate: Rate of a model of one rate, in [Hz], to which faster runs are decimated; None for
             ``RATE``. A general model takes each run at its own.
@@ -150,12 +150,9 @@ def _train_general(inputs: Sequence[Path], output: Path, *, part: Part, overwrit
     refuse_existing(output, overwrite=overwrite)
     left_out, simulators = LeftOut(), Simulators()
     slowest = nc.ANY.bound(LOWEST, (nc.NOISE,))
-    fast = list(samples(inputs))  # have noise of two rates
-    parts: list[nc.Frames] = []
-    for paths, rate in ((inputs, None), (fast, HIGHEST)):
-        read = progress(classified(paths, rate, part, bare_too=True), "read", total=count(paths))
-        usable = left_out.without((recording for recording, _ in read), slowest)
-        parts += nc.frames_of(simulators.noting(usable), nc.ANY, thin=THIN)
+    read = progress(classified(inputs, None, part, bare_too=True), "read", total=count(inputs))
+    usable = left_out.without((recording for recording, _ in read), slowest)
+    parts = list(nc.frames_of(simulators.noting(usable), nc.ANY, thin=THIN))
     if not parts:
         raise InspectorError(f"no run to train {ANY_RATE} on; {left_out}")
     frames = nc.Frames.joined(parts)

@@ -47,7 +47,7 @@ class Search:
     """The settings of a grid search.
 
     Attributes:
-        training: Annotated runs, samples, folders of them, or NoisyTest folders.
+        training: Annotated runs, folders of them, or NoisyTest folders.
         validation: Recordings of a validation set; without any, the training set is folded.
         part: The part of all these recordings to read.
         folds: Number of folds without a validation set.

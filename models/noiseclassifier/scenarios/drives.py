@@ -4,7 +4,10 @@ from collections import deque
 
 import numpy as np
 
-from noiseclassifier.scenarios.imperfections import Imperfections
+from noiseclassifier.scenarios.domains import Domain
+from noiseclassifier.scenarios.faults import NO_DRIVE_FAULT, DriveFault, Imperfections
+from noiseclassifier.scenarios.motions import RATE, STEP, TICK, times
+from noiseclassifier.scenarios.robots import Drivetrain
 from noisemodel.types import Array
 
 
@@ -32,29 +35,23 @@ class Drives:
 
     Args:
         start: Joint positions at rest, shape (joints,), in [rad].
-        stiffness: Position gains, shape (joints,), in [N m/rad].
-        damping: Velocity gains, shape (joints,), in [N m s/rad].
-        limit: Largest torques, shape (joints,), in [N m].
         offset: Encoder error at rest, shape (joints,), in [rad].
-        step: Time between two samples, in [s].
     """
 
     def __init__(
         self,
         start: Array,
         *,
-        stiffness: Array,
-        damping: Array,
-        limit: Array,
+        drivetrain: Drivetrain,
         offset: Array,
         imperfections: Imperfections,
-        step: float,
     ) -> None:
-        self._stiffness, self._damping = stiffness, damping
-        self._least, self._limit = -limit, limit
+        self._stiffness = np.array(drivetrain.stiffness) * imperfections.stiffness
+        self._damping = np.array(drivetrain.damping) * imperfections.damping
+        self._limit = np.array(drivetrain.torque)
+        self._least = -self._limit
         self._count = imperfections.encoder_step
-        self._step = step
-        self._alpha, self._beta = tracking_gains(imperfections.encoder_bandwidth, step)
+        self._alpha, self._beta = tracking_gains(imperfections.encoder_bandwidth, STEP)
         self._tracked, self._velocity = start + offset, np.zeros_like(start)
         self._waiting: deque[Array] = deque(
             [np.zeros_like(start)] * imperfections.torque_delay, imperfections.torque_delay
@@ -71,7 +68,7 @@ class Drives:
             Positions, in [rad], and velocities, in [rad/s], as the drives report them.
         """
         reading = np.rint((position + error) / self._count) * self._count
-        predicted = self._tracked + self._step * self._velocity
+        predicted = self._tracked + STEP * self._velocity
         innovation = reading - predicted
         self._tracked = predicted + self._alpha * innovation
         self._velocity = self._velocity + self._beta * innovation
@@ -115,3 +112,167 @@ class Drives:
         acting = self._waiting.popleft()
         self._waiting.append(np.minimum(np.maximum(demanded, self._least), self._limit))
         return acting
+
+
+LOAD_SHARE = 0.2
+"""Share of the rotors' inertia that stays on the joint's side of an elastic gear."""
+DAMPING_RATIO = 0.05
+"""Of an elastic gear."""
+STRIBECK = 0.05
+"""Speed over which static friction decays to Coulomb friction, in [rad/s]."""
+POLES = 7
+"""Periods of cogging per turn of the motor."""
+ORDERS = (1, 2)
+"""Orders of the ripple, as multiples of the gear ratio."""
+
+
+class DomainDrives(Drives):
+    """The drives of all joints in a wide domain, one sample after the other.
+
+    An elastic gear is a spring with free play between rotor and joint (Spong 1987), whose
+    transmission error is locked to the rotor's angle, so that it shakes the joint at the orders
+    of the gear. Friction beyond Coulomb's is Stribeck's (Armstrong-Helouvry et al. 1994).
+
+    Args:
+        start: Joint positions at rest, shape (joints,), in [rad].
+        offset: Encoder error at rest, shape (joints,), in [rad].
+        settling: Time before the recording, in [s].
+    """
+
+    def __init__(
+        self,
+        start: Array,
+        *,
+        domain: Domain,
+        drivetrain: Drivetrain,
+        imperfections: Imperfections,
+        fault: DriveFault = NO_DRIVE_FAULT,
+        offset: Array,
+        settling: float,
+        rng: np.random.Generator,
+    ) -> None:
+        super().__init__(start, drivetrain=drivetrain, offset=offset, imperfections=imperfections)
+        joints, limit = len(start), self._limit
+        self._domain, self._fault = domain, fault
+        self._gains = self._stiffness, self._damping
+        self._sample = -round(settling * RATE)
+        self._begin, self._end = _samples(fault)
+        self._added = _torque(fault, self._begin, self._end, joints)
+        self._outside: Array | float = 0.0
+        self._changed = bool(np.any(fault.offset))
+        self._demands: deque[Array] = deque(
+            [np.zeros(joints)] * (1 + imperfections.torque_delay + round(fault.delay * RATE)),
+            1 + imperfections.torque_delay + round(fault.delay * RATE),
+        )
+        self._delay = imperfections.torque_delay
+        self._acting = np.zeros(joints)
+        self._slope = limit * (STEP / domain.torque_rise)
+        self._period = round(1 / domain.policy_rate / TICK) if domain.policy_rate else 0
+        self._phase = int(rng.integers(max(self._period, 1)))
+        self._target = start.copy()
+        self._tick = 0
+        self._before = start.copy()  # the joints' positions of the sample before
+        coulomb = np.array(drivetrain.friction) * imperfections.friction
+        self._stiction = (domain.stiction - 1) * coulomb
+        self._cogging = domain.cogging * limit
+        self._teeth = domain.gear * POLES * np.ones(joints)
+        self._teeth_phase = rng.uniform(0, 2 * np.pi, joints)
+        orders = np.array(ORDERS) * domain.gear
+        self._orders = orders[:, None]
+        self._order_phase = rng.uniform(0, 2 * np.pi, (len(orders), joints))
+        # A transmission error a sin(n q) makes a velocity of a n |qd|.
+        self._error = domain.ripple / self._orders * rng.uniform(0.3, 1, (len(orders), joints))
+        self._elastic = domain.flexibility > 0
+        rotor = np.array(drivetrain.armature) / LOAD_SHARE  # what is left of it is the joint's
+        self._rotor = (1 - LOAD_SHARE) * rotor
+        natural = 2 * np.pi * domain.flexibility
+        self._spring = self._rotor * natural**2
+        self._loss = 2 * DAMPING_RATIO * self._rotor * natural
+        self._angle, self._speed = start.copy(), np.zeros(joints)
+
+    def command(self, targets: Array, rates: Array, torque: Array) -> tuple[Array, Array, Array]:
+        """What the drives follow over one tick: after faults of commands, held by a policy."""
+        tick, self._tick = self._tick, self._tick + 1
+        if self._fault.command:
+            time = self._sample * STEP + times(len(targets), STEP)
+            targets, rates = self._fault.command(time, targets, rates)
+        if not self._period:
+            return targets, rates, self._domain.feedforward * torque
+        if (tick + self._phase) % self._period == 0:
+            # A policy has no feed-forward: its targets lie off by as much as the torque takes.
+            stiffness, damping = self._gains
+            self._target = targets[0] + (torque + damping * rates[0]) / stiffness
+        held = np.tile(self._target, (len(targets), 1))
+        return held, np.zeros_like(rates), 0 * torque
+
+    def read(self, position: Array, error: Array) -> tuple[Array, Array]:
+        """Readings of all encoders, which sit on the rotors."""
+        self._joint = position
+        if self._changed and self._sample >= self._begin:
+            error = error + self._fault.offset
+        return super().read(self._angle if self._elastic else position, error)
+
+    def torque(
+        self, position: Array, velocity: Array, desired: Array, rate: Array, feedforward: Array
+    ) -> Array:
+        """Torques on the joints."""
+        inside = self._begin <= self._sample < self._end
+        if self._sample == self._begin:
+            stiffness, damping = self._gains
+            self._stiffness = stiffness * self._fault.stiffness
+            self._damping = damping * self._fault.damping
+        elif self._sample == self._end:
+            self._stiffness, self._damping = self._gains
+        motor = super().torque(position, velocity, desired, rate, feedforward)
+        if inside:
+            motor = motor * self._fault.power
+        speed = self._speed if self._elastic else velocity
+        motor = motor + self._cogging * np.sin(self._teeth * self._angle + self._teeth_phase)
+        motor -= self._stiction * np.exp(-np.square(speed / STRIBECK)) * np.tanh(speed / 5e-3)
+        added = self._added[self._sample - self._begin] if inside and len(self._added) else 0.0
+        self._outside = added if self._fault.outside else 0.0
+        self._sample += 1
+        if not self._elastic:
+            self._angle = position
+            return np.asarray(motor + added)
+        return np.asarray(self._through_gear(motor) + added)
+
+    def measured(self, acting: Array) -> Array:
+        """Torques that sensors between gears and joints measure, without what acts from outside."""
+        return acting - self._outside
+
+    def _delayed(self, demanded: Array) -> Array:
+        """Torques demanded before the delay, within limits of torque and of its rate."""
+        self._demands.appendleft(demanded)
+        late = self._delay
+        if self._fault.delay and self._begin <= self._sample < self._end:
+            late += round(self._fault.delay * RATE)
+        wanted = np.clip(self._demands[late], self._least, self._limit)
+        change = np.clip(wanted - self._acting, -self._slope, self._slope)
+        self._acting = np.asarray(self._acting + change)
+        return self._acting
+
+    def _through_gear(self, motor: Array) -> Array:
+        """Torque of the gears on the joints; moves the rotors by one sample."""
+        joint_speed = (self._joint - self._before) / STEP
+        self._before = self._joint.copy()
+        ripple = (self._error * np.sin(self._orders * self._angle + self._order_phase)).sum(axis=0)
+        twist = self._angle + ripple - self._joint
+        play = self._domain.backlash / 2
+        gear = self._spring * (twist - np.clip(twist, -play, play))
+        gear = gear + np.where(np.abs(twist) > play, self._loss * (self._speed - joint_speed), 0.0)
+        self._speed = self._speed + STEP * (motor - gear) / self._rotor
+        self._angle = self._angle + STEP * self._speed
+        return np.asarray(gear)
+
+
+def _samples(fault: DriveFault) -> tuple[int, int]:
+    if fault.event is None:
+        return 2**62, 2**62
+    return round(fault.event.start * RATE), round(fault.event.stop * RATE)
+
+
+def _torque(fault: DriveFault, begin: int, end: int, joints: int) -> Array:
+    if fault.torque is None:
+        return np.zeros((0, joints))
+    return fault.torque(times(end - begin, STEP))

@@ -33,7 +33,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from noiseclassifier.scenarios.events import Event
+from noiseclassifier.scenarios.motions import STEP, Contact, Event
 from noisemodel import Block
 from noisemodel.types import Array, Mask
 
@@ -242,3 +242,51 @@ def _spans(mask: Mask, bridge: int) -> list[Span]:
 def _clipped(spans: Sequence[Span], first: int, end: int) -> list[Span]:
     """Parts of spans that lie in a range."""
     return [(max(a, first), min(b, end)) for a, b in spans if a < end and b > first]
+
+
+APART = 0.05
+"""Contacts with a shorter pause are merged, in [s]."""
+IMPACT = 0.02
+"""Time over which the impulse of a contact is integrated, in [s]."""
+
+
+def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
+    """Unplanned contacts, as events.
+
+    Args:
+        force: Contact force of each effector, shape (samples, effectors), in [N].
+
+    Returns:
+        One event per contact that begins outside of the planned ones of its effector, with its
+        impulse in [N s] and its largest force in [N].
+    """
+    events = []
+    for effector, measured in enumerate(force.T):
+        own = [contact for contact in planned if contact.effector == effector]
+        for first, last in _touches(measured):
+            onset = first * STEP
+            if any(contact.start <= onset < contact.stop for contact in own):
+                continue
+            onset_force = measured[first : first + round(IMPACT / STEP)]
+            facts = {
+                "effector": effector,
+                "impulse": float(onset_force.sum() * STEP),
+                "force": float(onset_force.max()),
+            }
+            # The impact is the cause; leaning on the obstacle afterwards is not.
+            stop = min(last * STEP, onset + IMPACT)
+            events.append(
+                Event("impact", "unplanned contact", onset, max(stop, onset + STEP), facts)
+            )
+    return tuple(events)
+
+
+def _touches(force: Array) -> list[tuple[int, int]]:
+    """First and last sample of each contact."""
+    touching = np.flatnonzero(force > 0)
+    if not touching.size:
+        return []
+    pauses = np.flatnonzero(np.diff(touching) > APART / STEP)
+    firsts = touching[np.concatenate(([0], pauses + 1))]
+    lasts = touching[np.concatenate((pauses, [-1]))]
+    return list(zip(firsts.tolist(), lasts.tolist(), strict=True))

@@ -1,42 +1,84 @@
-"""Labelled runs, from a robot, a scenario and a seed."""
+"""Labelled runs, from a robot, a scenario or a fault of wide domains, and a seed."""
 
-from dataclasses import asdict, dataclass
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+from zlib import crc32
 
 import numpy as np
 
-from noiseclassifier.scenarios.case import Case
-from noiseclassifier.scenarios.clock import RATE, STEP, STEPS, times
-from noiseclassifier.scenarios.contacts import unplanned
-from noiseclassifier.scenarios.defects import Plan
-from noiseclassifier.scenarios.errors import (
-    DivergedError,
-    MissingSimulatorError,
-    ScenarioError,
-    SimulationError,
-    UnknownScenarioError,
-    UnsimulatedRobotError,
-    UnsuitedScenarioError,
-)
-from noiseclassifier.scenarios.events import Event
-from noiseclassifier.scenarios.faults import Faults
-from noiseclassifier.scenarios.imperfections import Imperfections
-from noiseclassifier.scenarios.labels import RULE, annotate
-from noiseclassifier.scenarios.robots import ROBOTS, Simulated
-from noiseclassifier.scenarios.table import SCENARIOS, Scenario
-from noisemodel import Run
+from noiseclassifier.scenarios.domains import DISTRIBUTION, LIMITS, MOTIONS, Distribution, Domain
+from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
+from noiseclassifier.scenarios.errors import DivergedError, ScenarioError, SimulationError, unknown
+from noiseclassifier.scenarios.faults import NO_DEFECT, Defect, Faults, Imperfections, drawn
+from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
+from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Event, Plan, times
+from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Drivetrain, Simulated
+from noiseclassifier.scenarios.table import FAULTS, SCENARIOS, Scenario, suited
+from noisemodel import Run, decimated
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
-    from noiseclassifier.scenarios.drives import Drives
     from noiseclassifier.scenarios.loop import Motion, Scene
 
-RECIPE = 3
-"""Version of the simulation; it increases whenever a seed gives another run than before."""
+RECIPE, WIDE_RECIPE = 3, 2
+"""Versions of the simulations; they increase whenever a seed gives another run than before."""
 SHORTEST = 3.0
-"""Least duration, in which every defect can act, in [s]."""
+"""Least duration of a scenario, in which every defect can act, in [s]."""
+GOOD = "good"
+"""Name of a run of wide domains without a fault, the twin of all others of its robot and seed."""
+FIRST = 10_000
+"""Least seed of wide domains: names of their runs differ from those of the scenarios."""
+DURATION = 6.0
+"""Of a run of wide domains, in [s]."""
+SLOW = 2000.0
+"""Rate at which most of these runs are kept, in [Hz]."""
+FAST_SHARE = 0.15
+"""Share of the seeds whose runs are kept at 10 kHz."""
+LAG = 0.6
+"""Most phase that delay and filters take from a velocity loop at its crossover, in [rad]."""
+LOOP_MARGIN = 0.5
+"""Most of the damping that they take from a position loop."""
+SOFT = 0.5
+"""Scale of the position gains below which a robot moves as one with soft drives."""
+SAME = 0.1
+"""Contacts of a run and of its twin are the same if they start so close together, in [s]."""
+RATTLE = 0.15
+"""Share of a fault-free motion above ``FAST`` from which on its drives rattle: no good run."""
+FAST, AUDIBLE = 40.0, 0.3
+"""Lowest frequency of rattling, in [Hz], and its least level, in [rad/s]."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """What runs with the same twin share: robot, seed, and a motion or a distribution to draw."""
+
+    robot: str
+    seed: int
+    motion: Any = None
+    distribution: Distribution | None = None
+
+    @property
+    def nominal(self) -> Simulated:
+        """The robot, before a domain changes it."""
+        return ROBOTS.get(self.robot) or WIDE[self.robot]
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What a seed draws before the plan; each kind of randomness has a stream of its own."""
+
+    robot: Simulated
+    motion: Any
+    domain: Domain | None
+    planned: np.random.Generator
+    body: np.random.Generator
+    sensors: np.random.Generator
+    faulty: np.random.Generator
+    gears: np.random.Generator
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,69 +87,135 @@ class Trial:
 
     motion: "Motion"
     events: tuple[Event, ...]
+    contacts: tuple[Event, ...]
     faults: Faults
     imperfections: Imperfections
+    setup: Setup
 
 
-def simulate(robot: str, scenario: str | int, seed: int, *, duration: float | None = None) -> Run:
+def simulate(
+    robot: str,
+    scenario: str | int,
+    seed: int,
+    *,
+    duration: float | None = None,
+    wide: bool = False,
+    distribution: Distribution = DISTRIBUTION,
+) -> Run:
     """Labelled run of a robot in a scenario, simulated at 10 kHz.
 
-    The run without the defect and with the same seed, its twin, is simulated too; labels follow
-    from the difference by the rule in `scenarios.labels`. Scenarios with the same motion share
-    their twin.
+    The run without the fault and with the same seed, its twin, is simulated too; labels follow from
+    the difference by the rule in `scenarios.labels`. Runs with the same motion share their twin.
 
     Args:
+        robot: One of `ROBOTS`; in wide domains one of more robots.
+        scenario: Name or number of one of `SCENARIOS`; in wide domains "good" or a fault.
+        seed: Draws motion, robot, sensors and fault, and in wide domains the domain.
         duration: Duration of the run, in [s]; by default that of the motion.
+        wide: Whether to draw body, drives, control and motion from a distribution. Such a run is
+            kept at 2 kHz or at 10 kHz; ``effort`` is the torque of the drives after gears, limits
+            and delays, before the friction of the joints, in [N m].
+        distribution: That distribution.
+
+    Returns:
+        The run, as the drives report it; stage ``planned`` is the velocity of the plan. ``meta``
+        has the recipe, the drawn fault and all events.
+
+    Raises:
+        ScenarioError: If the names or numbers are unknown, or MuJoCo is not installed.
+        SimulationError: If the run diverges, or the robot falls.
     """
-    entry, simulated = look_up(robot, scenario)
-    case = entry.cases[simulated.family]
-    duration = case.motion.duration if duration is None else duration
-    if seed < 0:
-        raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
-    if not SHORTEST <= duration < np.inf:
-        raise ScenarioError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
+    name = str(scenario)
+    if wide:
+        start, defect, duration = _wide_start(robot, name, seed, duration, distribution)
+    else:
+        entry, simulated = look_up(robot, scenario)
+        case, name = entry.cases[simulated.family], entry.name
+        duration = case.motion.duration if duration is None else duration
+        if seed < 0:
+            raise ScenarioError(f"seed {seed}: expected an integer of at least 0")
+        if not SHORTEST <= duration < np.inf:
+            raise ScenarioError(f"duration {duration:g} s: expected at least {SHORTEST:g} s")
+        start = Start(robot, seed, case.motion)
+        defect = NO_DEFECT if entry.healthy else case.defect
     versions = software()
     try:
-        twin = _twin(robot, Case(case.motion), seed, duration)
-        trial = twin if entry.healthy else _trial(simulated, case, seed, duration)
+        twin = _twin(start, duration)
+        trial = twin if defect is NO_DEFECT else _trial(start, defect, duration)
     except DivergedError as error:
-        raise SimulationError(robot, entry.name, seed, error.time, error.problem) from error
-    blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, trial.events, rate=RATE)
-    motion = trial.motion
-    held = [joint for joint, angle in simulated.held.items() if angle]
-    still = np.zeros((len(motion.velocity), len(held)))
-    posture = still + [simulated.held[joint] for joint in held]
+        raise SimulationError(robot, name, seed, error.time, error.problem) from error
+    events = (*trial.events, *trial.contacts)
+    if wide:  # soft legs scuff
+        events = () if trial is twin else (*trial.events, *_further(trial, twin))
+    blocks, traces = annotate(trial.motion.velocity, twin.motion.velocity, events, rate=RATE)
+    meta = {
+        "source": "simulation",
+        "scenario": name,
+        "seed": int(seed),
+        "duration": float(duration),
+        "versions": versions,
+        "defect": dict(trial.faults.facts),
+        "events": [trace.record() for trace in traces],
+        "labelling": asdict(RULE),
+    }
+    if not wide:
+        facts = {"number": entry.number, "recipe": RECIPE, "motion": asdict(case.motion)}
+        facts["imperfections"] = asdict(trial.imperfections)
+        return _whole(trial.motion, simulated, robot=robot, blocks=blocks, meta={**meta, **facts})
+    domain = trial.setup.domain
+    assert domain is not None
+    meta |= {
+        "simulator": "mujoco",
+        "recipe": f"domains {WIDE_RECIPE}",
+        "domain": domain.as_dict(),
+        "motion": repr(trial.setup.motion),
+        "effort_limit": [domain.torque_limit * one for one in start.nominal.drives.torque],
+    }
+    rate = RATE if np.random.default_rng((seed, 1)).uniform() < FAST_SHARE else SLOW
+    joints = start.nominal.drives.joints
+    return kept(trial.motion, rate, joint_names=joints, robot=robot, blocks=blocks, meta=meta)
 
-    def whole(signal: Array, others: Array = still) -> Any:
-        return np.hstack((signal, others)).astype(np.float32)
 
-    return Run(
-        time=times(len(motion.velocity), STEP),
-        joint_names=(*simulated.drives.joints, *held),
-        velocity=whole(motion.velocity),
-        position=whole(motion.position, posture),
-        velocity_desired=whole(motion.velocity_desired),
-        position_desired=whole(motion.position_desired, posture),
-        stages={"planned": whole(motion.planned), "commanded": whole(motion.commanded)},
-        effort=whole(motion.torque),
-        **_base(motion),
-        robot=robot,
-        blocks=blocks,
-        meta={
-            "source": "simulation",
-            "scenario": entry.name,
-            "number": entry.number,
-            "seed": int(seed),
-            "duration": float(duration),
-            "recipe": RECIPE,
-            "versions": versions,
-            "motion": asdict(case.motion),
-            "imperfections": asdict(trial.imperfections),
-            "defect": dict(trial.faults.facts),
-            "events": [trace.record() for trace in traces],
-            "labelling": asdict(RULE),
-        },
-    )
+def faults_of(robot: str, seed: int | None = None) -> tuple[str, ...]:
+    """Names of the faults of a robot in wide domains; with a seed, of those that can act."""
+    if robot not in WIDE:
+        raise unknown(f"robot {robot!r} cannot be simulated", robot, WIDE)
+    family = WIDE[robot].family
+    if seed is None:
+        return tuple(FAULTS[family])
+    return suited(family, _setup(Start(robot, seed, distribution=DISTRIBUTION)).motion)
+
+
+def _wide_start(
+    robot: str, fault: str, seed: int, duration: float | None, distribution: Distribution
+) -> tuple[Start, Defect, float]:
+    names = (GOOD, *faults_of(robot))
+    if fault not in names:
+        raise ScenarioError(
+            f"scenario {fault!r} does not exist for {robot!r}; it has {', '.join(names)}"
+        )
+    if seed < FIRST:
+        raise ScenarioError(f"seed {seed}: expected at least {FIRST}")
+    defect = NO_DEFECT if fault == GOOD else FAULTS[WIDE[robot].family][fault]
+    start = Start(robot, seed, distribution=distribution)
+    return start, defect, DURATION if duration is None else duration
+
+
+def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
+    """A scenario and a robot by their names."""
+    if robot not in ROBOTS:
+        raise unknown(f"robot {robot!r} cannot be simulated", robot, ROBOTS)
+    numbers = {str(entry.number): name for name, entry in SCENARIOS.items()}
+    name = numbers.get(str(scenario), str(scenario))
+    if name not in SCENARIOS:
+        raise unknown(f"no scenario {name!r}", name, SCENARIOS)
+    simulated, entry = ROBOTS[robot], SCENARIOS[name]
+    if simulated.family not in entry.cases:
+        own = [name for name, other in SCENARIOS.items() if simulated.family in other.cases]
+        raise ScenarioError(
+            f"scenario {name!r} does not exist for {robot!r}; it has {', '.join(own)}"
+        )
+    return entry, simulated
 
 
 def software() -> dict[str, str]:
@@ -115,90 +223,156 @@ def software() -> dict[str, str]:
     try:
         import mujoco
     except ImportError as error:
-        raise MissingSimulatorError from error
+        raise ScenarioError(
+            "simulation needs MuJoCo, which is not installed;"
+            " run `pip install 'noise-inspector[sim]'`"
+        ) from error
     import pinocchio
 
     modules = {"mujoco": mujoco, "pinocchio": pinocchio, "numpy": np}
     return {name: str(module.__version__) for name, module in modules.items()}
 
 
-def look_up(robot: str, scenario: str | int) -> tuple[Scenario, Simulated]:
-    """A scenario and a robot by their names."""
-    if robot not in ROBOTS:
-        raise UnsimulatedRobotError(robot, ROBOTS)
-    numbers = {str(entry.number): name for name, entry in SCENARIOS.items()}
-    name = numbers.get(str(scenario), str(scenario))
-    if name not in SCENARIOS:
-        raise UnknownScenarioError(name, SCENARIOS)
-    simulated, entry = ROBOTS[robot], SCENARIOS[name]
-    if simulated.family not in entry.cases:
-        suited = [name for name, other in SCENARIOS.items() if simulated.family in other.cases]
-        raise UnsuitedScenarioError(name, robot, suited)
-    return entry, simulated
-
-
 @lru_cache(maxsize=1)
-def _twin(robot: str, healthy: Case, seed: int, duration: float) -> Trial:
-    """Run without the defect; scenarios of one motion and seed share it."""
-    return _trial(ROBOTS[robot], healthy, seed, duration)
+def _twin(start: Start, duration: float) -> Trial:
+    """Run without the fault; all runs of one start share it."""
+    twin = _trial(start, NO_DEFECT, duration)
+    if start.distribution is not None:
+        _refuse_rattling(twin.motion.velocity)
+    return twin
 
 
-def _trial(robot: Simulated, case: Case, seed: int, duration: float) -> Trial:
-    """One run; each kind of randomness has its own stream, so that twins differ in one only."""
-    family = import_module(f"noiseclassifier.scenarios.{robot.family}.scene")
-    streams = np.random.SeedSequence(seed).spawn(4)
-    motion, robot_rng, sensors, defect = (np.random.default_rng(stream) for stream in streams)
-    plan: Plan = family.plan(robot, case.motion, motion, duration)
-    imperfections = Imperfections.draw(
-        robot_rng,
-        len(robot.drives.joints),
-        bodies=family.bodies(robot),
-        payload=robot.payload,
-        force=robot.force_noise,
+def _refuse_rattling(velocity: Array) -> None:
+    """Refuse a run without a fault whose drives rattle all the same."""
+    from scipy.signal import butter, sosfilt
+
+    fast = sosfilt(butter(2, FAST, "highpass", fs=RATE, output="sos"), velocity, axis=0)
+    level, whole = (
+        float(np.sqrt(np.median(np.square(signal).sum(axis=1)))) for signal in (fast, velocity)
     )
-    faults = case.defect.draw(defect, plan)
+    if level > max(AUDIBLE, RATTLE * whole):
+        raise DivergedError(0.0, f"it rattles without a fault, at {level:.2g} rad/s")
+
+
+def _trial(start: Start, defect: Defect, duration: float) -> Trial:
+    """One run; as each kind of randomness has its own stream, twins differ in the fault only."""
+    family = import_module(f"noiseclassifier.scenarios.{start.nominal.family}")
+    setup = _setup(start)
+    robot = setup.robot
+    joints = len(robot.drives.joints)
+    plan: Plan = family.plan(robot, setup.motion, setup.planned, duration)
+    imperfections = _imperfections(setup, joints, family.bodies(robot))
+    faults = drawn(defect, setup.faulty, plan, robot.drives)
     scene = family.scene(robot, plan, faults, imperfections)
-    recorded = _record(robot, scene, plan, faults, imperfections, sensors)
-    events = faults.events + unplanned(recorded.contact, plan.contacts) + scene.events
-    return Trial(recorded, events, faults, imperfections)
+    common: dict[str, Any] = {
+        "drivetrain": robot.drives,
+        "offset": faults.offsets(joints),
+        "imperfections": imperfections,
+    }
+    if setup.domain is None:
+        drives = Drives(scene.start[-joints:], **common)
+    else:
+        drives = DomainDrives(
+            scene.start[-joints:],
+            domain=setup.domain,
+            fault=faults.drive,
+            settling=scene.settling * TICK,
+            rng=setup.gears,
+            **common,
+        )
+    recording = recorded(scene, drives, plan, faults, imperfections, setup.sensors)
+    contacts = unplanned(recording.contact, plan.contacts)
+    events = (*faults.events, *scene.events)
+    return Trial(recording, events, contacts, faults, imperfections, setup)
 
 
-def _record(
-    robot: Simulated,
-    scene: "Scene",
-    plan: Plan,
-    faults: Faults,
-    imperfections: Imperfections,
-    rng: np.random.Generator,
-) -> "Motion":
-    """Record the scene with the drives of the robot and the errors of its sensors."""
-    from noiseclassifier.scenarios.drives import Drives
+def _setup(start: Start) -> Setup:
+    """What the seed of a run draws before its plan."""
+    nominal = start.nominal
+    if start.distribution is None:
+        seeds = np.random.SeedSequence(start.seed).spawn(5)
+        streams = map(np.random.default_rng, seeds)
+        return Setup(nominal, start.motion, None, *streams)
+    seeds = np.random.SeedSequence((start.seed, crc32(nominal.name.encode()))).spawn(7)
+    domains, motions, planned, body, gears, sensors, faulty = map(np.random.default_rng, seeds)
+    drawn = start.distribution.domain(domains, LIMITS[nominal.family])
+    robot, domain = _changed(nominal, drawn)
+    soft = domain.stiffness < SOFT or domain.policy_rate > 0
+    motion = MOTIONS[nominal.family](motions, domain.wildness, nominal, soft=soft)
+    scaled = robot.scaled(domain.length)
+    return Setup(scaled, motion, domain, planned, body, sensors, faulty, gears)
+
+
+def _changed(robot: Simulated, domain: Domain) -> tuple[Simulated, Domain]:
+    """The robot with the drives of the domain, its delay no longer than its gains bear.
+
+    A velocity loop of gain d on an inertia J crosses over at d/J, and a delay t takes t k of the
+    damping d: whoever builds a robot leaves a margin to both. The rotor alone is the least
+    inertia that a loop can have. Where filters of the velocity leave no margin, gains are lower.
+    """
+
+    def grown(values: tuple[float, ...], factor: float) -> tuple[float, ...]:
+        return tuple(factor * value for value in values)
 
     nominal = robot.drives
-    joints = len(nominal.joints)
-    drives = Drives(
-        scene.start[-joints:],
-        stiffness=np.array(nominal.stiffness) * imperfections.stiffness,
-        damping=np.array(nominal.damping) * imperfections.damping,
-        limit=np.array(nominal.torque),
-        offset=faults.offsets(joints),
-        imperfections=imperfections,
-        step=STEP,
+    inertia = np.array(nominal.armature) * domain.rotor
+    lag = STEP + domain.torque_rise / 2 + 1 / (np.pi * domain.encoder_bandwidth)
+    damping = np.minimum(domain.damping * np.array(nominal.damping), LAG * inertia / lag)
+    stiffness = domain.stiffness * np.array(nominal.stiffness)
+    stiffness = np.minimum(stiffness, np.minimum(damping**2 / inertia, LOOP_MARGIN * damping / lag))
+    bearable = np.minimum(LAG * inertia / damping, LOOP_MARGIN * damping / stiffness).min() - lag
+    domain = replace(domain, delay=float(np.clip(domain.delay, 0.0, max(bearable, 0.0))))
+    rotor = domain.rotor * (LOAD_SHARE if domain.flexibility else 1.0)
+    drives = Drivetrain(
+        joints=nominal.joints,
+        stiffness=tuple(stiffness.tolist()),
+        damping=tuple(damping.tolist()),
+        torque=grown(nominal.torque, domain.torque_limit),
+        armature=grown(nominal.armature, rotor),
+        friction=grown(nominal.friction, domain.friction),
+        viscous=grown(nominal.viscous, domain.viscous),
     )
-    return recorded(scene, drives, plan, faults, imperfections, rng)
+    return replace(robot, drives=drives), domain
+
+
+def _imperfections(setup: Setup, joints: int, bodies: int) -> Imperfections:
+    """What differs from robot to robot, from joint to joint and from body to body."""
+    robot, domain, rng = setup.robot, setup.domain, setup.body
+    if domain is None:
+        return Imperfections.draw(
+            rng, joints, bodies=bodies, payload=robot.payload, force=robot.force_noise
+        )
+
+    def scales(spread: float, count: int = joints) -> tuple[float, ...]:
+        return tuple(rng.uniform(1 - spread, 1 + spread, count).tolist())
+
+    return Imperfections(
+        stiffness=scales(0.1),
+        damping=scales(0.1),
+        force_gain=float(rng.uniform(0.9, 1.1)),
+        mass=tuple((domain.mass * np.array(scales(0.05, bodies))).tolist()),
+        payload=domain.payload * robot.payload,
+        friction=scales(0.3),
+        viscous=scales(0.3),
+        encoder_bits=domain.encoder_bits,
+        encoder_noise=float(0.1 * 2 * np.pi / 2**domain.encoder_bits),
+        encoder_bandwidth=domain.encoder_bandwidth,
+        force_noise=float(rng.uniform(0.25, 1.0)) * robot.force_noise,
+        torque_delay=round(domain.delay * RATE),
+    )
 
 
 def recorded(
     scene: "Scene",
-    drives: "Drives",
+    drives: Drives,
     plan: Plan,
     faults: Faults,
     imperfections: Imperfections,
     rng: np.random.Generator,
 ) -> "Motion":
-    """Record a scene with given drives."""
+    """Record a scene with given drives and the errors of its sensors."""
     from noiseclassifier.scenarios.loop import record
-    from noiseclassifier.scenarios.sensing import sensors_of
+    from noiseclassifier.scenarios.world import sensors_of
 
     recording, joints = len(plan.time), scene.model.nu
     ticks = scene.settling + recording
@@ -220,11 +394,121 @@ def recorded(
     )
 
 
-def _base(motion: "Motion") -> dict[str, Any]:
-    """Pose and velocity of a floating base in Pinocchio's conventions; empty if it is fixed."""
-    if not motion.base_pose.size:
-        return {}
-    from noiseclassifier.scenarios.floatingbase import pinocchio_base
+def _further(trial: Trial, twin: Trial) -> list[Event]:
+    """Unplanned contacts of a run that its twin does not have."""
+    return [
+        contact
+        for contact in trial.contacts
+        if not any(
+            abs(contact.start - other.start) < SAME
+            and contact.facts["effector"] == other.facts["effector"]
+            for other in twin.contacts
+        )
+    ]
 
-    pose, velocity = pinocchio_base(motion.base_pose, motion.base_velocity)
-    return {"base_pose": pose.astype(np.float32), "base_velocity": velocity.astype(np.float32)}
+
+def _single(signal: Any) -> Any:
+    return signal.astype(np.float32)
+
+
+def _whole(motion: "Motion", simulated: Simulated, **facts: Any) -> Run:
+    """A recording as a run, with the joints that are held away from 0, in single precision."""
+    held = [joint for joint, angle in simulated.held.items() if angle]
+    still = np.zeros((len(motion.velocity), len(held)))
+    posture = still + [simulated.held[joint] for joint in held]
+
+    def whole(signal: Array, others: Array = still) -> Any:
+        return _single(np.hstack((signal, others)))
+
+    base = {}
+    if motion.base_pose.size:
+        from noiseclassifier.scenarios.world import pinocchio_base
+
+        pose, velocity = pinocchio_base(motion.base_pose, motion.base_velocity)
+        base = {"base_pose": _single(pose), "base_velocity": _single(velocity)}
+    return Run(
+        time=times(len(motion.velocity), STEP),
+        joint_names=(*simulated.drives.joints, *held),
+        velocity=whole(motion.velocity),
+        position=whole(motion.position, posture),
+        velocity_desired=whole(motion.velocity_desired),
+        position_desired=whole(motion.position_desired, posture),
+        stages={"planned": whole(motion.planned), "commanded": whole(motion.commanded)},
+        effort=whole(motion.torque),
+        **base,
+        **facts,
+    )
+
+
+def kept(motion: "Motion", rate: float, **facts: Any) -> Run:
+    """What is kept of a recording: positions, velocities, torques, single precision, at a rate."""
+    run = Run(
+        time=times(len(motion.velocity), STEP),
+        velocity=_single(motion.velocity),
+        velocity_desired=_single(motion.velocity_desired),
+        stages={
+            "planned": _single(motion.planned),
+            "position": _single(motion.position),
+            "target": _single(motion.position_desired),
+            "torque": _single(motion.torque),
+        },
+        **facts,
+    )
+    run = decimated(run, rate)
+    stages = {name: _single(stage) for name, stage in run.stages.items()}
+    return replace(
+        run,
+        velocity=_single(run.velocity),
+        velocity_desired=_single(run.velocity_desired),
+        position=stages.pop("position"),
+        position_desired=stages.pop("target"),
+        effort=stages.pop("torque"),
+        stages=stages,
+    )
+
+
+def digest(run: Run) -> str:
+    """SHA-256 of the arrays of a run: names, shapes, every bit of every signal, and the blocks."""
+    arrays = {
+        "time": run.time,
+        "velocity": run.velocity,
+        "position": run.position,
+        "velocity_desired": run.velocity_desired,
+        "position_desired": run.position_desired,
+        "effort": run.effort,
+        "base_pose": run.base_pose,
+        "base_velocity": run.base_velocity,
+        **run.stages,
+        "block_start": np.array([block.start for block in run.blocks], dtype=np.float64),
+        "block_stop": np.array([block.stop for block in run.blocks], dtype=np.float64),
+        "block_label": np.array([block.label for block in run.blocks], dtype=str),
+    }
+    hashed = hashlib.sha256(repr((run.joint_names, run.desired_joint_names)).encode())
+    for name, array in arrays.items():
+        if array is not None:
+            hashed.update(f"{name}{array.dtype.str}{array.shape}".encode())
+            hashed.update(np.ascontiguousarray(array).tobytes())
+    return hashed.hexdigest()
+
+
+def reproduce(run: Run) -> Run:
+    """The full run, at 10 kHz and with all signals, of one that a data set keeps.
+
+    Raises:
+        ScenarioError: If the software here does not make it bit for bit.
+    """
+    recipe = run.meta
+    robot, scenario, seed = str(run.robot), str(recipe["scenario"]), int(recipe["seed"])
+    again = simulate(robot, scenario, seed, duration=recipe["duration"])
+    if digest(again) != recipe["sha256"]:
+        raise ScenarioError(
+            f"{robot}/{scenario}-{seed:03d} cannot be reproduced: it was made with"
+            f" {_versions(recipe)}, here is {_versions(again.meta)};"
+            " install the versions that it was made with"
+        )
+    return again
+
+
+def _versions(meta: Mapping[str, Any]) -> str:
+    versions = ", ".join(f"{name} {number}" for name, number in meta.get("versions", {}).items())
+    return f"recipe {meta.get('recipe')} ({versions})"

@@ -1,17 +1,33 @@
-"""The scenarios, as data: motions, defects, and the classes that their runs may have.
+"""The scenarios, and the faults of wide domains, as table.toml has them."""
 
-Numbers 1 to 24 are those of the paper's table (Sygulla & Rixen, Table I), with its
-parameters for humanoids; the others were added. Other families have equivalents where possible.
-"""
-
-from collections.abc import Mapping
-from dataclasses import dataclass
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
-from noiseclassifier.scenarios.arm.cases import ARM
-from noiseclassifier.scenarios.case import BANDS, Case, multisine
-from noiseclassifier.scenarios.humanoid.cases import HUMANOID
-from noiseclassifier.scenarios.quadruped.cases import QUADRUPED
+from noiseclassifier.scenarios import faults
+from noiseclassifier.scenarios.faults import NO_DEFECT, ON_DRIVES, Ahead, Defect, Scaled, Underfoot
+from noiseclassifier.scenarios.motions import Motion, Picks, Reach, Stand, Trot, Walk
+
+BANDS: tuple[tuple[int, int], ...] = (
+    (20, 30), (30, 40), (40, 50), (50, 60), (60, 100), (100, 150), (150, 250), (250, 350),
+    (900, 1000),
+)  # fmt: skip
+"""The paper's bands of oscillation, in [Hz]."""
+MOTIONS = {"humanoid": Walk, "quadruped": Trot, "arm": Picks}
+"""Motions of the scenarios, by family."""
+_EACH = "each-band"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scenario for one family of robots."""
+
+    motion: Motion
+    defect: Defect = field(default=NO_DEFECT)
+    description: str = ""
 
 
 @dataclass(frozen=True)
@@ -35,52 +51,80 @@ class Scenario:
         return self.labels == ("ok",)
 
 
-_OK = ("ok",)
-_IMPACT = ("ok", "impact", "highaccelerations")
-_FAST = ("ok", "highaccelerations", "oscillations", "impact")
-_OSCILLATION = ("ok", "oscillations", "impact")
+def _plain(value: Any) -> Any:
+    """A value of a TOML file, its lists as tuples."""
+    return tuple(map(_plain, value)) if isinstance(value, list) else value
 
-_LINES = (
-    (1, "straight", "No defect: straight ahead, or from place to place.", _OK),
-    (2, "curve", "No defect: in a curve.", _OK),
-    (3, "directions", "No defect: sideways, backward, or in any direction.", _OK),
-    (4, "spot", "No defect: on the spot.", _OK),
-    (5, "obstacle-full", "An undetected obstacle under the whole foot.", _IMPACT),
-    (6, "obstacle-heel", "An undetected obstacle under the heel.", _IMPACT),
-    (7, "obstacle-toe", "An undetected obstacle under the toe.", _IMPACT),
-    (8, "obstacle-left", "An undetected obstacle under the left side of a foot.", _IMPACT),
-    (9, "obstacle-right", "An undetected obstacle under the right side of a foot.", _IMPACT),
-    (10, "decalibrated", "An encoder has an offset.", _IMPACT),
-    *(
-        (
-            11 + index,
-            multisine(low, high),
-            f"Sines of {low} to {high} Hz are superposed on the height of feet or tool.",
-            _OSCILLATION,
-        )
-        for index, (low, high) in enumerate(BANDS)
-    ),
-    (20, "early-height", "Repeated early contact, at varied heights of the motion.", _IMPACT),
-    (21, "early-duration", "Repeated early contact, at varied durations of the motion.", _IMPACT),
-    (22, "platform", "Missing ground: a partial contact at an edge, a step down.", _FAST),
-    (23, "force-jump", "The signal of a force sensor jumps.", _FAST),
-    (24, "torque-jump", "The signal of a torque sensor, or of an attitude, jumps.", _FAST),
-    (25, "limit-cycle", "Force control with too high gains becomes a limit cycle.", _OSCILLATION),
-    (26, "faint-oscillation", "Sines in any of the bands, of 0.01 to 2 mm.", _OSCILLATION),
-    (27, "reference-jump", "The planned motion jumps by millimetres.", _FAST),
+
+def _defect(given: Mapping[str, Any], band: tuple[int, int]) -> Any:
+    settings = {name: _plain(value) for name, value in given.items()}
+    kind, units = settings.pop("kind"), settings.pop("units", None)
+    if "bands" in settings:
+        settings["bands"] = BANDS if settings["bands"] == "all" else (band,)
+    if "defect" in settings:
+        settings["defect"] = _defect(settings["defect"], band)
+    defect = getattr(faults, kind)(**settings)
+    return Scaled(defect, units) if units else defect
+
+
+def _named(name: str) -> Iterator[tuple[str, tuple[int, int]]]:
+    """A name, or one for each of the paper's bands."""
+    for low, high in BANDS if _EACH in name else BANDS[:1]:
+        yield name.replace(_EACH, f"{low}-{high}"), (low, high)
+
+
+def _scenarios(given: Mapping[str, Any]) -> Iterator[Scenario]:
+    for number, (name, band) in enumerate(_named(given["name"]), start=given["number"]):
+        cases = {
+            family: Case(
+                MOTIONS[family](**{k: _plain(v) for k, v in each.get("motion", {}).items()}),
+                _defect(each["fault"], band) if "fault" in each else NO_DEFECT,
+                each.get("description", ""),
+            )
+            for family, each in given.items()
+            if family in MOTIONS
+        }
+        description = given["description"].replace(_EACH, "{} to {}".format(*band))
+        labels = ("ok", *given.get("labels", "").split())
+        yield Scenario(number, name, description, labels, MappingProxyType(cases))
+
+
+_TABLE = tomllib.loads(Path(__file__).with_name("table.toml").read_text(encoding="utf-8"))
+
+SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
+    {line.name: line for given in _TABLE["scenario"] for line in _scenarios(given)}
 )
-
-_CASES = {"humanoid": HUMANOID, "quadruped": QUADRUPED, "arm": ARM}
-
-_TABLE = tuple(
-    Scenario(
-        *line,
-        MappingProxyType(
-            {family: cases[line[1]] for family, cases in _CASES.items() if line[1] in cases}
-        ),
-    )
-    for line in _LINES
-)
-
-SCENARIOS: Mapping[str, Scenario] = MappingProxyType({line.name: line for line in _TABLE})
 """All scenarios, by name."""
+FAULTS: Mapping[str, Mapping[str, Defect]] = MappingProxyType(
+    {
+        family: MappingProxyType(
+            ON_DRIVES
+            | {
+                own: _defect(fault, band)
+                for name, fault in each.items()
+                for own, band in _named(name)
+            }
+        )
+        for family, each in _TABLE["wide"].items()
+    }
+)
+"""Faults of wide domains by family and name: of drives and commands, and the family's own."""
+
+
+def suited(family: str, motion: Any) -> tuple[str, ...]:
+    """Names of the faults of a family that can act in a motion."""
+    idle: tuple[str, ...] = ()
+    on_contact = ("obstacle", "giving-way", "force-gain", "force-jump")
+    if isinstance(motion, Reach):
+        idle = on_contact
+    elif isinstance(motion, Picks):
+        idle = ("joint-stop", *(on_contact if motion.way == "directions" else ()))
+    elif isinstance(motion, Trot) and motion.gait == "stand":
+        idle = tuple(
+            name for name, each in FAULTS[family].items() if isinstance(each, Underfoot | Ahead)
+        )
+    elif isinstance(motion, Stand):
+        idle = ("edge", *(name for name in FAULTS[family] if name.startswith("obstacle")))
+    elif family == "humanoid" and not motion.walk.drop:
+        idle = ("edge",)
+    return tuple(name for name in FAULTS[family] if name not in idle)

@@ -1,1 +1,0 @@
-"""Arms that pick from a table."""

@@ -1,0 +1,519 @@
+"""Wide domains: the distribution, and what one run draws of it."""
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
+from math import isfinite
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias, get_args
+
+import numpy as np
+
+from noiseclassifier.scenarios.errors import ScenarioError
+from noiseclassifier.scenarios.motions import (
+    REACHES,
+    Gesture,
+    Picks,
+    Range,
+    Reach,
+    Stand,
+    Stroll,
+    Trot,
+    Walk,
+)
+from noiseclassifier.scenarios.robots import Arm, Humanoid, Quadruped
+
+if TYPE_CHECKING:
+    pass
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Drives with which a family's robots stay upright in at least four of five runs.
+
+    Attributes:
+        delay: Longest time from a reading to its torque, in [s].
+        hold: Longest time for which targets are held, in [s].
+        flexibility: Lowest natural frequency of rotors on elastic gears, in [Hz].
+    """
+
+    stiffness: Range = (0.0, float("inf"))
+    damping: Range = (0.0, float("inf"))
+    delay: float = float("inf")
+    hold: float = float("inf")
+    feedforward: float = 0.0
+    flexibility: float = 0.0
+
+
+Control: TypeAlias = Literal["pd", "computed-torque", "impedance", "policy"]
+Velocity: TypeAlias = Literal["measured", "filtered", "differentiated"]
+Desired: TypeAlias = Literal["commanded", "planned", "zero", "missing"]
+Effort: TypeAlias = Literal["missing", "torque", "current"]
+TARGET_CONTROL: Control = "impedance"
+"""Control that is never learnt from."""
+TARGET_BITS = 13
+"""Encoders of so many bits or fewer are never learnt from, in any kind of log."""
+TARGET_HOLD = 4
+"""Logs whose samples are held so many times or more are never learnt from."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Domain:
+    """Body, drives and control of one run; scales multiply the robot's nominal values.
+
+    Attributes:
+        flexibility: Natural frequency of the rotors on their elastic gears, in [Hz]; 0 if rigid.
+        backlash: Free play of the gears, in [rad].
+        torque_rise: Time from no torque to the limit, in [s].
+        delay: From a reading to its torque, in [s].
+        policy_rate: Rate of the targets of a policy, held in between, in [Hz]; 0 for none.
+        encoder_bandwidth: Of the velocities in the loop, in [Hz].
+    """
+
+    wildness: float
+    length: float
+    mass: float
+    payload: float
+    gear: float
+    ripple: float
+    flexibility: float
+    backlash: float
+    cogging: float
+    stiction: float
+    friction: float
+    viscous: float
+    rotor: float
+    torque_limit: float
+    torque_rise: float
+    delay: float
+    control: Control
+    stiffness: float
+    damping: float
+    feedforward: float
+    policy_rate: float
+    encoder_bits: int
+    encoder_bandwidth: float
+
+    @property
+    def name(self) -> str:
+        """Name of the domain in evaluations: the simulator and the kind of control."""
+        return f"mujoco-{self.control}"
+
+    @property
+    def target(self) -> bool:
+        """Whether it lies in a part of the distribution that is never learnt from."""
+        return self.control == TARGET_CONTROL
+
+    def as_dict(self) -> dict[str, Any]:
+        """All values, with the name."""
+        return {"name": self.name, **asdict(self)}
+
+    def __str__(self) -> str:
+        return _lines(self.as_dict())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Logger:
+    """Sensing and logging of one run.
+
+    Attributes:
+        rate: Sample rate, in [Hz].
+        cutoff: Of the low-pass, in [Hz].
+        noise: Standard deviation of the white noise of velocities, in [rad/s].
+        resonances: Frequencies that the ripple excites, in [Hz].
+        current: Current of a motor at the torque limit, in [A]; 0 unless it is logged.
+    """
+
+    rate: float
+    velocity: Velocity
+    bits: int
+    cutoff: float
+    noise: float
+    jitter: float
+    lost: float
+    repeated: float
+    hold: int
+    ripple: float
+    roughness: float
+    gear: float
+    resonances: tuple[float, ...]
+    desired: Desired
+    effort: Effort = "missing"
+    current: float = 0.0
+    effort_noise: float = 0.0
+    effort_bits: int = 16
+
+    @property
+    def target(self) -> bool:
+        """Whether it lies in a part of the distribution that is never learnt from."""
+        return self.bits <= TARGET_BITS or self.hold >= TARGET_HOLD
+
+    def as_dict(self) -> dict[str, Any]:
+        """All values."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        return _lines(self.as_dict())
+
+
+def _lines(values: dict[str, Any]) -> str:
+    def text(value: Any) -> str:
+        return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+    return "\n".join(f"{name:18}{text(value)}" for name, value in values.items())
+
+
+Ends: TypeAlias = tuple[float, float]
+"""Mild end and wild end of a range."""
+RESONANCES = 2
+"""Most resonances of one robot."""
+PRESENT = 0.5
+"""Share of the robots that have a given imperfection of gears at all."""
+CURRENTS = 0.5
+"""Share of the logs with efforts whose efforts are currents."""
+RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0)
+"""Rates of loggers, in [Hz], each drawn as often as it is listed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Distribution:
+    """Ranges of what domains and loggers draw, from mild to wild ends, as domains.toml has them."""
+
+    ends: Mapping[str, Ends]
+
+    def changed(self, **ends: Ends) -> "Distribution":
+        """The distribution with other ends of some ranges.
+
+        Raises:
+            ScenarioError: If they are not within what domains.toml allows.
+        """
+        for name, given in ends.items():
+            (least, most), unit = ABOUT[name]["within"], ABOUT[name].get("unit", "")
+            if not (isinstance(given, tuple) and len(given) == 2):
+                problem = "expected a mild and a wild end"
+            elif not all(isfinite(end) and least <= end <= most for end in given):
+                problem = f"expected within {least:g} to {most:g} {unit}".rstrip()
+            else:
+                continue
+            raise ScenarioError(f"distribution: {name} {given}: {problem}")
+        return Distribution({**self.ends, **ends})
+
+    def domain(self, rng: np.random.Generator, limits: Limits) -> Domain:
+        """Draw the domain of one run."""
+        draw = _Draw(self, rng, float(rng.uniform()))
+        control: Control = str(rng.choice(get_args(Control)))  # type: ignore[assignment]
+        stiffness = draw("stiffness")
+        if control == "impedance":  # soft by definition
+            stiffness = min(stiffness, draw.far("stiffness"))
+        stiffness = float(np.clip(stiffness, *limits.stiffness))
+        damping = float(np.clip(draw("damping") * np.sqrt(stiffness), *limits.damping))
+        elastic = draw.present()
+        return Domain(
+            wildness=draw.wildness,
+            length=draw.either("length"),
+            mass=draw.either("mass"),
+            payload=draw("payload"),
+            gear=draw.far("gear"),
+            ripple=draw("ripple") if elastic else 0.0,
+            flexibility=max(draw("flexibility"), limits.flexibility) if elastic else 0.0,
+            backlash=draw("backlash") if elastic and draw.present() else 0.0,
+            cogging=draw("cogging") if draw.present() else 0.0,
+            stiction=draw("stiction") if draw.present() else 1.0,
+            friction=draw.either("friction"),
+            viscous=draw.either("viscous"),
+            rotor=draw.either("rotor"),
+            torque_limit=draw("torque_limit"),
+            torque_rise=draw("torque_rise"),
+            delay=min(draw("delay"), limits.delay),
+            control=control,
+            stiffness=stiffness,
+            damping=damping,
+            feedforward=max(draw("feedforward"), limits.feedforward) if control == "pd" else 1.0,
+            policy_rate=max(draw("policy_rate"), 1 / limits.hold) if control == "policy" else 0.0,
+            encoder_bits=round(draw("loop_bits")),
+            encoder_bandwidth=draw("loop_bandwidth"),
+        )
+
+    def logger(
+        self,
+        rng: np.random.Generator,
+        domain: Domain,
+        *,
+        most: float,
+        rate: float | None = None,
+    ) -> Logger:
+        """Draw the logger of one run.
+
+        Args:
+            most: Highest rate, that of the run, in [Hz].
+            rate: The rate, in place of one that is drawn, in [Hz].
+        """
+        draw = _Draw(self, rng, domain.wildness)
+        drawn = float(rng.choice([each for each in RATES if each <= most * (1 + 1e-6)]))
+        rate = rate or drawn
+        held = rng.uniform() < 0.1
+        # Of another generator, so that it changes nothing else.
+        efforts = _Draw(self, rng.spawn(1)[0], domain.wildness)
+        return Logger(
+            rate=rate,
+            velocity=str(rng.choice(get_args(Velocity))),  # type: ignore[arg-type]
+            bits=round(draw("bits")),
+            cutoff=min(draw("cutoff"), 0.4 * rate),
+            noise=draw("noise"),
+            jitter=draw("jitter"),
+            lost=draw("lost") if draw.present() else 0.0,
+            repeated=draw("repeated") if draw.present() else 0.0,
+            hold=max(1, round(draw.far("hold"))) if held else 1,
+            ripple=draw.far("log_ripple"),
+            roughness=draw("roughness"),
+            gear=domain.gear,
+            resonances=tuple(draw.far("resonance") for _ in range(rng.integers(RESONANCES + 1))),
+            desired=str(  # type: ignore[arg-type]
+                rng.choice(get_args(Desired), p=(0.5, 0.35, 0.08, 0.07))
+            ),
+            **efforts.effort(),
+        )
+
+    def __str__(self) -> str:
+        head = ("setting", "mild", "wild", "unit", "what", "source")
+        rows = [
+            (name, *(f"{end:g}" for end in ends), *described(name))
+            for name, ends in self.ends.items()
+        ]
+        return "\n".join(
+            f"{name:16}{mild:>8}{wild:>8} {unit:6}{text:50}{source}"
+            for name, mild, wild, unit, text, source in (head, *rows)
+        )
+
+
+def described(name: str) -> tuple[str, str, str]:
+    """Unit, meaning and source of a setting of the distribution."""
+    about = ABOUT[name]
+    return about.get("unit", ""), about["text"], about["source"]
+
+
+class _Draw:
+    """Values of one run."""
+
+    def __init__(
+        self, distribution: Distribution, rng: np.random.Generator, wildness: float
+    ) -> None:
+        self._distribution, self._rng, self.wildness = distribution, rng, wildness
+
+    def __call__(self, name: str) -> float:
+        """A value between the mild end and the point on the way to the wild one."""
+        return self._between(name, self.wildness * float(np.sqrt(self._rng.uniform())))
+
+    def far(self, name: str) -> float:
+        """A value between both ends, at any wildness."""
+        return self._between(name, float(self._rng.uniform()))
+
+    def either(self, name: str) -> float:
+        """A value, or its inverse."""
+        value = self(name)
+        return value if self._rng.uniform() < 0.5 else 1 / value
+
+    def present(self) -> bool:
+        """Whether the robot has an imperfection."""
+        return bool(self._rng.uniform() < PRESENT)
+
+    def effort(self) -> dict[str, Any]:
+        """What of efforts a logger has."""
+        share, kind = self._rng.uniform(size=2).tolist()
+        current, noise, bits = (self.far("current"), self("effort_noise"), self("effort_bits"))
+        there, measured = share < self("effort_share"), kind >= CURRENTS
+        return {
+            "effort": ("torque" if measured else "current") if there else "missing",
+            "current": 0.0 if measured or not there else current,
+            "effort_noise": noise,
+            "effort_bits": round(bits),
+        }
+
+    def _between(self, name: str, share: float) -> float:
+        mild, wild = self._distribution.ends[name]
+        if ABOUT[name].get("log") and mild > 0 and wild > 0:
+            return float(mild * (wild / mild) ** share)
+        return float(mild + share * (wild - mild))
+
+
+ABOUT: Mapping[str, Any] = tomllib.loads(
+    Path(__file__).with_name("domains.toml").read_text(encoding="utf-8")
+)
+"""What domains.toml says of each setting."""
+DISTRIBUTION = Distribution({name: tuple(each["ends"]) for name, each in ABOUT.items()})
+"""The distribution of all wide runs."""
+PICKS = 0.35
+"""Share of motions that are picks."""
+SLOWEST = 0.05
+"""Lowest peak speed of a joint in a movement, in [rad/s]."""
+FASTEST = (0.5, 2.5)
+"""Highest peak speed, mild and wild, in [rad/s]."""
+STANDS = 0.3
+"""Share of motions in the air that begin with standing for a while."""
+STANDING = (1.5, 4.0)
+"""How long they stand, in [s]."""
+
+
+def arm_motion(
+    rng: np.random.Generator, wildness: float, arm: Arm | None = None, *, soft: bool = False
+) -> Picks | Reach:
+    """Motion of an arm."""
+    picks, kind, way = rng.uniform(size=3).tolist()
+    fast, hard, wide, stops, carries, pace, force = rng.uniform(size=7).tolist()
+    stands, long = rng.uniform(size=2).tolist()
+    if picks < PICKS and (arm is None or arm.reach is not None):
+        ways = ("straight", "curve", "directions", "spot")
+        low = 10.0 + 10.0 * force
+        return Picks(
+            way=ways[int(way * len(ways))],
+            hover=(0.005, 0.01 + 0.02 * wildness),
+            force=(low, low + 20.0),
+        )
+    fastest = SLOWEST * (_mixed(FASTEST, wildness) / SLOWEST) ** (0.45 + 0.55 * fast)
+    return Reach(
+        kind=REACHES[int(kind * len(REACHES))],
+        speed=(max(SLOWEST, fastest / 3), fastest),
+        acceleration=4.0 + hard * (4.0 + 12.0 * wildness),
+        spread=0.3 + wide * (0.3 + 0.7 * wildness),
+        pause=(0.0, 0.1 + 0.5 * pace),
+        stops=0.3 * wildness if stops < 0.5 * wildness else 0.0,
+        payload=(0.1, 0.5 + 1.5 * wildness) if carries < 0.2 + 0.4 * wildness else (0.0, 0.0),
+        stand=_mixed(STANDING, long) if stands < STANDS else 0.2,
+    )
+
+
+ARM_LIMITS = Limits(flexibility=12.0)
+"""An arm does not fall."""
+
+
+def _mixed(span: Range, share: float) -> float:
+    return span[0] + share * (span[1] - span[0])
+
+
+WALKS: Mapping[str, Walk] = MappingProxyType(
+    {
+        "walk": Walk(),
+        "slow": Walk(single=(0.7, 1.0), double=(0.5, 0.8)),
+        "brisk": Walk(single=(0.45, 0.6), double=(0.085, 0.1)),
+        "shuffle": Walk(height=(0.025, 0.035), single=(0.3, 0.4), double=(0.12, 0.18)),
+        "march": Walk(way="spot", height=(0.06, 0.09), single=(0.4, 0.8), double=(0.1, 0.3)),
+        "platform": Walk(drop=0.06, height=(0.07, 0.07), single=(0.75, 0.9)),
+    }
+)
+"""Gaits, by long and short times on both feet, on one, and lifts of the feet."""
+WAYS = ("straight", "curve", "directions", "spot")
+MILD, WILD = ("walk", "slow", "march"), ("brisk", "shuffle", "platform")
+"""Gaits for any wildness, and those that come with it."""
+STANDS_STILL = 0.3
+"""Share of the runs in which it only stands."""
+HUMANOID_LIMITS = Limits(
+    stiffness=(0.05, 1.0), damping=(0.2, 0.5), delay=0.004, hold=0.01, feedforward=0.9,
+    flexibility=40.0,
+)  # fmt: skip
+"""Of 30 runs drawn within stiffness, damping, delay and hold, over all robots and motions, 29
+stayed upright, with velocity errors below 0.2 rad/s rms."""
+
+
+def humanoid_motion(
+    rng: np.random.Generator,
+    wildness: float,
+    robot: Humanoid | None = None,
+    *,
+    soft: bool = False,
+) -> Stroll | Stand:
+    """Draw a motion."""
+    upper = Gesture(
+        way=str(rng.choice(("still", "sines", "reaches"))),
+        size=(0.0, 0.2 + 0.8 * wildness),
+        period=(2.0 - 1.2 * wildness, 3.0 - 1.0 * wildness),
+    )
+    if rng.uniform() < STANDS_STILL:
+        still = rng.uniform() < 1 / 3
+        return Stand(
+            sway=(0.0, 0.0) if still else (0.1, 0.3 + 0.3 * wildness),
+            squat=(0.0, 0.0) if still else (0.01, 0.04 + 0.06 * wildness),
+            period=(2.5 - 1.2 * wildness, 4.0),
+            upper=upper,
+        )
+    gaits = MILD if rng.uniform() > wildness else MILD + WILD
+    walk = WALKS[str(rng.choice(gaits))]
+    way = walk.way if walk.way == "spot" or walk.drop else str(rng.choice(WAYS))
+    walk = replace(walk, way=way, jitter=0.02 + 0.08 * wildness)
+    return Stroll(walk=walk, stops=int(rng.integers(3)), pause=(0.8, 2.0), upper=upper)
+
+
+GAITS: Mapping[str, float] = MappingProxyType(
+    {"trot": 0.5, "walk": 0.25, "pace": 0.1, "stand": 0.15}
+)
+"""Probability of each gait; a bound is left out, long robots slip in it."""
+SPREAD: Mapping[str, tuple[Range, Range]] = MappingProxyType(
+    {
+        "period": ((0.9, 1.1), (0.72, 1.35)),
+        "height": ((0.9, 1.1), (0.5, 1.5)),
+        "speed": ((0.5, 1.0), (0.2, 1.4)),
+        "jitter": ((0.0, 0.05), (0.0, 0.2)),
+        "posing": ((0.0, 0.3), (0.2, 1.0)),
+    }
+)
+"""Range of each setting of `noiseclassifier.scenarios.motions.Trot`, mild and wild."""
+QUICK: Mapping[str, float] = MappingProxyType({"trot": 0.7, "walk": 0.8})
+"""Longest period of each gait on soft drives, as `scenarios.motions.Trot` has it."""
+
+
+def quadruped_motion(
+    rng: np.random.Generator,
+    wildness: float,
+    robot: Quadruped | None = None,
+    *,
+    soft: bool = False,
+) -> Trot:
+    """Random motion."""
+    gait = str(rng.choice(list(GAITS), p=list(GAITS.values())))
+
+    def draw(name: str) -> float:
+        mild, wild = (np.array(span) for span in SPREAD[name])
+        return float(rng.uniform(*(mild + wildness * (wild - mild))))
+
+    period, height, posing = draw("period"), draw("height"), draw("posing")
+    moves_body = gait == "stand" or float(rng.uniform()) < 0.4 * wildness
+    pauses = int(rng.binomial(2, 0.4 * wildness)) if gait != "stand" else 0
+    drawn = Trot(
+        gait=gait,
+        way=str(rng.choice(WAYS)),
+        period=(period, period),
+        height=(height, height),
+        speed=draw("speed"),
+        jitter=draw("jitter"),
+        posing=(posing, posing) if moves_body else (0.0, 0.0),
+        pauses=pauses,
+        duration=5.0 + 1.5 * pauses,
+    )
+    return steady(drawn) if soft else drawn
+
+
+def steady(motion: Trot) -> Trot:
+    """The motion on soft drives: quick steps, which catch the body in time.
+
+    A pace, in which feet rattle, becomes a trot; a stand stays.
+    """
+    gait = "trot" if motion.gait == "pace" else motion.gait
+    if gait not in QUICK:
+        return motion
+    shortest, longest = (min(period, QUICK[gait]) for period in motion.period)
+    return replace(motion, gait=gait, period=(shortest, longest))
+
+
+QUADRUPED_LIMITS = Limits(
+    stiffness=(0.1, 1.5), damping=(0.15, 1.5), delay=0.01, hold=0.02, feedforward=0.6,
+    flexibility=40.0,
+)  # fmt: skip
+"""Common to all quadrupeds, with delays no longer than their gains bear."""
+
+LIMITS = {"arm": ARM_LIMITS, "humanoid": HUMANOID_LIMITS, "quadruped": QUADRUPED_LIMITS}
+MOTIONS: Mapping[str, Callable[..., Any]] = {
+    "arm": arm_motion,
+    "humanoid": humanoid_motion,
+    "quadruped": quadruped_motion,
+}
+"""By family: from random numbers, wildness and a robot to a motion."""

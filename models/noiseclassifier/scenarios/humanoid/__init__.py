@@ -1,1 +1,0 @@
-"""Humanoids that walk."""

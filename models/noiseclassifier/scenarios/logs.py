@@ -1,0 +1,384 @@
+"""Logs of a simulated run: what sensors and a logger make of it, with labels decided anew.
+
+This needs no simulation. Ripple of the gears, sensing and sampling are applied to a run and to its
+twin, the run of the same robot and seed without a fault. A fault keeps its label where it still can
+be seen: where the difference that it makes exceeds the twin's log (its motion, ripple and noise)
+by ``CONTRAST`` in at least one band of one joint, in the measured velocities, in their error, or in
+the efforts, if the log has any. Bands of efforts begin at ``SLOWEST``, those of velocities at
+``LOWEST``: a push is slow. Of efforts, the mean of a frame is left out, since a window would spread
+weights into the lowest bands; so a force that does not change cannot be seen. A push of a hand
+has a label while it can be seen in the efforts, even if velocities do not show it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noiseclassifier.scenarios.domains import Logger
+from noiseclassifier.scenarios.motions import PUSH
+from noisemodel import Block, Run
+from noisemodel.types import Array, Mask, Real
+
+CONTRAST = 10 ** (3 / 10)
+"""Least ratio of the power of a fault to that of the twin's log in a band: 3 dB."""
+FRAME, HOP = 0.4, 0.1
+"""Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
+LOWEST = 10.0
+"""Lowest frequency of the bands, in [Hz]; each is a third of an octave wide."""
+SLOWEST = 1.0
+"""That of efforts, in [Hz]: the lowest band of a frame has its first line, at 2.5 Hz, into which
+the window spreads what is slower."""
+HARMONICS = (1, 2, 4)
+"""Orders of the ripple, as multiples of the gear ratio."""
+SHARPNESS, GAIN = 8.0, 3.0
+"""Quality and gain of the resonances that ripple excites."""
+
+
+def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
+    """The log of a run.
+
+    Returns:
+        Measured velocities, what is desired and efforts (torques in [N m], or currents in [A]), at
+        the logger's rate, with those of the failures' labels that can still be seen; ``meta`` has
+        the logger.
+    """
+    found, reference = _log(run, logger, seed), _log(twin, logger, seed)
+    blocks = run.blocks
+    if run is not twin:
+        difference = _clean(run, logger) - _clean(twin, logger)
+        seen = visible(difference, reference.velocity, rate=logger.rate)
+        if found.velocity_desired is not None and reference.velocity_desired is not None:
+            desired = found.velocity_desired - reference.velocity_desired
+            floor = reference.velocity_desired - reference.velocity
+            seen |= visible(desired - difference, floor, rate=logger.rate)
+        pushed: tuple[Block, ...] = ()
+        if found.effort is not None and reference.effort is not None:
+            felt = visible(
+                found.effort - reference.effort,  # their noise is equal
+                reference.effort,
+                rate=logger.rate,
+                lowest=SLOWEST,
+                centred=True,
+            )
+            seen, pushed = seen | felt, _kept(_pushes(run), felt)
+        blocks = _joined((*_kept(run.blocks, seen), *pushed))
+    end = len(found.velocity) / logger.rate
+    blocks = tuple(replace(b, stop=min(b.stop, end)) for b in blocks if b.start < end)
+    events = [
+        {**event, "labelled": _overlap(event, blocks)} for event in run.meta.get("events", ())
+    ]
+    return replace(
+        found, blocks=blocks, meta={**run.meta, "events": events, "logger": logger.as_dict()}
+    )
+
+
+def visible(
+    difference: Real, floor: Real, *, rate: float, lowest: float = LOWEST, centred: bool = False
+) -> Mask:
+    """Frames in which a difference exceeds a floor by ``CONTRAST`` in a band of a joint.
+
+    Args:
+        difference: What a fault changes, shape (samples, joints).
+        floor: The signal without the fault, shape (samples, joints).
+        rate: Sample rate, in [Hz].
+        lowest: Lowest frequency of the bands, in [Hz].
+    """
+    length, hop = round(FRAME * rate), round(HOP * rate)
+    starts = np.arange(0, max(len(difference) - length, 0) + 1, hop)
+    window = np.hanning(length)[:, None]
+    frequencies = np.fft.rfftfreq(length, 1 / rate)
+    edges = lowest * 2 ** (np.arange(0, 3 * np.log2(rate / 2 / lowest) + 1) / 3)
+    edges = edges[np.r_[True, np.diff(np.searchsorted(frequencies, edges)) > 0]]
+    first = np.searchsorted(frequencies, edges)
+    first = first[first < len(frequencies)]
+    out = np.zeros(len(starts), dtype=bool)
+    for number, start in enumerate(starts):
+        frame = slice(start, start + length)
+        signals = difference[frame], floor[frame]
+        if centred:
+            signals = signals[0] - signals[0].mean(axis=0), signals[1] - signals[1].mean(axis=0)
+        ours, theirs = (
+            np.add.reduceat(np.square(np.abs(np.fft.rfft(window[: len(s)] * s, axis=0))), first)
+            for s in signals
+        )
+        out[number] = bool(np.any((ours > CONTRAST * theirs) & (ours > 0)))
+    return out
+
+
+def _kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
+    """Blocks without the parts of failures that cannot be seen."""
+    kept = []
+    for block in blocks:
+        if block.label == "ok":
+            kept.append(block)
+            continue
+        starts = HOP * np.arange(len(seen))
+        frames = starts[seen & (starts < block.stop) & (starts + FRAME > block.start)]
+        if block.stop - block.start <= FRAME:  # one frame holds all of it
+            middle = (block.start + block.stop) / 2
+            if np.any(np.abs(frames + FRAME / 2 - middle) <= FRAME / 2):
+                kept.append(block)
+            continue
+        start, stop = np.inf, -np.inf
+        for frame in frames.tolist():
+            if frame > stop:
+                kept += _piece(block, start, stop)
+                start = frame
+            stop = frame + FRAME
+        kept += _piece(block, start, stop)
+    return tuple(kept)
+
+
+def _piece(block: Block, start: float, stop: float) -> list[Block]:
+    first, last = max(block.start, start), min(block.stop, stop)
+    return [replace(block, start=first, stop=last)] if last > first else []
+
+
+def _pushes(run: Run) -> tuple[Block, ...]:
+    """The times in which hands push, by their events."""
+    return tuple(
+        Block(event["start"], event["stop"], event["label"])
+        for event in run.meta.get("events", ())
+        if event.get("cause") == PUSH
+    )
+
+
+def _joined(blocks: Sequence[Block]) -> tuple[Block, ...]:
+    """Blocks in order, those of one label that overlap as one."""
+    joined: list[Block] = []
+    for block in sorted(blocks):
+        last = joined[-1] if joined else None
+        if last and last.label == block.label and block.start < last.stop:
+            joined[-1] = replace(last, stop=max(last.stop, block.stop))
+        else:
+            joined.append(block)
+    return tuple(joined)
+
+
+def _overlap(event: dict[str, Any], blocks: Sequence[Block]) -> float:
+    """Time that the label of an event has, in [s]."""
+    mine = (b for b in blocks if b.label == event["label"] and b.stop > event["start"])
+    later = event["stop"] + 0.5
+    return float(round(sum(max(0.0, min(b.stop, later) - b.start) for b in mine), 6))
+
+
+def _clean(run: Run, logger: Logger) -> Array:
+    """Velocities as the logger has them, without noise, ripple and quantisation."""
+    velocity = run.velocity.astype(np.float64)
+    if logger.velocity != "measured":
+        velocity = _low_pass(velocity, logger.cutoff, run.rate)
+    return _held(_sampled(velocity, run.rate, _stamps(run, logger)), logger.hold)
+
+
+def _log(run: Run, logger: Logger, seed: int) -> Run:
+    rng = np.random.default_rng(seed)
+    joints = run.velocity.shape[1]
+    phases = rng.uniform(0, 2 * np.pi, (len(HARMONICS), joints))
+    weights = rng.uniform(0.2, 1, (len(HARMONICS), joints))
+    count = len(_stamps(run, logger))
+    jitter = rng.standard_normal(count) * logger.jitter / logger.rate
+    noise = logger.noise * rng.standard_normal((count, joints))
+    lost, repeated = rng.uniform(size=(2, count))
+    rough = logger.roughness * rng.standard_normal((count, joints))
+    stamps = np.maximum.accumulate(_stamps(run, logger) + jitter)
+    assert run.position is not None
+    position, velocity = (s.astype(np.float64) for s in (run.position, run.velocity))
+    if logger.ripple:
+        error, ripple = _ripple(position, velocity, run.rate, logger, phases, weights)
+        position, velocity = position + error, velocity + ripple
+    if logger.velocity == "differentiated":
+        counts = 2 * np.pi / 2**logger.bits
+        angle = np.rint(_sampled(position, run.rate, stamps) / counts) * counts
+        velocity = np.diff(angle, axis=0, prepend=angle[:1]) * logger.rate
+        velocity = _low_pass(velocity, logger.cutoff, logger.rate, order=1)
+    else:
+        if logger.velocity == "filtered":
+            velocity = _low_pass(velocity, logger.cutoff, run.rate)
+        velocity = _sampled(velocity, run.rate, stamps)
+        velocity += noise + rough * velocity
+    effort = _effort(run, logger, stamps, seed)
+    for signal in (velocity, effort):
+        if signal is not None:
+            _transmit(signal, repeated < logger.repeated, lost < logger.lost)
+    return Run(
+        time=np.arange(count) / logger.rate,
+        joint_names=run.joint_names,
+        velocity=_held(velocity, logger.hold).astype(np.float32),
+        velocity_desired=_desired(run, logger),
+        effort=None if effort is None else _held(effort, logger.hold).astype(np.float32),
+        robot=run.robot,
+        meta=run.meta,
+    )
+
+
+def _effort(run: Run, logger: Logger, stamps: Array, seed: int) -> Array | None:
+    """Efforts at stamps, shape (samples, joints), in [N m] or [A]; or None."""
+    if run.effort is None or logger.effort == "missing":
+        return None
+    effort, most = run.effort.astype(np.float64), np.array(run.meta["effort_limit"])
+    if logger.effort == "current":
+        effort, most = effort * (logger.current / most), np.full_like(most, logger.current)
+    if logger.velocity != "measured":
+        effort = _low_pass(effort, logger.cutoff, run.rate)
+    effort = _sampled(effort, run.rate, stamps)
+    rng = np.random.default_rng((seed, 1))  # not that of velocities, which stay what they are
+    effort += logger.effort_noise * most * rng.standard_normal(effort.shape)
+    counts = 2 * most / 2**logger.effort_bits
+    return np.asarray(np.rint(effort / counts) * counts)
+
+
+def _transmit(signal: Array, repeated: Mask, lost: Mask) -> None:
+    """Repeat samples of a signal, shape (samples, joints), and interpolate lost ones, in place."""
+    signal[_again(repeated)] = signal[_before(repeated)]
+    if lost.any() and not lost.all():
+        known = np.flatnonzero(~lost)
+        for joint in range(signal.shape[1]):
+            signal[lost, joint] = np.interp(np.flatnonzero(lost), known, signal[known, joint])
+
+
+def _desired(run: Run, logger: Logger) -> Any:
+    """What the log has as desired velocities, shape (samples, joints), in [rad/s]; or None."""
+    wanted = {"commanded": run.velocity_desired, "planned": run.stages["planned"]}
+    if logger.desired == "missing":
+        return None
+    if logger.desired == "zero":
+        return np.zeros((len(_stamps(run, logger)), run.velocity.shape[1]), dtype=np.float32)
+    signal = wanted[logger.desired]
+    if signal is None or not signal.any():  # a policy has no desired velocities
+        signal = run.stages["planned"]
+    return _sampled(signal.astype(np.float64), run.rate, _stamps(run, logger)).astype(np.float32)
+
+
+def _ripple(
+    position: Array, velocity: Array, rate: float, logger: Logger, phases: Array, weights: Array
+) -> tuple[Array, Array]:
+    """Ripple locked to the joints' angles, of positions, in [rad], and velocities, in [rad/s]."""
+    from scipy.signal import iirpeak, lfilter
+
+    error, ripple = np.zeros_like(position), np.zeros_like(velocity)
+    for harmonic, phase, weight in zip(HARMONICS, phases, weights, strict=True):
+        order = harmonic * logger.gear
+        size = logger.ripple * weight / harmonic
+        # Above a quarter of the sample rate it would alias: a real one is sampled in the log only.
+        fades = np.clip(2 - 4 * order * np.abs(velocity) / (2 * np.pi) / (rate / 4), 0, 1)
+        error += fades * size / order * np.sin(order * position + phase)
+        ripple += fades * size * velocity * np.cos(order * position + phase)
+    excited = ripple.copy()
+    for frequency in logger.resonances:
+        b, a = iirpeak(frequency, SHARPNESS, fs=rate)
+        excited += GAIN * lfilter(b, a, ripple, axis=0)
+    return error, excited
+
+
+def _stamps(run: Run, logger: Logger) -> Array:
+    """Nominal times of the samples, shape (samples,), in [s]."""
+    return np.arange(int(len(run.time) * logger.rate / run.rate * (1 + 1e-9))) / logger.rate
+
+
+def _sampled(signal: Array, rate: float, stamps: Array) -> Array:
+    """Linear interpolation of a signal, shape (samples, joints), at stamps, in [s]."""
+    place = np.clip(stamps * rate, 0, len(signal) - 1)
+    first = np.minimum(place.astype(int), len(signal) - 2)
+    share = (place - first)[:, None]
+    return np.asarray((1 - share) * signal[first] + share * signal[first + 1])
+
+
+def _low_pass(signal: Array, cutoff: float, rate: float, *, order: int = 2) -> Array:
+    from scipy.signal import butter, sosfilt, sosfilt_zi
+
+    sections = butter(order, min(cutoff, 0.45 * rate), fs=rate, output="sos")
+    state = sosfilt_zi(sections)[:, :, None] * signal[:1]
+    return np.asarray(sosfilt(sections, signal, axis=0, zi=state)[0])
+
+
+def _held(signal: Array, samples: int) -> Array:
+    return signal if samples == 1 else signal[np.arange(len(signal)) // samples * samples]
+
+
+def _again(repeated: Mask) -> NDArray[np.intp]:
+    """Samples that repeat the one before."""
+    return np.flatnonzero(repeated[1:]) + 1
+
+
+def _before(repeated: Mask) -> NDArray[np.intp]:
+    return np.flatnonzero(repeated[1:])
+
+
+ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
+"""Class of each kind of fault."""
+LOWEST_ADDED = 15.0
+"""Lowest frequency, in [Hz]; the highest is 0.45 of the sample rate."""
+LEVELS = 0.03, 10.0
+"""Least and most root mean square while it lasts, in [rad/s]: from what can be felt on."""
+LASTS = 0.4, 1.2
+"""Shortest and longest tone or noise, in [s]."""
+BLOW = 0.1
+"""Duration of a blow, in [s]."""
+APART = 2.5
+"""From the start of a fault to that of the next, in [s]."""
+UNLABELLED = 0.05
+"""Time around a fault that has no label, in [s]."""
+ALL = 0.3
+"""Share of the faults that all joints have."""
+
+
+def with_faults(run: Run, *, seed: int) -> Run:
+    """A good log with faults added to its measured velocities."""
+    rng = np.random.default_rng(seed)
+    velocity = run.velocity.astype(np.float64)
+    end, blocks, events = len(velocity) / run.rate, list[Block](), list[dict[str, Any]]()
+    starts = np.arange(1.0, end - LASTS[1], APART) + rng.uniform(0.0, 0.3)
+    edge = 0.0
+    for start in starts.tolist():
+        kind = str(rng.choice(list(ADDED)))
+        stop = start + (BLOW if kind == "blow" else rng.uniform(*LASTS))
+        part = slice(round(start * run.rate), round(stop * run.rate))
+        frequency = LOWEST_ADDED * (0.45 * run.rate / LOWEST_ADDED) ** rng.uniform()
+        level = LEVELS[0] * (LEVELS[1] / LEVELS[0]) ** rng.uniform()
+        joints = np.arange(velocity.shape[1])
+        if rng.uniform() > ALL:
+            joints = rng.choice(joints, 1)
+        signal = fault(kind, part.stop - part.start, frequency, run.rate, rng)
+        added = np.zeros_like(velocity)
+        added[part, joints] = level * signal[:, None]
+        around = slice(max(0, part.start - round(run.rate / 2)), part.stop + round(run.rate / 2))
+        seen = visible(added[around], run.velocity[around], rate=run.rate).any()
+        velocity += added
+        label = ADDED[kind]
+        labelled = stop - start if seen else 0.0
+        events.append({"label": label, "start": start, "stop": stop, "labelled": labelled})
+        blocks.append(Block(edge, start - UNLABELLED, "ok"))
+        blocks += [Block(start, stop, label)] if seen else []
+        edge = stop + UNLABELLED
+    blocks.append(Block(edge, end, "ok"))
+    meta = {**run.meta, "scenario": "added", "events": events}
+    return replace(run, velocity=velocity.astype(np.float32), blocks=tuple(blocks), meta=meta)
+
+
+def fault(
+    kind: str, samples: int, frequency: float, rate: float, rng: np.random.Generator
+) -> Array:
+    """A fault of level 1.
+
+    Args:
+        frequency: Of a tone, of the middle of an octave of noise, of what rings after a blow, in
+            [Hz].
+        rate: Sample rate, in [Hz].
+
+    Returns:
+        Shape (samples,), of root mean square 1.
+    """
+    time = np.arange(samples) / rate
+    if kind == "noise":
+        white = np.fft.rfft(rng.standard_normal(samples))
+        place = np.fft.rfftfreq(samples, 1 / rate)
+        white[(place < frequency / np.sqrt(2)) | (place > frequency * np.sqrt(2))] = 0.0
+        signal = np.fft.irfft(white, samples)
+    else:
+        signal = np.sin(2 * np.pi * (frequency * time + rng.uniform()))
+        if kind == "blow":
+            signal *= np.exp(-time * frequency / 3.0)
+    return np.asarray(signal / max(np.sqrt(np.mean(signal**2)), 1e-9))

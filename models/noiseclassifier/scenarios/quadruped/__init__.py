@@ -1,1 +1,0 @@
-"""Quadrupeds that trot."""

@@ -1,0 +1,554 @@
+"""MuJoCo models made from Pinocchio models, and inverse kinematics of whole robots."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Protocol
+
+import mujoco
+import numpy as np
+import pinocchio as pin
+from scipy.linalg import solve_banded
+
+from noiseclassifier.scenarios.errors import ScenarioError
+from noiseclassifier.scenarios.faults import Imperfections
+from noiseclassifier.scenarios.motions import TICK, Ball, Box, Effector, Rod, Sole
+from noiseclassifier.scenarios.robots import Drivetrain
+from noisemodel import Robot, RobotError
+from noisemodel.joints import Joint, table_of
+from noisemodel.types import Array
+
+
+class Reducible(Protocol):
+    """The joints of a robot; robots of every family have them."""
+
+    @property
+    def name(self) -> str:
+        """Name of the URDF, as `noisemodel.ROBOTS` lists it."""
+
+    @property
+    def drives(self) -> Drivetrain:
+        """The joints that move."""
+
+    @property
+    def length_scale(self) -> float:
+        """Scale of all lengths of the URDF."""
+
+    @property
+    def held(self) -> Mapping[str, float]:
+        """Positions of the locked joints that are not at 0, in [rad] or [m]."""
+
+
+def reduced_model(robot: Reducible) -> Any:
+    """Pinocchio model of a robot, with all other joints locked."""
+    held = tuple(sorted(robot.held.items()))
+    return _reduced(robot.name, robot.drives.joints, held, robot.length_scale)
+
+
+def configuration(model: Any, joints: Array) -> Array:
+    """Pinocchio's configuration of a robot with a fixed base.
+
+    Args:
+        joints: Joint positions, shape (joints,), in [rad].
+    """
+    if model.nq == model.nv:
+        return joints
+    return np.asarray(pin.integrate(model, pin.neutral(model), joints))
+
+
+@lru_cache(maxsize=8)
+def _reduced(
+    name: str, moved: tuple[str, ...], held: tuple[tuple[str, float], ...], scale: float
+) -> Any:
+    model = Robot.load(name).model
+    lacking = {*moved, *dict(held)} - set(model.names)
+    if lacking:
+        raise ScenarioError(
+            f"{name} has no joint {', '.join(sorted(lacking))}; it has {', '.join(model.names[1:])}"
+        )
+    posture = pin.neutral(model)
+    for joint, position in held:
+        posture[model.joints[model.getJointId(joint)].idx_q] = position
+    fixed = [
+        model.getJointId(joint)
+        for joint in model.names[1:]
+        if joint not in moved and model.joints[model.getJointId(joint)].nv == 1
+    ]
+    # Pinocchio refuses two frames of one name, as in anymal_c, and a joint and a body of one name.
+    try:
+        reduced = pin.buildReducedModel(model, fixed, posture)
+    except ValueError:
+        if fixed:
+            raise
+        reduced = model
+    if tuple(reduced.names)[-len(moved) :] != moved:
+        raise ScenarioError(
+            f"{name}: the drives are to be in the order of the URDF, {', '.join(reduced.names[1:])}"
+        )
+    return reduced if scale == 1.0 else _scaled(reduced, scale)
+
+
+def _scaled(model: Any, scale: float) -> Any:
+    """A copy of a model with all lengths scaled, its masses unchanged."""
+    scaled = model.copy()
+    for index in range(1, model.njoints):
+        scaled.jointPlacements[index] = _moved(model.jointPlacements[index], scale)
+        given = model.inertias[index]
+        scaled.inertias[index] = pin.Inertia(
+            given.mass, scale * given.lever, scale**2 * given.inertia
+        )
+    for index in range(model.nframes):
+        scaled.frames[index].placement = _moved(model.frames[index].placement, scale)
+    return scaled
+
+
+def _moved(placement: Any, scale: float) -> Any:
+    return pin.SE3(placement.rotation, scale * placement.translation)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Physics:
+    """Physical properties that a URDF lacks.
+
+    Attributes:
+        timestep: In [s].
+        armature: Inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg].
+        damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
+        friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
+        contact: Time constant of a contact, in [s].
+    """
+
+    timestep: float
+    armature: Array
+    damping: Array
+    friction: Array
+    contact: float = 0.005
+    grip: float = 0.8
+
+
+SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
+ROBOT, WORLD = 1, 2
+"""Contact groups: the robot collides with the world, never with itself."""
+
+
+def add_effector(
+    spec: Any, bodies: Sequence[Any], model: Any, effector: Effector, physics: Physics
+) -> None:
+    """Add the geom of an effector, and a site that encloses all of its contacts."""
+    if not model.existFrame(effector.frame):
+        known = ", ".join(frame.name for frame in model.frames)
+        raise ScenarioError(
+            f"the robot has no frame {effector.frame!r} for an effector; it has {known}"
+        )
+    frame = model.frames[model.getFrameId(effector.frame)]
+    body = bodies[frame.parentJoint]
+    geom, size, middle, around = _solid(effector)
+    pose = frame.placement
+    shape = {"quat": quaternion(pose.rotation), **_surface(ROBOT, WORLD, physics)}
+    if isinstance(effector, Ball):
+        shape["condim"] = 4  # a foot of rubber does not spin on the spot
+    body.add_geom(name=effector.frame, type=geom, size=size, pos=pose.act(middle), **shape)
+    body.add_site(
+        name=effector.frame,
+        type=mujoco.mjtGeom.mjGEOM_BOX if isinstance(effector, Sole) else SPHERE,
+        pos=pose.act(np.array(effector.point)),
+        quat=shape["quat"],
+        size=around,
+    )
+
+
+def add_boxes(spec: Any, boxes: Sequence[Box], physics: Physics) -> None:
+    """Add the boxes of the world, all of them present."""
+    for number, box in enumerate(boxes):
+        spec.worldbody.add_geom(
+            name=_box(number),
+            type=mujoco.mjtGeom.mjGEOM_BOX,
+            pos=box.centre,
+            size=box.half,
+            quat=[np.cos(box.yaw / 2), 0, 0, np.sin(box.yaw / 2)],
+            **_surface(WORLD, ROBOT, physics),
+        )
+
+
+def set_collision(model: Any, geom: int, *, present: bool) -> None:
+    """Enable or disable the collisions of a geom."""
+    model.geom_contype[geom], model.geom_conaffinity[geom] = (WORLD, ROBOT) if present else (0, 0)
+
+
+def box_changes(model: Any, boxes: Sequence[Box]) -> dict[int, list[tuple[int, bool]]]:
+    """Disable the boxes that are not present at first; the changes of all boxes."""
+    changes: dict[int, list[tuple[int, bool]]] = {}
+    for number, box in enumerate(boxes):
+        geom = model.geom(_box(number)).id
+        if box.since > 0:
+            set_collision(model, geom, present=False)
+            changes.setdefault(round(box.since / TICK), []).append((geom, True))
+        if box.until < np.inf:
+            changes.setdefault(round(box.until / TICK), []).append((geom, False))
+    return changes
+
+
+def quaternion(rotation: Array) -> list[float]:
+    """Quaternion of a rotation matrix in MuJoCo's order: w, x, y, z."""
+    q = pin.Quaternion(rotation)
+    return [q.w, q.x, q.y, q.z]
+
+
+def _box(number: int) -> str:
+    return f"box{number}"
+
+
+def _surface(own: int, other: int, physics: Physics) -> dict[str, Any]:
+    return {
+        "contype": own,
+        "conaffinity": other,
+        "friction": [physics.grip, 0.01, 0.001],
+        "solref": [physics.contact, 1.0],
+    }
+
+
+def _solid(effector: Effector) -> tuple[Any, list[float], Array, list[float]]:
+    """Geometry of an effector: type, size and centre of its geom, and the size of its site."""
+    if isinstance(effector, Rod):  # MuJoCo leaves the round ends out of a capsule's length
+        half = effector.length / 2
+        size = [effector.radius, half - effector.radius, 0.0]
+        capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
+        return capsule, size, np.array([0, 0, half]), [2.5 * effector.radius] * 3
+    if isinstance(effector, Ball):
+        ball = [effector.radius, 0.0, 0.0]
+        return SPHERE, ball, np.zeros(3), [1.5 * effector.radius] * 3
+    half = effector.thickness / 2
+    size = [*effector.patch, half]
+    around = [*(1.2 * extent for extent in effector.patch), effector.thickness]
+    return mujoco.mjtGeom.mjGEOM_BOX, size, np.add(effector.point, (0, 0, half)), around
+
+
+BASE_SENSORS = {
+    "base.place": "FRAMEPOS",
+    "base.turn": "FRAMEQUAT",
+    "base.velocity": "FRAMELINVEL",
+    "base.spin": "FRAMEANGVEL",
+    "centre.place": "SUBTREECOM",
+    "centre.velocity": "SUBTREELINVEL",
+}
+"""Sensors of the floating base and of the centre of mass, in the world's axes: positions
+in [m], the quaternion (w, x, y, z), velocities in [m/s], the angular velocity in [rad/s]."""
+
+
+def add_sensors(spec: Any, effectors: Sequence[Effector], root: str | None) -> None:
+    """Add the sensors that `sensors_of` describes, the contact forces of the effectors first."""
+    for effector in effectors:
+        _add(spec, f"{effector.frame}.touch", "TOUCH", "SITE", effector.frame)
+    for effector in effectors:
+        if isinstance(effector, Sole):
+            _add(spec, f"{effector.frame}.force", "FORCE", "SITE", effector.frame)
+            _add(spec, f"{effector.frame}.torque", "TORQUE", "SITE", effector.frame)
+    if root is None:
+        return
+    for effector in effectors:
+        _add(spec, f"{effector.frame}.place", "FRAMEPOS", "SITE", effector.frame)
+    for name, kind in BASE_SENSORS.items():
+        _add(spec, name, kind, "BODY" if "centre" in name else "XBODY", root)
+
+
+def sensors_of(model: Any) -> dict[str, slice]:
+    """Slices of the sensors of a model from `noiseclassifier.scenarios.mujoco_model.build`.
+
+    Returns:
+        Slice of each sensor in the vector of all, by name: ``<frame>.touch`` of each effector, its
+        contact force in [N]; ``<frame>.force`` and ``<frame>.torque`` of each sole, the load of the
+        sole in [N] and [N m], in the sole's axes, with MuJoCo's sign: negate them for the force of
+        the ground on the foot. Floating robots have
+        ``<frame>.place`` of each effector in [m], and those of ``BASE_SENSORS``.
+    """
+    return {
+        model.sensor(number).name: slice(
+            int(model.sensor_adr[number]), int(model.sensor_adr[number] + model.sensor_dim[number])
+        )
+        for number in range(model.nsensor)
+    }
+
+
+def _add(spec: Any, name: str, kind: str, sort: str, place: str) -> None:
+    spec.add_sensor(
+        name=name,
+        type=getattr(mujoco.mjtSensor, f"mjSENS_{kind}"),
+        objtype=getattr(mujoco.mjtObj, f"mjOBJ_{sort}"),
+        objname=place,
+    )
+
+
+TYPES = {
+    "revolute": mujoco.mjtJoint.mjJNT_HINGE,
+    "continuous": mujoco.mjtJoint.mjJNT_HINGE,
+    "prismatic": mujoco.mjtJoint.mjJNT_SLIDE,
+}
+
+
+def build(
+    model: Any, physics: Physics, *, effectors: Sequence[Effector] = (), boxes: Sequence[Box] = ()
+) -> Any:
+    """MuJoCo model with one torque actuator per joint."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = physics.timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 10  # firm friction: tools do not creep
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # divergence must show
+    spec.compiler.degree = False
+    joints = _joints(model)
+    bodies = _add_bodies(spec, model, joints, physics)
+    for effector in effectors:
+        add_effector(spec, bodies, model, effector, physics)
+    add_sensors(spec, effectors, joints[0].name if joints[0].kind == "floating" else None)
+    add_boxes(spec, boxes, physics)
+    try:
+        return spec.compile()
+    except ValueError as error:
+        problem = " ".join(str(error).split())
+        raise ScenarioError(f"MuJoCo refuses the robot: {problem}") from error
+
+
+def _add_bodies(spec: Any, model: Any, joints: Sequence[Joint], physics: Physics) -> list[Any]:
+    """Add all bodies with their joints and drives; the world comes first."""
+    bodies = [spec.worldbody]
+    driven = 0
+    for index, joint in enumerate(joints):
+        body = bodies[joint.parent].add_body(name=joint.name, **_pose(model, index + 1))
+        _give_inertia(body, model.inertias[index + 1])
+        bodies.append(body)
+        if joint.kind == "floating":
+            body.add_freejoint(name=joint.name)
+            continue
+        body.add_joint(
+            name=joint.name,
+            type=TYPES[joint.kind],
+            axis=(np.eye(3) if joint.turn is None else joint.turn)[joint.axis],
+            armature=physics.armature[driven],
+            damping=[physics.damping[driven], 0, 0],
+            frictionloss=physics.friction[driven],
+        )
+        spec.add_actuator(
+            name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT
+        ).set_to_motor()
+        driven += 1
+    return bodies
+
+
+def _joints(model: Any) -> tuple[Joint, ...]:
+    try:
+        joints = table_of(model)
+    except RobotError as error:
+        raise ScenarioError(str(error)) from error
+    for joint in joints:
+        if joint.kind not in TYPES and not (joint.kind == "floating" and joint is joints[0]):
+            raise ScenarioError(
+                f"joint {joint.name!r} is {joint.kind}; {', '.join(TYPES)} joints can be simulated"
+            )
+    return joints
+
+
+def _pose(model: Any, index: int) -> dict[str, Any]:
+    placement = model.jointPlacements[index]
+    return {"pos": placement.translation, "quat": quaternion(placement.rotation)}
+
+
+def _give_inertia(body: Any, inertia: Any) -> None:
+    tensor = inertia.inertia
+    body.mass = inertia.mass
+    body.ipos = inertia.lever
+    body.fullinertia = [tensor[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+    body.explicitinertial = True
+
+
+class WholeBody:
+    """Inverse kinematics with one Newton step per call.
+
+    Args:
+        start: Configuration to start from, shape (nq,).
+
+    Attributes:
+        configuration: The present configuration, as Pinocchio has it, shape (nq,).
+        inverse: Inverse Jacobian of the last step: velocities, as Pinocchio has them, per rates of
+            the equations, shape (nv, nv).
+    """
+
+    def __init__(
+        self, model: Any, effectors: Sequence[Effector], start: Array, *, upper: int = 0
+    ) -> None:
+        self._model = model.copy()
+        self._frames = [_add_point(self._model, effector) for effector in effectors]
+        self._data = self._model.createData()
+        widths = [6 if isinstance(effector, Sole) else 3 for effector in effectors]
+        ends = np.cumsum(widths).tolist()
+        self._rows = [slice(end - width, end) for width, end in zip(widths, ends, strict=True)]
+        self._heights = [rows.start + 2 for rows in self._rows]
+        equations = ends[-1] + 6 + upper
+        if equations != model.nv:
+            raise ScenarioError(
+                f"{len(widths)} effectors make {equations} equations, the robot has {model.nv}"
+                " unknowns; lock all joints that are not in its legs"
+            )
+        self._centre, self._base = slice(ends[-1], ends[-1] + 3), slice(ends[-1] + 3, ends[-1] + 6)
+        self._upper = slice(ends[-1] + 6, equations)
+        self._jacobian = np.zeros((equations, equations))
+        self._jacobian[self._upper, equations - upper :] = np.eye(upper)
+        self._error = np.zeros(equations)
+        self.configuration = np.array(start, dtype=np.float64)
+        self.inverse = np.zeros((equations, equations))
+
+    def follow(
+        self,
+        places: Array,
+        turns: Sequence[Array],
+        centre: Array,
+        base: Array,
+        *,
+        upper: Array | None = None,
+        steps: int = 1,
+    ) -> Array:
+        """Configuration after Newton steps; one is enough for targets that moved by millimetres.
+
+        Args:
+            places: Of the effectors' points, shape (effectors, 3), in [m].
+            turns: Rotation matrix of each sole, shape (3, 3); those of balls are ignored.
+            centre: Of mass, shape (3,), in [m].
+            base: Rotation matrix of the base, shape (3, 3).
+            upper: Positions of the upper body's joints, shape (upper,), in [rad]; by default they
+                stay.
+
+        Returns:
+            The new configuration, shape (nq,).
+        """
+        model, data = self._model, self._data
+        jacobian, error = self._jacobian, self._error
+        for _ in range(steps):
+            pin.computeJointJacobians(model, data, self.configuration)
+            for index, (frame, rows) in enumerate(zip(self._frames, self._rows, strict=True)):
+                pose = pin.updateFramePlacement(model, data, frame)
+                columns = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+                width = rows.stop - rows.start
+                jacobian[rows] = columns[:width]
+                error[rows.start : rows.start + 3] = places[index] - pose.translation
+                if width == 6:
+                    error[rows.start + 3 : rows.stop] = _turn(pose.rotation, turns[index])
+            jacobian[self._centre] = pin.jacobianCenterOfMass(model, data, False)
+            error[self._centre] = centre - data.com[0]
+            rotation = data.oMi[1].rotation
+            jacobian[self._base, 3:6] = rotation
+            error[self._base] = _turn(rotation, base)
+            if upper is not None:
+                error[self._upper] = upper - self.configuration[model.nq - len(upper) :]
+            self.inverse = np.linalg.inv(jacobian)
+            self.configuration = pin.integrate(model, self.configuration, self.inverse @ error)
+        return self.configuration
+
+    def hold(self, bearing: Array) -> Array:
+        """Torques that hold the robot still under ground forces.
+
+        Args:
+            bearing: Ground force on each effector's point, in the order of the equations: force, in
+                [N], and, for a sole, torque, in [N m].
+
+        Returns:
+            Torques of the joints, shape (joints,), in [N m].
+        """
+        gravity = pin.computeGeneralizedGravity(self._model, self._data, self.configuration)
+        legs = self._jacobian[: self._centre.start, 6:]
+        return np.asarray(gravity[6:] - bearing @ legs)
+
+    @property
+    def lift(self) -> Array:
+        """Movement of the joints per height of each effector, shape (effectors, joints)."""
+        return self.inverse[6:, self._heights].T
+
+    @property
+    def planes(self) -> Array:
+        """Rates of the effectors' x and y per velocity, shape (2 effectors, nv)."""
+        rows = [row for height in self._heights for row in (height - 2, height - 1)]
+        return self._jacobian[rows]
+
+    @property
+    def heights(self) -> Array:
+        """Rates of the effectors' heights per velocity, shape (effectors, nv)."""
+        return self._jacobian[self._heights]
+
+
+def _add_point(model: Any, effector: Effector) -> int:
+    """Add the point of an effector as a frame; its index."""
+    if not model.existFrame(effector.frame):
+        known = ", ".join(frame.name for frame in model.frames)
+        raise ScenarioError(
+            f"the robot has no frame {effector.frame!r} to stand on; it has {known}"
+        )
+    parent = model.getFrameId(effector.frame)
+    frame = model.frames[parent]
+    pose = frame.placement * pin.SE3(np.eye(3), np.array(effector.point))
+    kind = pin.FrameType.OP_FRAME
+    return int(
+        model.addFrame(pin.Frame(f"{effector.frame}.point", frame.parentJoint, parent, pose, kind))
+    )
+
+
+def _turn(rotation: Array, wanted: Array) -> Array:
+    """Rotation vector from one rotation to another, in the world's axes, shape (3,), in [rad]."""
+    return np.asarray(rotation @ pin.log3(rotation.T @ wanted))
+
+
+def pinocchio_base(pose: Array, velocity: Array) -> tuple[Array, Array]:
+    """Pose and velocity of a floating base as Pinocchio has them.
+
+    Args:
+        pose: Position and quaternion (w, x, y, z), shape (samples, 7).
+        velocity: Linear in the world's axes, angular in the base's own, shape (samples, 6).
+    """
+    place, w, xyz = pose[:, :3], pose[:, 3:4], pose[:, 4:]
+    linear = velocity[:, :3]
+    # v' = R^T v, R of the quaternion: v + 2 w (v x u) + 2 (v x u) x u, u its vector part.
+    turned = 2 * np.cross(linear, xyz)
+    linear = linear + w * turned + np.cross(turned, xyz)
+    return np.hstack((place, xyz, w)), np.hstack((linear, velocity[:, 3:]))
+
+
+def real_model(model: Any, frame: str, point: Array, imperfections: Imperfections) -> Any:
+    """A robot's model with its real masses, unknown to its controller.
+
+    Args:
+        point: Where it hangs, in the frame's axes, shape (3,), in [m].
+    """
+    import pinocchio as pin
+
+    real = model.copy()
+    for index, scale in enumerate(imperfections.mass, start=1):
+        given = model.inertias[index]
+        real.inertias[index] = pin.Inertia(given.mass * scale, given.lever, given.inertia * scale)
+    holder = model.frames[model.getFrameId(frame)]
+    real.appendBodyToJoint(
+        holder.parentJoint,
+        pin.Inertia.FromSphere(imperfections.payload, 0.02),
+        holder.placement * pin.SE3(np.eye(3), point),
+    )
+    return real
+
+
+GRAVITY = 9.81
+"""In [m/s²]."""
+
+
+def centre_of_mass(zmp: Array, rate: float) -> Array:
+    """Motion of the centre of mass for a zero-moment point.
+
+    Args:
+        zmp: Zero-moment point at each tick, at rest at both ends, shape (ticks, 2), in [m].
+        rate: Natural frequency of the inverted pendulum, in [rad/s].
+
+    Returns:
+        The bounded solution of c - c''/rate² = zmp, shape (ticks, 2), in [m].
+    """
+    # Kajita et al., Biped walking pattern generation, ICRA 2003; here as one banded system.
+    stiff = 1 / (rate * TICK) ** 2
+    bands = np.zeros((3, len(zmp)))
+    bands[0, 2:] = bands[2, :-2] = -stiff
+    bands[1] = 1 + 2 * stiff
+    bands[1, [0, -1]] = 1
+    return np.asarray(solve_banded((1, 1), bands, zmp), dtype=np.float64)
