@@ -46,9 +46,8 @@ from inspector.progress import progress
 from inspector.training.recordings import classified
 from inspector.training.training import ANY_RATE, THIN, LeftOut, lacking, profile_at
 from noiseclassifier.confusion import ratio
-from noiseclassifier.estimators.calibration import identity, unthinned
-from noiseclassifier.estimators.estimator import ESTIMATORS
-from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT, Probable
+from noiseclassifier.estimators import ESTIMATORS
+from noiseclassifier.estimators.decision import NOVELTY_LIMIT, Probable, identity, unthinned
 from noiseclassifier.estimators.trees import TAIL, Trees
 from noiseclassifier.evaluation.matching import OK, UNCLEAR, Outcome, Predictions, within
 from noiseclassifier.evaluation.measures import MOST, auc, harmonic_mean
@@ -60,7 +59,6 @@ from noiseclassifier.pooling import RELATIVE, columns
 from noiseclassifier.scenarios.domains import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
 from noiseclassifier.scenarios.robots import ROBOTS, TARGETS, WIDE
 from noiseclassifier.signals import EFFORT, JOINTS, NOISE, feeds, named
-from noiseclassifier.splitting import folds
 from noiseclassifier.tuning.grid import Grid
 from noisemodel import NoiseModelError
 

@@ -49,7 +49,7 @@ def load_library(paths: Sequence[str | Path] = ()) -> Library:
         paths: Model files, or names of models that ship; all of these unless given.
 
     Raises:
-        ModelFileError: If a file is no model.
+        FileError: If a file is no model.
     """
     files = assets.model_files([Path(path) for path in paths])
     return {path.stem: nc.load(path) for path in files}
@@ -76,7 +76,7 @@ def _fits(model: nc.Model, robot: str | None) -> bool:
         or not any(map(nc.signals.by_joint, model.profile.signals))
     ):
         return True
-    robots = {nc.splitting.robot_of(name) for name in model.runs} - {""}
+    robots = {nc.recording.robot_of(name) for name in model.runs} - {""}
     return not robots or robot in robots
 
 

@@ -161,7 +161,7 @@ def write_card(path: Path, sections: dict[str, list[Path]]) -> None:
         report = evaluate(path, inputs, part=part)
         texts.append(f"## {title}\n\n```\n{report}\n```\n")
         print(f"\n{path.stem}: {title}\n{report}", flush=True)
-    robots = {nc.splitting.robot_of(run) for run in model.runs}
+    robots = {nc.recording.robot_of(run) for run in model.runs}
     card = CARD.format(
         name=path.stem,
         rates=", ".join(f"{rate:g}" for rate in RATES),

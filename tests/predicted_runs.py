@@ -4,8 +4,7 @@ import numpy as np
 
 from noiseclassifier.evaluation.matching import Predictions
 from noiseclassifier.labels import Labels
-from noiseclassifier.recording import Block
-from noiseclassifier.splitting import group_of
+from noiseclassifier.recording import Block, group_of
 
 CLASSES = ("ok", "impact", "highaccelerations", "oscillations")
 RATE, LENGTH, HOP = 1000.0, 400, 100

@@ -10,7 +10,7 @@ from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, per
 
 from inspector.training import evaluation
 from noiseclassifier.evaluation.assessment import measure
-from noiseclassifier.splitting import group_of
+from noiseclassifier.recording import group_of
 
 
 def run(path, seed, *, label="oscillations"):

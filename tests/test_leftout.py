@@ -10,8 +10,7 @@ import pytest
 import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.training.recordings import classified
-from noiseclassifier.estimators.calibration import identity
-from noiseclassifier.estimators.probabilistic import NOVELTY_LIMIT
+from noiseclassifier.estimators.decision import NOVELTY_LIMIT, identity
 from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.evaluation.matching import Outcome, predict
 from noiseclassifier.logbands import ANY

@@ -110,10 +110,10 @@ def test_perfect_predictions_score_one_with_the_exact_bound_of_their_groups():
 
 def test_runs_of_the_training_set_are_refused_or_listed(classifier):
     known = recording("panda/swing-001", 1)
-    with pytest.raises(nc.SeenError, match=r"panda/swing-001: .* on the same recording as"):
+    with pytest.raises(nc.DatasetError, match=r"panda/swing-001: .* on the same recording as"):
         nc.assess(classifier, [*fresh(), known])
     sibling = recording("panda/good-002", 50, swings=False)
-    with pytest.raises(nc.SeenError, match="'panda/swing-002', which shares its motion"):
+    with pytest.raises(nc.DatasetError, match="'panda/swing-002', which shares its motion"):
         nc.assess(classifier, [sibling])
     found = nc.assess(classifier, [*fresh(), known, sibling], seen_too=True)
     assert list(found.seen) == ["panda/swing-001", "panda/good-002"]

@@ -105,7 +105,7 @@ def test_frames_that_touch_a_gap_are_left_out():
 
 def test_a_label_that_is_no_class_is_named():
     with pytest.raises(
-        nc.UnknownLabelError, match="walk: label 'rattle' is no class; there are ok, impact"
+        nc.RecordingError, match="walk: label 'rattle' is no class; there are ok, impact"
     ):
         nc.Dataset.of([recording(Block(0.0, 1.0, "rattle"))], PROFILE)
 

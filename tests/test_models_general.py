@@ -339,12 +339,12 @@ def test_a_model_bound_to_a_robot_is_a_file_of_its_own(tmp_path):
     ):
         bound.save(tmp_path / "model.npz", overwrite=True)
         rewrite(tmp_path / "model.npz", **changes)
-        with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+        with pytest.raises(nc.FileError, match=rf"model.npz: .*{reason}"):
             nc.load(tmp_path / "model.npz")
 
 
 def test_a_model_for_any_rate_is_no_classifier(path):
-    with pytest.raises(nc.ModelFileError, match="is a model for any rate"):
+    with pytest.raises(nc.FileError, match="is a model for any rate"):
         nc.Classifier.load(path)
 
 
@@ -376,7 +376,7 @@ def test_a_model_for_any_rate_is_no_classifier(path):
 def test_a_wrong_recipe_is_refused(path, changes, reason):
     recipe = [] if changes is None else {**asdict(RECIPE), **changes}
     rewrite(path, {"recipe": recipe})
-    with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+    with pytest.raises(nc.FileError, match=rf"model.npz: .*{reason}"):
         nc.load(path)
 
 
@@ -398,7 +398,7 @@ def test_a_damaged_file_is_refused(path, name, change, reason):
     with np.load(path, allow_pickle=False) as members:
         array = members[name]
     rewrite(path, **{name: change(array)})
-    with pytest.raises(nc.ModelFileError, match=rf"model.npz: .*{reason}"):
+    with pytest.raises(nc.FileError, match=rf"model.npz: .*{reason}"):
         nc.load(path)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.estimators.calibration import calibrate, calibrated
-from noiseclassifier.estimators.mlp import Networks, _fit, _parts
+from noiseclassifier.estimators.decision import calibrate, calibrated
+from noiseclassifier.estimators.networks import Networks, _fit, _parts
 
 
 @pytest.mark.filterwarnings("ignore:Stochastic Optimizer")

@@ -29,7 +29,7 @@ chunk_labels = ["ok", "impact"]
 @pytest.fixture(params=[0, 1_000_000], ids=["Arrow", "NumPy"])
 def log(tmp_path, monkeypatch, request):
     """Writes a `.log` of some text, for either reader."""
-    monkeypatch.setattr("noiseclassifier.logfile.LARGE", request.param)
+    monkeypatch.setattr("noiseclassifier.noisytest.LARGE", request.param)
 
     def write(text, name="walk.log"):
         path = tmp_path / name
@@ -87,7 +87,7 @@ def test_both_readers_read_the_same_bits(log):
 @IN_PLACE
 @given(st.text(max_size=60))
 def test_any_text_is_read_or_refused_with_a_reason(log, text):
-    with suppress(nc.DataFileError):
+    with suppress(nc.FileError):
         time, noise = nc.read_log(log(text))
         assert len(time) == len(noise) >= 2
 
@@ -114,12 +114,12 @@ def test_any_text_is_read_or_refused_with_a_reason(log, text):
     ],
 )
 def test_what_is_wrong_with_a_log_is_named(log, text, reason):
-    with pytest.raises(nc.DataFileError, match=reason):
+    with pytest.raises(nc.FileError, match=reason):
         nc.read_log(log(text))
 
 
 def test_a_log_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(nc.DataFileError, match=r"none.log: cannot be read"):
+    with pytest.raises(nc.FileError, match=r"none.log: cannot be read"):
         nc.read_log(tmp_path / "none.log")
 
 
@@ -153,7 +153,7 @@ def test_annotations_take_integers_and_open_ends(log):
     ],
 )
 def test_what_is_wrong_with_annotations_is_named(log, text, reason):
-    with pytest.raises(nc.DataFileError, match=reason):
+    with pytest.raises(nc.FileError, match=reason):
         read_annotations(log(text, "walk.toml"))
 
 
@@ -167,7 +167,7 @@ def test_a_recording_joins_signal_annotations_and_hash(log):
 
 def test_a_log_without_annotations_is_refused(log, tmp_path):
     log(rows(10))
-    with pytest.raises(nc.DataFileError, match=r"walk.toml: .* each .log needs its .toml"):
+    with pytest.raises(nc.FileError, match=r"walk.toml: .* each .log needs its .toml"):
         list(read_folder(tmp_path))
 
 
@@ -179,9 +179,9 @@ def test_a_log_of_another_rate_is_refused(log, tmp_path):
 
 
 def test_an_empty_folder_is_refused(tmp_path):
-    with pytest.raises(nc.DataFileError, match=r"has no .log file; name a folder"):
+    with pytest.raises(nc.FileError, match=r"has no .log file; name a folder"):
         list(read_folder(tmp_path))
-    with pytest.raises(nc.DataFileError, match="is no folder"):
+    with pytest.raises(nc.FileError, match="is no folder"):
         list(read_folder(tmp_path / "none"))
 
 
@@ -237,7 +237,7 @@ def test_an_empty_configuration_is_noisytests_default(tmp_path):
 def test_what_is_wrong_with_a_configuration_is_named(tmp_path, text, reason):
     path = tmp_path / "config.json"
     path.write_text(text)
-    with pytest.raises(nc.DataFileError, match=rf"config.json: .*{reason}"):
+    with pytest.raises(nc.FileError, match=rf"config.json: .*{reason}"):
         profile_from_config(path)
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.estimators.calibration import calibrate, calibrated
-from noiseclassifier.estimators.estimator import ESTIMATORS
-from noiseclassifier.examples import Examples
+from noiseclassifier.dataset import Examples
+from noiseclassifier.estimators import ESTIMATORS
+from noiseclassifier.estimators.decision import calibrate, calibrated
 from noiseclassifier.signals import stacked
 
 RATE = 1000.0

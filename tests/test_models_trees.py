@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_limits
 
 import noiseclassifier as nc
 from noiseclassifier.estimators import trees as module
-from noiseclassifier.estimators.calibration import calibrate
+from noiseclassifier.estimators.decision import calibrate
 from noiseclassifier.estimators.trees import Detector, Trees
 
 

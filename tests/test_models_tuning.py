@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.recording import Block, Recording
-from noiseclassifier.splitting import folds
+from noiseclassifier.recording import Block, Recording, folds
 from noiseclassifier.tuning import kernels
 from noiseclassifier.tuning.grid import Grid
 from noiseclassifier.tuning.search import CRITERIA, Measures, measure, order, validate

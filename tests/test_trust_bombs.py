@@ -230,13 +230,13 @@ def test_methods_that_unpack_gigabytes_at_once_are_not_read(tmp_path, method):
 def test_a_hostile_manifest_of_a_model_is_one_line(tmp_path, text):
     with np.load(model_files()[0]) as shipped:
         np.savez(tmp_path / "m.npz", **{**shipped, "manifest": np.array(text)})
-    with pytest.raises(nc.ModelFileError, match="m.npz: manifest is no JSON") as caught:
+    with pytest.raises(nc.FileError, match="m.npz: manifest is no JSON") as caught:
         load_library([tmp_path / "m.npz"])
     assert "\n" not in str(caught.value)
 
 
 def test_a_device_is_no_model():
-    with pytest.raises(nc.ModelFileError, match="is no regular file"):
+    with pytest.raises(nc.FileError, match="is no regular file"):
         load_library([Path("/dev/zero")])
 
 
@@ -254,7 +254,7 @@ def test_an_archive_whose_names_are_no_text_is_one_line(tmp_path):
     for read, error in (
         (Run.load, RunFileError),
         (read_log, LogError),
-        (lambda each: load_library([each]), nc.ModelFileError),
+        (lambda each: load_library([each]), nc.FileError),
     ):
         with pytest.raises(error) as caught:
             read(path)

@@ -46,7 +46,7 @@ def evaluate(
         frames and of events.
 
     Raises:
-        SeenError: If it was trained on a run, unless ``seen_too``.
+        DatasetError: If it was trained on a run, unless ``seen_too``.
     """
     classifier = nc.load(model)
     rate = None if isinstance(classifier, nc.General) else classifier.rate

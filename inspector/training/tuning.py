@@ -17,7 +17,7 @@ from inspector.training.recordings import Simulators, recordings
 from inspector.training.training import profile_at
 from inspector.training.tuningfile import opened
 from noiseclassifier.modelfile import versions
-from noiseclassifier.splitting import check_apart, folds, group_of
+from noiseclassifier.recording import check_apart, folds, group_of
 from noiseclassifier.tuning.grid import ESTIMATOR_SETTINGS, Grid, Point
 from noiseclassifier.tuning.search import Criterion, Measures, Validation, measure, order, validate
 from noiseclassifier.tuning.trial import Trial

@@ -14,38 +14,41 @@ only to train.
 from noiseclassifier.choice import Model, load, nearest
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.dataset import Dataset
+from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import (
     AnnotationError,
-    DataFileError,
     DatasetError,
     FileError,
     MissingSignalError,
-    ModelFileError,
     ModelsError,
     NoFrameError,
     OutputError,
     ProfileError,
     RateError,
     RecordingError,
-    SeenError,
     SignalError,
-    UnknownLabelError,
 )
 from noiseclassifier.evaluation.assessment import Assessment, assess, evaluate
 from noiseclassifier.evaluation.matching import Unanswered, match
-from noiseclassifier.examples import Examples
 from noiseclassifier.features import features
 from noiseclassifier.framing import frame
 from noiseclassifier.general import Frames, General, frames_of
 from noiseclassifier.labels import UNKNOWN, Event, Labels
 from noiseclassifier.lasting import Lasting, merged
 from noiseclassifier.logbands import ANY, EACH, GENERAL, SCALAR, LogBands
-from noiseclassifier.logfile import nominal_rate, read_log
+from noiseclassifier.noisytest import nominal_rate, read_log
 from noiseclassifier.profile import CLASSES, Profile
-from noiseclassifier.recording import Block, Fault, Recording
+from noiseclassifier.recording import (
+    Block,
+    Fault,
+    Recording,
+    check_apart,
+    folds,
+    group_of,
+    held_out,
+    leave_one_out,
+)
 from noiseclassifier.signals import NOISE, Signals
-from noiseclassifier.splitting import check_apart, folds, group_of, held_out, leave_one_out
 from noiseclassifier.stream import Stream
 
 __all__ = [
@@ -60,7 +63,6 @@ __all__ = [
     "Assessment",
     "Block",
     "Classifier",
-    "DataFileError",
     "Dataset",
     "DatasetError",
     "Evaluation",
@@ -75,7 +77,6 @@ __all__ = [
     "LogBands",
     "MissingSignalError",
     "Model",
-    "ModelFileError",
     "ModelsError",
     "NoFrameError",
     "OutputError",
@@ -84,12 +85,10 @@ __all__ = [
     "RateError",
     "Recording",
     "RecordingError",
-    "SeenError",
     "SignalError",
     "Signals",
     "Stream",
     "Unanswered",
-    "UnknownLabelError",
     "assess",
     "check_apart",
     "evaluate",

@@ -22,7 +22,7 @@ def load(path: str | Path) -> Model:
         path: The file, of a model of one rate or of a general one.
 
     Raises:
-        ModelFileError: If the file is missing, damaged, no model file, or of another version.
+        FileError: If the file is missing, damaged, no model file, or of another version.
     """
     manifest, arrays = modelfile.read(path)
     kind = General if "recipe" in manifest else Classifier

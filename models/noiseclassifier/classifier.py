@@ -10,10 +10,9 @@ import numpy as np
 
 from noiseclassifier import modelfile
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.dataset import Dataset
-from noiseclassifier.errors import DatasetError, MissingSignalError, ModelFileError, RateError
-from noiseclassifier.estimators.estimator import ESTIMATORS, Estimator
-from noiseclassifier.examples import CHUNK, Examples
+from noiseclassifier.dataset import CHUNK, Dataset, Examples
+from noiseclassifier.errors import DatasetError, FileError, MissingSignalError, RateError
+from noiseclassifier.estimators import ESTIMATORS, Estimator
 from noiseclassifier.features import features, standard
 from noiseclassifier.framefeatures import frames_of
 from noiseclassifier.labels import UNKNOWN, Labels
@@ -302,12 +301,12 @@ class Classifier:
             path: The file.
 
         Raises:
-            ModelFileError: If the file is missing, damaged, no model file, of another version, or
+            FileError: If the file is missing, damaged, no model file, of another version, or
                 a model for any rate.
         """
         manifest, arrays = modelfile.read(path)
         if "recipe" in manifest:
-            raise ModelFileError(path, "is a model for any rate; read it by models.load")
+            raise FileError(path, "is a model for any rate; read it by models.load")
         return cls.of(manifest, arrays, modelfile.digest(path))
 
     @classmethod

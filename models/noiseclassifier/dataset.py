@@ -1,6 +1,7 @@
-"""The data set: labelled frames of many recordings."""
+"""Data sets: labelled frames of many recordings, and their features to train an estimator with."""
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -14,14 +15,14 @@ from noiseclassifier.errors import (
     NoFrameError,
     RateError,
     RecordingError,
-    UnknownLabelError,
 )
+from noiseclassifier.features import features
 from noiseclassifier.framing import frame, pad_end
 from noiseclassifier.noisytest import read_folder
 from noiseclassifier.profile import NOMINAL, Profile
-from noiseclassifier.recording import Block, Recording
+from noiseclassifier.recording import Block, Recording, group_of
 from noiseclassifier.signals import stacked
-from noiseclassifier.types import Mask, Real, Words
+from noiseclassifier.types import Array, Mask, Real, Words
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +58,7 @@ class Dataset:
 
         Raises:
             RateError: If a recording has another rate than the profile.
-            UnknownLabelError: If a label is no class of the profile.
+            RecordingError: If a label is no class of the profile.
             RecordingError: If a block cannot be cut.
             NoFrameError: If there is no frame at all.
             DatasetError: If a name repeats.
@@ -65,7 +66,7 @@ class Dataset:
         frames, labels, runs = [], [], []
         hashes: dict[str, str] = {}
         for recording in recordings:
-            _check(recording, profile, hashes)
+            _check_recording(recording, profile, hashes)
             hashes[recording.name] = recording.sha256
             for block in recording.blocks:
                 signal, valid = cut(recording, block, profile, training=training)
@@ -95,7 +96,7 @@ class Dataset:
             All annotated frames.
 
         Raises:
-            DataFileError: If a file is missing or cannot be understood.
+            FileError: If a file is missing or cannot be understood.
             ModelsError: As `of` does.
         """
         return cls.of(read_folder(folder, rate=profile.rate), profile, training=training)
@@ -104,7 +105,7 @@ class Dataset:
         return len(self.labels)
 
 
-def _check(recording: Recording, profile: Profile, hashes: Mapping[str, str]) -> None:
+def _check_recording(recording: Recording, profile: Profile, hashes: Mapping[str, str]) -> None:
     if abs(recording.rate / profile.rate - 1.0) > NOMINAL:
         raise RateError(
             recording.rate,
@@ -113,7 +114,9 @@ def _check(recording: Recording, profile: Profile, hashes: Mapping[str, str]) ->
         )
     for block in recording.blocks:
         if block.label not in profile.classes:
-            raise UnknownLabelError(recording.name, block.label, profile.classes)
+            known = ", ".join(profile.classes)
+            problem = f"label {block.label!r} is no class; there are {known}"
+            raise RecordingError(recording.name, problem)
     if recording.name in hashes:
         raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
 
@@ -126,21 +129,6 @@ def cut(
     A block shorter than a frame is padded in training, lest a frame mixes failures that follow
     each other, and widened to its surroundings otherwise (paper, Sec. III-A); a profile may ask
     for widened ones in training too, and for failures in every place of a frame.
-
-    Args:
-        recording: Where the block lies.
-        block: One annotated stretch of it.
-        profile: How long a frame is, and how blocks are cut.
-        training: Whether the frames are for training.
-
-    Returns:
-        Samples, shape (samples,), or (signals, samples) if the profile has several, and
-        which of them are valid, shape (samples,); padding counts as valid.
-
-    Raises:
-        SignalError: If the recording lacks a signal.
-        RecordingError: If the block holds no sample, or the recording is shorter than a frame that
-            a block is widened to.
     """
     lost = int(profile.drop_first_sample)
     precision = np.float32 if profile.single_precision else np.float64
@@ -172,17 +160,7 @@ def cut(
 
 
 def _bounds(time: Real, block: Block, profile: Profile, *, pad: bool) -> tuple[float, float]:
-    """Start and stop of the samples, in NoisyTest's order of operations, for equal rounding.
-
-    Args:
-        time: Times of the recording's samples, shape (samples,), in [s].
-        block: The annotated block.
-        profile: How long a frame is.
-        pad: Whether a short block keeps its bounds, to be padded.
-
-    Returns:
-        Start and stop, in [s].
-    """
+    """Start and stop of the samples, in NoisyTest's order of operations, for equal rounding."""
     start, stop = block.start, block.stop
     if stop == inf and len(time):
         stop = time[-1] + profile.open_end / profile.rate
@@ -215,3 +193,78 @@ def _samples(time: Real, start: float, stop: float, profile: Profile) -> slice:
         return slice(inside[0], inside[-1] + 1) if len(inside) else slice(0, 0)
     first = max(round((start - float(time[0])) * profile.rate), 0)
     return slice(first, first + round((stop - start) * profile.rate))
+
+
+CHUNK = 64
+"""Frames per evaluation, which bounds the memory that they take."""
+
+
+@dataclass(frozen=True, eq=False)
+class Examples:
+    """Features of labelled frames; a tenth of the memory that the frames themselves take.
+
+    Attributes:
+        features: Not yet standardised, shape (frames, features).
+        labels: Class of each frame, shape (frames,).
+        runs: Name of the recording that each frame is from, shape (frames,).
+        hashes: SHA-256 of each recording, by name.
+    """
+
+    features: Array
+    labels: Words
+    runs: Words
+    hashes: Mapping[str, str]
+
+    @classmethod
+    def of(cls, dataset: Dataset, profile: Profile) -> Self:
+        """Features of all frames of a data set.
+
+        Args:
+            dataset: Annotated frames, cut by the same profile.
+            profile: What to compute.
+
+        Raises:
+            SignalError: If the frames do not fit the profile.
+        """
+        chunks = range(0, len(dataset), CHUNK)
+        found = [features(dataset.frames[first : first + CHUNK], profile) for first in chunks]
+        return cls(np.concatenate(found), dataset.labels, dataset.runs, dataset.hashes)
+
+    @classmethod
+    def read(cls, recordings: Iterable[Recording], profile: Profile) -> Self:
+        """Features of recordings, read one after the other; only the features are kept.
+
+        Args:
+            recordings: Annotated signals at the profile's rate, each of another name; those
+                without a frame are skipped.
+            profile: How blocks are cut and framed, and what to compute.
+
+        Raises:
+            NoFrameError: If there is no frame at all.
+            DatasetError: If a name repeats.
+            ModelsError: As `Dataset.of` does.
+        """
+        found: list[Self] = []
+        hashes: dict[str, str] = {}
+        for recording in recordings:
+            if recording.name in hashes:
+                raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
+            hashes[recording.name] = recording.sha256
+            with suppress(NoFrameError):
+                found.append(cls.of(Dataset.of([recording], profile), profile))
+        if not found:
+            raise NoFrameError(len(hashes), profile.classes)
+        return cls(
+            np.concatenate([each.features for each in found]),
+            np.concatenate([each.labels for each in found]),
+            np.concatenate([each.runs for each in found]),
+            MappingProxyType(hashes),
+        )
+
+    @property
+    def groups(self) -> Words:
+        """Group of each frame, shape (frames,); see `splitting.group_of`."""
+        return np.array([group_of(name) for name in self.runs.tolist()])
+
+    def __len__(self) -> int:
+        return len(self.labels)

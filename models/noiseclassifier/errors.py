@@ -1,11 +1,11 @@
-"""Errors of signals, data sets and models: one base error, facts in subclasses."""
+"""Errors of signals, data sets and models: one base error; subclasses are those that are caught."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
 
 
 class ModelsError(ValueError):
-    """The base of every error that `models` expects."""
+    """The base of every error that `noiseclassifier` expects."""
 
 
 class SignalError(ModelsError):
@@ -42,20 +42,6 @@ class RecordingError(ModelsError):
         super().__init__(f"{name}: {problem}")
 
 
-class UnknownLabelError(RecordingError):
-    """An annotation whose label is no class of the profile.
-
-    Args:
-        name: The name of the recording.
-        label: The label that was given.
-        known: The classes that the profile has.
-    """
-
-    def __init__(self, name: str, label: str, known: Iterable[str]) -> None:
-        self.label, self.known = label, tuple(known)
-        super().__init__(name, f"label {label!r} is no class; there are {', '.join(self.known)}")
-
-
 class RateError(ModelsError):
     """A sample rate that no model takes.
 
@@ -72,7 +58,7 @@ class RateError(ModelsError):
 
 
 class FileError(ModelsError):
-    """A file that cannot be read or written.
+    """A model file, or a file of a data set, that cannot be read or holds wrong values.
 
     Args:
         path: The file.
@@ -84,8 +70,8 @@ class FileError(ModelsError):
         super().__init__(f"{path}: {problem}")
 
 
-class DataFileError(FileError):
-    """A file or folder of a data set that cannot be used."""
+class OutputError(FileError):
+    """An output that exists already or cannot be written."""
 
 
 class AnnotationError(ModelsError):
@@ -101,16 +87,8 @@ class AnnotationError(ModelsError):
         super().__init__(f"{where}: {problem}" if where else problem)
 
 
-class ModelFileError(FileError):
-    """A file that is not a model, or that holds one that is wrong."""
-
-
-class OutputError(FileError):
-    """An output that exists already or cannot be written."""
-
-
 class DatasetError(ModelsError):
-    """A data set that cannot be built, or that no classifier can be trained on."""
+    """A data set that cannot be built, or that no classifier can be trained or tested on."""
 
 
 class NoFrameError(DatasetError):
@@ -127,21 +105,3 @@ class NoFrameError(DatasetError):
             f"no annotated frame in {count} recordings; annotate blocks of"
             f" {', '.join(self.classes)}"
         )
-
-
-class SeenError(DatasetError):
-    """Test recordings that a model was trained on.
-
-    Args:
-        seen: What the model was trained on, by name of the recording.
-        total: Number of test recordings.
-        advice: What to do about it.
-    """
-
-    def __init__(
-        self, seen: Mapping[str, str], total: int, advice: str = "measure it on other runs"
-    ) -> None:
-        self.seen, self.total = dict(seen), total
-        name, what = next(iter(self.seen.items()))
-        others = f" (and {len(seen) - 1} more of {total})" if len(seen) > 1 else ""
-        super().__init__(f"{name}: the model was trained on {what}{others}; {advice}")

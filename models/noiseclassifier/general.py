@@ -17,7 +17,7 @@ from noiseclassifier import modelfile
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.confusion import Evaluation
 from noiseclassifier.errors import DatasetError, MissingSignalError, RateError
-from noiseclassifier.estimators.calibration import unthinned
+from noiseclassifier.estimators.decision import unthinned
 from noiseclassifier.estimators.trees import Detector, Trees
 from noiseclassifier.evaluation.matching import OK, UNCLEAR, truth_of, within
 from noiseclassifier.features import standard
@@ -26,10 +26,9 @@ from noiseclassifier.labels import UNKNOWN
 from noiseclassifier.logbands import HIGHEST, INPUTS, LOWEST, LogBands
 from noiseclassifier.pooling import RELATIVE
 from noiseclassifier.profile import TOLERANCE
-from noiseclassifier.recording import Recording
+from noiseclassifier.recording import Recording, group_of
 from noiseclassifier.reference import Reference
 from noiseclassifier.signals import NOISE, feeds, named
-from noiseclassifier.splitting import group_of
 from noiseclassifier.types import Array, Index, Real, Words
 
 LEARNT = (INPUTS[0], INPUTS[1], INPUTS[4], INPUTS[6])

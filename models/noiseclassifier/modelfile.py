@@ -24,8 +24,8 @@ import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
 
-from noiseclassifier.errors import ModelFileError, OutputError, ProfileError
-from noiseclassifier.estimators.estimator import ESTIMATORS
+from noiseclassifier.errors import FileError, OutputError, ProfileError
+from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.features import feature_count
 from noiseclassifier.jsontext import from_json
@@ -149,26 +149,26 @@ def read(path: str | Path) -> tuple[dict[str, Any], dict[str, Array]]:
         The manifest and the arrays, which are finite and of the shapes that it asks for.
 
     Raises:
-        ModelFileError: If the file is missing, damaged, no model file, of another version, or
+        FileError: If the file is missing, damaged, no model file, of another version, or
             contradicts itself.
     """
     try:
         if not stat.S_ISREG(Path(path).stat().st_mode) and not Path(path).is_dir():
-            raise ModelFileError(path, "is no regular file")
+            raise FileError(path, "is no regular file")
         with zipfile.ZipFile(path) as archive:
             dimensions = _check_members(path, archive)
             members = {name: _member(path, archive, name, n) for name, n in dimensions.items()}
     except OSError as error:
-        raise ModelFileError(path, f"cannot be read ({error.strerror or error})") from error
+        raise FileError(path, f"cannot be read ({error.strerror or error})") from error
     except (zipfile.BadZipFile, EOFError, RuntimeError, UnicodeDecodeError) as error:
         problem = f"is no model file, or a damaged one ({_one_line(error)})"
-        raise ModelFileError(path, problem) from error
+        raise FileError(path, problem) from error
     manifest = _manifest(path, str(members.pop("manifest")))
     if "threshold" in members:
         members.setdefault("missing", np.zeros_like(members["threshold"]))
     for name, array in members.items():
         if not np.isfinite(array).all():
-            raise ModelFileError(path, f"array {name!r} holds values that are not finite")
+            raise FileError(path, f"array {name!r} holds values that are not finite")
     check(path, manifest, members)
     return manifest, members
 
@@ -184,15 +184,15 @@ def _check_members(path: str | Path, archive: zipfile.ZipFile) -> dict[str, int]
     kinds = [kind for kind in _KINDS if there == sorted(f"{name}.npy" for name in kind)]
     if not kinds:
         wanted = " or ".join(", ".join(sorted(kind)) for kind in _KINDS[: len(ESTIMATORS)])
-        raise ModelFileError(
+        raise FileError(
             path, f"is no model file: holds {_escaped(', '.join(there))}, expected {wanted}"
         )
     for info in archive.infolist():
         # Stored as they are, members cannot be larger than the file that holds them.
         if info.compress_type != zipfile.ZIP_STORED or info.file_size != info.compress_size:
-            raise ModelFileError(path, f"member {info.filename!r} is compressed, expected stored")
+            raise FileError(path, f"member {info.filename!r} is compressed, expected stored")
     if sum(info.file_size for info in archive.infolist()) > LARGEST:
-        raise ModelFileError(path, f"is larger than {LARGEST} bytes, the most that is read")
+        raise FileError(path, f"is larger than {LARGEST} bytes, the most that is read")
     return kinds[0]
 
 
@@ -206,16 +206,16 @@ def _member(path: str | Path, archive: zipfile.ZipFile, name: str, dimensions: i
         shape, _, dtype = npy.read_array_header_1_0(header)
         size = prod(shape) * dtype.itemsize
     except Exception as error:  # NumPy lets those of its parser through: any, by the bytes
-        raise ModelFileError(path, f"array {name!r} is damaged ({_one_line(error)})") from error
+        raise FileError(path, f"array {name!r} is damaged ({_one_line(error)})") from error
     fits = dtype.kind == "U" if name == "manifest" else dtype == np.dtype("<f8")
     if not fits or len(shape) != dimensions:
-        raise ModelFileError(
+        raise FileError(
             path,
             f"array {name!r} is of type {dtype} and shape {shape},"
             f" expected {'text' if name == 'manifest' else 'float64'}, {dimensions}-D",
         )
     if size != len(content) - header.tell() or min(shape, default=0) < 0 or not dtype.itemsize:
-        raise ModelFileError(path, f"array {name!r} is damaged: its size is not what it declares")
+        raise FileError(path, f"array {name!r} is damaged: its size is not what it declares")
     array: NDArray[Any] = np.load(io.BytesIO(content), allow_pickle=False)
     return array
 
@@ -232,11 +232,11 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
     try:
         manifest = from_json(text)
     except ValueError as error:
-        raise ModelFileError(path, f"manifest is no JSON ({error})") from error
+        raise FileError(path, f"manifest is no JSON ({error})") from error
     given = manifest.get("format") if isinstance(manifest, dict) else manifest
     known = (FORMAT, *OLD_FORMATS)
     if given not in known:
-        raise ModelFileError(
+        raise FileError(
             path,
             f"is of format {given!r}, this version reads {', '.join(map(repr, known))}:"
             " train it again, or read it by the version that wrote it",
@@ -244,7 +244,7 @@ def _manifest(path: str | Path, text: str) -> dict[str, Any]:
     found = dict(manifest) if given == FORMAT else _renamed(manifest)
     profile = found.get("profile")
     if isinstance(profile, dict) and profile.get("estimator") == "baseline":
-        raise ModelFileError(path, f"is a baseline of good runs: {ACCEPT}")
+        raise FileError(path, f"is a baseline of good runs: {ACCEPT}")
     return found
 
 
@@ -270,20 +270,10 @@ _JSON_TYPES = {
 
 
 def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Array]) -> None:
-    """Check a manifest, and the arrays against it.
-
-    Args:
-        path: The file that they are from.
-        manifest: The manifest of a known format.
-        arrays: Its arrays, each of the right dimensions.
-
-    Raises:
-        ModelFileError: If an entry is missing or wrong, or an array has not the shape that
-            profile and classes ask for.
-    """
+    """Check a manifest, and the arrays against it."""
     for name, kind in _JSON_TYPES.items():
         if not isinstance(manifest.get(name), kind):
-            raise ModelFileError(
+            raise FileError(
                 path,
                 f"manifest has {name} = {str(manifest.get(name))[:80]}, expected a {kind.__name__}",
             )
@@ -299,14 +289,14 @@ def check(path: str | Path, manifest: Mapping[str, Any], arrays: Mapping[str, Ar
                 )
             count, profile = len(recipe.columns), recipe.bound(HIGHEST)
     except ProfileError as error:
-        raise ModelFileError(path, f"manifest has a wrong profile: {error}") from error
+        raise FileError(path, f"manifest has a wrong profile: {error}") from error
     classes = manifest["classes"]
     if len(classes) < 2 or classes != [name for name in profile.classes if name in classes]:
-        raise ModelFileError(
+        raise FileError(
             path, f"classes {classes} are not two or more of {', '.join(profile.classes)}, in order"
         )
     if manifest["rate"] != profile.rate:
-        raise ModelFileError(
+        raise FileError(
             path, f"rate is {manifest['rate']} Hz, but {profile.rate} Hz in its profile"
         )
     _check_arrays(path, profile, count, len(classes), arrays)
@@ -317,19 +307,19 @@ def _check_arrays(
 ) -> None:
     estimator = ESTIMATORS[profile.estimator]
     if lacking := sorted(estimator.DIMENSIONS.keys() - arrays.keys()):
-        raise ModelFileError(
+        raise FileError(
             path, f"its profile asks for {profile.estimator}, but it has no {', '.join(lacking)}"
         )
     wanted = estimator.shapes(arrays, profile, features=count, classes=classes)
     for name, shape in {**wanted, "mean": (count,), "scale": (count,)}.items():
         if arrays[name].shape != shape:
-            raise ModelFileError(
+            raise FileError(
                 path, f"array {name!r} has shape {arrays[name].shape}, its profile asks for {shape}"
             )
     if "location" in arrays:
-        raise ModelFileError(path, f"is adapted to good runs: {ACCEPT}")
+        raise FileError(path, f"is adapted to good runs: {ACCEPT}")
     if not (arrays["scale"] > 0).all():
-        raise ModelFileError(path, "array 'scale' holds values that are not above 0")
+        raise FileError(path, "array 'scale' holds values that are not above 0")
     for name, most in estimator.highest(profile, features=count).items():
         if arrays[name].min() < 0 or arrays[name].max() > most:
-            raise ModelFileError(path, f"array {name!r} holds values beyond 0 to {most}")
+            raise FileError(path, f"array {name!r} holds values beyond 0 to {most}")

@@ -1,17 +1,161 @@
-"""Read the data-set folders and the configuration of NoisyTest."""
+"""NoisyTest's folders, configuration, and ``.log``: a row of time and noise for each sample."""
 
 import hashlib
+import stat
+import warnings
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from math import inf
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from noiseclassifier.errors import AnnotationError, DataFileError, ProfileError, RateError
+import numpy as np
+
+from noiseclassifier.errors import AnnotationError, FileError, ProfileError, RateError
 from noiseclassifier.jsontext import from_json, from_toml, text_of
-from noiseclassifier.logfile import nominal_rate, read_log
 from noiseclassifier.profile import CLASSES, TOLERANCE, Profile
 from noiseclassifier.recording import Block, Recording
+from noiseclassifier.types import Array
+
+LARGE = 1_000_000
+"""Files of so many bytes or more are read by Arrow: a quarter of NumPy's time, after 45 ms for its
+import."""
+LONGEST_LINE = 2**16
+"""Characters of a line: far more than those of two numbers and a comment."""
+
+
+def read_log(path: str | Path) -> tuple[Array, Array]:
+    """Read a noise signal of two columns, separated by blanks or tabs.
+
+    Comments start with ``#``, anywhere; empty lines, a missing header and a missing last line end
+    are all right.
+
+    Args:
+        path: The file.
+
+    Returns:
+        Times in [s] and the noise estimate, each of shape (samples,).
+
+    Raises:
+        FileError: If the file is missing or empty, a line is no pair of finite numbers, or
+            time does not go forward in even steps; the line is named.
+    """
+    _check_regular(path)
+    columns = _read_fast(path)
+    if columns is None or columns.shape[1] != 2 or not np.isfinite(columns).all():
+        columns = _read_slowly(path)
+    time, noise = columns.T.copy()
+    _check_time(path, time)
+    return time, noise
+
+
+def nominal_rate(time: Array) -> float:
+    """Sample rate that evenly spaced times have on the whole, in [Hz]."""
+    return float(f"{(len(time) - 1) / (time[-1] - time[0]):.9g}")
+
+
+def _check_regular(path: str | Path) -> None:
+    """Refuse a device or a pipe, which may have no end."""
+    try:
+        regular = stat.S_ISREG(Path(path).stat().st_mode) or Path(path).is_dir()
+    except OSError as error:
+        raise FileError(path, f"cannot be read ({error.strerror or error})") from error
+    if not regular:
+        raise FileError(path, "is no regular file; save what it holds to one")
+
+
+def _read_fast(path: str | Path) -> Array | None:
+    """Array by a compiled reader; None if it fails, or the rows are ragged."""
+    with suppress(OSError):
+        if Path(path).stat().st_size >= LARGE and (columns := _read_by_arrow(path)) is not None:
+            return columns
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            with Path(path).open(encoding="latin-1") as stream:
+                return np.loadtxt(_lines(path, stream), ndmin=2)
+        except FileError:
+            raise
+        except (ValueError, UserWarning):
+            return None
+        except OSError as error:
+            raise FileError(path, f"cannot be read ({error.strerror or error})") from error
+
+
+def _read_by_arrow(path: str | Path) -> Array | None:
+    """Array of rows with one blank, below comments; None of any other layout."""
+    import pyarrow
+    from pyarrow import csv
+
+    start = 0
+    with Path(path).open("rb") as stream:
+        while stream.readline(LONGEST_LINE).startswith(b"#"):
+            start = stream.tell()
+        stream.seek(start)
+        try:
+            table = csv.read_csv(
+                stream,
+                read_options=csv.ReadOptions(use_threads=False, column_names=["time", "noise"]),
+                parse_options=csv.ParseOptions(delimiter=" ", quote_char=False),
+                convert_options=csv.ConvertOptions(
+                    column_types=dict.fromkeys(("time", "noise"), pyarrow.float64()), null_values=[]
+                ),
+            )
+        except pyarrow.ArrowInvalid:
+            return None
+    return np.stack([column.to_numpy() for column in table.columns], axis=1)
+
+
+def _lines(path: str | Path, stream: TextIO) -> Iterator[str]:
+    """Lines of a log, which end."""
+    while line := stream.readline(LONGEST_LINE):
+        if len(line) == LONGEST_LINE:
+            raise FileError(path, f"has a line of more than {LONGEST_LINE} characters")
+        yield line
+
+
+def _read_slowly(path: str | Path) -> Array:
+    """Read line by line, to name the line that is wrong."""
+    rows = []
+    with Path(path).open(encoding="utf-8-sig", errors="replace") as lines:
+        for number, line in enumerate(_lines(path, lines), start=1):
+            words = line.partition("#")[0].split()
+            if words:
+                rows.append(_row(path, number, words))
+    if not rows:
+        raise FileError(path, "is empty; expected rows of time and noise")
+    return np.array(rows)
+
+
+def _row(path: str | Path, number: int, words: list[str]) -> list[float]:
+    if len(words) != 2:
+        raise FileError(path, f"line {number} has {len(words)} columns, expected time and noise")
+    try:
+        row = [float(word) for word in words]
+    except ValueError as error:
+        raise FileError(path, f"line {number}: {error}") from error
+    if not np.isfinite(row).all():
+        raise FileError(path, f"line {number} is not finite: {' '.join(words)}")
+    return row
+
+
+def _check_time(path: str | Path, time: Array) -> None:
+    if len(time) < 2:
+        raise FileError(path, "has one row; a rate takes two or more")
+    steps = np.diff(time)
+    step = np.median(steps)
+    # Printed times are rounded, so that half a step is no gap yet.
+    wrong = np.flatnonzero((steps <= 0) | (np.abs(steps - step) > 0.5 * step))
+    if len(wrong):
+        row = int(wrong[0])
+        what = "goes backward or stands still" if steps[row] <= 0 else "is not in even steps"
+        raise FileError(
+            path,
+            f"time {what} from row {row + 1} to row {row + 2}:"
+            f" {time[row]:.9g} s, then {time[row + 1]:.9g} s, where a step is {step:.6g} s",
+        )
+
 
 _SETTINGS = {
     "import_preprocessor": {
@@ -42,13 +186,13 @@ def read_folder(folder: str | Path, *, rate: float | None = None) -> Iterator[Re
         Recordings with their annotations, named after their files.
 
     Raises:
-        DataFileError: If there is no ``.log``, or a file cannot be understood.
+        FileError: If there is no ``.log``, or a file cannot be understood.
         RateError: If a recording has another rate.
     """
     logs = sorted(Path(folder).glob("*.log"))
     if not logs:
         state = "has no .log file" if Path(folder).is_dir() else "is no folder"
-        raise DataFileError(folder, f"{state}; name a folder of .log files with .toml beside them")
+        raise FileError(folder, f"{state}; name a folder of .log files with .toml beside them")
     for log in logs:
         yield read_recording(log, rate=rate)
 
@@ -64,7 +208,7 @@ def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
         The recording, named after the file, with the hash of the file.
 
     Raises:
-        DataFileError: If a file is missing or cannot be understood.
+        FileError: If a file is missing or cannot be understood.
         RateError: If the recording has another rate.
         RecordingError: If the annotations do not fit the signal.
     """
@@ -79,38 +223,21 @@ def read_recording(log: str | Path, *, rate: float | None = None) -> Recording:
 
 
 def read_annotations(path: str | Path) -> tuple[Block, ...]:
-    """Annotated blocks of a ``.toml``, in their order; see `parse_annotations`.
-
-    Args:
-        path: The file.
-
-    Raises:
-        DataFileError: If the file is missing, or cannot be understood.
-    """
+    """Annotated blocks of a ``.toml``, in their order; see `parse_annotations`."""
     try:
         return tuple(parse_annotations(text_of(path)))
     except OSError as error:
-        raise DataFileError(
+        raise FileError(
             path, f"cannot be read ({error.strerror}); each .log needs its .toml"
         ) from error
     except AnnotationError as error:
-        raise DataFileError(path, str(error)) from error
+        raise FileError(path, str(error)) from error
     except ValueError as error:
-        raise DataFileError(path, f"not TOML ({error})") from error
+        raise FileError(path, f"not TOML ({error})") from error
 
 
 def parse_annotations(text: str) -> Iterator[Block]:
-    """Annotated blocks: ``chunk_ranges`` and ``chunk_labels`` of the table ``data``.
-
-    Args:
-        text: TOML; a stop of -1 means the end of the recording.
-
-    Yields:
-        The blocks, in their order; those that last to the end stop at infinity.
-
-    Raises:
-        AnnotationError: If it is no TOML, lacks the lists, or they hold other things.
-    """
+    """Annotated blocks: ``chunk_ranges`` and ``chunk_labels`` of the table ``data``."""
     try:
         data = from_toml(text).get("data", {})
     except ValueError as error:
@@ -135,14 +262,14 @@ def profile_from_config(path: str | Path) -> Profile:
         A profile with NoisyTest's quirks.
 
     Raises:
-        DataFileError: If the file is no such configuration, or a name in it is unknown.
+        FileError: If the file is no such configuration, or a name in it is unknown.
     """
     try:
         config = from_json(text_of(path))
     except OSError as error:
-        raise DataFileError(path, f"cannot be read ({error.strerror})") from error
+        raise FileError(path, f"cannot be read ({error.strerror})") from error
     except ValueError as error:
-        raise DataFileError(path, f"is no JSON ({error})") from error
+        raise FileError(path, f"is no JSON ({error})") from error
     settings = Profile.noisytest().as_dict()
     for section, content in _known(path, config, _SETTINGS, "the configuration").items():
         arguments = _known(path, content, ("arguments",), section).get("arguments", {})
@@ -152,7 +279,7 @@ def profile_from_config(path: str | Path) -> Profile:
     try:
         profile = Profile.of(settings)
     except ProfileError as error:
-        raise DataFileError(path, str(error)) from error
+        raise FileError(path, str(error)) from error
     return replace(profile, open_end=round(0.1 * profile.rate))
 
 
@@ -171,12 +298,10 @@ def _block(span: Any, label: Any, where: str) -> Block:
 def _known(path: str | Path, table: Any, names: Any, where: str) -> dict[str, Any]:
     """A table without unknown names."""
     if not isinstance(table, dict):
-        raise DataFileError(path, f"{where} is {table!r}, expected a JSON object")
+        raise FileError(path, f"{where} is {table!r}, expected a JSON object")
     for key in table:
         if key not in names:
-            raise DataFileError(
-                path, f"unknown key {key!r} in {where}; it takes {', '.join(names)}"
-            )
+            raise FileError(path, f"unknown key {key!r} in {where}; it takes {', '.join(names)}")
     return table
 
 
@@ -185,7 +310,7 @@ def _classes(path: str | Path, targets: Any) -> tuple[str, ...]:
     if not targets:
         return CLASSES
     if not isinstance(targets, dict) or sorted(targets.values(), key=str) != [*range(len(targets))]:
-        raise DataFileError(
+        raise FileError(
             path,
             f"keywords_to_target_data is {targets!r}, expected labels with the numbers 0, 1, 2…",
         )

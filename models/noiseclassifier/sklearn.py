@@ -47,10 +47,10 @@ from sklearn.utils.metaestimators import available_if
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from noiseclassifier.dataset import CHUNK
 from noiseclassifier.errors import ProfileError, SignalError
-from noiseclassifier.estimators.estimator import ESTIMATORS
-from noiseclassifier.estimators.probabilistic import Probable
-from noiseclassifier.examples import CHUNK
+from noiseclassifier.estimators import ESTIMATORS
+from noiseclassifier.estimators.decision import Probable
 from noiseclassifier.features import feature_count, features, standard
 from noiseclassifier.logbands import GENERAL, SCALAR, LogBands
 from noiseclassifier.profile import Profile

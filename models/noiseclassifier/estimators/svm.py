@@ -106,14 +106,7 @@ class SupportVectorMachines:
         return {name: getattr(self, name) for name in self.DIMENSIONS}
 
     def decision(self, features: Array) -> Array:
-        """Decision values, sum y_i alpha_i K(x_i, x) + b (paper, Sec. III-B).
-
-        Args:
-            features: Feature vectors, shape (frames, features).
-
-        Returns:
-            Shape (frames, decisions).
-        """
+        """Decision values, sum y_i alpha_i K(x_i, x) + b (paper, Sec. III-B)."""
         similarity = features @ self.vectors.T
         if self.kernel == "rbf":  # K(x, y) = exp(-gamma |x - y|^2)
             squares = np.einsum("ij,ij->i", features, features)[:, None] + self._squares
@@ -140,16 +133,7 @@ def svm_count(classes: int, multiclass: Multiclass) -> int:
 
 
 def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
-    """Class of each frame: that of most votes of the pairs, or of the largest decision value.
-
-    Args:
-        decisions: Decision values, shape (frames, decisions).
-        classes: How many classes there are.
-        multiclass: How the SVMs are combined.
-
-    Returns:
-        Index of a class for each frame, shape (frames,); the first of equals.
-    """
+    """Class of each frame: that of most votes of the pairs, or of the largest decision value."""
     ballot = decisions
     if multiclass == "one-vs-one":
         ballot = _votes(decisions, classes)
@@ -158,19 +142,7 @@ def choose(decisions: Array, *, classes: int, multiclass: Multiclass) -> Index:
 
 
 def score(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
-    """Score of each class, larger meaning more certain.
-
-    Args:
-        decisions: Decision values, shape (frames, decisions).
-        classes: How many classes there are.
-        multiclass: How the SVMs are combined.
-
-    Returns:
-        Scores, shape (frames, classes). One-vs-rest: the decision values. One-vs-one: votes, and
-        less than half a vote for the sum of decision values, as scikit-learn has it
-        (`decision_function` in its shape "ovr"); among classes with the same votes, `choose` takes
-        the first.
-    """
+    """Score of each class, larger meaning more certain."""
     if multiclass == "one-vs-rest":
         return decisions
     first, second = _sides(classes)
@@ -193,16 +165,7 @@ def _sides(classes: int) -> tuple[Array, Array]:
 
 
 def fit(features: Array, targets: Index, profile: Profile) -> SupportVectorMachines:
-    """Train support vector machines.
-
-    Args:
-        features: Feature vectors, shape (frames, features).
-        targets: Class of each, as an index from 0 without a gap, shape (frames,).
-        profile: Kernel, parameters, and how the SVMs are combined.
-
-    Returns:
-        The SVMs, with their support vectors.
-    """
+    """Train support vector machines."""
     fit_all = _one_vs_one if profile.multiclass == "one-vs-one" else _one_vs_rest
     return fit_all(features, targets, profile)
 
@@ -266,14 +229,7 @@ def svc(
     *,
     precomputed: bool = False,
 ) -> Any:
-    """scikit-learn's support vector machines, not yet trained.
-
-    Args:
-        profile: Kernel and its parameter.
-        regularization: C.
-        weights: Factor of C for each class; 1 by default.
-        precomputed: Whether it is trained on kernel matrices in place of features.
-    """
+    """scikit-learn's support vector machines, not yet trained."""
     from sklearn.svm import SVC
 
     return SVC(

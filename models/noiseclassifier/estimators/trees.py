@@ -20,10 +20,9 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from noiseclassifier.estimators.calibration import calibrate, identity, of_seen_classes
-from noiseclassifier.estimators.probabilistic import Probable
+from noiseclassifier.estimators.decision import Probable, calibrate, identity, of_seen_classes
 from noiseclassifier.profile import MOST_LEAVES, Profile
-from noiseclassifier.splitting import folds
+from noiseclassifier.recording import folds
 from noiseclassifier.types import Array, Index, Mask, Words
 
 BATCH = 32
@@ -90,19 +89,7 @@ class Trees(Probable):
         profile: Profile,
         rising: Index | None = None,
     ) -> "Trees":
-        """Train trees on all frames, and calibrate them by trees that left a part out.
-
-        Args:
-            features: Standardised, shape (frames, features).
-            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
-            groups: Runs of a group share their motion, shape (frames,).
-            profile: Number and size of the trees.
-            rising: 1 for each feature that, larger, never makes a failure less likely, else 0,
-                shape (features,); a detector alone heeds it.
-
-        Returns:
-            The trees; equal input gives equal trees. Those of one group are not calibrated.
-        """
+        """Train trees on all frames, and calibrate them by trees that left a part out."""
         return cls.staged(features, targets, groups, profile, (profile.rounds,), rising)[0]
 
     @classmethod
@@ -115,19 +102,7 @@ class Trees(Probable):
         rounds: Sequence[int],
         rising: Index | None = None,
     ) -> list["Trees"]:
-        """Train trees once for several numbers of rounds.
-
-        Args:
-            features: Standardised, shape (frames, features).
-            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
-            groups: Runs of a group share their motion, shape (frames,).
-            profile: Most rounds, and size of the trees.
-            rounds: Numbers of rounds, none above the profile's.
-            rising: As `fit` takes it.
-
-        Returns:
-            For each number, the trees that `fit` gives for it.
-        """
+        """Train trees once for several numbers of rounds."""
         from joblib import Parallel, delayed
 
         parts = _parts(targets, groups)
@@ -194,14 +169,7 @@ class Trees(Probable):
         return replace(self, left=self.left[:, :count], **own)
 
     def at(self, there: Index) -> "Trees":
-        """Trees of frames that lack some of the features.
-
-        Args:
-            there: Indices of the features that they have, ascending, shape (fewer,).
-
-        Returns:
-            Trees with the logits of these frames from their features, shape (frames, fewer).
-        """
+        """Trees of frames that lack some of the features."""
         number = self.feature.astype(np.intp)
         place = np.searchsorted(there, number).clip(max=len(there) - 1)
         known = there[place] == number
@@ -286,13 +254,7 @@ class Trees(Probable):
 
     @cached_property
     def _side_by_side(self) -> tuple[Index, Array, Mask, NDArray[np.uint16], Array, Index]:
-        """All first splits of the trees that count side by side, and then all second ones.
-
-        Returns:
-            Features, thresholds, whether missing features are on the right, and leaves on the
-            left, as bits, shape (splits, trees); all leaves in a row, and where those of each tree
-            begin, shape (trees,).
-        """
+        """All first splits of the trees that count side by side, and then all second ones."""
         own = self._by_class
         start, stop = self.left[:, own].astype(np.int64)
         bits = ((1 << stop) - (1 << start)).astype(np.uint16)
@@ -375,13 +337,7 @@ def _boosted(
     rounds: int,
     rising: Index | None = None,
 ) -> tuple[Array, Array, Array]:
-    """Boosted trees of some of the frames; none in rounds of the profile beyond these.
-
-    Returns:
-        Of each split the feature, the threshold, whether a missing feature is on its right, and its
-        leaves on the left, shape (5, rounds, classes, splits); leaves, shape (rounds, classes,
-        leaves); and what classes start from, shape (classes,).
-    """
+    """Boosted trees of some of the frames; none in rounds of the profile beyond these."""
     from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits
 
@@ -421,13 +377,7 @@ def _known(features: Array) -> Array:
 
 
 def _lay_out(nodes: Any) -> tuple[list[list[float]], list[float]]:
-    """Splits and leaves of a tree of scikit-learn.
-
-    Returns:
-        Of each split the feature, the threshold, whether a missing feature is on its right, the
-        first leaf on its left, and the first one that is not; and the values of the leaves, from
-        left to right.
-    """
+    """Splits and leaves of a tree of scikit-learn."""
     splits: list[list[float]] = []
     values: list[float] = []
 

@@ -11,7 +11,7 @@ import numpy as np
 from noiseclassifier.classifier import Classifier
 from noiseclassifier.confusion import Evaluation
 from noiseclassifier.dataset import Dataset
-from noiseclassifier.errors import DatasetError, SeenError, SignalError
+from noiseclassifier.errors import DatasetError, SignalError
 from noiseclassifier.evaluation.intervals import LEAST_GROUPS, Estimate, Resampling
 from noiseclassifier.evaluation.matching import FALSE, Localise, Predictions, Unanswered, predict
 from noiseclassifier.evaluation.measures import (
@@ -23,9 +23,8 @@ from noiseclassifier.evaluation.measures import (
     Reliability,
 )
 from noiseclassifier.labels import interval
-from noiseclassifier.recording import Recording
+from noiseclassifier.recording import Recording, check_apart, seen
 from noiseclassifier.signals import named
-from noiseclassifier.splitting import seen
 
 FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
@@ -188,8 +187,8 @@ def assess(
         All measures.
 
     Raises:
-        SeenError: If the model was trained on a recording, unless ``seen_too``.
-        DatasetError: If there is no annotated frame, no recording has a verdict, or a name repeats.
+        DatasetError: If the model was trained on a recording, unless ``seen_too``, there is no
+            annotated frame, no recording has a verdict, or a name repeats.
         ModelsError: If a recording has another rate, or a label that is no class.
     """
     predictions: dict[str, Predictions] = {}
@@ -204,8 +203,8 @@ def assess(
             continue
         digest = recording.sha256
         known |= seen(model.runs, {name: digest})
-        if known and not seen_too:
-            raise SeenError(known, 1, ADVICE)
+        if not seen_too:
+            check_apart(model.runs, {name: digest}, ADVICE)
         if digest in first:
             copies[name] = first[digest]
             continue

@@ -34,8 +34,7 @@ from noiseclassifier.classifier import Classifier
 from noiseclassifier.dataset import Dataset
 from noiseclassifier.errors import DatasetError
 from noiseclassifier.labels import CONFIRM, UNKNOWN, Event, Labels
-from noiseclassifier.recording import Block, Fault, Recording
-from noiseclassifier.splitting import group_of, robot_of
+from noiseclassifier.recording import Block, Fault, Recording, group_of, robot_of
 from noiseclassifier.types import Array, Index, Mask, Words
 
 OK, UNCLEAR = "ok", ""

@@ -11,9 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from noiseclassifier.estimators import svm
-from noiseclassifier.estimators.calibration import TINY
-from noiseclassifier.estimators.estimator import ESTIMATORS
+from noiseclassifier.estimators import ESTIMATORS, svm
+from noiseclassifier.estimators.decision import TINY
 from noiseclassifier.profile import Profile
 from noiseclassifier.tuning.logloss import class_margins
 from noiseclassifier.types import Array, Index, Words

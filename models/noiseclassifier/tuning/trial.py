@@ -11,9 +11,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from noiseclassifier.dataset import Dataset
+from noiseclassifier.dataset import Dataset, Examples
 from noiseclassifier.errors import NoFrameError
-from noiseclassifier.examples import Examples
 from noiseclassifier.profile import Profile
 from noiseclassifier.recording import Recording
 from noiseclassifier.types import Array, Index, Mask, Words

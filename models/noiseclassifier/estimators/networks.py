@@ -15,10 +15,9 @@ from typing import Any, ClassVar, Self, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from noiseclassifier.estimators.calibration import TINY, calibrate, identity, of_seen_classes
-from noiseclassifier.estimators.probabilistic import Probable
+from noiseclassifier.estimators.decision import TINY, Probable, calibrate, identity, of_seen_classes
 from noiseclassifier.profile import Profile
-from noiseclassifier.splitting import folds
+from noiseclassifier.recording import folds
 from noiseclassifier.types import Array, Index, Words
 
 Single: TypeAlias = NDArray[np.float32]
@@ -69,15 +68,6 @@ class Networks(Probable):
         Rare classes have larger weights, by the square root of how much rarer they are: with
         balanced weights, networks would raise alarms for the rarest class. Calibration restores
         the frequencies.
-
-        Args:
-            features: Standardised, shape (frames, features).
-            targets: Class of each frame, as an index from 0 without a gap, shape (frames,).
-            groups: Runs of a group share their motion, shape (frames,).
-            profile: Size and training of the networks.
-
-        Returns:
-            The networks; equal input gives equal networks. Those of one group are not calibrated.
         """
         classes = int(targets.max()) + 1
         networks, logits, truth = [], [], []

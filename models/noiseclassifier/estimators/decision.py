@@ -1,4 +1,4 @@
-"""Decisions by probabilities: the class of a frame, the alarm threshold, and novelty."""
+"""Decisions by calibrated probabilities: the class of a frame, the alarm threshold, and novelty."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -7,8 +7,63 @@ from math import log1p
 
 import numpy as np
 
-from noiseclassifier.estimators.calibration import calibrated
 from noiseclassifier.types import Array, Index, Mask
+
+TINY = 1e-12
+"""Added to a probability before its logarithm."""
+
+
+def calibrated(logits: Array, calibration: Array) -> Array:
+    """Logarithms of calibrated probabilities: logits scaled, and shifted for each class.
+
+    Vector scaling with one scale for all classes, C. Guo et al., *On Calibration of Modern Neural
+    Networks*, 2017, Sec. 4.2.
+    """
+    scaled = calibration[0] * logits + calibration[1:]
+    found: Array = scaled - np.logaddexp.reduce(scaled, -1, keepdims=True)
+    return found
+
+
+def calibrate(logits: Array, targets: Index) -> Array:
+    """Calibration of the least log-loss.
+
+    A class without frames is not shifted.
+    """
+    from scipy.optimize import minimize
+
+    there, truth = np.unique(targets, return_inverse=True)
+    classes, rows = logits.shape[1], np.arange(len(targets))
+    logits = logits.take(there, axis=1)
+
+    def loss(calibration: Array) -> tuple[float, Array]:
+        found = calibrated(logits, calibration)
+        excess = np.exp(found)
+        excess[rows, truth] -= 1.0
+        slope = np.append((excess * logits).sum(), excess.sum(axis=0)) / len(targets)
+        return float(-found[rows, truth].mean()), slope
+
+    calibration = identity(classes)
+    best = minimize(loss, identity(len(there)), jac=True, method="L-BFGS-B").x
+    calibration[[0, *(1 + there)]] = best
+    return calibration
+
+
+def of_seen_classes(targets: Index, train: Index, test: Index) -> Index:
+    """Indices of the test frames whose class is in the training set."""
+    return test[np.isin(targets[test], targets[train])]
+
+
+def unthinned(calibration: Array, thin: int) -> Array:
+    """Calibration for all frames, of one for every ``thin``-th `ok` frame and all failures."""
+    shift = np.zeros(len(calibration))
+    shift[1] = np.log(thin)
+    return calibration + shift
+
+
+def identity(classes: int) -> Array:
+    """The calibration that changes nothing, shape (1 + classes,)."""
+    return np.append(1.0, np.zeros(classes))
+
 
 NOVELTY_LIMIT = 2.0
 """A frame is out of distribution if its novelty score exceeds this."""
@@ -49,15 +104,7 @@ class Probable(ABC):
         """Logits of the classes, not calibrated, shape (frames, classes)."""
 
     def decision(self, features: Array) -> Array:
-        """Probability of each class, and novelty of the frame.
-
-        Args:
-            features: Feature vectors, shape (frames, features).
-
-        Returns:
-            Logarithms of calibrated probabilities, then the novelty score, shape
-            (frames, classes + 1).
-        """
+        """Probability of each class, and novelty of the frame."""
         decisions = np.empty((len(features), self.width))
         decisions[:, :-1] = calibrated(self.logits(features), self.calibration)
         np.fmax.reduce(features - self.maximum, 1, out=decisions[:, -1])
@@ -74,13 +121,6 @@ class Probable(ABC):
 
         Of the failures it is the one whose probability exceeds its frequency most: a rare class is
         not masked by a frequent one (balanced accuracy weighs them alike).
-
-        Args:
-            decisions: On frames, shape (frames, classes + 1).
-
-        Returns:
-            Index of a class for each frame, shape (frames,); one more than the last for a frame
-            that is out of distribution and below the alarm threshold.
         """
         logarithms = decisions[:, :-1]
         chosen: Index = 1 + (logarithms[:, 1:] - self._expected).argmax(axis=1)
