@@ -43,8 +43,7 @@ from threadpoolctl import threadpool_limits
 import noiseclassifier as nc
 from inspector.errors import InspectorError
 from inspector.progress import progress
-from inspector.training.recordings import classified
-from inspector.training.training import ANY_RATE, THIN, LeftOut, lacking, profile_at
+from inspector.train import ANY_RATE, THIN, LeftOut, classified, lacking, profile_at
 from noiseclassifier.confusion import ratio
 from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.decision import NOVELTY_LIMIT, Probable, identity, unthinned
@@ -56,10 +55,11 @@ from noiseclassifier.framefeatures import frame_features
 from noiseclassifier.general import LEARNT, UNBOUNDED, kept
 from noiseclassifier.logbands import ANY, HIGHEST, LOWEST
 from noiseclassifier.pooling import RELATIVE, columns
+from noiseclassifier.recording import folds
 from noiseclassifier.scenarios.domains import TARGET_BITS, TARGET_CONTROL, TARGET_HOLD
 from noiseclassifier.scenarios.robots import ROBOTS, TARGETS, WIDE
 from noiseclassifier.signals import EFFORT, JOINTS, NOISE, feeds, named
-from noiseclassifier.tuning.grid import Grid
+from noiseclassifier.tuning import Grid
 from noisemodel import NoiseModelError
 
 ALARMS = (0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 0.998)

@@ -173,9 +173,7 @@ class Ours:
 
     def _points(self) -> int:
         """Measure all points of the paper's grid with one stride; their number."""
-        from noiseclassifier.tuning.grid import Grid
-        from noiseclassifier.tuning.search import measure
-        from noiseclassifier.tuning.trial import Trial
+        from noiseclassifier.tuning import Grid, Trial, measure
 
         grid = Grid.of(["paper"], self._profile.kernel).profiles(self._profile)
         points = [point for point in grid if point.stride == self._profile.stride]

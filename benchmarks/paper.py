@@ -31,8 +31,7 @@ os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 import numpy as np
 
 import noiseclassifier as nc
-from inspector.training import recordings, training
-from inspector.training.part import Part
+from inspector.train import PARTS, classified, of_run, train
 from noiseclassifier.evaluation.assessment import measure, number, percent
 from noiseclassifier.evaluation.matching import Predictions, predict
 from noiseclassifier.scenarios.robots import limbs
@@ -94,7 +93,7 @@ def main() -> None:
     arguments.add_argument("--training", type=Path, required=True)
     arguments.add_argument("--test", type=Path, nargs="+", required=True)
     arguments.add_argument("--output", type=Path, required=True, help="folder of the models")
-    arguments.add_argument("--part", type=Part, choices=Part, default=Part.TEST, help="of the test")
+    arguments.add_argument("--part", choices=PARTS, default="test", help="of the test")
     arguments.add_argument("--from", type=int, default=0, dest="first", help="seed of the test")
     arguments.add_argument("--good", type=Path, nargs="*", default=[], help="measured whole")
     arguments.add_argument("--seeds", type=int, help="of each robot, to train on; by default all")
@@ -103,9 +102,9 @@ def main() -> None:
     arguments.add_argument("--limit", type=int, help="most runs to train on and to measure")
     arguments.add_argument("--jobs", type=int, default=1, help="parallel models")
     given = arguments.parse_args()
-    known = spread(first_seeds(files([given.training], Part.TRAINING), given.seeds), given.limit)
+    known = spread(first_seeds(files([given.training], "training"), given.seeds), given.limit)
     fresh = [path for path in files(given.test, given.part) if seed_of(path) >= given.first]
-    test, good = spread(fresh, given.limit), spread(files(given.good, Part.ALL), given.limit)
+    test, good = spread(fresh, given.limit), spread(files(given.good, "all"), given.limit)
     given.output.mkdir(parents=True, exist_ok=True)
     work = partial(measured, known=known, test=test, good=good, folder=given.output)
     found = list(in_order(work, [*given.models, *given.profiles], jobs=given.jobs, died=stop))
@@ -118,12 +117,12 @@ def stop(task: Path | str) -> NoReturn:
     raise SystemExit(f"{task}: {DIED}")
 
 
-def files(folders: Sequence[Path], part: Part) -> list[Path]:
+def files(folders: Sequence[Path], part: str) -> list[Path]:
     """The samples of a part."""
     every = [path for folder in folders for path in sorted(folder.rglob("*.npz"))]
-    if part is Part.ALL:
+    if part == "all":
         return every
-    test = part is Part.TEST
+    test = part == "test"
     return [path for path in every if nc.held_out(nc.group_of(name_of(path))) == test]
 
 
@@ -165,7 +164,9 @@ def measured(
     classifier, reduced = nc.Classifier.load(path), ()
     every = [*test, *good]
     names = {name_of(one) for one in test}
-    found = predictions(classifier, recordings.recordings(every, classifier.rate))
+    both = (each for each, _ in classified(every, classifier.rate))
+    read = (each for each in both if isinstance(each, nc.Recording))
+    found = predictions(classifier, read)
     if classifier.profile.kernel != "linear":
         limbed = [one for one in every if one.parent.name in HALF]
         half = predictions(classifier, halved(limbed, classifier.rate))
@@ -194,7 +195,7 @@ def trained(profile: str, paths: Sequence[Path], folder: Path) -> Path:
     """Model of a profile, trained unless it exists."""
     path = folder / f"{profile}.npz"
     if not path.exists():
-        training.train(paths, profile, RATE, path)
+        train(paths, profile, RATE, path)
     elif set(nc.Classifier.load(path).runs) != set(map(name_of, paths)):
         raise SystemExit(f"{path}: trained on other runs; remove it, or take another --output")
     return path
@@ -217,7 +218,7 @@ def halved(paths: Sequence[Path], rate: float) -> Iterator[nc.Recording]:
             blocks=run.blocks,
             meta=run.meta,
         )
-        yield recordings.of_run(path, half, rate)
+        yield of_run(path, half, rate)
 
 
 def tables(found: Sequence[Measured]) -> str:

@@ -14,9 +14,7 @@ from zlib import crc32
 
 import noiseclassifier as nc
 from inspector.progress import progress
-from inspector.training.evaluation import evaluate
-from inspector.training.part import Part
-from inspector.training.training import ANY_RATE, train
+from inspector.train import ANY_RATE, evaluate, train
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios.dataset import (
     DatasetSpec,
@@ -87,7 +85,7 @@ def main() -> None:
     sources = [logs(wide, build, rate, "source") for rate in RATES]
     path = HERE / f"{NAME}.npz"
     more = [added(source) for source in sources]
-    train([*sources, *more, home.path], ANY_RATE, None, path, part=Part.TRAINING, overwrite=True)
+    train([*sources, *more, home.path], ANY_RATE, None, path, part="training", overwrite=True)
     sections = {"Other seeds of the same robots, in wide domains, at 1 kHz": [sources[2]]}
     for rate in SHOWN:
         title = f"Robots and control that were never learnt from, at {rate:g} Hz"
@@ -157,7 +155,7 @@ def write_card(path: Path, sections: dict[str, list[Path]]) -> None:
     model = nc.load(path)
     texts = []
     for title, inputs in sections.items():
-        part = Part.TEST if "same robots" in title else Part.ALL
+        part = "test" if "same robots" in title else "all"
         report = evaluate(path, inputs, part=part)
         texts.append(f"## {title}\n\n```\n{report}\n```\n")
         print(f"\n{path.stem}: {title}\n{report}", flush=True)

@@ -81,7 +81,7 @@ def test_half_of_the_limbs_has_their_norm(paper, data):
 
 
 def test_profiles_are_trained_on_the_first_seeds_of_the_training_part(paper, data):
-    known = paper.first_seeds(paper.files([data], paper.Part.TRAINING), 3)
+    known = paper.first_seeds(paper.files([data], "training"), 3)
     names = [paper.name_of(path) for path in known]
     assert names == [
         *("go2/straight-000", "go2/straight-001", "go2/straight-003"),
@@ -112,7 +112,7 @@ def test_the_three_tables_are_filled(paper, data, tmp_path, monkeypatch, capsys)
 
 
 def test_a_model_of_other_runs_is_refused(paper, data, tmp_path):
-    paths = paper.files([data], paper.Part.TRAINING)
+    paths = paper.files([data], "training")
     paper.trained("paper-linear", paths[:2], tmp_path)
     with pytest.raises(SystemExit, match="trained on other runs; remove it"):
         paper.trained("paper-linear", paths[:3], tmp_path)

@@ -8,7 +8,7 @@ import pytest
 from commandline import call
 from predicted_runs import CLASSES, GOOD, IMPACT, OSCILLATION, frames, many, perfect, predicted
 
-from inspector.training import evaluation
+from inspector import train
 from noiseclassifier.evaluation.assessment import measure
 from noiseclassifier.recording import group_of
 
@@ -151,7 +151,7 @@ def test_findings_are_those_that_classify_reports(folder, tmp_path):
     from inspector.library import load_library
 
     path = simulated(tmp_path / "fast.npz", 30, robot="panda")
-    report = evaluation.evaluate(folder / "model.npz", [path])
+    report = train.evaluate(folder / "model.npz", [path])
     (outcome,) = report.protocol.outcomes
     expected = analyse(path, load_library([folder / "model.npz"]))
     assert outcome.run.findings == expected.findings
@@ -178,7 +178,7 @@ def test_runs_of_one_name_in_two_folders_are_told_apart(folder, tmp_path):
         simulated(tmp_path / place / "run.npz", 50 + number)
         simulated(tmp_path / place / "panda" / "soft-007.npz", 60 + number, robot="panda")
     inputs = tmp_path / "one", tmp_path / "two"
-    report = evaluation.evaluate(folder / "model.npz", inputs)
+    report = train.evaluate(folder / "model.npz", inputs)
     names = [outcome.run.name for outcome in report.protocol.outcomes]
     assert names == ["panda/soft-007", "run", "panda/two/soft-007", "run (two)"]
     assert [group_of(name) for name in names] == ["panda-007", "run", "panda-007", "run (two)"]
@@ -190,7 +190,7 @@ def test_a_run_with_injected_faults_needs_no_blocks(folder, tmp_path):
     with np.load(path) as archive:
         arrays = {name: archive[name] for name in archive.files if "block" not in name}
     np.savez(path, **arrays)
-    report = evaluation.evaluate(folder / "model.npz", [path, folder / "test"])
+    report = train.evaluate(folder / "model.npz", [path, folder / "test"])
     first = report.protocol.outcomes[0]
     assert (first.found.tolist(), first.faults[0].felt) == ([True], False)
     assert first.counts["ok_hours"] == 0.0
@@ -244,7 +244,7 @@ def test_pictures_leave_out_measures_that_do_not_exist(tmp_path, monkeypatch):
         predicted("a", OSCILLATION[1:2], ["ok"] * len(frames()))
     ]  # no ok motion, and nothing found
     for recordings in (probable, many(6), silent):
-        evaluation.draw(measure(recordings), tmp_path / "p.png", title="m", overwrite=True)
+        train.draw(measure(recordings), tmp_path / "p.png", title="m", overwrite=True)
     texts = [
         {text.get_text() for text in figure.findobj() if hasattr(text, "get_text")}
         for figure in drawn

@@ -17,7 +17,7 @@ from inspector.audit import Observability, audit
 from inspector.hold import without_hold
 from inspector.library import CannotTellError, label_run, signals_of
 from inspector.report.markdown import report
-from inspector.training.recordings import classified
+from inspector.train import classified
 
 LIBRARY = {"general": trained()}
 FIXED = {"fixed": fixed()}

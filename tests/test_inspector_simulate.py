@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from inspector.cli import main
-from inspector.training.recordings import recordings
+from inspector.train import classified
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
 from noiseclassifier.scenarios.simulation import digest, look_up
@@ -232,7 +232,7 @@ def test_a_data_set_keeps_the_signals_of_its_runs_at_its_rate(simulated, inspect
         assert kept.velocity.dtype == np.float32
         assert kept.rate == pytest.approx(rate)
         assert kept.meta["sha256"] == digest(run)
-        (recording,) = recordings([data], rate)
+        ((recording, _),) = classified([data], rate)
         assert recording.name == "panda/straight-000"
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-import inspector.training.tuning
+import inspector.tune
 import noiseclassifier as nc
 from noisemodel import parallel
 
@@ -74,9 +74,9 @@ def counted(monkeypatch):
 
     def measure(profiles, trial):
         points.extend(profiles)
-        return nc.tuning.search.measure(profiles, trial)
+        return nc.tuning.measure(profiles, trial)
 
-    monkeypatch.setattr(inspector.training.tuning, "measure", measure)
+    monkeypatch.setattr(inspector.tune, "measure", measure)
     return points
 
 
@@ -159,6 +159,15 @@ def test_an_interrupted_search_resumes_to_the_same_bytes(data, whole, tmp_path, 
     assert output.read_bytes() == content
 
 
+def test_the_accuracy_along_each_setting_is_drawn(data, whole, tmp_path):
+    pytest.importorskip("matplotlib")
+    picture = tmp_path / "tuned.png"
+    status, out, _ = tune(data, whole[0], "--picture", picture)
+    assert (status, out) == (0, whole[1])
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert "exists already" in tune(data, whole[0], "--picture", picture)[2]
+
+
 @pytest.mark.slow
 def test_two_jobs_give_the_same_results(data, whole, tmp_path):
     output = tmp_path / "tuned.jsonl"
@@ -169,7 +178,7 @@ def test_two_jobs_give_the_same_results(data, whole, tmp_path):
 def test_a_point_that_kills_its_worker_is_named_and_the_search_resumes(
     data, whole, tmp_path, monkeypatch
 ):
-    output, measure = tmp_path / "tuned.jsonl", inspector.training.tuning.measure
+    output, measure = tmp_path / "tuned.jsonl", inspector.tune.measure
 
     def die(profiles, trial):
         if profiles[0].stride == 50:
@@ -177,7 +186,7 @@ def test_a_point_that_kills_its_worker_is_named_and_the_search_resumes(
         return measure(profiles, trial)
 
     with monkeypatch.context() as patch:
-        patch.setattr(inspector.training.tuning, "measure", die)
+        patch.setattr(inspector.tune, "measure", die)
         patch.setattr(parallel, "_forks", lambda: True)
         status, _, err = tune(data, output, "-j", 2)
     assert status == 3

@@ -9,7 +9,7 @@ import pytest
 
 import noiseclassifier as nc
 from inspector.errors import InspectorError
-from inspector.training.recordings import classified
+from inspector.train import classified
 from noiseclassifier.estimators.decision import NOVELTY_LIMIT, identity
 from noiseclassifier.estimators.trees import Trees
 from noiseclassifier.evaluation.matching import Outcome, predict

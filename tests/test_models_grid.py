@@ -3,7 +3,7 @@ from dataclasses import fields, replace
 import pytest
 
 import noiseclassifier as nc
-from noiseclassifier.tuning.grid import MOST, SETTINGS, Grid, GridError
+from noiseclassifier.tuning import MOST, SETTINGS, Grid
 
 RBF = nc.Profile.noisytest("rbf")
 
@@ -92,7 +92,7 @@ def test_a_point_is_the_profile_with_its_values():
     ],
 )
 def test_what_is_wrong_with_a_grid_is_named(texts, reason):
-    with pytest.raises(GridError, match=reason):
+    with pytest.raises(nc.ProfileError, match=reason):
         Grid.of(texts)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from noiseclassifier.tuning.logloss import balanced_log_loss, class_margins
+from noiseclassifier.tuning import balanced_log_loss, class_margins
 
 RANDOM = np.random.default_rng(5)
 

@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
+from noiseclassifier import tuning
 from noiseclassifier.recording import Block, Recording, folds
-from noiseclassifier.tuning import kernels
-from noiseclassifier.tuning.grid import Grid
-from noiseclassifier.tuning.search import CRITERIA, Measures, measure, order, validate
-from noiseclassifier.tuning.trial import Trial
+from noiseclassifier.tuning import CRITERIA, Grid, Measures, Trial, measure, order, validate
 
 SMALL = {"rate": 1000.0, "length": 400, "hop": 100, "window": 256, "stride": 48}
 PROFILES = {
@@ -105,7 +103,7 @@ def test_points_of_other_estimators_predict_what_a_classifier_predicts(estimator
 def test_too_many_frames_for_a_kernel_matrix_change_no_decision(monkeypatch):
     points, trial = some_points(PROFILES["paper"]), sets().trial
     kept = validate(points, trial).decisions
-    monkeypatch.setattr(kernels, "LARGEST", 0)
+    monkeypatch.setattr(tuning, "LARGEST", 0)
     for with_matrix, without in zip(kept, validate(points, trial).decisions, strict=True):
         assert np.array_equal(with_matrix.chosen, without.chosen)
         np.testing.assert_allclose(with_matrix.margins, without.margins, atol=1e-6)
@@ -130,12 +128,6 @@ def test_recordings_without_annotations_are_passed_over():
     (found,) = measure([PROFILES["paper"]], given.trial)
     more = Trial.against([*given.learn, silent], [silent, *given.check])
     assert measure([PROFILES["paper"]], more) == [found]
-    one, *others = np.split(np.arange(1 + len(more.recordings)), [1])
-    first = Trial(
-        [silent, *more.recordings],
-        [(others[0], one), *((1 + learn, 1 + check) for learn, check in more.splits)],
-    )
-    assert measure([PROFILES["paper"]], first) == [found]
 
 
 def test_measures_are_those_of_an_evaluation():

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import noiseclassifier as nc
-from inspector import verdict
+from inspector import tune, verdict
 from inspector.analysis.status import Status
 from inspector.errors import InspectorError
 from inspector.labelfiles import read_labels
@@ -18,7 +18,6 @@ from inspector.logs.names import column_signal, time_column
 from inspector.logs.read import read_log
 from inspector.reference import store
 from inspector.text import counted, plain
-from inspector.training import tuningfile
 from inspector.verdict import classify_file
 from noiseclassifier import jsontext, noisytest
 from noiseclassifier.scenarios import DatasetError
@@ -35,7 +34,7 @@ def read_state(path):
 
 
 def read_tuning(path):
-    with tuningfile.opened(path, {}, [{"C": 1.0}]):
+    with tune.opened(path, {}, [{"C": 1.0}]):
         pass
 
 

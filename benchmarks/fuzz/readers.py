@@ -20,7 +20,7 @@ import numpy as np
 
 import noiseclassifier as nc
 import noisemodel as nm
-from inspector import verdict
+from inspector import tune, verdict
 from inspector.analysis.analyse import analyse
 from inspector.assets import model_files
 from inspector.errors import InspectorError
@@ -30,7 +30,6 @@ from inspector.live import input as feeding
 from inspector.logs.mapping import ReadOptions, parse_mapping
 from inspector.logs.read import listing, read_logs
 from inspector.reference.store import Reference
-from inspector.training import tuningfile
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
 from noiseclassifier.scenarios.dataset import Folder, Task
@@ -350,9 +349,7 @@ def _read_resume(path: Path) -> None:
 
 
 def _read_tuning(path: Path) -> None:
-    with tuningfile.opened(
-        path, _header(path), [{"regularization": 1.0}, {"regularization": 10.0}]
-    ):
+    with tune.opened(path, _header(path), [{"regularization": 1.0}, {"regularization": 10.0}]):
         pass
 
 

@@ -1,12 +1,20 @@
 """`inspector evaluate`: the measures of a model on annotated runs."""
 
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from inspector.commands.options import InPart, Inputs, Overwrite
-from inspector.training.part import By, Part
+
+
+class By(StrEnum):
+    """What the runs of an evaluation are grouped by."""
+
+    ROBOT = "robot"
+    DOMAIN = "domain"
+    SCENARIO = "scenario"
 
 
 def evaluate(
@@ -21,7 +29,7 @@ def evaluate(
     picture: Annotated[
         Path | None, typer.Option(help="Write a PNG (needs the extra `report`).")
     ] = None,
-    part: InPart = Part.ALL,
+    part: InPart = "all",
     by: Annotated[
         By | None, typer.Option(help="Print one whole table: by robot, domain or scenario.")
     ] = None,
@@ -34,15 +42,20 @@ def evaluate(
     overwrite: Overwrite = False,
 ) -> None:
     """Evaluate a model on annotated runs that it was not trained on."""
-    from inspector import assets
-    from inspector.training.evaluation import Outputs
-    from inspector.training.evaluation import as_json as json_of
-    from inspector.training.evaluation import evaluate as evaluate_model
+    from inspector import assets, train
     from noiseclassifier.evaluation.assessment import table
+    from noisemodel.atomic import refuse_existing, replacing
 
-    outputs = Outputs(output, picture, overwrite=overwrite)
-    outputs.check()
+    for path in filter(None, (output, picture)):
+        refuse_existing(path, overwrite=overwrite)
+    if picture:
+        train.require()
     (file,) = assets.model_files([model])
-    report = evaluate_model(file, inputs, part=part, seen_too=seen_too)
-    outputs.write(report, file)
-    typer.echo(json_of(report, file) if as_json else table(report, by or ""))
+    report = train.evaluate(file, inputs, part=part, seen_too=seen_too)
+    text = train.as_json(report, file)
+    if output:
+        with replacing(output, overwrite=overwrite) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
+    if picture:
+        train.draw(report, picture, title=file.stem, overwrite=overwrite)
+    typer.echo(text if as_json else table(report, by or ""))

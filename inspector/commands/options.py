@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from inspector.analysis.status import Unknown
-from inspector.training.part import Part
 
 if TYPE_CHECKING:
     from inspector.logs.read import Opened, Reading
@@ -123,9 +122,15 @@ Floor = Annotated[
     float | None,
     typer.Option("--floor", help="Darkest level of spectrograms, in dB re 1 rad/s.", max=0.0),
 ]
+PARTS = ("all", "training", "test")
+"""Those of ``inspector.train``, which would take too long to import here."""
 InPart = Annotated[
-    Part,
-    typer.Option("--part", help="All runs, those to train on, or those held out as the test set."),
+    str,
+    typer.Option(
+        "--part",
+        callback=one_of(PARTS),
+        help=f"Which runs, one of {', '.join(PARTS)}; test are those held out as the test set.",
+    ),
 ]
 UnknownFrames = Annotated[
     Unknown, typer.Option("--unknown", help="What to do with frames out of distribution.")

@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 
 from inspector.commands.options import InPart, Inputs, Output, Overwrite
-from inspector.training.part import Part
 
 
 def train(
@@ -26,12 +25,12 @@ def train(
             " decimated.",
         ),
     ] = None,
-    part: InPart = Part.ALL,
+    part: InPart = "all",
     overwrite: Overwrite = False,
 ) -> None:
     """Train a model on annotated runs."""
-    from inspector.training.training import train as train_model
+    from inspector.train import train as train_model
 
-    report = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
-    typer.echo(str(report))
+    measures, left_out = train_model(inputs, profile, rate, output, part=part, overwrite=overwrite)
+    typer.echo(f"{measures}\n{left_out}")
     typer.echo(f"{output}: written; the measures above are of the training frames")

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from inspector.commands.options import Dask, InPart, Inputs, Overwrite, jobs_or_dask
-from inspector.training.part import Part
 
 
 class By(StrEnum):
@@ -35,7 +34,7 @@ def tune(
     folds: Annotated[
         int | None, typer.Option(min=2, help="Folds of the cross-validation.", show_default="5")
     ] = None,
-    part: InPart = Part.ALL,
+    part: InPart = "all",
     profile: Annotated[
         str,
         typer.Option(
@@ -61,6 +60,13 @@ def tune(
         Path | None,
         typer.Option(help="Train the best point on all training runs, write the model."),
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw the accuracy along each setting around the best point, as PNG (needs the"
+            " extra `report`)."
+        ),
+    ] = None,
     rows: Annotated[int, typer.Option(min=1, help="Number of points to print.")] = 10,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel processes.")] = 1,
@@ -72,8 +78,14 @@ def tune(
         raise typer.BadParameter("name runs with --validation, or a number of --folds, not both")
     from json import dumps
 
-    from inspector.training.tuning import Search
-    from inspector.training.tuning import tune as tune_profile
+    from inspector.compare.picture import require
+    from inspector.tune import Search
+    from inspector.tune import tune as tune_profile
+    from noisemodel.atomic import refuse_existing
+
+    if picture:
+        refuse_existing(picture, overwrite=overwrite)
+        require()
 
     search = Search(
         training=training,
@@ -88,6 +100,8 @@ def tune(
     tuned = tune_profile(search, output, model=train, jobs=where, overwrite=overwrite)
     report = dumps(tuned.as_dict(criterion.value, rows=rows), indent=2)
     typer.echo(report if as_json else tuned.table(criterion.value, rows=rows))
+    if picture:
+        tuned.draw(picture, criterion.value, overwrite=overwrite)
     if train:
         tuned.train(train, criterion.value, overwrite=overwrite)
         typer.echo(f"{train}: written, the best point trained on all training runs", err=as_json)

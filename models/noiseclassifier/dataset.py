@@ -231,13 +231,16 @@ class Examples:
         return cls(np.concatenate(found), dataset.labels, dataset.runs, dataset.hashes)
 
     @classmethod
-    def read(cls, recordings: Iterable[Recording], profile: Profile) -> Self:
+    def read(
+        cls, recordings: Iterable[Recording], profile: Profile, *, training: bool = True
+    ) -> Self:
         """Features of recordings, read one after the other; only the features are kept.
 
         Args:
             recordings: Annotated signals at the profile's rate, each of another name; those
                 without a frame are skipped.
             profile: How blocks are cut and framed, and what to compute.
+            training: Whether the frames are for training; see `cut`.
 
         Raises:
             NoFrameError: If there is no frame at all.
@@ -251,7 +254,8 @@ class Examples:
                 raise DatasetError(f"two recordings are called {recording.name!r}; name them apart")
             hashes[recording.name] = recording.sha256
             with suppress(NoFrameError):
-                found.append(cls.of(Dataset.of([recording], profile), profile))
+                dataset = Dataset.of([recording], profile, training=training)
+                found.append(cls.of(dataset, profile))
         if not found:
             raise NoFrameError(len(hashes), profile.classes)
         return cls(

@@ -1,1 +1,0 @@
-"""Models trained and evaluated on files: training, grid search, evaluation."""

@@ -1,0 +1,498 @@
+"""Tuning: the points of a grid, each as good as a model trained by itself, many at once.
+
+A grid is written as texts, one for each setting: ``stride=224:1024:100`` counts from a first value
+to a last one, both included, ``C=0.1:1000:x10`` multiplies, ``bands=comb,adjacent`` lists. The word
+``paper`` stands for the grid that the paper searched.
+
+What a point predicts is what `Classifier.train` with its profile would predict. Points that differ
+in settings of the estimator alone share their features; support vector machines that differ in C
+and gamma share the distances between frames, and those that differ in C alone the kernel matrix, so
+that a point costs little more than libsvm's own work.
+
+The balanced log-loss is finer than counts of frames: two points hardly ever have the same. It is
+computed from decision values, with one number fitted for all frames, so that it does not depend on
+the width of the margins.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from itertools import chain, groupby, product
+from math import floor, isfinite, isnan, log, prod
+from typing import Any, Literal, NamedTuple, Self, TypeAlias, get_args
+
+import numpy as np
+
+from noiseclassifier.confusion import Evaluation
+from noiseclassifier.dataset import Examples
+from noiseclassifier.errors import DatasetError, ProfileError
+from noiseclassifier.estimators import ESTIMATORS, svm
+from noiseclassifier.estimators.decision import TINY
+from noiseclassifier.features import standard
+from noiseclassifier.labels import UNKNOWN
+from noiseclassifier.profile import Kernel, Multiclass, Profile
+from noiseclassifier.recording import Recording
+from noiseclassifier.types import Array, Index, Words
+
+Value: TypeAlias = int | float | str
+Point: TypeAlias = Mapping[str, Value]
+Criterion: TypeAlias = Literal["balanced-accuracy", "log-loss", "subset-accuracy"]
+CRITERIA: tuple[Criterion, ...] = get_args(Criterion)
+
+FEATURE_SETTINGS = ("window", "stride", "bands", "floor", "least_deviation")
+"""Settings of the features that can be tuned."""
+OWN = {
+    "networks": ("networks", "units", "epochs", "decay", "alarm"),
+    "trees": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
+    "detector": ("rounds", "leaves", "learning_rate", "penalty", "alarm"),
+    "support vector machines": ("multiclass", "gamma", "regularization"),
+}
+ESTIMATOR_SETTINGS = tuple(dict.fromkeys(chain.from_iterable(OWN.values())))
+"""Settings of the estimators; points that differ in these alone share their features."""
+SETTINGS = FEATURE_SETTINGS + ESTIMATOR_SETTINGS
+"""Settings that can be tuned: all that come after framing; the last varies fastest."""
+OTHER_NAMES = {"C": "regularization"}
+MOST = 1_000_000
+"""Points that a grid may have."""
+LARGEST = 5000
+"""Training frames up to which a kernel matrix is kept, 200 MB then; above, libsvm has a cache."""
+DIGITS = 9
+"""Decimals of a measure: equal measures stay equal whatever the order of summation."""
+WIDEST = 6.0
+"""The slope of the log-loss is fitted within 2^-6 to 2^6 per unit of the margin."""
+CLOSE = 1e-5
+"""Tolerance of its exponent; the loss, which is flat there, has an error of 1e-9 then."""
+
+
+# --- the grid
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Settings of a profile, and the values of each, sorted as ``SETTINGS`` are.
+
+    Raises:
+        ProfileError: If a setting cannot be tuned, has no values or one of them twice, or the
+            points are too many.
+    """
+
+    axes: Mapping[str, tuple[Value, ...]]
+
+    def __post_init__(self) -> None:
+        """Check the axes, and sort them."""
+        for name, values in self.axes.items():
+            if name not in SETTINGS:
+                raise ProfileError(f"no setting {name!r} to tune; there are {', '.join(SETTINGS)}")
+            if not values or len(set(values)) < len(values):
+                state = "a value twice" if values else "no value"
+                raise ProfileError(f"grid has {state} for {name}, expected one or more, each once")
+        if not self.axes or len(self) > MOST:
+            raise ProfileError(
+                f"grid of {len(self) * bool(self.axes)} points, expected 1 to {MOST}"
+            )
+        ordered = {name: self.axes[name] for name in SETTINGS if name in self.axes}
+        object.__setattr__(self, "axes", ordered)
+
+    @classmethod
+    def paper(cls, kernel: Kernel = "rbf") -> Self:
+        """The grid that the paper searched, 24,300 points for the RBF kernel, 1,620 for the linear.
+
+        Its values are NoisyTest's to the bit: it adds a step to a float, so that errors add up
+        (C is 1.0999999999999999 where 1.1 is meant) and the last C and gamma just fall out.
+        """
+
+        def added_up(first: float, last: float, step: float) -> Iterator[float]:
+            value = first
+            while value <= last:
+                yield value
+                value += step
+
+        axes: dict[str, tuple[Value, ...]] = {
+            "stride": tuple(range(224, 1026, 10)),
+            "regularization": tuple(added_up(0.5, 2.5, 0.1)),
+        }
+        if kernel == "rbf":
+            axes["gamma"] = tuple(added_up(4.5e-4, 6.0e-4, 1.0e-5))
+        return cls(axes)
+
+    @classmethod
+    def of(cls, texts: Iterable[str], kernel: Kernel = "rbf") -> Self:
+        """Read a grid.
+
+        Args:
+            texts: ``paper``, or a setting and its values; a later text replaces the values that
+                an earlier one gave the same setting.
+            kernel: Kernel of the profile that is tuned.
+
+        Raises:
+            ProfileError: If a text cannot be understood, or the grid cannot be searched.
+        """
+        axes: dict[str, tuple[Value, ...]] = {}
+        for text in texts:
+            if text == "paper":
+                axes |= cls.paper(kernel).axes
+                continue
+            name, equals, values = text.partition("=")
+            if not equals:
+                raise ProfileError(f"grid {text!r}, expected paper or NAME=VALUES, say C=0.1,1,10")
+            name = OTHER_NAMES.get(name, name)
+            axes[name] = _values(name, values)
+        return cls(axes)
+
+    def points(self) -> Iterator[Point]:
+        """Yield a value for each setting, every combination once."""
+        for values in product(*self.axes.values()):
+            yield dict(zip(self.axes, values, strict=True))
+
+    def profiles(self, base: Profile) -> list[Profile]:
+        """Profile of each point; all other settings are those of ``base``.
+
+        Raises:
+            ProfileError: If a setting makes no sense with this profile, a value is out of its
+                range, or two do not fit together.
+        """
+        estimator = base.estimator if base.estimator in OWN else "support vector machines"
+        for name in self.axes:
+            foreign = name in ESTIMATOR_SETTINGS and name not in OWN[estimator]
+            idle: str = estimator if foreign else ""
+            if name == "gamma" and base.kernel == "linear":
+                idle = idle or "the linear kernel"
+            if idle:
+                raise ProfileError(f"{name} does nothing with {idle}; leave it out of the grid")
+        for stride in self.axes.get("stride", ()):
+            if isinstance(stride, int) and stride > base.length:
+                raise ProfileError(
+                    f"stride of {stride} samples is longer than a frame of {base.length}"
+                )
+        changes: Iterator[dict[str, Any]] = (dict(point) for point in self.points())
+        return [replace(base, **each) for each in changes]
+
+    def __len__(self) -> int:
+        return prod(len(values) for values in self.axes.values())
+
+
+def _values(name: str, text: str) -> tuple[Value, ...]:
+    """Read the values of a setting: words, a list of numbers, or a range of them."""
+    kinds = {field.name: field.type for field in fields(Profile)}
+    if kinds.get(name) not in (int, float):
+        return tuple(filter(None, text.split(",")))
+    parts = text.split(":")
+    if len(parts) == 1:
+        numbers: Sequence[float] = [_number(name, each) for each in text.split(",") if each.strip()]
+    elif len(parts) == 3:
+        numbers = _range(name, *parts)
+    else:
+        raise ProfileError(f"{name} is {text!r}, expected first:last:step or values with commas")
+    if kinds[name] is float:
+        return tuple(numbers)
+    if odd := next((each for each in numbers if each != int(each)), None):
+        raise ProfileError(f"{name} is {odd:g}, expected whole samples")
+    return tuple(map(int, numbers))
+
+
+def _range(name: str, first: str, last: str, step: str) -> list[float]:
+    start, stop = _number(name, first), _number(name, last)
+    by = _number(name, step.removeprefix("x"))
+    times = step.startswith("x")
+    if not (by > 1 and start > 0 if times else by > 0):
+        raise ProfileError(
+            f"{name} is {first}:{last}:{step}, expected a step above 0,"
+            " or from a value above 0 by a factor above 1"
+        )
+    if stop < start:
+        return []
+    steps = log(stop / start) / log(by) if times else (stop - start) / by
+    count = floor(steps + 1e-9) + 1
+    if count > MOST:
+        raise ProfileError(f"grid of {count} values of {name}, expected 1 to {MOST}")
+    exact = (start * by**i if times else start + i * by for i in range(count))
+    return [float(f"{each:.12g}") for each in exact]  # 0.7, and not 0.7000000000000001
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = float("nan")
+    if not isfinite(number):
+        raise ProfileError(f"{name} is {text!r}, expected a finite number")
+    return number
+
+
+# --- measures of points
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """Recordings to train points on, and to measure them by.
+
+    Attributes:
+        recordings: Annotated signals.
+        splits: Indices of the training recordings, and of the test recordings; each is tested in
+            one split at most.
+    """
+
+    recordings: Sequence[Recording]
+    splits: Sequence[tuple[Index, Index]]
+
+    @classmethod
+    def against(cls, training: Sequence[Recording], validation: Sequence[Recording]) -> Self:
+        """A single split: train on some recordings, test on others."""
+        every = np.arange(len(training) + len(validation))
+        return cls([*training, *validation], [(every[: len(training)], every[len(training) :])])
+
+    def names(self, indices: Index) -> list[str]:
+        """Names of some of the recordings."""
+        return [self.recordings[index].name for index in indices.tolist()]
+
+    def examples(self, profile: Profile, *, training: bool) -> Examples:
+        """Features of the training recordings, or of the test recordings, one by one."""
+        wanted = np.unique(np.concatenate([split[not training] for split in self.splits]))
+        found = [self.recordings[index] for index in wanted.tolist()]
+        return Examples.read(found, profile, training=training)
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Measures of a point; all but the loss are shares from 0 to 1, NaN where undefined.
+
+    Attributes:
+        balanced_accuracy: Mean recall of the classes.
+        log_loss: Balanced log-loss, in nats.
+        failure_recall: Failure frames that were predicted as any failure, of the failure frames.
+        false_alarm_rate: `ok` frames that were predicted as a failure, of the `ok` frames.
+        subset_accuracy: Frames with the right prediction, of all: the paper's criterion.
+    """
+
+    balanced_accuracy: float
+    log_loss: float
+    failure_recall: float
+    false_alarm_rate: float
+    subset_accuracy: float
+
+    def as_dict(self) -> dict[str, float | None]:
+        """All measures for JSON, None where undefined."""
+        return {name: None if isnan(value) else value for name, value in asdict(self).items()}
+
+
+class Decisions(NamedTuple):
+    """Decisions of one point on frames."""
+
+    chosen: Index
+    """Class of each, as an index, shape (frames,); of one that is unknown, beyond the classes."""
+    margins: Array
+    """Margins of the classes, or logarithms of their probabilities, shape (frames, classes)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """Decisions of points, which share their features, on all test frames.
+
+    Attributes:
+        classes: Names of the classes.
+        truth: Class of each frame, as an index, shape (frames,).
+        runs: Name of the recording that each is from, shape (frames,).
+        decisions: Of each point.
+        training_frames: Number of training frames in all.
+    """
+
+    classes: tuple[str, ...]
+    truth: Index
+    runs: Words
+    decisions: Sequence[Decisions]
+    training_frames: int
+
+    def measures(self) -> list[Measures]:
+        """Measures of each point."""
+        names = (*self.classes, UNKNOWN)
+        measures = []
+        for each in self.decisions:
+            cells = np.zeros((len(names), len(names)), dtype=np.int64)
+            np.add.at(cells, (self.truth, each.chosen), 1)
+            found = Evaluation(names, cells)
+            values = (
+                found.balanced_accuracy,
+                balanced_log_loss(each.margins, self.truth),
+                found.failure_recall,
+                found.false_alarm_rate,
+                found.subset_accuracy,
+            )
+            measures.append(Measures(*(round(value, DIGITS) for value in values)))
+        return measures
+
+
+def order(criterion: Criterion) -> Callable[[Measures], tuple[float, float]]:
+    """Key that sorts points, the best first; the log-loss breaks ties."""
+    if criterion == "log-loss":
+        return lambda measures: (measures.log_loss, 0.0)
+    name = criterion.replace("-", "_")
+    return lambda measures: (-getattr(measures, name), measures.log_loss)
+
+
+def measure(profiles: Sequence[Profile], trial: Trial) -> list[Measures]:
+    """Measures of points on test frames, see `validate`."""
+    return validate(profiles, trial).measures()
+
+
+def validate(profiles: Sequence[Profile], trial: Trial) -> Validation:
+    """Train points, and decide on all test frames by each.
+
+    Args:
+        profiles: Points that share their features; it pays if those of one gamma follow each other.
+        trial: Training and test recordings.
+
+    Raises:
+        DatasetError: If there are fewer than two classes, or a test class that some split has no
+            training frame of.
+        ModelsError: If a recording does not fit the profile.
+    """
+    known = trial.examples(profiles[0], training=True)
+    fresh = trial.examples(profiles[0], training=False)
+    there = {*known.labels.tolist(), *fresh.labels.tolist()}
+    if len(there) < 2:
+        raise DatasetError(f"all frames are {', '.join(there)}; tuning takes two classes")
+    classes = tuple(name for name in profiles[0].classes if name in there)
+    groups = known.groups
+    chosen = np.empty((len(profiles), len(fresh)), dtype=np.intp)
+    margins = np.empty((*chosen.shape, len(classes)))
+    for learn, check in trial.splits:
+        learnt = np.isin(known.runs, trial.names(learn))
+        checked = np.isin(fresh.runs, trial.names(check))
+        if not checked.any():
+            continue
+        if missing := [name for name in classes if name not in known.labels[learnt]]:
+            runs = sorted(set(fresh.runs[fresh.labels == missing[0]].tolist()))
+            raise DatasetError(
+                f"no frame of {missing[0]} to learn from where those of {', '.join(runs[:3])}"
+                " are checked; give more recordings of it, or take other folds"
+            )
+        near, far = known.features[learnt], fresh.features[checked]
+        mean, scale = standard(near, profiles[0])
+        targets = _indices(known.labels[learnt], classes)
+        near, far = (near - mean) / scale, (far - mean) / scale
+        for point, each in enumerate(decide(near, targets, groups[learnt], far, profiles)):
+            chosen[point, checked], margins[point, checked] = each
+    decisions = [Decisions(*each) for each in zip(chosen, margins, strict=True)]
+    return Validation(classes, _indices(fresh.labels, classes), fresh.runs, decisions, len(known))
+
+
+def _indices(labels: Words, classes: Sequence[str]) -> Index:
+    return np.array([classes.index(label) for label in labels.tolist()])
+
+
+# --- decisions, on shared kernel matrices
+
+
+def decide(
+    known: Array, targets: Index, groups: Words, fresh: Array, profiles: Sequence[Profile]
+) -> Iterator[Decisions]:
+    """Train the estimator of each point, and decide on test frames.
+
+    Args:
+        known: Training features, shape (frames, features).
+        targets: Class of each, as an index from 0 without a gap, shape (frames,).
+        groups: Runs of a group share their motion, shape (frames,).
+        fresh: Test features, shape (frames, features).
+        profiles: Points that share their features; it pays if those of one gamma follow each other.
+    """
+    classes = int(targets.max()) + 1
+    if profiles[0].estimator != "svm" or len(known) > LARGEST:
+        for profile in profiles:
+            estimator = ESTIMATORS[profile.estimator].fit(known, targets, groups, profile)
+            found = estimator.decision(fresh)
+            if profile.estimator == "svm":
+                margins = class_margins(found, classes=classes, multiclass=profile.multiclass)
+            else:
+                margins = np.log(estimator.score(found) + TINY)
+            yield Decisions(estimator.choose(found), margins)
+        return
+    from sklearn import config_context
+
+    near, far = known @ known.T, fresh @ known.T
+    rbf = profiles[0].kernel == "rbf"
+    if rbf:  # K(x, y) = exp(-gamma |x - y|^2)
+        squares = near.diagonal()
+        far = np.einsum("ij,ij->i", fresh, fresh)[:, None] + squares - 2.0 * far
+        near = squares[:, None] + squares - 2.0 * near
+    for gamma, points in groupby(profiles, key=lambda profile: profile.gamma):
+        train, test = (np.exp(-gamma * near), np.exp(-gamma * far)) if rbf else (near, far)
+        for profile in points:
+            # The input checks of scikit-learn would take a sixth of the time here.
+            with config_context(assume_finite=True, skip_parameter_validation=True):
+                found = _decisions(train, test, targets, profile)
+            multiclass = profile.multiclass
+            chosen = svm.choose(found, classes=classes, multiclass=multiclass)
+            yield Decisions(chosen, class_margins(found, classes=classes, multiclass=multiclass))
+
+
+def _decisions(train: Array, test: Array, targets: Index, profile: Profile) -> Array:
+    """Decision values of SVMs trained on a kernel matrix, shape (frames, decisions)."""
+    weights = svm.balance(targets)
+    if profile.multiclass == "one-vs-one":
+        weighted = dict(enumerate(weights.tolist()))
+        fitted = svm.svc(profile, profile.regularization, weighted, precomputed=True)
+        decisions: Array = fitted.fit(train, targets).decision_function(test)
+        # With two classes, scikit-learn turns the sign so that positive means the second.
+        return decisions if decisions.ndim == 2 else -decisions[:, None]
+    found = []
+    for number, weight in enumerate(weights.tolist()):
+        one = svm.svc(profile, profile.regularization * weight, precomputed=True)
+        found.append(one.fit(train, targets == number).decision_function(test))
+    return np.stack(found, axis=1)
+
+
+def class_margins(decisions: Array, *, classes: int, multiclass: Multiclass) -> Array:
+    """Least decision value in favour of each class, shape (frames, classes).
+
+    One-vs-rest: the decision values. One-vs-one: the least of the pairs of a class, above 0 if it
+    wins all of them.
+    """
+    if multiclass == "one-vs-rest":
+        return decisions
+    pairs = np.full((len(decisions), classes, classes), np.inf)
+    first, second = np.triu_indices(classes, 1)  # the order of the pairs in `svm`
+    pairs[:, first, second], pairs[:, second, first] = decisions, -decisions
+    worst: Array = pairs.min(axis=2)
+    return worst
+
+
+def balanced_log_loss(margins: Array, truth: Index) -> float:
+    """Mean log-loss of the classes, at the slope of the least loss.
+
+    With margins s, p_k = exp(a s_k) / sum_j exp(a s_j) is the probability of class k, and the loss
+    is the mean over classes of the mean over the class's frames of -log p_truth. The slope a > 0
+    has the least loss (Platt's scaling without a bias, one for all classes); it changes no
+    decision.
+
+    Args:
+        margins: Margins of the classes, shape (frames, classes).
+        truth: Class of each frame, as an index, shape (frames,).
+
+    Returns:
+        The loss in nats: 0 if all is certain and right, log(classes) if all margins are equal.
+    """
+    from scipy.optimize import brentq
+
+    counts = np.bincount(truth)
+    weight = 1.0 / (counts[truth] * np.count_nonzero(counts))
+    own = margins[np.arange(len(truth)), truth]
+
+    def rise(power: float) -> float:
+        return float(weight @ (_softmax(margins, 2.0**power)[1] - own))
+
+    # The loss is convex in a: where its derivative changes sign it is least.
+    if rise(-WIDEST) >= 0.0:
+        power = -WIDEST
+    elif rise(WIDEST) <= 0.0:
+        power = WIDEST
+    else:
+        power = brentq(rise, -WIDEST, WIDEST, xtol=CLOSE)
+    slope = 2.0**power
+    return float(weight @ (_softmax(margins, slope)[0] - slope * own))
+
+
+def _softmax(margins: Array, slope: float) -> tuple[Array, Array]:
+    """Log sum exp(a s), and the mean of s by its weights, each of shape (frames,)."""
+    highest = margins.max(axis=1)
+    share = np.exp(slope * (margins - highest[:, None]))
+    total = share.sum(axis=1)
+    return slope * highest + np.log(total), (share * margins).sum(axis=1) / total
