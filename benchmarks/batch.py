@@ -31,12 +31,9 @@ import numpy as np
 from noisemodel import Run
 
 ROOT = Path(__file__).parents[1]
-FILES = 8
-"""Number of files that links lead to."""
-THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-"""What `benchmarks` sets for its own process."""
-EVERY = 0.2
-"""Time between two samples of memory, in [s]."""
+FILES = 8  # number of files that links lead to
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")  # what `benchmarks` sets for its own process
+EVERY = 0.2  # time between two samples of memory, in [s]
 
 
 def motion(seed: int, *, rate: float, joints: int, seconds: float) -> Run:

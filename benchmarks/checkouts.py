@@ -58,12 +58,9 @@ SIMULATED: dict[str, Case] = {
     "solo12-multisine": ("solo12", "multisine-30-40", 2, 3.0),
 }
 """The simulated runs, by name."""
-SHIPPED = ("demo", "lola", *SIMULATED)
-"""What is compared unless runs are named."""
-TASKS = ("simulate", "runs", "logs", "train", "models")
-"""What a probe is given, each by name."""
-AGAIN = ("panda-early-height", "go2-force-jump")
-"""Runs that both checkouts simulate."""
+SHIPPED = ("demo", "lola", *SIMULATED)  # what is compared unless runs are named
+TASKS = ("simulate", "runs", "logs", "train", "models")  # what a probe is given, each by name
+AGAIN = ("panda-early-height", "go2-force-jump")  # runs that both checkouts simulate
 
 
 @dataclass(frozen=True)

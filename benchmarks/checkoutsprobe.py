@@ -18,16 +18,12 @@ from typing import Any
 
 import numpy as np
 
-KINDS = ("paper", "normal")
-"""Kinds of the extended noise that are computed."""
+KINDS = ("paper", "normal")  # kinds of the extended noise that are computed
 PACKAGES = ("numpy", "scipy", "scikit-learn", "pin", "mujoco")
 """Libraries whose versions may change results."""
-ESTIMATORS = ("svm", "networks", "trees")
-"""Estimators of log-band energies that are trained."""
-RATE = 10000.0
-"""Sample rate of NoisyTest's data set, in [Hz]."""
-CHUNK = 64
-"""Frames whose features are computed at once."""
+ESTIMATORS = ("svm", "networks", "trees")  # estimators of log-band energies that are trained
+RATE = 10000.0  # sample rate of NoisyTest's data set, in [Hz]
+CHUNK = 64  # frames whose features are computed at once
 
 
 def older(name: str, renamed: Mapping[str, str]) -> str:

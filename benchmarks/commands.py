@@ -19,8 +19,7 @@ from benchmarks.table import ROOT, Given, Row, in_turns, of_process
 from noisemodel import Robot, Run, simplified
 
 REPEATS = 3
-RECORDINGS = {"view of 10 s, 10 kHz, 32 joints": 20.0}
-"""Most that a recording may have, in [MB]."""
+RECORDINGS = {"view of 10 s, 10 kHz, 32 joints": 20.0}  # most that a recording may have, in [MB]
 
 
 def cases(folder: Path) -> dict[str, tuple[list[str], float, float | None]]:

@@ -14,10 +14,8 @@ from noisemodel.types import Array
 
 SAMPLES = 20_000
 REPEATS = 3
-MOST = {"normal": 0.35, "paper": 1.5}
-"""Most CPU time of 100,000 states, in [s]."""
-MEMORY = 300.0
-"""Most memory above the inputs of 100,000 states, in [MB]."""
+MOST = {"normal": 0.35, "paper": 1.5}  # most CPU time of 100,000 states, in [s]
+MEMORY = 300.0  # most memory above the inputs of 100,000 states, in [MB]
 IMPEDANCE = 1.204 * 343.2
 
 

@@ -28,8 +28,7 @@ from inspector import LiveSession
 
 ROBOT, RATE, SECONDS = "talos", 10_000.0, 6.0
 CHUNK = round(0.02 * RATE)
-WANTED = {"LiveSession": 4.0, "CSV": 2.5}
-"""Times real time: 25 % of a core, and 40 %."""
+WANTED = {"LiveSession": 4.0, "CSV": 2.5}  # times real time: 25 % of a core, and 40 %
 
 
 def rows(_: Given) -> Iterator[Row]:

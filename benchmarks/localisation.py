@@ -48,8 +48,7 @@ ACTS = {
     "partial contact at an edge": "measured",
 }
 """The stage in which each cause acts; jumps of sensors act in the commanded one."""
-LATE = 0.15
-"""Largest delay of a label after its cause, in [s]."""
+LATE = 0.15  # largest delay of a label after its cause, in [s]
 
 
 def run_of(folder: Path, robot: str, scenario: str, seed: int, seconds: float) -> nm.Run | None:

@@ -19,10 +19,8 @@ from benchmarks.table import ROOT, Given, Row, in_turns
 
 JOINTS = tuple(f"left_joint_number_{number}" for number in range(60))
 STORAGES = ("MCAP", "SQLITE3")
-SIZE, MESSAGE = 60, 3100
-"""Size of a bag, in [MB], and approximately of a message in it, in [bytes]."""
-SPEED, MEMORY = 20.0, 1000.0
-"""Least speed, in [MB/s], and most memory, in [MB]."""
+SIZE, MESSAGE = 60, 3100  # size of a bag, in [MB], and approximately of a message in it, in [bytes]
+SPEED, MEMORY = 20.0, 1000.0  # least speed, in [MB/s], and most memory, in [MB]
 REPEATS = 3
 
 

@@ -22,8 +22,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 SIGNALS = ("velocity", "velocity_desired", "position")
-PIECE = 50_000
-"""Samples that are made at once."""
+PIECE = 50_000  # samples that are made at once
 
 
 def motion(name: str, samples: np.ndarray, rate: float, joints: int) -> np.ndarray:

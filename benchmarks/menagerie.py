@@ -34,11 +34,7 @@ PREFIXES = ("panda_", "robot0_")
 
 @dataclass(frozen=True)
 class Row:
-    """What is measured of one robot; what was not is 0.
-
-    Attributes:
-        level: Sound power in the fixed motion, in [dB re 1 pW].
-    """
+    """What is measured of one robot; what was not is 0."""
 
     name: str
     problem: str = ""
@@ -46,7 +42,7 @@ class Row:
     joints: int = 0
     links: int = 0
     shaped: int = 0
-    level: float = 0.0
+    level: float = 0.0  # sound power in the fixed motion, in [dB re 1 pW]
     drawn: int = 0
 
 

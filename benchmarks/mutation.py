@@ -51,8 +51,7 @@ SEED = 27
 MEASURED = ("noisemodel", "models", "inspector/analysis")
 ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
 IDENTITY = {"Is", "IsNot"}
-MEMORY = 12 << 30
-"""Address space of a child, in [byte]."""
+MEMORY = 12 << 30  # address space of a child, in [byte]
 LEFT_OUT = (
     *("scenarios", "domains", "humanoid", "quadruped", "rockets", "leftout", "wheel"),
     *("*viewer", "*screenshot", "*picture", "*notebook"),
@@ -70,8 +69,7 @@ OPTIONS = (
     *(f"--deselect=tests/test_{name}" for name in ALONE),
 )
 
-CONTROL = 50
-"""Before one of so many mutants, its tests are run without a change: all have to pass."""
+CONTROL = 50  # before one of so many mutants, its tests are run without a change: all have to pass
 
 Lines = dict[str, dict[int, list[str]]]
 

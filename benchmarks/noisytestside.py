@@ -15,13 +15,10 @@ from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
-FILE = "earlycontacttoe.log"
-"""The file of the validation set that is labelled; a recording of 10 s."""
+FILE = "earlycontacttoe.log"  # the file of the validation set that is labelled; a recording of 10 s
 HOPS = 100
-POINTS = 3
-"""Points of the grid that are trained and measured by themselves."""
-FILES = 50
-"""Files of a folder; NoisyTest's data set has 32, the first ones come twice."""
+POINTS = 3  # points of the grid that are trained and measured by themselves
+FILES = 50  # files of a folder; NoisyTest's data set has 32, the first ones come twice
 TIMES = {
     "hop": HOPS,
     "hop, stream": HOPS,

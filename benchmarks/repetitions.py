@@ -14,14 +14,13 @@ from importlib import import_module
 from pathlib import Path
 
 import numpy as np
-from noiseclassifier.scenarios.case import Case
-from noiseclassifier.scenarios.clock import RATE, STEP, times
-from noiseclassifier.scenarios.contacts import unplanned
-from noiseclassifier.scenarios.imperfections import Imperfections
 
-from noiseclassifier.scenarios.labels import annotate
+from noiseclassifier.scenarios.drives import Drives
+from noiseclassifier.scenarios.faults import NO_DEFECT, Imperfections, drawn
+from noiseclassifier.scenarios.labels import annotate, unplanned
+from noiseclassifier.scenarios.motions import RATE, STEP, times
 from noiseclassifier.scenarios.robots import ROBOTS
-from noiseclassifier.scenarios.simulation import _record
+from noiseclassifier.scenarios.simulation import recorded
 from noiseclassifier.scenarios.table import SCENARIOS
 from noisemodel import Run, decimated
 
@@ -41,7 +40,7 @@ DEFECTS = (
 def trial(robot, way, repetition, defect, seed, duration=5.0):
     """Motion and events of one run; the repetition decides noise, friction and gains."""
     simulated = ROBOTS[robot]
-    family = import_module(f"noiseclassifier.scenarios.{simulated.family}.scene")
+    family = import_module(f"noiseclassifier.scenarios.{simulated.family}")
     motion = SCENARIOS[way].cases[simulated.family].motion
     plan = family.plan(simulated, motion, np.random.default_rng((seed, 1)), duration)
     joints = len(simulated.drives.joints)
@@ -64,13 +63,17 @@ def trial(robot, way, repetition, defect, seed, duration=5.0):
         stiffness=other(same.stiffness, 0.02),
         damping=other(same.damping, 0.02),
     )
-    case = Case(motion)
-    if defect:
-        case = replace(SCENARIOS[defect].cases[simulated.family], motion=motion)
-    faults = case.defect.draw(np.random.default_rng((seed, 4, len(defect))), plan)
+    fault = SCENARIOS[defect].cases[simulated.family].defect if defect else NO_DEFECT
+    faults = drawn(fault, np.random.default_rng((seed, 4, len(defect))), plan, simulated.drives)
     scene = family.scene(simulated, plan, faults, imperfections)
     noise = np.random.default_rng((seed, 5, repetition))
-    motion = _record(simulated, scene, plan, faults, imperfections, noise)
+    drives = Drives(
+        scene.start[-joints:],
+        drivetrain=simulated.drives,
+        offset=faults.offsets(joints),
+        imperfections=imperfections,
+    )
+    motion = recorded(scene, drives, plan, faults, imperfections, noise)
     return motion, faults.events + unplanned(motion.contact, plan.contacts) + scene.events
 
 

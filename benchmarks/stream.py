@@ -10,19 +10,14 @@ import noiseclassifier as nc
 from benchmarks.table import ROOT, Given, Row, used
 from noiseclassifier.signals import JOINTS, MOTION, NOISE, by_joint
 
-RATES = (125.0, 1000.0, 10_000.0)
-"""Rates of the signals, in [Hz]."""
+RATES = (125.0, 1000.0, 10_000.0)  # rates of the signals, in [Hz]
 INPUTS = {"joints": (*MOTION, *JOINTS), "norms": MOTION, "noise": (NOISE,)}
-MANY = 12
-"""Number of joints, that of a quadruped."""
+MANY = 12  # number of joints, that of a quadruped
 SECONDS = 10.0
 TURNS = 5
-CHUNK = 0.02
-"""Time of a chunk, in [s]."""
-WANTED = 100.0
-"""Times real time, in chunks and whole."""
-MEDIAN, SLOW = 3e-4, 2e-3
-"""Most time of a chunk that completes a frame, median and 99 %, in [s]."""
+CHUNK = 0.02  # time of a chunk, in [s]
+WANTED = 100.0  # times real time, in chunks and whole
+MEDIAN, SLOW = 3e-4, 2e-3  # most time of a chunk that completes a frame, median and 99 %, in [s]
 
 
 def rows(_: Given) -> Iterator[Row]:

@@ -15,36 +15,25 @@ CHATTER_GAIN, CHATTER_LAG = 20.0, 0.003
 
 @dataclass(frozen=True)
 class BulletArm:
-    """An arm of ``pybullet_data``.
-
-    Attributes:
-        force: Greatest torque of each motor, in [N m].
-        home: Posture around which it moves, in [rad].
-    """
+    """An arm of ``pybullet_data``."""
 
     urdf: str
     joints: tuple[str, ...]
-    force: tuple[float, ...]
-    home: tuple[float, ...]
+    force: tuple[float, ...]  # greatest torque of each motor, in [N m]
+    home: tuple[float, ...]  # posture around which it moves, in [rad]
     payload: str
     links: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Motors:
-    """Settings of the motors, and the load.
-
-    Attributes:
-        gain: Position gain: of the motor's constraint, or of the loop around it in [1/s].
-        payload: Mass added to the last link, in [kg].
-        damping: Viscous friction of the joints, in [N m s].
-    """
+    """Settings of the motors, and the load."""
 
     mode: str
-    gain: float
+    gain: float  # position gain: of the motor's constraint, or of the loop around it in [1/s]
     lag: int
-    payload: float
-    damping: float
+    payload: float  # mass added to the last link, in [kg]
+    damping: float  # viscous friction of the joints, in [N m s]
     feedforward: bool
 
     @classmethod

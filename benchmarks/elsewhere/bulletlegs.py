@@ -13,10 +13,8 @@ from noisemodel.types import Array
 LEGS = ("FR", "FL", "RR", "RL")
 PHASES = np.array([0.0, 0.5, 0.5, 0.0])
 SIDES = np.array([-1.0, 1.0, -1.0, 1.0])
-SETTLING = 0.8
-"""Time to stand before a run, in [s]."""
-CHATTER_LAG = 0.004
-"""Age of the measurements of a joint that chatters, in [s]."""
+SETTLING = 0.8  # time to stand before a run, in [s]
+CHATTER_LAG = 0.004  # age of the measurements of a joint that chatters, in [s]
 
 
 @dataclass(frozen=True)
@@ -25,10 +23,7 @@ class BulletLegs:
 
     Attributes:
         zeros: Joint angles of hip, thigh and calf at the zero of the URDF, in [rad].
-        lengths: Lateral offset of a leg, thigh and calf, in [m].
-        stance: Height of the hips over the feet, in [m].
         gains: Ranges of stiffness in [N m/rad] and damping in [N m s/rad].
-        torque: Greatest torque of a joint, in [N m].
     """
 
     urdf: str
@@ -36,38 +31,26 @@ class BulletLegs:
     names: tuple[str, str, str]
     signs: tuple[float, float, float, float]
     zeros: tuple[float, float, float]
-    lengths: tuple[float, float, float]
-    stance: float
+    lengths: tuple[float, float, float]  # lateral offset of a leg, thigh and calf, in [m]
+    stance: float  # height of the hips over the feet, in [m]
     gains: tuple[tuple[float, float], tuple[float, float]]
-    torque: float
+    torque: float  # greatest torque of a joint, in [N m]
     links: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Gait:
-    """A trot, and the gains of the joints.
+    """A trot, and the gains of the joints."""
 
-    Attributes:
-        period: Duration of two steps, in [s].
-        lift: Height of the swings, in [m].
-        speed: Speed ahead, in [m/s].
-        turn: Difference of the speeds of both sides, in [m/s].
-        rest: Time after which it stops, in [s].
-        stiffness: In [N m/rad].
-        damping: In [N m s/rad].
-        rotor: Inertia added to the links for that of the rotors, in [kg m²].
-        payload: Mass added to the trunk, in [kg].
-    """
-
-    period: float
-    lift: float
-    speed: float
-    turn: float
-    rest: float
-    stiffness: float
-    damping: float
-    rotor: float
-    payload: float
+    period: float  # duration of two steps, in [s]
+    lift: float  # height of the swings, in [m]
+    speed: float  # speed ahead, in [m/s]
+    turn: float  # difference of the speeds of both sides, in [m/s]
+    rest: float  # time after which it stops, in [s]
+    stiffness: float  # in [N m/rad]
+    damping: float  # in [N m s/rad]
+    rotor: float  # inertia added to the links for that of the rotors, in [kg m²]
+    payload: float  # mass added to the trunk, in [kg]
 
     @classmethod
     def draw(cls, rng: np.random.Generator, legs: BulletLegs, duration: float) -> "Gait":

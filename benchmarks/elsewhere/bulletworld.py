@@ -11,12 +11,9 @@ from benchmarks.elsewhere.faults import Push, Throw
 from noiseclassifier.scenarios.motions import Event
 from noisemodel.types import Array
 
-FLIGHT = 0.08
-"""Time between the appearance of a ball and its arrival, in [s]."""
-RADIUS = 0.06
-"""Of the balls, in [m]."""
-APART = 0.1
-"""Contacts farther apart are two events, in [s]."""
+FLIGHT = 0.08  # time between the appearance of a ball and its arrival, in [s]
+RADIUS = 0.06  # of the balls, in [m]
+APART = 0.1  # contacts farther apart are two events, in [s]
 
 
 class World:

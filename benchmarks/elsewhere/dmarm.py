@@ -11,27 +11,19 @@ from benchmarks.elsewhere.recorded import Recorded
 
 JOINTS = tuple(f"joint_{number}" for number in range(1, 7))
 HOME = (0.0, 3.1, 1.6, 0.0, 3.1, 0.0)
-CHATTER_GAIN, CHATTER_LAG = 20.0, 0.004
-"""Of the loop of a joint that chatters, in [1/s] and [s]."""
+CHATTER_GAIN, CHATTER_LAG = 20.0, 0.004  # of the loop of a joint that chatters, in [1/s] and [s]
 
 
 @dataclass(frozen=True)
 class Servos:
-    """Settings of the loop around the servos, and of the arm.
+    """Settings of the loop around the servos, and of the arm."""
 
-    Attributes:
-        gain: Of the position loop, in [1/s].
-        armature: Reflected inertia of the rotors, in [kg m²].
-        friction: Coulomb friction of the joints, in [N m].
-        payload: Mass added to the last link, in [kg].
-    """
-
-    gain: float
+    gain: float  # of the position loop, in [1/s]
     servo: float
     lag: int
-    armature: float
-    friction: float
-    payload: float
+    armature: float  # reflected inertia of the rotors, in [kg m²]
+    friction: float  # coulomb friction of the joints, in [N m]
+    payload: float  # mass added to the last link, in [kg]
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> "Servos":

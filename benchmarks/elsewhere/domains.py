@@ -52,7 +52,6 @@ class Domain:
     """A robot, a simulator and a controller.
 
     Attributes:
-        native: The rate of the simulator's own default or examples, in [Hz].
         scene: Draws a scene, from a random generator, a number, a duration in [s] and a rate in
             [Hz].
     """
@@ -61,7 +60,7 @@ class Domain:
     package: str
     robot: str | None
     joints: tuple[str, ...]
-    native: float
+    native: float  # the rate of the simulator's own default or examples, in [Hz]
     scene: Callable[[np.random.Generator, int, float, float], Scene]
 
     @property

@@ -13,37 +13,25 @@ from noisemodel.catalog import urdf_path
 
 @dataclass(frozen=True)
 class DrakeArm:
-    """An arm of example-robot-data; Drake's own models are a download.
-
-    Attributes:
-        force: Greatest torque of each joint, in [N m].
-        home: Posture around which it moves, in [rad].
-    """
+    """An arm of example-robot-data; Drake's own models are a download."""
 
     robot: str
     joints: tuple[str, ...]
     controller: str
-    force: tuple[float, ...]
-    home: tuple[float, ...]
+    force: tuple[float, ...]  # greatest torque of each joint, in [N m]
+    home: tuple[float, ...]  # posture around which it moves, in [rad]
     links: tuple[int, ...]
 
 
 @dataclass(frozen=True)
 class Loop:
-    """Settings of the controller, the drives and the load.
+    """Settings of the controller, the drives and the load."""
 
-    Attributes:
-        frequency: Frequency of the closed loop, in [rad/s].
-        inertia: Reflected inertia of the rotors, in [kg m²].
-        friction: Viscous friction of the joints, in [N m s].
-        payload: Mass added to the last link, unknown to the controller, in [kg].
-    """
-
-    frequency: float
+    frequency: float  # frequency of the closed loop, in [rad/s]
     damping: float
-    inertia: float
-    friction: float
-    payload: float
+    inertia: float  # reflected inertia of the rotors, in [kg m²]
+    friction: float  # viscous friction of the joints, in [N m s]
+    payload: float  # mass added to the last link, unknown to the controller, in [kg]
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> "Loop":

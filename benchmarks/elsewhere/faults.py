@@ -20,21 +20,16 @@ class Sizes:
     """Ranges from which a domain draws its faults.
 
     Attributes:
-        force: Peak of a push, in [N].
         ball: Mass of a thrown ball, in [kg]; None where nothing can be thrown.
-        delay: Additional age of measurements or commands, in [s].
-        jump: Jump of a joint's reference, in [rad].
-        hold: Duration for which a command is held, in [s].
-        offset: Offset of an encoder, in [rad].
     """
 
-    force: Range = (30.0, 150.0)
+    force: Range = (30.0, 150.0)  # peak of a push, in [N]
     ball: Range | None = (0.3, 1.5)
-    delay: Range = (0.03, 0.08)
+    delay: Range = (0.03, 0.08)  # additional age of measurements or commands, in [s]
     gain: Range = (15.0, 30.0)
-    jump: Range = (0.02, 0.1)
-    hold: Range = (0.06, 0.25)
-    offset: Range = (0.02, 0.06)
+    jump: Range = (0.02, 0.1)  # jump of a joint's reference, in [rad]
+    hold: Range = (0.06, 0.25)  # duration for which a command is held, in [s]
+    offset: Range = (0.02, 0.06)  # offset of an encoder, in [rad]
     late_commands: bool = False
     slow: bool = True
 
@@ -69,23 +64,14 @@ class Throw:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Control:
-    """What a controller is given at each tick, and what disturbs it.
+    """What a controller is given at each tick, and what disturbs it."""
 
-    Attributes:
-        position: Commanded positions, shape (ticks, joints), in [rad].
-        velocity: Commanded velocities, shape (ticks, joints), in [rad/s].
-        offset: Error of the encoders, shape (ticks, joints), in [rad].
-        delay: Additional age of measurements, shape (ticks,), in ticks.
-        late: Additional age of commands, shape (ticks,), in ticks.
-        gain: Factor on the gains, shape (ticks, joints).
-    """
-
-    position: Array
-    velocity: Array
-    offset: Array
-    delay: Array
-    late: Array
-    gain: Array
+    position: Array  # commanded positions, shape (ticks, joints), in [rad]
+    velocity: Array  # commanded velocities, shape (ticks, joints), in [rad/s]
+    offset: Array  # error of the encoders, shape (ticks, joints), in [rad]
+    delay: Array  # additional age of measurements, shape (ticks,), in ticks
+    late: Array  # additional age of commands, shape (ticks,), in ticks
+    gain: Array  # factor on the gains, shape (ticks, joints)
     pushes: tuple[Push, ...] = ()
     throws: tuple[Throw, ...] = ()
     events: tuple[Event, ...] = ()

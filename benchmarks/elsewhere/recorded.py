@@ -7,8 +7,7 @@ import numpy as np
 from noiseclassifier.scenarios.motions import Event
 from noisemodel.types import Array
 
-FASTEST = 60.0
-"""Joint speed beyond which a simulation has diverged, in [rad/s]."""
+FASTEST = 60.0  # joint speed beyond which a simulation has diverged, in [rad/s]
 
 
 class DroppedError(Exception):
@@ -17,17 +16,11 @@ class DroppedError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Recorded:
-    """Simulated motion, without sensors.
+    """Simulated motion, without sensors."""
 
-    Attributes:
-        position: Joint positions, shape (samples, joints), in [rad].
-        velocity: Joint velocities, shape (samples, joints), in [rad/s].
-        effort: Joint torques, shape (samples, joints), in [N m].
-    """
-
-    position: Array
-    velocity: Array
-    effort: Array
+    position: Array  # joint positions, shape (samples, joints), in [rad]
+    velocity: Array  # joint velocities, shape (samples, joints), in [rad/s]
+    effort: Array  # joint torques, shape (samples, joints), in [N m]
     events: tuple[Event, ...] = ()
 
     def checked(self, rate: float) -> "Recorded":

@@ -35,8 +35,7 @@ from benchmarks.fuzz.readers import READERS, Reader
 
 SECONDS, BYTES = 20, 2 * 10**9
 """Processor time in [s] and resident memory in [byte] that a command may take."""
-WALL = 150.0
-"""Time that it may take in all, in [s]: one that waits takes no processor time."""
+WALL = 150.0  # time that it may take in all, in [s]: one that waits takes no processor time
 
 OUTCOMES = ("handled", "traceback", "hang", "memory", "nonsense", "raw text")
 """Result or one line; a bug; above ``SECONDS``; above ``BYTES``; a result of what cannot have one;
@@ -48,19 +47,14 @@ NOT_FINITE = re.compile(r"\b(nan|inf) (√W|W|rad|m|s|Hz|dB|ms)\b")
 
 @dataclass(frozen=True)
 class Result:
-    """What became of a file.
-
-    Attributes:
-        seconds: Processor time, in [s].
-        megabytes: Peak of the resident memory, in [MB].
-    """
+    """What became of a file."""
 
     reader: str
     case: str
     outcome: str
     status: int
-    seconds: float
-    megabytes: float
+    seconds: float  # processor time, in [s]
+    megabytes: float  # peak of the resident memory, in [MB]
     said: str
 
 

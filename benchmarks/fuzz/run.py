@@ -39,8 +39,7 @@ GROUPS = {
 }
 """Readers that are fuzzed together; each input goes to one of them."""
 
-SEEDS = 30
-"""Damaged files of each reader to begin with."""
+SEEDS = 30  # damaged files of each reader to begin with
 
 SHORT, LONGEST = 1000, 20_000
 """Bytes that a whole text is cut to, and that an input has at most: short ones are read faster."""

@@ -46,27 +46,18 @@ from noiseclassifier.scenarios.world import (
 from noisemodel import Robot
 from noisemodel.types import Array
 
-NEAR = 0.002
-"""Height over the table at which force control starts, in [m]."""
-METRIC = Units()
-"""Metres and newtons."""
+NEAR = 0.002  # height over the table at which force control starts, in [m]
+METRIC = Units()  # metres and newtons
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Plan of the motion of a tool, at every tick.
+    """Plan of the motion of a tool, at every tick."""
 
-    Attributes:
-        position: Of the tool's tip, shape (ticks, 3), in [m].
-        yaw: Turn of the tool about the vertical since the start, shape (ticks,), in [rad].
-        force: Force to press with; NaN while force control is off, shape (ticks,), in [N].
-        keep: Share of the last offset of the force control that remains, shape (ticks,).
-    """
-
-    position: Array
-    yaw: Array
-    force: Array
-    keep: Array
+    position: Array  # of the tool's tip, shape (ticks, 3), in [m]
+    yaw: Array  # turn of the tool about the vertical since the start, shape (ticks,), in [rad]
+    force: Array  # force to press with; NaN while force control is off, shape (ticks,), in [N]
+    keep: Array  # share of the last offset of the force control that remains, shape (ticks,)
     contacts: tuple[Contact, ...]
     effectors: tuple[Effector, ...]
     ground: tuple[Box, ...]
@@ -122,14 +113,7 @@ def pick(
     duration: float,
     units: Units = METRIC,
 ) -> Plan:
-    """Plan of picks, one after the other.
-
-    Args:
-        start: Where the tip is at first, shape (3,), in [m].
-        table: Height of the table, in [m].
-        reach: Ranges of x and y on the table, in [m].
-        duration: Duration of the plan, in [s].
-    """
+    """Plan of picks, one after the other."""
     segments = [Segment(0.2, (float(start[0]), float(start[1]), float(start[2])), 0.0)]
     contacts = []
     now = segments[0].duration
@@ -217,26 +201,14 @@ def _sample(segments: list[Segment]) -> tuple[list[Array], list[Array], list[Arr
     return positions, yaws, forces, keeps
 
 
-FURTHEST = 0.1
-"""Largest offset of the tool by force control, in [m]."""
-GUARD = 80.0
-"""Contact force beyond which the tool yields while it descends, in [N]."""
-TOUCHING = 5.0
-"""Contact force that no noise of a sensor reaches, in [N]."""
-UNLOADING = 0.4
-"""Time in which force control unloads a tool that touched before it started, in [s]."""
+FURTHEST = 0.1  # largest offset of the tool by force control, in [m]
+GUARD = 80.0  # contact force beyond which the tool yields while it descends, in [N]
+TOUCHING = 5.0  # contact force that no noise of a sensor reaches, in [N]
+UNLOADING = 0.4  # time in which force control unloads a tool that touched before it started, in [s]
 
 
 class ToolControl:
-    """Follows a plan with a tool that points down, and presses with the planned force.
-
-    Args:
-        point: The tip in the frame's axes, shape (3,), in [m].
-        rest: Joint positions at first, shape (joints,), in [rad].
-        gain: Speed of the tool per error of the contact force at each tick, shape (ticks,),
-            in [m/(s N)].
-        time_constant: Low-pass on the contact force, in [s].
-    """
+    """Follows a plan with a tool that points down, and presses with the planned force."""
 
     def __init__(
         self,
@@ -263,11 +235,7 @@ class ToolControl:
         self._turning = np.gradient(plan.yaw, TICK)
 
     def tick(self, number: int, sensors: Array) -> Reference:
-        """Advance by one tick.
-
-        Args:
-            sensors: Contact force that the sensor reports, shape (1,), in [N].
-        """
+        """Advance by one tick."""
         tip = self._plan.position[number] + (0.0, 0.0, self._press(number, float(sensors[0])))
         joints, inverse = self._solve(tip, self._plan.yaw[number])
         before, here, after = self._joints = [*self._joints[1:], joints]
@@ -347,11 +315,7 @@ SETTLING = 300
 def plan(
     arm: Arm, motion: Picks | Reach, rng: np.random.Generator, duration: float
 ) -> Plan | ReachPlan:
-    """Plan of the motion of one run.
-
-    Args:
-        duration: Duration of the run, in [s].
-    """
+    """Plan of the motion of one run."""
     model = reduced_model(arm)
     if isinstance(motion, Reach):
         ability = _ability(arm)

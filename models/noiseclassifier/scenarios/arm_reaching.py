@@ -27,56 +27,34 @@ from noisemodel.types import Array
 
 HIGHEST_ACCELERATION = 30.0
 """Limit of the feed-forward acceleration at jumps of the reference, in [rad/s²]."""
-MARGIN = 0.1
-"""Distance from the joints' limits, in [rad]."""
-OVER = 0.08
-"""How far splines and waves may reach into that margin, in [rad]."""
-SHORTEST = 0.2
-"""Shortest movement, in [s]."""
-TURN = np.pi
-"""Furthest position of a joint without nearer limits, in [rad]."""
-SHARE = 0.7
-"""Share of the drives' torque that a plan may need, and of the URDF's speed."""
-SLOWER = 1.25
-"""Factor on the duration of a movement that needs too much torque."""
-LONG_PAUSES = 0.15
-"""Share of the pauses that are long."""
-LONG = (1.0, 3.0)
-"""A long pause, in [s]."""
-BRAKING = (0.05, 0.2)
-"""Time in which an emergency stop brakes, in [s]."""
-HALTED = (0.3, 1.0)
-"""Time between an emergency stop and going on, in [s]."""
-RESUMING = 0.4
-"""Time in which the motion gets back to its speed, in [s]."""
-CARRYING = (0.5, 2.5)
-"""Time between picking up and putting down, and until the next time, in [s]."""
-GRASPING = (0.06, 0.15)
-"""Time in which the tool takes over a weight, in [s]."""
-SINES = (0.05, 1.5)
-"""Frequencies of sines, in [Hz]."""
-HAND = (0.4, 1.5)
-"""Bandwidth of the hand that teleoperates, in [Hz]."""
-SENDING = (20.0, 60.0)
-"""Rate at which a teleoperation device sends positions, in [Hz]."""
+MARGIN = 0.1  # distance from the joints' limits, in [rad]
+OVER = 0.08  # how far splines and waves may reach into that margin, in [rad]
+SHORTEST = 0.2  # shortest movement, in [s]
+TURN = np.pi  # furthest position of a joint without nearer limits, in [rad]
+SHARE = 0.7  # share of the drives' torque that a plan may need, and of the URDF's speed
+SLOWER = 1.25  # factor on the duration of a movement that needs too much torque
+LONG_PAUSES = 0.15  # share of the pauses that are long
+LONG = (1.0, 3.0)  # A long pause, in [s]
+BRAKING = (0.05, 0.2)  # time in which an emergency stop brakes, in [s]
+HALTED = (0.3, 1.0)  # time between an emergency stop and going on, in [s]
+RESUMING = 0.4  # time in which the motion gets back to its speed, in [s]
+CARRYING = (0.5, 2.5)  # time between picking up and putting down, and until the next time, in [s]
+GRASPING = (0.06, 0.15)  # time in which the tool takes over a weight, in [s]
+SINES = (0.05, 1.5)  # frequencies of sines, in [Hz]
+HAND = (0.4, 1.5)  # bandwidth of the hand that teleoperates, in [Hz]
+SENDING = (20.0, 60.0)  # rate at which a teleoperation device sends positions, in [Hz]
 
 
 @dataclass(frozen=True, eq=False)
 class ReachPlan:
-    """Plan of the motion of an arm's joints, at every tick.
+    """Plan of the motion of an arm's joints, at every tick."""
 
-    Attributes:
-        joints: Positions, shape (ticks, joints), in [rad].
-        position: Of the tool's tip, shape (ticks, 3), in [m].
-        stops: Times of emergency stops, in [s].
-    """
-
-    joints: Array
-    position: Array
+    joints: Array  # positions, shape (ticks, joints), in [rad]
+    position: Array  # of the tool's tip, shape (ticks, 3), in [m]
     effectors: tuple[Effector, ...]
     units: Units
     payloads: tuple[Payload, ...] = ()
-    stops: tuple[float, ...] = ()
+    stops: tuple[float, ...] = ()  # times of emergency stops, in [s]
     foreseen: bool = True
 
     @property
@@ -102,24 +80,15 @@ class ReachPlan:
 
 @dataclass(frozen=True, eq=False)
 class Ability:
-    """What an arm can do.
-
-    Attributes:
-        rest: Joint positions around which it moves, shape (joints,), in [rad].
-        low: Lowest positions, shape (joints,), in [rad].
-        high: Highest positions, shape (joints,), in [rad].
-        speed: Largest speeds, shape (joints,), in [rad/s].
-        torque: Largest torques, shape (joints,), in [N m].
-        armature: Inertia of the drives, shape (joints,), in [kg m²].
-    """
+    """What an arm can do."""
 
     model: Any
-    rest: Array
-    low: Array
-    high: Array
-    speed: Array
-    torque: Array
-    armature: Array
+    rest: Array  # joint positions around which it moves, shape (joints,), in [rad]
+    low: Array  # lowest positions, shape (joints,), in [rad]
+    high: Array  # highest positions, shape (joints,), in [rad]
+    speed: Array  # largest speeds, shape (joints,), in [rad/s]
+    torque: Array  # largest torques, shape (joints,), in [N m]
+    armature: Array  # inertia of the drives, shape (joints,), in [kg m²]
 
     def feasible(self, positions: Array, fastest: float, ticks: int) -> bool:
         """Whether drives can follow.
@@ -159,11 +128,7 @@ def reach(
     units: Units,
     duration: float,
 ) -> ReachPlan:
-    """Plan of movements, one after the other.
-
-    Args:
-        duration: Duration of the plan, in [s].
-    """
+    """Plan of movements, one after the other."""
     if motion.kind not in KINDS:
         raise ScenarioError(
             f"motion of kind {motion.kind!r} is unknown; there are {', '.join(KINDS)}"
@@ -374,18 +339,11 @@ def _tips(model: Any, tool: Effector, joints: Array) -> Array:
     return tips
 
 
-DAMPING = 1e-3
-"""Of the inverse Jacobian, in [m²]."""
+DAMPING = 1e-3  # of the inverse Jacobian, in [m²]
 
 
 class JointControl:
-    """Follows planned joint positions with the torque of the model as feed-forward.
-
-    Args:
-        joints: Planned positions, shape (ticks, joints), in [rad].
-        shift: Added to the planned place of the tool's tip, shape (ticks, 3), in [m].
-        fastest: Largest acceleration that the feed-forward torque has, in [rad/s²].
-    """
+    """Follows planned joint positions with the torque of the model as feed-forward."""
 
     def __init__(
         self,

@@ -45,18 +45,14 @@ from noisemodel.atomic import replacing
 from noisemodel.parallel import DIED, Jobs, polled
 
 FORMAT, MANIFEST, TIMES, FALLEN = "noise-dataset/1", "dataset.json", "times.csv", ".fallen.json"
-LEAST_RUNS = 20
-"""Number of runs from which too many falls are an error."""
-FAULTY_RUNS = 2
-"""Faulty runs of each robot and seed in wide domains."""
+LEAST_RUNS = 20  # number of runs from which too many falls are an error
+FAULTY_RUNS = 2  # faulty runs of each robot and seed in wide domains
 FRAME, HOP = 0.4, 0.1
 """Length of a frame, and time from one to the next (paper, Sec. III-A), in [s]."""
-FEW = 8
-"""Robots up to which each has a column, and scenarios named at most."""
+FEW = 8  # robots up to which each has a column, and scenarios named at most
 _NAMES = re.compile(r"([a-z0-9_]+)/(.+)-(\d{3,})")
 
-Choice: TypeAlias = Mapping[str, tuple[str, ...]]
-"""Names of the scenarios of each robot."""
+Choice: TypeAlias = Mapping[str, tuple[str, ...]]  # names of the scenarios of each robot
 Side: TypeAlias = Literal["all", "source", "target", "logger"]
 """All logs; those that are learnt from; those of robots and domains that never are; and of robots
 and domains that are, those of loggers that never are."""
@@ -118,16 +114,12 @@ def _has(robot: str, scenario: str) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetSpec:
-    """The size of a data set of scenarios: a number of seeds, or of hours.
-
-    Attributes:
-        hours: Total duration of all runs, in [h].
-    """
+    """The size of a data set of scenarios: a number of seeds, or of hours."""
 
     choice: Choice
     first: int = 0
     seeds: int | None = None
-    hours: float | None = None
+    hours: float | None = None  # total duration of all runs, in [h]
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -218,18 +210,12 @@ def _faults(robot: str, seed: int, count: int, always: Sequence[str]) -> list[st
 
 @dataclass(frozen=True)
 class Folder:
-    """The folder of a data set.
-
-    Attributes:
-        wide: Whether its runs are of wide domains.
-        duration: Duration of each run, in [s]; None is that of its motion.
-        rate: Highest rate of the runs of scenarios, in [Hz].
-    """
+    """The folder of a data set."""
 
     path: Path
-    wide: bool = False
-    duration: float | None = None
-    rate: float = RATE
+    wide: bool = False  # whether its runs are of wide domains
+    duration: float | None = None  # duration of each run, in [s]; None is that of its motion
+    rate: float = RATE  # highest rate of the runs of scenarios, in [Hz]
 
     @classmethod
     def opened(
@@ -482,11 +468,7 @@ def logs(
     side: Side = "all",
     distribution: Distribution = DISTRIBUTION,
 ) -> Iterator[tuple[str, Run]]:
-    """Logs of the runs of wide domains, each with its name: ``<robot>/<fault>[.copy]-<seed>``.
-
-    Args:
-        rate: Of all logs, in [Hz]; drawn by default. Runs kept at a lower rate have no log then.
-    """
+    """Logs of the runs of wide domains, each with its name: ``<robot>/<fault>[.copy]-<seed>``."""
     if side not in get_args(Side):
         raise DatasetError(f"no side {side!r}; there are {', '.join(get_args(Side))}")
     kept = set(folder.kept())
@@ -547,15 +529,13 @@ class Statistics:
         upright: Runs that stood, and all runs, by robot and scenario.
         amounts: Blocks, their seconds and frames, by robot and class.
         costs: Processor time and duration of the runs of each robot, in [s].
-        motion: Total duration of all runs, in [s].
-        size: Of all files, in [B].
     """
 
     upright: Mapping[str, Mapping[str, tuple[int, int]]]
     amounts: Mapping[str, Mapping[str, Mapping[str, float]]]
     costs: Mapping[str, Mapping[str, float]]
-    motion: float
-    size: int
+    motion: float  # total duration of all runs, in [s]
+    size: int  # of all files, in [B]
 
     @classmethod
     def of(cls, folder: Folder) -> Self:

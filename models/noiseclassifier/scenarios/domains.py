@@ -30,32 +30,23 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Limits:
-    """Drives with which a family's robots stay upright in at least four of five runs.
-
-    Attributes:
-        delay: Longest time from a reading to its torque, in [s].
-        hold: Longest time for which targets are held, in [s].
-        flexibility: Lowest natural frequency of rotors on elastic gears, in [Hz].
-    """
+    """Drives with which a family's robots stay upright in at least four of five runs."""
 
     stiffness: Range = (0.0, float("inf"))
     damping: Range = (0.0, float("inf"))
-    delay: float = float("inf")
-    hold: float = float("inf")
+    delay: float = float("inf")  # longest time from a reading to its torque, in [s]
+    hold: float = float("inf")  # longest time for which targets are held, in [s]
     feedforward: float = 0.0
-    flexibility: float = 0.0
+    flexibility: float = 0.0  # lowest natural frequency of rotors on elastic gears, in [Hz]
 
 
 Control: TypeAlias = Literal["pd", "computed-torque", "impedance", "policy"]
 Velocity: TypeAlias = Literal["measured", "filtered", "differentiated"]
 Desired: TypeAlias = Literal["commanded", "planned", "zero", "missing"]
 Effort: TypeAlias = Literal["missing", "torque", "current"]
-TARGET_CONTROL: Control = "impedance"
-"""Control that is never learnt from."""
-TARGET_BITS = 13
-"""Encoders of so many bits or fewer are never learnt from, in any kind of log."""
-TARGET_HOLD = 4
-"""Logs whose samples are held so many times or more are never learnt from."""
+TARGET_CONTROL: Control = "impedance"  # control that is never learnt from
+TARGET_BITS = 13  # encoders of so many bits or fewer are never learnt from, in any kind of log
+TARGET_HOLD = 4  # logs whose samples are held so many times or more are never learnt from
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,11 +55,6 @@ class Domain:
 
     Attributes:
         flexibility: Natural frequency of the rotors on their elastic gears, in [Hz]; 0 if rigid.
-        backlash: Free play of the gears, in [rad].
-        torque_rise: Time from no torque to the limit, in [s].
-        delay: From a reading to its torque, in [s].
-        policy_rate: Rate of the targets of a policy, held in between, in [Hz]; 0 for none.
-        encoder_bandwidth: Of the velocities in the loop, in [Hz].
     """
 
     wildness: float
@@ -78,22 +64,22 @@ class Domain:
     gear: float
     ripple: float
     flexibility: float
-    backlash: float
+    backlash: float  # free play of the gears, in [rad]
     cogging: float
     stiction: float
     friction: float
     viscous: float
     rotor: float
     torque_limit: float
-    torque_rise: float
-    delay: float
+    torque_rise: float  # time from no torque to the limit, in [s]
+    delay: float  # from a reading to its torque, in [s]
     control: Control
     stiffness: float
     damping: float
     feedforward: float
-    policy_rate: float
+    policy_rate: float  # rate of the targets of a policy, held in between, in [Hz]; 0 for none
     encoder_bits: int
-    encoder_bandwidth: float
+    encoder_bandwidth: float  # of the velocities in the loop, in [Hz]
 
     @property
     def name(self) -> str:
@@ -115,21 +101,13 @@ class Domain:
 
 @dataclass(frozen=True, kw_only=True)
 class Logger:
-    """Sensing and logging of one run.
+    """Sensing and logging of one run."""
 
-    Attributes:
-        rate: Sample rate, in [Hz].
-        cutoff: Of the low-pass, in [Hz].
-        noise: Standard deviation of the white noise of velocities, in [rad/s].
-        resonances: Frequencies that the ripple excites, in [Hz].
-        current: Current of a motor at the torque limit, in [A]; 0 unless it is logged.
-    """
-
-    rate: float
+    rate: float  # sample rate, in [Hz]
     velocity: Velocity
     bits: int
-    cutoff: float
-    noise: float
+    cutoff: float  # of the low-pass, in [Hz]
+    noise: float  # standard deviation of the white noise of velocities, in [rad/s]
     jitter: float
     lost: float
     repeated: float
@@ -137,10 +115,10 @@ class Logger:
     ripple: float
     roughness: float
     gear: float
-    resonances: tuple[float, ...]
+    resonances: tuple[float, ...]  # frequencies that the ripple excites, in [Hz]
     desired: Desired
     effort: Effort = "missing"
-    current: float = 0.0
+    current: float = 0.0  # current of a motor at the torque limit, in [A]; 0 unless it is logged
     effort_noise: float = 0.0
     effort_bits: int = 16
 
@@ -164,14 +142,10 @@ def _lines(values: dict[str, Any]) -> str:
     return "\n".join(f"{name:18}{text(value)}" for name, value in values.items())
 
 
-Ends: TypeAlias = tuple[float, float]
-"""Mild end and wild end of a range."""
-RESONANCES = 2
-"""Most resonances of one robot."""
-PRESENT = 0.5
-"""Share of the robots that have a given imperfection of gears at all."""
-CURRENTS = 0.5
-"""Share of the logs with efforts whose efforts are currents."""
+Ends: TypeAlias = tuple[float, float]  # mild end and wild end of a range
+RESONANCES = 2  # most resonances of one robot
+PRESENT = 0.5  # share of the robots that have a given imperfection of gears at all
+CURRENTS = 0.5  # share of the logs with efforts whose efforts are currents
 RATES = (100.0, 125.0, 200.0, 250.0, 500.0, 1000.0, 1000.0, 1000.0, 2000.0, 5000.0, 10_000.0)
 """Rates of loggers, in [Hz], each drawn as often as it is listed."""
 
@@ -183,11 +157,7 @@ class Distribution:
     ends: Mapping[str, Ends]
 
     def changed(self, **ends: Ends) -> "Distribution":
-        """The distribution with other ends of some ranges.
-
-        Raises:
-            ScenarioError: If they are not within what domains.toml allows.
-        """
+        """The distribution with other ends of some ranges."""
         for name, given in ends.items():
             (least, most), unit = ABOUT[name]["within"], ABOUT[name].get("unit", "")
             if not (isinstance(given, tuple) and len(given) == 2):
@@ -243,12 +213,7 @@ class Distribution:
         most: float,
         rate: float | None = None,
     ) -> Logger:
-        """Draw the logger of one run.
-
-        Args:
-            most: Highest rate, that of the run, in [Hz].
-            rate: The rate, in place of one that is drawn, in [Hz].
-        """
+        """Draw the logger of one run."""
         draw = _Draw(self, rng, domain.wildness)
         drawn = float(rng.choice([each for each in RATES if each <= most * (1 + 1e-6)]))
         rate = rate or drawn
@@ -343,16 +308,11 @@ ABOUT: Mapping[str, Any] = tomllib.loads(
 """What domains.toml says of each setting."""
 DISTRIBUTION = Distribution({name: tuple(each["ends"]) for name, each in ABOUT.items()})
 """The distribution of all wide runs."""
-PICKS = 0.35
-"""Share of motions that are picks."""
-SLOWEST = 0.05
-"""Lowest peak speed of a joint in a movement, in [rad/s]."""
-FASTEST = (0.5, 2.5)
-"""Highest peak speed, mild and wild, in [rad/s]."""
-STANDS = 0.3
-"""Share of motions in the air that begin with standing for a while."""
-STANDING = (1.5, 4.0)
-"""How long they stand, in [s]."""
+PICKS = 0.35  # share of motions that are picks
+SLOWEST = 0.05  # lowest peak speed of a joint in a movement, in [rad/s]
+FASTEST = (0.5, 2.5)  # highest peak speed, mild and wild, in [rad/s]
+STANDS = 0.3  # share of motions in the air that begin with standing for a while
+STANDING = (1.5, 4.0)  # how long they stand, in [s]
 
 
 def arm_motion(
@@ -383,8 +343,7 @@ def arm_motion(
     )
 
 
-ARM_LIMITS = Limits(flexibility=12.0)
-"""An arm does not fall."""
+ARM_LIMITS = Limits(flexibility=12.0)  # an arm does not fall
 
 
 def _mixed(span: Range, share: float) -> float:
@@ -405,8 +364,7 @@ WALKS: Mapping[str, Walk] = MappingProxyType(
 WAYS = ("straight", "curve", "directions", "spot")
 MILD, WILD = ("walk", "slow", "march"), ("brisk", "shuffle", "platform")
 """Gaits for any wildness, and those that come with it."""
-STANDS_STILL = 0.3
-"""Share of the runs in which it only stands."""
+STANDS_STILL = 0.3  # share of the runs in which it only stands
 HUMANOID_LIMITS = Limits(
     stiffness=(0.05, 1.0), damping=(0.2, 0.5), delay=0.004, hold=0.01, feedforward=0.9,
     flexibility=40.0,

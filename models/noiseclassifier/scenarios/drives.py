@@ -75,13 +75,7 @@ class Drives:
         return reading, self._velocity
 
     def command(self, targets: Array, rates: Array, torque: Array) -> tuple[Array, Array, Array]:
-        """What the drives follow over one tick.
-
-        Args:
-            targets: Positions of the reference, shape (samples, joints), in [rad].
-            rates: Velocities of the reference, shape (samples, joints), in [rad/s].
-            torque: Torques of the model, shape (joints,), in [N m].
-        """
+        """What the drives follow over one tick."""
         return targets, rates, torque
 
     def torque(
@@ -114,16 +108,11 @@ class Drives:
         return acting
 
 
-LOAD_SHARE = 0.2
-"""Share of the rotors' inertia that stays on the joint's side of an elastic gear."""
-DAMPING_RATIO = 0.05
-"""Of an elastic gear."""
-STRIBECK = 0.05
-"""Speed over which static friction decays to Coulomb friction, in [rad/s]."""
-POLES = 7
-"""Periods of cogging per turn of the motor."""
-ORDERS = (1, 2)
-"""Orders of the ripple, as multiples of the gear ratio."""
+LOAD_SHARE = 0.2  # share of the rotors' inertia that stays on the joint's side of an elastic gear
+DAMPING_RATIO = 0.05  # of an elastic gear
+STRIBECK = 0.05  # speed over which static friction decays to Coulomb friction, in [rad/s]
+POLES = 7  # periods of cogging per turn of the motor
+ORDERS = (1, 2)  # orders of the ripple, as multiples of the gear ratio
 
 
 class DomainDrives(Drives):

@@ -33,8 +33,7 @@ Signal: TypeAlias = Callable[[Array], Array]
 
 Command: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
 """From times, shape (samples,), targets and rates, shape (samples, joints), to both."""
-MARGIN = 0.8
-"""Time without faults at the begin and at the end of a run, in [s]."""
+MARGIN = 0.8  # time without faults at the begin and at the end of a run, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,18 +41,15 @@ class DriveFault:
     """A fault of drives or commands; by default none.
 
     Attributes:
-        stiffness: Factor of the position gains meanwhile, shape (joints,).
-        damping: Factor of the velocity gains meanwhile, shape (joints,).
-        delay: Further delay meanwhile, in [s].
         offset: Error of the encoders from the start of the event on, shape (joints,), in [rad].
         torque: Torque added meanwhile: from times since the start, shape (samples,), in [s], to
             shape (samples, joints), in [N m].
     """
 
     event: Event | None = None
-    stiffness: Array | float = 1.0
-    damping: Array | float = 1.0
-    delay: float = 0.0
+    stiffness: Array | float = 1.0  # factor of the position gains meanwhile, shape (joints,)
+    damping: Array | float = 1.0  # factor of the velocity gains meanwhile, shape (joints,)
+    delay: float = 0.0  # further delay meanwhile, in [s]
     power: float = 1.0
     offset: Array | float = 0.0
     torque: Callable[[Array], Array] | None = None
@@ -80,7 +76,6 @@ class Faults:
         overlay: Heights and their rates, added to the reference of the drives: time to shape
             (samples, effectors, 2), in [m] and [m/s].
         sensors: Added to the values of sensors, by name: time to shape (ticks, values).
-        gain: Scale of the force control's gains: time to shape (ticks,).
     """
 
     boxes: tuple[Box, ...] = ()
@@ -89,7 +84,7 @@ class Faults:
     shift: Signal | None = None
     overlay: Signal | None = None
     sensors: Mapping[str, Signal] = field(default_factory=dict)
-    gain: Signal = np.ones_like
+    gain: Signal = np.ones_like  # scale of the force control's gains: time to shape (ticks,)
     loads: tuple[Load, ...] = ()
     drive: DriveFault = NO_DRIVE_FAULT
     events: tuple[Event, ...] = ()
@@ -132,16 +127,7 @@ def sines(
     stop: float,
     shares: Array,
 ) -> Array:
-    """Sum of sines that fades in and out over 0.1 s, and its rate.
-
-    Args:
-        time: Shape (times,), in [s].
-        rates: Of the sines, shape (sines,), in [rad/s].
-        phases: Of the sines, shape (sines,), in [rad].
-        start: When it starts, in [s].
-        stop: When it ends, in [s].
-        shares: Scale of each effector, shape (effectors,).
-    """
+    """Sum of sines that fades in and out over 0.1 s, and its rate."""
     out = np.zeros((len(time), len(shares), 2))
     inside = (start < time) & (time < stop)
     now = time[inside]
@@ -155,38 +141,26 @@ def sines(
 
 @dataclass(frozen=True, kw_only=True)
 class Imperfections:
-    """Deviations of one robot from its model; scales multiply the nominal values.
-
-    Attributes:
-        payload: Mass unknown to the controller, in [kg].
-        encoder_noise: Standard deviation of the encoders' noise, in [rad].
-        encoder_bandwidth: Natural frequency of the filter that reports velocities, in [Hz].
-        force_noise: Standard deviation of the force sensors' noise per millisecond, in [N].
-    """
+    """Deviations of one robot from its model; scales multiply the nominal values."""
 
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
     force_gain: float
     mass: tuple[float, ...]
-    payload: float
+    payload: float  # mass unknown to the controller, in [kg]
     friction: tuple[float, ...]
     viscous: tuple[float, ...]
     encoder_bits: int
-    encoder_noise: float
-    encoder_bandwidth: float
-    force_noise: float
+    encoder_noise: float  # standard deviation of the encoders' noise, in [rad]
+    encoder_bandwidth: float  # natural frequency of the filter that reports velocities, in [Hz]
+    force_noise: float  # standard deviation of the force sensors' noise per millisecond, in [N]
     torque_delay: int
 
     @classmethod
     def draw(
         cls, rng: np.random.Generator, joints: int, *, bodies: int, payload: float, force: float
     ) -> Self:
-        """Draw the imperfections of one robot.
-
-        Args:
-            payload: Largest mass that the controller has no model of, in [kg].
-            force: Largest standard deviation of the force sensors' noise, in [N].
-        """
+        """Draw the imperfections of one robot."""
 
         def scales(spread: float, count: int = joints) -> tuple[float, ...]:
             return tuple(rng.uniform(1 - spread, 1 + spread, count).tolist())
@@ -214,14 +188,10 @@ class Imperfections:
 
 @dataclass(frozen=True)
 class Decalibration:
-    """An encoder with an offset.
-
-    Attributes:
-        angle: The offset, in [rad].
-    """
+    """An encoder with an offset."""
 
     joints: tuple[int, ...]
-    angle: Range
+    angle: Range  # the offset, in [rad]
     either: bool = False
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
@@ -235,17 +205,11 @@ class Decalibration:
 
 @dataclass(frozen=True)
 class ReferenceJumps:
-    """Jumps of the planned motion: away and back again.
+    """Jumps of the planned motion: away and back again."""
 
-    Attributes:
-        every: Mean time between two jumps, in [s].
-        distance: Distance of a jump, in [m].
-        speed: Speed during a jump, in [m/s].
-    """
-
-    every: float = 1.4
-    distance: Range = (0.001, 0.004)
-    speed: Range = (0.1, 2.0)
+    every: float = 1.4  # mean time between two jumps, in [s]
+    distance: Range = (0.001, 0.004)  # distance of a jump, in [m]
+    speed: Range = (0.1, 2.0)  # speed during a jump, in [m/s]
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
         """Draw times, effectors, directions, distances and speeds."""
@@ -282,15 +246,13 @@ class SensorJumps:
     """Jumps of the signal of a force sensor during contacts.
 
     Attributes:
-        size: Size of a jump, either way, in [N], [N m] or [rad].
-        hold: Duration of a jump, in [s].
         after: When the jumps of one contact begin, after its start, in [s].
     """
 
-    size: Range
+    size: Range  # size of a jump, either way, in [N], [N m] or [rad]
     sensor: str = "touch"
     axes: tuple[bool, ...] = (True,)
-    hold: Range = (0.02, 0.06)
+    hold: Range = (0.02, 0.06)  # duration of a jump, in [s]
     after: tuple[Range, ...] = ((0.35, 0.42), (0.52, 0.6))
     share: float = 1.0
 
@@ -365,14 +327,12 @@ class Multisine:
     """Oscillations superposed on the height of an effector: one sine per hertz of a band.
 
     Attributes:
-        bands: The bands to choose from, in [Hz].
-        amplitude: Of one sine of equal power, in [m].
         fastest: Upper limit of the speed, which reduces the amplitude in high bands, in [m/s]: the
             2 mm of the paper at 900 Hz would be 11 m/s, which no drive follows.
     """
 
-    bands: tuple[Range, ...]
-    amplitude: Range
+    bands: tuple[Range, ...]  # the bands to choose from, in [Hz]
+    amplitude: Range  # of one sine of equal power, in [m]
     fastest: float = np.inf
     start: Range = (0.15, 0.4)
     stop: Range = (0.7, 0.95)
@@ -414,15 +374,10 @@ def _log_uniform(rng: np.random.Generator, span: Range, count: int) -> Array:
 
 @dataclass(frozen=True)
 class Obstacles:
-    """Boxes on the ground, unknown to the controller, where effectors touch down.
+    """Boxes on the ground, unknown to the controller, where effectors touch down."""
 
-    Attributes:
-        height: Height of a box, in [m].
-        half: Half of its edge lengths along and across the effector, in [m].
-    """
-
-    height: Range
-    half: Range
+    height: Range  # height of a box, in [m]
+    half: Range  # half of its edge lengths along and across the effector, in [m]
     offset: Range = (0.0, 0.0)
     effectors: tuple[int, ...] = ()
     share: float = 1.0
@@ -465,17 +420,11 @@ class Obstacles:
 
 @dataclass(frozen=True)
 class GivingWay:
-    """Ground that gives way under an effector: a box that vanishes.
+    """Ground that gives way under an effector: a box that vanishes."""
 
-    Attributes:
-        depth: Height of the box, in [m].
-        half: Half of its edge lengths, in [m].
-        after: When it vanishes, after the start of a contact, in [s].
-    """
-
-    depth: Range
-    half: Range
-    after: Range
+    depth: Range  # height of the box, in [m]
+    half: Range  # half of its edge lengths, in [m]
+    after: Range  # when it vanishes, after the start of a contact, in [s]
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
         """Lower the ground, and put boxes where contacts are planned, for some time."""
@@ -525,13 +474,9 @@ class Overhang:
 
 @dataclass(frozen=True)
 class StepDown:
-    """A step down at an edge across the path.
+    """A step down at an edge across the path."""
 
-    Attributes:
-        depth: Height of the step, in [m].
-    """
-
-    depth: Range
+    depth: Range  # height of the step, in [m]
     when: Range = (0.3, 0.5)
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
@@ -576,12 +521,9 @@ class StepDown:
         )
 
 
-MOVING = 0.05
-"""Least speed of an effector that is to collide, in [m/s]."""
-SLOW = 0.05
-"""Highest speed of an effector that moves slowly, in [m/s]."""
-ALONE = 0.6
-"""Time without pushes at the begin and at the end of a run, in [s]."""
+MOVING = 0.05  # least speed of an effector that is to collide, in [m/s]
+SLOW = 0.05  # highest speed of an effector that moves slowly, in [m/s]
+ALONE = 0.6  # time without pushes at the begin and at the end of a run, in [s]
 
 
 @runtime_checkable
@@ -599,16 +541,13 @@ class Collisions:
     """Obstacles in the air that a tool meets while it moves, each at another time.
 
     Attributes:
-        every: Mean time between two collisions, in [s].
-        stiffness: In [N/m], times the robot's unit of force.
         limit: Force at which an obstacle breaks loose, in [N], times the robot's unit of force.
-        hold: Time in which its resistance fades, in [s].
     """
 
-    every: float = 2.0
-    stiffness: Range = (1e3, 1e5)
+    every: float = 2.0  # mean time between two collisions, in [s]
+    stiffness: Range = (1e3, 1e5)  # in [N/m], times the robot's unit of force
     limit: Range = (10.0, 150.0)
-    hold: Range = (0.1, 0.5)
+    hold: Range = (0.1, 0.5)  # time in which its resistance fades, in [s]
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
         """Draw times at which the tool is to move, and obstacles; none where it does not."""
@@ -641,17 +580,11 @@ class Collisions:
 
 @dataclass(frozen=True)
 class JointStops:
-    """An end stop of a joint that is nearer than the controller knows.
+    """An end stop of a joint that is nearer than the controller knows."""
 
-    Attributes:
-        overshoot: How far beyond it the plan goes at most, in [rad].
-        stiffness: In [N m/rad], times the robot's unit of torque.
-        least: Least range of a joint's motion, in [rad].
-    """
-
-    overshoot: Range = (0.05, 0.4)
-    stiffness: Range = (3e3, 3e4)
-    least: float = 0.1
+    overshoot: Range = (0.05, 0.4)  # how far beyond it the plan goes at most, in [rad]
+    stiffness: Range = (3e3, 3e4)  # in [N m/rad], times the robot's unit of torque
+    least: float = 0.1  # least range of a joint's motion, in [rad]
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
         """Draw joint, side and angle; none where joints move little, or have no plan."""
@@ -678,19 +611,12 @@ class JointStops:
 
 @dataclass(frozen=True)
 class Pushes:
-    """Hands that push links while the robot stands or moves slowly, each at another time.
+    """Hands that push links while the robot stands or moves slowly, each at another time."""
 
-    Attributes:
-        every: Mean time between two pushes, in [s].
-        force: Largest force, in [N], times the robot's unit of force.
-        rise: Time in which it rises, and time in which it falls, in [s].
-        hold: Time in between, in [s].
-    """
-
-    every: float = 2.5
-    force: Range = (3.0, 40.0)
-    rise: Range = (0.1, 1.0)
-    hold: Range = (0.0, 0.4)
+    every: float = 2.5  # mean time between two pushes, in [s]
+    force: Range = (3.0, 40.0)  # largest force, in [N], times the robot's unit of force
+    rise: Range = (0.1, 1.0)  # time in which it rises, and time in which it falls, in [s]
+    hold: Range = (0.0, 0.4)  # time in between, in [s]
     along: Range = (0.3, 1.0)
 
     def draw(self, rng: np.random.Generator, plan: Plan) -> Faults:
@@ -966,8 +892,7 @@ class OnPlan(Protocol):
         ...
 
 
-Defect: TypeAlias = OnDrives | OnPlan
-"""Settings from which a seed draws faults."""
+Defect: TypeAlias = OnDrives | OnPlan  # settings from which a seed draws faults
 
 
 @dataclass(frozen=True)
@@ -998,8 +923,7 @@ def begun(plan: Plan, effectors: Sequence[int] = ()) -> list[Contact]:
     ]
 
 
-ADVANCE = 0.3
-"""Shortest way over which a step down may come, as a share of the height of the robot."""
+ADVANCE = 0.3  # shortest way over which a step down may come, as a share of the height of the robot
 
 
 @dataclass(frozen=True)

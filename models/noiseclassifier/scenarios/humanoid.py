@@ -26,27 +26,16 @@ from noiseclassifier.scenarios.world import (
 )
 from noisemodel.types import Array
 
-INSIDE = 0.77
-"""Largest offset of the zero-moment point in a sole, as a share of its half extent."""
-STEEPEST = 0.25
-"""Largest tilt of a sole, in [rad]."""
-FURTHEST = 0.04
-"""Largest deviation of a foot from its plan in height, in [m]."""
-DRIFT = 0.05
-"""Largest integral of the capture point's error, in [m s]."""
-TOUCH = 30.0
-"""Force above which a sole is in contact, in [N]."""
-FLAT = 5.0
-"""Rate at which a sole in the air returns to its plan, in [1/s]."""
+INSIDE = 0.77  # largest offset of the zero-moment point in a sole, as a share of its half extent
+STEEPEST = 0.25  # largest tilt of a sole, in [rad]
+FURTHEST = 0.04  # largest deviation of a foot from its plan in height, in [m]
+DRIFT = 0.05  # largest integral of the capture point's error, in [m s]
+TOUCH = 30.0  # force above which a sole is in contact, in [N]
+FLAT = 5.0  # rate at which a sole in the air returns to its plan, in [1/s]
 
 
 class Stabilizer:
-    """Heights and tilts of the soles from plan and sensors, once per tick.
-
-    Args:
-        strength: Scale of the gains of the force control at each tick, shape (ticks,).
-        weight: Weight of the nominal robot, in [N].
-    """
+    """Heights and tilts of the soles from plan and sensors, once per tick."""
 
     def __init__(
         self,
@@ -82,12 +71,7 @@ class Stabilizer:
         self._height = 0.0
 
     def step(self, number: int, sensors: Array) -> tuple[list[float], list[list[float]]]:
-        """Advance by one tick.
-
-        Returns:
-            Height of each sole over its plan, in [m], and its tilts about its own x and y axes,
-            in [rad].
-        """
+        """Advance by one tick."""
         values = sensors.tolist()
         measured = [
             (-values[bearing], _within(-values[turning], x), _within(-values[turning + 1], y))
@@ -169,18 +153,12 @@ def _within(value: float, limit: float) -> float:
     return min(max(value, -limit), limit)
 
 
-LOWEST = 0.25
-"""Distance below its plan at which a base has fallen, in [m]."""
-LEVEL = 0.8
-"""Vertical component of the base's own z axis below which it has fallen."""
+LOWEST = 0.25  # distance below its plan at which a base has fallen, in [m]
+LEVEL = 0.8  # vertical component of the base's own z axis below which it has fallen
 
 
 class WalkControl:
-    """Controller with a stabilizer and whole-body inverse kinematics.
-
-    Args:
-        weight: Weight of the nominal robot, in [N].
-    """
+    """Controller with a stabilizer and whole-body inverse kinematics."""
 
     def __init__(
         self,
@@ -266,20 +244,14 @@ def bearing(plan: Plan) -> Array:
     return np.asarray((share[:, :, None] * each[:, None]).reshape(len(force), 12))
 
 
-SETTLING = 500
-"""Ticks before the recording during which the robot comes to rest on its feet."""
-LEVER = 0.05
-"""Noise of torque sensors per noise of force sensors, in [m]."""
+SETTLING = 500  # ticks before the recording during which the robot comes to rest on its feet
+LEVER = 0.05  # noise of torque sensors per noise of force sensors, in [m]
 
 
 def plan(
     robot: Humanoid, motion: Walk | Stroll | Stand, rng: np.random.Generator, duration: float
 ) -> Plan:
-    """Plan of the motion of one run.
-
-    Args:
-        duration: Duration of the run, in [s].
-    """
+    """Plan of the motion of one run."""
     if isinstance(motion, Walk):
         return walk(robot, footsteps(robot, motion, rng, duration), duration)
     if isinstance(motion, Stroll):

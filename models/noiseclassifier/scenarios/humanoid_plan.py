@@ -26,25 +26,15 @@ from noisemodel.types import Array
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Plan of the motion of a humanoid, at every tick.
+    """Plan of the motion of a humanoid, at every tick."""
 
-    Attributes:
-        places: Of the soles, shape (ticks, feet, 3), in [m].
-        yaws: Directions of the soles, shape (ticks, feet), in [rad].
-        swinging: The foot in the air, or -1, shape (ticks,).
-        zmp: Zero-moment point, x and y, shape (ticks, 2), in [m].
-        centre: Centre of mass, shape (ticks, 3), in [m].
-        upper: Positions of the upper body's joints, shape (ticks, joints), in [rad].
-        rate: Natural frequency of the inverted pendulum, in [rad/s].
-    """
-
-    places: Array
-    yaws: Array
-    swinging: Integers
-    zmp: Array
-    centre: Array
-    upper: Array
-    rate: float
+    places: Array  # of the soles, shape (ticks, feet, 3), in [m]
+    yaws: Array  # directions of the soles, shape (ticks, feet), in [rad]
+    swinging: Integers  # the foot in the air, or -1, shape (ticks,)
+    zmp: Array  # zero-moment point, x and y, shape (ticks, 2), in [m]
+    centre: Array  # centre of mass, shape (ticks, 3), in [m]
+    upper: Array  # positions of the upper body's joints, shape (ticks, joints), in [rad]
+    rate: float  # natural frequency of the inverted pendulum, in [rad/s]
     contacts: tuple[Contact, ...]
     effectors: tuple[Effector, ...]
     ground: tuple[Box, ...]
@@ -97,44 +87,28 @@ class Plan:
         )
 
 
-REST = (0.6, 1.0)
-"""Time of standing before the walk, in [s]."""
-CLOSE = 0.6
-"""Time in which the weight moves from the last foot to the middle of both, in [s]."""
-STAND = 0.3
-"""Least time of standing at the end, in [s]."""
+REST = (0.6, 1.0)  # time of standing before the walk, in [s]
+CLOSE = 0.6  # time in which the weight moves from the last foot to the middle of both, in [s]
+STAND = 0.3  # least time of standing at the end, in [s]
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step of one foot.
-
-    Attributes:
-        place: x, y, z of its sole afterwards, in [m].
-        yaw: Its direction afterwards, in [rad].
-        shift: When the weight starts to shift to the other foot, in [s].
-        start: When it is to leave the ground, in [s].
-        stop: When it is to touch the ground, in [s].
-        height: Height of its swing, in [m].
-    """
+    """One step of one foot."""
 
     foot: int
-    place: tuple[float, float, float]
-    yaw: float
-    shift: float
-    start: float
-    stop: float
-    height: float
+    place: tuple[float, float, float]  # x, y, z of its sole afterwards, in [m]
+    yaw: float  # its direction afterwards, in [rad]
+    shift: float  # when the weight starts to shift to the other foot, in [s]
+    start: float  # when it is to leave the ground, in [s]
+    stop: float  # when it is to touch the ground, in [s]
+    height: float  # height of its swing, in [m]
 
 
 def footsteps(
     robot: Humanoid, motion: Walk, rng: np.random.Generator, duration: float
 ) -> tuple[Step, ...]:
-    """Footsteps of a walk.
-
-    Args:
-        duration: Duration of the run, in [s].
-    """
+    """Footsteps of a walk."""
     single, double = (
         robot.pace * float(rng.uniform(*span)) for span in (motion.single, motion.double)
     )
@@ -169,11 +143,7 @@ def footsteps(
 def stopping(
     robot: Humanoid, motion: Stroll, rng: np.random.Generator, duration: float
 ) -> tuple[Step, ...]:
-    """Footsteps of a walk with stops.
-
-    Args:
-        duration: Duration of the run, in [s].
-    """
+    """Footsteps of a walk with stops."""
     pauses = rng.uniform(*motion.pause, motion.stops)
     pauses = pauses[np.cumsum(pauses) < duration / 2]
     steps = list(footsteps(robot, motion.walk, rng, duration - float(pauses.sum())))
@@ -207,16 +177,12 @@ def _advance(robot: Humanoid, motion: Walk, rng: np.random.Generator) -> tuple[f
     return 0.0, 0.0, 0.0
 
 
-TOP = 0.45
-"""Time at which a swinging foot is highest, as a share of its swing."""
+TOP = 0.45  # time at which a swinging foot is highest, as a share of its swing
 EARLY = 0.13
 """How early a foot may touch down, as a share of its swing: its height is a few millimetres."""
-BRIM = 0.01
-"""Distance from the last toe on a platform to its edge, in [m]."""
-TALL = 0.855
-"""Height of the centre of mass of TALOS, for which periods are given, in [m]."""
-NO_FOOT = -1
-"""The foot in the air while both are on the ground."""
+BRIM = 0.01  # distance from the last toe on a platform to its edge, in [m]
+TALL = 0.855  # height of the centre of mass of TALOS, for which periods are given, in [m]
+NO_FOOT = -1  # the foot in the air while both are on the ground
 
 
 def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, Array, Integers]:
@@ -257,11 +223,7 @@ def paths(robot: Humanoid, steps: Sequence[Step], time: Array) -> tuple[Array, A
 
 
 def contacts_of(robot: Humanoid, steps: Sequence[Step], duration: float) -> tuple[Contact, ...]:
-    """Planned contacts of the feet.
-
-    Args:
-        duration: How long the plan lasts, in [s].
-    """
+    """Planned contacts of the feet."""
     stands = []
     for foot in (0, 1):
         side = robot.apart if foot == 0 else -robot.apart
@@ -287,24 +249,15 @@ def ground_of(robot: Humanoid, steps: Sequence[Step]) -> tuple[Box, ...]:
     return (Box((edge - 1.0, 0.0, floor / 2), (1.0, 1.0, -floor / 2)), below)
 
 
-SMOOTH = 0.06
-"""Time over which the movement of the zero-moment point is smoothed, in [s]."""
-DESCENT = 0.3
-"""Time over which the movement of the centre of mass in height is smoothed, in [s]."""
-BESIDE = 0.005
-"""Inward offset of the zero-moment point from the centre of a sole, in [m]."""
+SMOOTH = 0.06  # time over which the movement of the zero-moment point is smoothed, in [s]
+DESCENT = 0.3  # time over which the movement of the centre of mass in height is smoothed, in [s]
+BESIDE = 0.005  # inward offset of the zero-moment point from the centre of a sole, in [m]
 
 
 def walk(
     robot: Humanoid, steps: Sequence[Step], duration: float, *, upper: Array | None = None
 ) -> Plan:
-    """Plan of a walk over footsteps.
-
-    Args:
-        duration: Duration of the plan, in [s].
-        upper: Positions of the upper body's joints, shape (ticks, joints), in [rad]; by default at
-            rest.
-    """
+    """Plan of a walk over footsteps."""
     time = times(round(duration / TICK), TICK)
     places, yaws, swinging = paths(robot, steps, time)
     rate = float(np.sqrt(GRAVITY / robot.centre))
@@ -382,21 +335,12 @@ def _smooth(signal: Array, span: float) -> Array:
     return np.stack(smooth, axis=1).reshape(signal.shape)
 
 
-FADE = 1.0
-"""Time in which sines fade in, in [s]."""
-DWELL = 0.3
-"""Longest time of rest between two reaches, as a share of a reach."""
+FADE = 1.0  # time in which sines fade in, in [s]
+DWELL = 0.3  # longest time of rest between two reaches, as a share of a reach
 
 
 def gesture(robot: Humanoid, motion: Gesture, rng: np.random.Generator, duration: float) -> Array:
-    """Positions of the upper body's joints.
-
-    Args:
-        duration: Duration of the run, in [s].
-
-    Returns:
-        Shape (ticks, joints), in [rad]; at rest at first.
-    """
+    """Positions of the upper body's joints."""
     time = times(round(duration / TICK), TICK)
     reach = np.array(robot.reach)
     size = float(rng.uniform(*motion.size)) * reach
@@ -424,18 +368,12 @@ def _reaches(time: Array, size: Array, motion: Gesture, rng: np.random.Generator
     return moved
 
 
-STILL = 0.5
-"""Time of standing still at both ends, in [s]."""
-SWAY_FADE = 1.0
-"""Time in which sway and squat fade in and out, in [s]."""
+STILL = 0.5  # time of standing still at both ends, in [s]
+SWAY_FADE = 1.0  # time in which sway and squat fade in and out, in [s]
 
 
 def stand(robot: Humanoid, motion: Stand, rng: np.random.Generator, duration: float) -> Plan:
-    """Plan of standing.
-
-    Args:
-        duration: Duration of the run, in [s].
-    """
+    """Plan of standing."""
     plan = walk(robot, (), duration, upper=gesture(robot, motion.upper, rng, duration))
     time = times(len(plan.zmp), TICK)
     slow = np.sqrt(robot.centre / TALL)  # period of a pendulum

@@ -37,61 +37,39 @@ from noiseclassifier.scenarios.motions import STEP, Contact, Event
 from noisemodel import Block
 from noisemodel.types import Array, Mask
 
-Span = tuple[int, int]
-"""First sample and the one after the last."""
+Span = tuple[int, int]  # first sample and the one after the last
 
 
 @dataclass(frozen=True, kw_only=True)
 class Rule:
-    """Thresholds of the labelling rule; the metadata of runs has them by these names.
+    """Thresholds of the labelling rule; the metadata of runs has them by these names."""
 
-    Attributes:
-        lowest: Cut-off frequency of the high-pass of the deviation, in [Hz].
-        smoothing: Window of the root mean square, in [s].
-        felt: Level above which a deviation is significant, in [rad/s].
-        before: Duration of the background before an event, in [s].
-        gap: Longest gap that is bridged, in [s].
-        tail: Time after the cause that still belongs to an event, in [s].
-        blow: Least level of an impact, in [rad/s].
-        acceleration: Least value of a high acceleration, in [rad/s²].
-        margin: Unlabelled time around all that is not ok, in [s].
-        shortest: Shortest ok block, in [s].
-    """
-
-    lowest: float = 10.0
-    smoothing: float = 0.02
-    felt: float = 0.03
+    lowest: float = 10.0  # cut-off frequency of the high-pass of the deviation, in [Hz]
+    smoothing: float = 0.02  # window of the root mean square, in [s]
+    felt: float = 0.03  # level above which a deviation is significant, in [rad/s]
     contrast: float = 1.5
-    before: float = 0.4
-    gap: float = 0.1
-    tail: float = 0.15
-    blow: float = 0.1
-    acceleration: float = 20.0
+    before: float = 0.4  # duration of the background before an event, in [s]
+    gap: float = 0.1  # longest gap that is bridged, in [s]
+    tail: float = 0.15  # time after the cause that still belongs to an event, in [s]
+    blow: float = 0.1  # least level of an impact, in [rad/s]
+    acceleration: float = 20.0  # least value of a high acceleration, in [rad/s²]
     periods: int = 5
-    margin: float = 0.05
-    shortest: float = 0.2
+    margin: float = 0.05  # unlabelled time around all that is not ok, in [s]
+    shortest: float = 0.2  # shortest ok block, in [s]
 
 
-RULE = Rule()
-"""The rule that all simulated runs are labelled by."""
+RULE = Rule()  # the rule that all simulated runs are labelled by
 
 
 @dataclass(frozen=True)
 class Trace:
-    """The effect of an event on the motion.
-
-    Attributes:
-        labelled: Time with its label, in [s].
-        peak: Its highest level, in [rad/s].
-        acceleration: Fastest change of a joint's deviation, in [rad/s²].
-        background: Highest level of its background, in [rad/s].
-    """
+    """The effect of an event on the motion."""
 
     event: Event
-    labelled: float
-    peak: float
-    acceleration: float
-    background: float
+    labelled: float  # time with its label, in [s]
+    peak: float  # its highest level, in [rad/s]
+    acceleration: float  # fastest change of a joint's deviation, in [rad/s²]
+    background: float  # highest level of its background, in [rad/s]
 
     def record(self) -> dict[str, Any]:
         """The trace as plain data."""
@@ -244,22 +222,12 @@ def _clipped(spans: Sequence[Span], first: int, end: int) -> list[Span]:
     return [(max(a, first), min(b, end)) for a, b in spans if a < end and b > first]
 
 
-APART = 0.05
-"""Contacts with a shorter pause are merged, in [s]."""
-IMPACT = 0.02
-"""Time over which the impulse of a contact is integrated, in [s]."""
+APART = 0.05  # contacts with a shorter pause are merged, in [s]
+IMPACT = 0.02  # time over which the impulse of a contact is integrated, in [s]
 
 
 def unplanned(force: Array, planned: Sequence[Contact]) -> tuple[Event, ...]:
-    """Unplanned contacts, as events.
-
-    Args:
-        force: Contact force of each effector, shape (samples, effectors), in [N].
-
-    Returns:
-        One event per contact that begins outside of the planned ones of its effector, with its
-        impulse in [N s] and its largest force in [N].
-    """
+    """Unplanned contacts, as events."""
     events = []
     for effector, measured in enumerate(force.T):
         own = [contact for contact in planned if contact.effector == effector]

@@ -26,15 +26,12 @@ CONTRAST = 10 ** (3 / 10)
 """Least ratio of the power of a fault to that of the twin's log in a band: 3 dB."""
 FRAME, HOP = 0.4, 0.1
 """Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
-LOWEST = 10.0
-"""Lowest frequency of the bands, in [Hz]; each is a third of an octave wide."""
+LOWEST = 10.0  # lowest frequency of the bands, in [Hz]; each is a third of an octave wide
 SLOWEST = 1.0
 """That of efforts, in [Hz]: the lowest band of a frame has its first line, at 2.5 Hz, into which
 the window spreads what is slower."""
-HARMONICS = (1, 2, 4)
-"""Orders of the ripple, as multiples of the gear ratio."""
-SHARPNESS, GAIN = 8.0, 3.0
-"""Quality and gain of the resonances that ripple excites."""
+HARMONICS = (1, 2, 4)  # orders of the ripple, as multiples of the gear ratio
+SHARPNESS, GAIN = 8.0, 3.0  # quality and gain of the resonances that ripple excites
 
 
 def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
@@ -309,20 +306,14 @@ def _before(repeated: Mask) -> NDArray[np.intp]:
 
 ADDED = {"tone": "oscillations", "noise": "oscillations", "blow": "impact"}
 """Class of each kind of fault."""
-LOWEST_ADDED = 15.0
-"""Lowest frequency, in [Hz]; the highest is 0.45 of the sample rate."""
+LOWEST_ADDED = 15.0  # lowest frequency, in [Hz]; the highest is 0.45 of the sample rate
 LEVELS = 0.03, 10.0
 """Least and most root mean square while it lasts, in [rad/s]: from what can be felt on."""
-LASTS = 0.4, 1.2
-"""Shortest and longest tone or noise, in [s]."""
-BLOW = 0.1
-"""Duration of a blow, in [s]."""
-APART = 2.5
-"""From the start of a fault to that of the next, in [s]."""
-UNLABELLED = 0.05
-"""Time around a fault that has no label, in [s]."""
-ALL = 0.3
-"""Share of the faults that all joints have."""
+LASTS = 0.4, 1.2  # shortest and longest tone or noise, in [s]
+BLOW = 0.1  # duration of a blow, in [s]
+APART = 2.5  # from the start of a fault to that of the next, in [s]
+UNLABELLED = 0.05  # time around a fault that has no label, in [s]
+ALL = 0.3  # share of the faults that all joints have
 
 
 def with_faults(run: Run, *, seed: int) -> Run:
@@ -361,16 +352,7 @@ def with_faults(run: Run, *, seed: int) -> Run:
 def fault(
     kind: str, samples: int, frequency: float, rate: float, rng: np.random.Generator
 ) -> Array:
-    """A fault of level 1.
-
-    Args:
-        frequency: Of a tone, of the middle of an octave of noise, of what rings after a blow, in
-            [Hz].
-        rate: Sample rate, in [Hz].
-
-    Returns:
-        Shape (samples,), of root mean square 1.
-    """
+    """A fault of level 1."""
     time = np.arange(samples) / rate
     if kind == "noise":
         white = np.fft.rfft(rng.standard_normal(samples))

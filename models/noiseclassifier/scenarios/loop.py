@@ -25,8 +25,7 @@ from noiseclassifier.scenarios.motions import (
 from noiseclassifier.scenarios.world import set_collision
 from noisemodel.types import Array
 
-FASTEST = 50.0
-"""A joint that is faster than this has diverged, in [rad/s] or [m/s]."""
+FASTEST = 50.0  # A joint that is faster than this has diverged, in [rad/s] or [m/s]
 _S = np.arange(STEPS)[:, None] / STEPS
 _POSITION = np.hstack(
     (
@@ -89,18 +88,14 @@ class Force(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A robot in its environment, ready to be simulated.
-
-    Attributes:
-        noise: Standard deviation of each sensor's noise per tick, shape (sensors,).
-    """
+    """A robot in its environment, ready to be simulated."""
 
     model: Any
     start: Array
     control: Control
     effectors: int
     settling: int
-    noise: Array
+    noise: Array  # standard deviation of each sensor's noise per tick, shape (sensors,)
     changes: Mapping[int, Sequence[tuple[int, bool]]] = field(default_factory=dict)
     forces: tuple[Force, ...] = ()
 
@@ -115,28 +110,20 @@ class Motion:
     """The recorded signals, before rounding.
 
     Attributes:
-        position: As the drives report it, shape (samples, joints), in [rad].
-        velocity: As the drives report it, shape (samples, joints), in [rad/s].
-        position_desired: Reference of the drives, shape (samples, joints), in [rad].
-        velocity_desired: Reference of the drives, shape (samples, joints), in [rad/s].
-        planned: Velocities of the plan alone, shape (samples, joints), in [rad/s].
-        commanded: Velocities that the controller demands, shape (samples, joints), in [rad/s].
-        torque: As the drives measure it, shape (samples, joints), in [N m].
-        contact: True contact force of each effector, shape (samples, effectors), in [N].
         base_pose: True pose of a floating base, as MuJoCo has it (quaternion w, x, y, z),
             shape (samples, 7), or (samples, 0).
         base_velocity: Its velocity, as MuJoCo has it (linear in the world's axes, angular in its
             own), shape (samples, 6), or (samples, 0).
     """
 
-    position: Array
-    velocity: Array
-    position_desired: Array
-    velocity_desired: Array
-    planned: Array
-    commanded: Array
-    torque: Array
-    contact: Array
+    position: Array  # as the drives report it, shape (samples, joints), in [rad]
+    velocity: Array  # as the drives report it, shape (samples, joints), in [rad/s]
+    position_desired: Array  # reference of the drives, shape (samples, joints), in [rad]
+    velocity_desired: Array  # reference of the drives, shape (samples, joints), in [rad/s]
+    planned: Array  # velocities of the plan alone, shape (samples, joints), in [rad/s]
+    commanded: Array  # velocities that the controller demands, shape (samples, joints), in [rad/s]
+    torque: Array  # as the drives measure it, shape (samples, joints), in [N m]
+    contact: Array  # true contact force of each effector, shape (samples, effectors), in [N]
     base_pose: Array
     base_velocity: Array
 
@@ -216,17 +203,13 @@ def record(
     return motion.since(scene.settling * STEPS)
 
 
-SLOWEST = 0.03
-"""Least speed of an effector that collides, in [m/s]."""
-PATIENCE = 0.5
-"""How long an obstacle waits for an effector to be that fast, in [s]."""
-LOOSE = 0.08
-"""Time in which an obstacle breaks loose, in [s]."""
+SLOWEST = 0.03  # least speed of an effector that collides, in [m/s]
+PATIENCE = 0.5  # how long an obstacle waits for an effector to be that fast, in [s]
+LOOSE = 0.08  # time in which an obstacle breaks loose, in [s]
 SLIDING = 0.25
 """Share of its force that it resists with from then on: drives that hold it off for long would be
 saturated, and let the arm fly off at the end."""
-RELEASED = 0.2
-"""Least duration of a contact whose end is an event of its own, in [s]."""
+RELEASED = 0.2  # least duration of a contact whose end is an event of its own, in [s]
 DISSIPATION = 1.5
 """Damping of a contact per depth and stiffness, in [s/m] (Hunt and Crossley, Coefficient of
 restitution interpreted as damping in vibroimpact, J. Applied Mechanics 1975): no force at the

@@ -8,14 +8,10 @@ import numpy as np
 
 from noisemodel.types import Array
 
-TICK = 1e-3
-"""Time between two ticks of control, in [s]."""
-STEPS = 10
-"""Samples per tick."""
-STEP = TICK / STEPS
-"""Time between two samples, in [s]."""
-RATE = round(1 / STEP)
-"""Samples per second, in [Hz]."""
+TICK = 1e-3  # time between two ticks of control, in [s]
+STEPS = 10  # samples per tick
+STEP = TICK / STEPS  # time between two samples, in [s]
+RATE = round(1 / STEP)  # samples per second, in [Hz]
 
 
 def times(count: int, step: float) -> Array:
@@ -41,18 +37,14 @@ class Box:
     """A box that stands in the world.
 
     Attributes:
-        centre: x, y, z of its centre, in [m].
-        half: Half of its edge lengths, in [m].
-        yaw: How far it is turned about the vertical, in [rad].
         since: When it appears, in [s]: a box where a foot stands would intersect the foot.
-        until: When it vanishes, in [s].
     """
 
-    centre: tuple[float, float, float]
-    half: tuple[float, float, float]
-    yaw: float = 0.0
+    centre: tuple[float, float, float]  # x, y, z of its centre, in [m]
+    half: tuple[float, float, float]  # half of its edge lengths, in [m]
+    yaw: float = 0.0  # how far it is turned about the vertical, in [rad]
     since: float = 0.0
-    until: float = float("inf")
+    until: float = float("inf")  # when it vanishes, in [s]
 
     @property
     def top(self) -> float:
@@ -62,16 +54,11 @@ class Box:
 
 @dataclass(frozen=True)
 class Rod:
-    """A rod with round ends on the z axis of a robot's frame, from the frame's origin outwards.
-
-    Attributes:
-        length: From the origin to the outermost point, in [m].
-        radius: Radius of the rod and of its ends, in [m].
-    """
+    """A rod with round ends on the z axis of a robot's frame, from the frame's origin outwards."""
 
     frame: str
-    length: float
-    radius: float
+    length: float  # from the origin to the outermost point, in [m]
+    radius: float  # radius of the rod and of its ends, in [m]
 
     @property
     def point(self) -> tuple[float, float, float]:
@@ -89,27 +76,21 @@ class Sole:
     """A flat sole whose lower face has its middle at a point of a robot's frame.
 
     Attributes:
-        patch: Half of its length and of its width, in [m].
         point: Middle of the lower face, in the frame's axes, in [m].
-        thickness: In [m].
     """
 
     frame: str
-    patch: tuple[float, float]
+    patch: tuple[float, float]  # half of its length and of its width, in [m]
     point: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    thickness: float = 0.02
+    thickness: float = 0.02  # in [m]
 
 
 @dataclass(frozen=True)
 class Ball:
-    """A ball around the origin of a robot's frame.
-
-    Attributes:
-        radius: In [m].
-    """
+    """A ball around the origin of a robot's frame."""
 
     frame: str
-    radius: float
+    radius: float  # in [m]
 
     @property
     def point(self) -> tuple[float, float, float]:
@@ -128,24 +109,15 @@ Effector: TypeAlias = Rod | Sole | Ball
 
 @dataclass(frozen=True)
 class Contact:
-    """A planned contact.
+    """A planned contact."""
 
-    Attributes:
-        start: When the effector may first touch, in [s].
-        lift: When it is to lift off, in [s].
-        stop: When it must have lifted off, in [s].
-        place: x, y, z of the surface there, in [m].
-        yaw: Direction of the effector there, in [rad].
-        approach: When it starts to descend to the place, in [s]; 0 for the first contact.
-    """
-
-    start: float
-    lift: float
-    stop: float
-    place: tuple[float, float, float]
+    start: float  # when the effector may first touch, in [s]
+    lift: float  # when it is to lift off, in [s]
+    stop: float  # when it must have lifted off, in [s]
+    place: tuple[float, float, float]  # x, y, z of the surface there, in [m]
     effector: int = 0
-    yaw: float = 0.0
-    approach: float = 0.0
+    yaw: float = 0.0  # direction of the effector there, in [rad]
+    approach: float = 0.0  # when it starts to descend to the place, in [s]; 0 for the first contact
 
     def later(self, delay: float) -> "Contact":
         """The contact with all times later by a delay, in [s]."""
@@ -162,40 +134,27 @@ class Contact:
 
 @dataclass(frozen=True)
 class Event:
-    """An event that may lead to a failure.
-
-    Attributes:
-        start: When it began, in [s].
-        stop: When its cause ended, in [s].
-    """
+    """An event that may lead to a failure."""
 
     label: str
     cause: str
-    start: float
-    stop: float
+    start: float  # when it began, in [s]
+    stop: float  # when its cause ended, in [s]
     facts: Mapping[str, Any] = field(default_factory=dict)
 
 
-PUSH = "push of a hand"
-"""Cause of the events of pushes, which velocities may not show."""
+PUSH = "push of a hand"  # cause of the events of pushes, which velocities may not show
 
 
 @dataclass(frozen=True, kw_only=True)
 class Payload:
-    """A mass that an effector holds for some time: its weight, its inertia left out.
-
-    Attributes:
-        start: When it is picked up, in [s].
-        stop: When it is put down, in [s].
-        mass: In [kg].
-        rise: Time in which its weight appears and vanishes, in [s].
-    """
+    """A mass that an effector holds for some time: its weight, its inertia left out."""
 
     frame: str
-    start: float
-    stop: float
-    mass: float
-    rise: float = 0.08
+    start: float  # when it is picked up, in [s]
+    stop: float  # when it is put down, in [s]
+    mass: float  # in [kg]
+    rise: float = 0.08  # time in which its weight appears and vanishes, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,75 +162,49 @@ class Collision:
     """An obstacle in the air, where an effector is at that time, that it pushes away.
 
     It breaks loose at its limit of force, then resists with less, and at last not at all.
-
-    Attributes:
-        start: When the effector meets it; if it is slow then, as soon as it is fast, in [s].
-        hold: Time in which its resistance fades, in [s].
-        stiffness: In [N/m].
-        limit: Force at which it breaks loose, in [N].
     """
 
     frame: str
-    start: float
-    hold: float
-    stiffness: float
-    limit: float
+    start: float  # when the effector meets it; if it is slow then, as soon as it is fast, in [s]
+    hold: float  # time in which its resistance fades, in [s]
+    stiffness: float  # in [N/m]
+    limit: float  # force at which it breaks loose, in [N]
 
 
 @dataclass(frozen=True, kw_only=True)
 class JointStop:
-    """A mechanical end stop of a joint.
-
-    Attributes:
-        angle: Where it is, in [rad].
-        stiffness: In [N m/rad].
-    """
+    """A mechanical end stop of a joint."""
 
     joint: int
-    angle: float
+    angle: float  # where it is, in [rad]
     side: int
-    stiffness: float
+    stiffness: float  # in [N m/rad]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Push:
-    """A hand that pushes at the centre of mass of a link.
-
-    Attributes:
-        start: When its force begins to rise, in [s].
-        stop: When it has vanished, in [s].
-        rise: Time in which it rises, in [s].
-        fall: Time in which it falls, in [s].
-        force: Its largest value, in the world's axes, in [N].
-    """
+    """A hand that pushes at the centre of mass of a link."""
 
     along: float
-    start: float
-    stop: float
-    rise: float
-    fall: float
-    force: tuple[float, float, float]
+    start: float  # when its force begins to rise, in [s]
+    stop: float  # when it has vanished, in [s]
+    rise: float  # time in which it rises, in [s]
+    fall: float  # time in which it falls, in [s]
+    force: tuple[float, float, float]  # its largest value, in the world's axes, in [N]
 
 
-Load: TypeAlias = Payload | Collision | JointStop | Push
-"""A force on a robot from outside."""
+Load: TypeAlias = Payload | Collision | JointStop | Push  # A force on a robot from outside
 Range: TypeAlias = tuple[float, float]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Picks:
-    """An arm comes down on a table, presses, and goes up again.
-
-    Attributes:
-        hover: Height over the table at which it slows down, in [m].
-        force: Contact force, in [N].
-        duration: Default duration of a run, in [s].
-    """
+    """An arm comes down on a table, presses, and goes up again."""
 
     way: str = "straight"
-    hover: Range = (0.01, 0.01)
-    force: Range = (15.0, 30.0)
-    duration: float = 6.0
+    hover: Range = (0.01, 0.01)  # height over the table at which it slows down, in [m]
+    force: Range = (15.0, 30.0)  # contact force, in [N]
+    duration: float = 6.0  # default duration of a run, in [s]
 
 
 REACHES = ("minimum-jerk", "trapezoid", "spline", "sines", "teleoperation")
@@ -283,101 +216,71 @@ class Reach:
     """An arm moves its joints in the air, from rest to rest.
 
     Attributes:
-        speed: Highest speed of a movement's fastest joint, in [rad/s].
-        acceleration: Largest acceleration of a joint, in [rad/s²].
-        spread: Furthest distance of a joint from its position at rest, in [rad].
-        pause: Time between two movements; some are longer, in [s].
-        stand: Time that it stands before its first movement, in [s].
-        stops: Emergency stops per second, in [1/s]; the arm goes on after each.
         payload: Mass that it picks up and puts down, times the robot's unit of force, in [kg];
             (0, 0) for none.
-        duration: Default duration of a run, in [s].
     """
 
     kind: str = "minimum-jerk"
-    speed: Range = (0.3, 1.0)
-    acceleration: float = 10.0
-    spread: float = 0.6
-    pause: Range = (0.05, 0.4)
-    stops: float = 0.0
+    speed: Range = (0.3, 1.0)  # highest speed of a movement's fastest joint, in [rad/s]
+    acceleration: float = 10.0  # largest acceleration of a joint, in [rad/s²]
+    spread: float = 0.6  # furthest distance of a joint from its position at rest, in [rad]
+    pause: Range = (0.05, 0.4)  # time between two movements; some are longer, in [s]
+    stops: float = 0.0  # emergency stops per second, in [1/s]; the arm goes on after each
     payload: Range = (0.0, 0.0)
-    stand: float = 0.2
-    duration: float = 6.0
+    stand: float = 0.2  # time that it stands before its first movement, in [s]
+    duration: float = 6.0  # default duration of a run, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Walk:
-    """A humanoid walks.
-
-    Attributes:
-        height: How high the feet are lifted, in [m].
-        single: Time on one foot, in [s].
-        double: Time on both, in [s].
-        drop: Height of a platform that it walks down from, in [m]; 0 on flat ground.
-        duration: Default duration of a run, in [s].
-    """
+    """A humanoid walks."""
 
     way: str = "straight"
-    height: Range = (0.05, 0.05)
-    single: Range = (0.6, 0.9)
-    double: Range = (0.12, 0.25)
+    height: Range = (0.05, 0.05)  # how high the feet are lifted, in [m]
+    single: Range = (0.6, 0.9)  # time on one foot, in [s]
+    double: Range = (0.12, 0.25)  # time on both, in [s]
     jitter: float = 0.05
-    drop: float = 0.0
-    duration: float = 7.0
+    drop: float = 0.0  # height of a platform that it walks down from, in [m]; 0 on flat ground
+    duration: float = 7.0  # default duration of a run, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Trot:
-    """A quadruped trots, or goes in another gait.
-
-    Attributes:
-        duration: Default duration of a run, in [s].
-        pause: How long it stands each time, in [s].
-    """
+    """A quadruped trots, or goes in another gait."""
 
     way: str = "straight"
     height: Range = (1.0, 1.0)
     period: Range = (0.8, 1.2)
     jitter: float = 0.1
-    duration: float = 5.0
+    duration: float = 5.0  # default duration of a run, in [s]
     gait: str = "trot"
     speed: float = 1.0
     pauses: int = 0
-    pause: Range = (0.5, 1.0)
+    pause: Range = (0.5, 1.0)  # how long it stands each time, in [s]
     posing: Range = (0.0, 0.0)
 
 
-Motion: TypeAlias = Picks | Reach | Walk | Trot
-"""A motion of any family."""
+Motion: TypeAlias = Picks | Reach | Walk | Trot  # A motion of any family
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gesture:
-    """Movement of the upper body's joints around their rest; nothing for a robot without.
-
-    Attributes:
-        period: Of a sine, or duration of a reach, in [s].
-    """
+    """Movement of the upper body's joints around their rest; nothing for a robot without."""
 
     way: str = "still"
     size: Range = (0.0, 0.0)
-    period: Range = (1.0, 2.0)
+    period: Range = (1.0, 2.0)  # of a sine, or duration of a reach, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Stroll:
-    """A humanoid walks, stops on the way, and moves its upper body.
-
-    Attributes:
-        pause: How long, in [s].
-        duration: Default duration of a run, in [s].
-    """
+    """A humanoid walks, stops on the way, and moves its upper body."""
 
     walk: Walk
     stops: int = 0
-    pause: Range = (1.0, 2.0)
+    pause: Range = (1.0, 2.0)  # how long, in [s]
     upper: Gesture = field(default_factory=Gesture)
-    duration: float = 7.0
+    duration: float = 7.0  # default duration of a run, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -387,29 +290,22 @@ class Stand:
     Attributes:
         period: Of sway and squat, in [s], for a robot as high as TALOS; others have the same share
             of their own period.
-        duration: Default duration of a run, in [s].
     """
 
     sway: Range = (0.0, 0.0)
     squat: Range = (0.0, 0.0)
     period: Range = (2.0, 4.0)
     upper: Gesture = field(default_factory=Gesture)
-    duration: float = 7.0
+    duration: float = 7.0  # default duration of a run, in [s]
 
 
 @dataclass(frozen=True)
 class Units:
-    """Units that scale defects to the size of a robot.
+    """Units that scale defects to the size of a robot."""
 
-    Attributes:
-        length: In [m]; speeds in lengths per second scale with it too.
-        force: In [N].
-        torque: In [N m].
-    """
-
-    length: float = 1.0
-    force: float = 1.0
-    torque: float = 1.0
+    length: float = 1.0  # in [m]; speeds in lengths per second scale with it too
+    force: float = 1.0  # in [N]
+    torque: float = 1.0  # in [N m]
 
 
 class Plan(Protocol):

@@ -24,10 +24,8 @@ from noiseclassifier.scenarios.world import (
 )
 from noisemodel.types import Array
 
-POSITION_GAIN = 1.0
-"""Rate of the correction per distance from the planned path, in [1/s]."""
-VELOCITY_FILTER = 0.05
-"""Time constant of the low-pass on the measured velocity, in [s]."""
+POSITION_GAIN = 1.0  # rate of the correction per distance from the planned path, in [1/s]
+VELOCITY_FILTER = 0.05  # time constant of the low-pass on the measured velocity, in [s]
 LOWEST, STEEPEST = 0.5, 0.7
 """Share of its height below which, and tilt above which, in [rad], the robot has fallen."""
 
@@ -56,14 +54,7 @@ class StateEstimate:
     def update(
         self, sensors: Array, *, place: Array, velocity: Array, yaw: float, tilt: Array
     ) -> None:
-        """Update the estimate with the sensors of one tick.
-
-        Args:
-            place: Planned position of the centre of mass, shape (2,), in [m].
-            velocity: Its planned velocity, shape (2,), in [m/s].
-            yaw: The planned direction of the body, in [rad].
-            tilt: Its planned roll and pitch, shape (2,), in [rad].
-        """
+        """Update the estimate with the sensors of one tick."""
         rolled, pitched = tilt.tolist()
         w, x, y, z = sensors[self._where["base.turn"]].tolist()
         roll = atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
@@ -91,32 +82,20 @@ def _share(time_constant: float) -> float:
     return TICK / (time_constant + TICK)
 
 
-BALANCE = 0.7
-"""Gain of the foot placement on the offset of the capture point."""
+BALANCE = 0.7  # gain of the foot placement on the offset of the capture point
 FURTHEST = 0.3
 """Largest distance of feet from their planned place, as a share of the robot's height."""
-FIXED = 0.8
-"""Share of its path after which the place of a foot is fixed."""
-DESCENDING = 0.5
-"""Share of its path after which a foot may touch down early."""
-CONTACT = 0.15
-"""Force above which a foot is in contact, as a share of the weight."""
-LEVELLING = 50.0
-"""Rate at which a foot in the air compensates the tilt of the body, in [1/s]."""
-LEAK = 4.0
-"""Rate at which the compliance of a foot decays, in [1/s]."""
-SMOOTHING = 0.008
-"""Time constant of the low-pass on the vertical speed of feet, in [s]."""
-HIGHEST = 0.16
-"""Largest vertical correction of feet, as a share of the robot's height."""
+FIXED = 0.8  # share of its path after which the place of a foot is fixed
+DESCENDING = 0.5  # share of its path after which a foot may touch down early
+CONTACT = 0.15  # force above which a foot is in contact, as a share of the weight
+LEVELLING = 50.0  # rate at which a foot in the air compensates the tilt of the body, in [1/s]
+LEAK = 4.0  # rate at which the compliance of a foot decays, in [1/s]
+SMOOTHING = 0.008  # time constant of the low-pass on the vertical speed of feet, in [s]
+HIGHEST = 0.16  # largest vertical correction of feet, as a share of the robot's height
 
 
 class Feet:
-    """Places of the feet, corrected by feedback.
-
-    Args:
-        gain: Scale of the feedback of forces at each tick, shape (ticks,).
-    """
+    """Places of the feet, corrected by feedback."""
 
     def __init__(self, robot: Quadruped, standing: Standing, plan: Plan, gain: Array) -> None:
         feet = len(robot.feet)
@@ -131,11 +110,7 @@ class Feet:
         self._early = np.zeros(feet, dtype=bool)
 
     def places(self, number: int, estimate: StateEstimate) -> Array:
-        """Places of the feet.
-
-        Returns:
-            Shape (feet, 3), in [m].
-        """
+        """Places of the feet."""
         places: Array = self._plan.feet[number].copy()
         places[:, :2] += self._placement(number, estimate)
         places[:, 2] += self._compliance(number, estimate)
@@ -187,11 +162,7 @@ HIGHEST_ACCELERATION = 1500.0
 
 
 class TrotControl:
-    """Controller with attitude feedback of the base and foot placement.
-
-    Args:
-        gain: Scale of the feedback of forces at each tick, shape (ticks,).
-    """
+    """Controller with attitude feedback of the base and foot placement."""
 
     def __init__(
         self,
@@ -268,11 +239,7 @@ _CENTRE = slice(-6, -4)
 
 
 def _rates(plan: Plan) -> Array:
-    """Planned rates of the whole body's equations: feet, centre of mass, turn of the base.
-
-    Returns:
-        Shape (ticks, equations), in [m/s] and [rad/s].
-    """
+    """Planned rates of the whole body's equations: feet, centre of mass, turn of the base."""
     feet = plan.feet.reshape(len(plan.yaw), -1)
     rates = np.gradient(np.column_stack((feet, plan.centre, plan.tilt, plan.yaw)), TICK, axis=0)
     rates[:, -3:-1] = turned(plan.yaw, rates[:, -3:-1])  # of small tilts
@@ -281,18 +248,12 @@ def _rates(plan: Plan) -> Array:
 
 SETTLING = 400
 """Ticks before the recording during which the robot comes to rest under its unknown load."""
-ATTITUDE_NOISE = 1e-4
-"""Standard deviation of the measured attitude per tick, in [rad]."""
-VELOCITY_NOISE = 5e-3
-"""Standard deviation of the measured velocity per tick, in [m/s]."""
+ATTITUDE_NOISE = 1e-4  # standard deviation of the measured attitude per tick, in [rad]
+VELOCITY_NOISE = 5e-3  # standard deviation of the measured velocity per tick, in [m/s]
 
 
 def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: float) -> Plan:
-    """Plan of the motion of one run.
-
-    Args:
-        duration: Duration of the run, in [s].
-    """
+    """Plan of the motion of one run."""
     return trot(robot, stand(robot), motion, rng, duration)
 
 

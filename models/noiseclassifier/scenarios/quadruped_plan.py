@@ -25,8 +25,7 @@ from noiseclassifier.scenarios.robots import Quadruped
 from noiseclassifier.scenarios.world import GRAVITY, WholeBody, centre_of_mass, reduced_model
 from noisemodel.types import Array, Mask
 
-LONGEST = 0.15
-"""Longest time in which a group takes its share of the weight, in [s]."""
+LONGEST = 0.15  # longest time in which a group takes its share of the weight, in [s]
 
 
 @dataclass(frozen=True)
@@ -44,8 +43,7 @@ class Gait:
         return max(self.groups) + 1
 
 
-TROT = Gait((0, 1, 1, 0), 0.62, level=True)
-"""Diagonal pairs."""
+TROT = Gait((0, 1, 1, 0), 0.62, level=True)  # diagonal pairs
 GAITS: Mapping[str, Gait] = MappingProxyType(
     {
         "trot": TROT,
@@ -60,18 +58,12 @@ front right; a "pace" is by sides; a "bound" is front and rear in turn."""
 
 @dataclass(frozen=True)
 class Beat:
-    """One swing of one group of feet.
-
-    Attributes:
-        begin: When the weight starts to shift to the other feet, in [s].
-        lift: When the feet leave the ground, in [s].
-        touch: When they touch it again, in [s].
-    """
+    """One swing of one group of feet."""
 
     group: int
-    begin: float
-    lift: float
-    touch: float
+    begin: float  # when the weight starts to shift to the other feet, in [s]
+    lift: float  # when the feet leave the ground, in [s]
+    touch: float  # when they touch it again, in [s]
 
 
 def beats(
@@ -83,13 +75,7 @@ def beats(
     jitter: float,
     gait: Gait = TROT,
 ) -> tuple[Beat, ...]:
-    """Beats of a gait.
-
-    Args:
-        begin: Start, in [s].
-        end: When all feet have to be on the ground again, in [s].
-        period: Mean time of a cycle, in [s].
-    """
+    """Beats of a gait."""
     out: list[Beat] = []
     while True:
         cycle = period * (1 + float(rng.uniform(-jitter, jitter)))
@@ -103,11 +89,7 @@ def beats(
 
 
 def loads(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
-    """Planned share of the weight on each foot, shape (times, feet); rows add up to 1.
-
-    Args:
-        time: Shape (times,), in [s].
-    """
+    """Planned share of the weight on each foot, shape (times, feet); rows add up to 1."""
     knots = [[-1.0] for _ in range(gait.count)]
     bearing = [[1.0] for _ in range(gait.count)]
     ends = [beat.touch + 0.1 for beat in timing]
@@ -121,11 +103,7 @@ def loads(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
 
 
 def swings(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
-    """Completed share of the swing of each foot, shape (times, feet); 1 on the ground.
-
-    Args:
-        time: Shape (times,), in [s].
-    """
+    """Completed share of the swing of each foot, shape (times, feet); 1 on the ground."""
     groups = np.ones((len(time), gait.count))
     for beat in timing:
         now = (beat.lift <= time) & (time < beat.touch)
@@ -133,12 +111,9 @@ def swings(time: Array, timing: Sequence[Beat], gait: Gait = TROT) -> Array:
     return groups[:, gait.groups]
 
 
-TOP = 0.4
-"""Share of a swing after which the foot is highest."""
-ACROSS = 0.8
-"""Share of a swing after which the foot is over its next foothold."""
-NEAR = 0.8
-"""Share of a swing after which a contact is planned."""
+TOP = 0.4  # share of a swing after which the foot is highest
+ACROSS = 0.8  # share of a swing after which the foot is over its next foothold
+NEAR = 0.8  # share of a swing after which a contact is planned
 LANDING = 0.1
 """Speed at which a foot is to touch the ground, in heights of its swing per time of its descent."""
 
@@ -171,12 +146,6 @@ def footholds(
     """Footholds: under the hip in the middle of each stance.
 
     This is the neutral point of Raibert, Legged Robots That Balance, 1986.
-
-    Args:
-        hip: Where the foot stands at first, shape (2,), in [m].
-        way: Path of the body at every tick, shape (ticks, 2), in [m].
-        yaw: Direction of the body at every tick, shape (ticks,), in [rad].
-        stop: When the body is at rest, in [s].
     """
     ends = [*(beat.lift for beat in beats), np.inf][1:]
     middles = [(beat.touch + end) / 2 for beat, end in zip(beats, ends, strict=True)]
@@ -192,15 +161,7 @@ def footholds(
 def foot_path(
     time: Array, beats: Sequence[Beat], places: Sequence[Foothold], progress: Array
 ) -> Array:
-    """Path of a foot from foothold to foothold.
-
-    Args:
-        time: Shape (times,), in [s].
-        progress: Completed share of its path in its swing, shape (times,).
-
-    Returns:
-        Path of the foot over the ground, shape (times, 2), in [m].
-    """
+    """Path of a foot from foothold to foothold."""
     stands = np.array(places)[:, :2]
     begun = np.searchsorted([beat.lift for beat in beats], time, side="right")
     before = stands[np.maximum(begun - 1, 0)]
@@ -226,10 +187,8 @@ def contacts_of(foot: int, beats: Sequence[Beat], places: Sequence[Foothold]) ->
     ]
 
 
-CHANGE = 0.6
-"""Time in which the velocity goes from one command to the next, in [s]."""
-HOLD = (1.5, 3.0)
-"""Time from one command to the next, in [s]."""
+CHANGE = 0.6  # time in which the velocity goes from one command to the next, in [s]
+HOLD = (1.5, 3.0)  # time from one command to the next, in [s]
 
 
 def steer(
@@ -240,16 +199,7 @@ def steer(
     *,
     bouts: Sequence[tuple[float, float]],
 ) -> tuple[Array, Array]:
-    """Path and direction of the body by random commands, from rest to rest.
-
-    Args:
-        time: Shape (times,), in [s].
-        bouts: Start and end of each motion, in [s].
-
-    Returns:
-        Path of the body over the ground, shape (times, 2), in [m], and its direction, shape
-        (times,), in [rad].
-    """
+    """Path and direction of the body by random commands, from rest to rest."""
     velocity = np.zeros((len(time), 3))  # ahead, to the left, turning
     for start, stop in bouts:
         now, before = start, np.zeros(3)
@@ -284,16 +234,12 @@ def _command(way: str, robot: Quadruped, rng: np.random.Generator) -> Array:
     return np.array([speed, 0.0, 0.0])
 
 
-TILT = (0.15, 0.12)
-"""Largest roll and pitch, in [rad]."""
+TILT = (0.15, 0.12)  # largest roll and pitch, in [rad]
 SHIFT = (0.08, 0.06, 0.08)
 """Largest shift ahead, to the left and up, as a share of the height of the centre of mass."""
-FREQUENCY = (0.2, 1.5)
-"""Frequencies of the sines, in [Hz]."""
-SINES = 3
-"""Sines per axis."""
-POSE_FADE = 0.8
-"""Time of fading in and out, in [s]."""
+FREQUENCY = (0.2, 1.5)  # frequencies of the sines, in [Hz]
+SINES = 3  # sines per axis
+POSE_FADE = 0.8  # time of fading in and out, in [s]
 
 
 class Poses(NamedTuple):
@@ -306,12 +252,7 @@ class Poses(NamedTuple):
 
 
 def poses(time: Array, rng: np.random.Generator, share: float, *, size: float) -> Poses:
-    """Random poses, from and to the neutral one.
-
-    Args:
-        time: Shape (times,), in [s].
-        size: Height of the centre of mass, in [m].
-    """
+    """Random poses, from and to the neutral one."""
     if not share:
         return Poses(np.zeros((len(time), 2)), np.zeros((len(time), 3)))
     largest = share * np.array((*TILT, *(size * shift for shift in SHIFT)))
@@ -331,16 +272,13 @@ class Standing:
     """A robot that stands on the ground, its centre of mass over the middle of its feet.
 
     Attributes:
-        configuration: As Pinocchio has it, shape (nq,).
         feet: Centres of its feet, the middle between them in the origin, shape (feet, 3), in [m].
-        height: Of its centre of mass, in [m].
-        weight: In [N].
     """
 
-    configuration: Array
+    configuration: Array  # as Pinocchio has it, shape (nq,)
     feet: Array
-    height: float
-    weight: float
+    height: float  # of its centre of mass, in [m]
+    weight: float  # in [N]
 
 
 def stand(robot: Quadruped) -> Standing:
@@ -366,44 +304,28 @@ def _stand(name: str, rest: tuple[float, ...], feet: tuple[Ball, ...], model: An
     return Standing(standing, places, height, weight)
 
 
-REST = 0.5
-"""Time of standing before and after the trot, in [s]."""
-STAND = "stand"
-"""Name of the gait without steps."""
-CYCLES = 2.5
-"""Least time from one pause to the next, in periods; a short run has fewer pauses."""
+REST = 0.5  # time of standing before and after the trot, in [s]
+STAND = "stand"  # name of the gait without steps
+CYCLES = 2.5  # least time from one pause to the next, in periods; a short run has fewer pauses
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Plan of the motion of a quadruped, at every tick.
+    """Plan of the motion of a quadruped, at every tick."""
 
-    Attributes:
-        centre: Centre of mass, shape (ticks, 3), in [m].
-        yaw: Direction of the body, shape (ticks,), in [rad].
-        tilt: Roll and pitch of the body, shape (ticks, 2), in [rad].
-        push: Planned horizontal force of a foot per vertical force on it, shape (ticks, 2).
-        feet: Centres of the feet, shape (ticks, feet, 3), in [m].
-        swing: Whether each foot is in the air, shape (ticks, feet).
-        progress: Completed share of the path of each foot; 1 in stance, shape (ticks, feet).
-        load: Planned share of the weight on each foot, shape (ticks, feet).
-        size: Height of the centre of mass, in [m].
-        weight: In [N].
-    """
-
-    centre: Array
-    yaw: Array
-    tilt: Array
-    push: Array
-    feet: Array
-    swing: Mask
-    progress: Array
-    load: Array
+    centre: Array  # centre of mass, shape (ticks, 3), in [m]
+    yaw: Array  # direction of the body, shape (ticks,), in [rad]
+    tilt: Array  # roll and pitch of the body, shape (ticks, 2), in [rad]
+    push: Array  # planned horizontal force of a foot per vertical force on it, shape (ticks, 2)
+    feet: Array  # centres of the feet, shape (ticks, feet, 3), in [m]
+    swing: Mask  # whether each foot is in the air, shape (ticks, feet)
+    progress: Array  # completed share of the path of each foot; 1 in stance, shape (ticks, feet)
+    load: Array  # planned share of the weight on each foot, shape (ticks, feet)
     contacts: tuple[Contact, ...]
     effectors: tuple[Ball, ...]
     ground: tuple[Box, ...]
-    size: float
-    weight: float
+    size: float  # height of the centre of mass, in [m]
+    weight: float  # in [N]
 
     @property
     def time(self) -> Array:
@@ -447,11 +369,7 @@ def trot(
     rng: np.random.Generator,
     duration: float,
 ) -> Plan:
-    """Plan of a gait from rest to rest.
-
-    Args:
-        duration: Duration of the plan, in [s].
-    """
+    """Plan of a gait from rest to rest."""
     shapes, steering, bending = rng.spawn(3)
     gait = _gait(motion.gait)
     height = robot.height * float(shapes.uniform(*motion.height))

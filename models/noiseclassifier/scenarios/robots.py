@@ -12,8 +12,7 @@ from typing import Any, ClassVar, TypeAlias
 from noiseclassifier.scenarios.motions import Ball, Rod, Sole, Units
 from noisemodel import Robot
 
-LEGS = 12
-"""How many of a humanoid's drives, the first ones, are in its legs."""
+LEGS = 12  # how many of a humanoid's drives, the first ones, are in its legs
 UPPER = {
     "stiffness": 0.2, "damping": 0.2, "torque": 0.25,
     "armature": 0.2, "friction": 0.2, "viscous": 0.2,
@@ -23,24 +22,15 @@ UPPER = {
 
 @dataclass(frozen=True, kw_only=True)
 class Drivetrain:
-    """One drive per joint, nominal values.
-
-    Attributes:
-        stiffness: Position gain of each drive, in [N m/rad].
-        damping: Velocity gain of each drive, in [N m s/rad].
-        torque: Limit of each drive, in [N m].
-        armature: Inertia of each drive at its joint, in [kg m²].
-        friction: Coulomb friction of each joint, in [N m].
-        viscous: Viscous friction of each joint, in [N m s/rad].
-    """
+    """One drive per joint, nominal values."""
 
     joints: tuple[str, ...]
-    stiffness: tuple[float, ...]
-    damping: tuple[float, ...]
-    torque: tuple[float, ...]
-    armature: tuple[float, ...]
-    friction: tuple[float, ...]
-    viscous: tuple[float, ...]
+    stiffness: tuple[float, ...]  # position gain of each drive, in [N m/rad]
+    damping: tuple[float, ...]  # velocity gain of each drive, in [N m s/rad]
+    torque: tuple[float, ...]  # limit of each drive, in [N m]
+    armature: tuple[float, ...]  # inertia of each drive at its joint, in [kg m²]
+    friction: tuple[float, ...]  # coulomb friction of each joint, in [N m]
+    viscous: tuple[float, ...]  # viscous friction of each joint, in [N m s/rad]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,13 +39,7 @@ class Arm:
 
     Attributes:
         rest: Joint positions before it moves, in [rad]; the tool points down if it picks.
-        table: Height of the table, in [m].
         reach: Ranges of x and of y of the places on the table, in [m]; None if it cannot pick.
-        contact: Time constant of the tool's rubber tip, in [s].
-        force_gain: Speed of the tool per error of the contact force, in [m/(s N)].
-        force_filter: Time constant of the low-pass on the contact force, in [s].
-        payload: Largest mass at the tool that the controller has no model of, in [kg].
-        force_noise: Largest standard deviation of the force sensor's noise, in [N].
     """
 
     family: ClassVar[str] = "arm"
@@ -63,13 +47,13 @@ class Arm:
     drives: Drivetrain
     tool: Rod
     rest: tuple[float, ...]
-    table: float = 0.0
+    table: float = 0.0  # height of the table, in [m]
     reach: tuple[tuple[float, float], tuple[float, float]] | None = None
-    contact: float = 0.015
-    force_gain: float = 1e-3
-    force_filter: float = 0.005
-    payload: float = 0.3
-    force_noise: float = 0.4
+    contact: float = 0.015  # time constant of the tool's rubber tip, in [s]
+    force_gain: float = 1e-3  # speed of the tool per error of the contact force, in [m/(s N)]
+    force_filter: float = 0.005  # time constant of the low-pass on the contact force, in [s]
+    payload: float = 0.3  # largest mass at the tool that the controller has no model of, in [kg]
+    force_noise: float = 0.4  # largest standard deviation of the force sensor's noise, in [N]
     held: dict[str, float] = field(default_factory=dict)
     units: Units = field(default_factory=Units)
     length_scale: float = 1.0
@@ -97,36 +81,23 @@ class Arm:
 
 @dataclass(frozen=True, kw_only=True)
 class Quadruped:
-    """A robot on four legs with round feet.
-
-    Attributes:
-        rest: Joint positions when it stands, in [rad].
-        period: Nominal time of a cycle, in which each foot steps once, in [s].
-        height: Nominal height of a swing, in [m].
-        speed: Highest speed ahead, in [m/s].
-        turning: Highest speed of turning, in [rad/s].
-        attitude_filter: Time constant of the low-pass on the attitude, in [s].
-        force_gain: Speed of a foot per error of its contact force, in [m/(s N)].
-        force_filter: Time constant of the low-pass on the contact forces, in [s].
-        payload: Largest mass on its back that the controller has no model of, in [kg].
-        force_noise: Largest standard deviation of the force sensors' noise, in [N].
-    """
+    """A robot on four legs with round feet."""
 
     family: ClassVar[str] = "quadruped"
     name: str
     drives: Drivetrain
     feet: tuple[Ball, ...]
-    rest: tuple[float, ...]
-    period: float
-    height: float
-    speed: float
-    turning: float = 0.5
+    rest: tuple[float, ...]  # joint positions when it stands, in [rad]
+    period: float  # nominal time of a cycle, in which each foot steps once, in [s]
+    height: float  # nominal height of a swing, in [m]
+    speed: float  # highest speed ahead, in [m/s]
+    turning: float = 0.5  # highest speed of turning, in [rad/s]
     attitude_gain: float = 0.6
-    attitude_filter: float = 0.01
-    force_gain: float
-    force_filter: float = 0.01
-    payload: float
-    force_noise: float
+    attitude_filter: float = 0.01  # time constant of the low-pass on the attitude, in [s]
+    force_gain: float  # speed of a foot per error of its contact force, in [m/(s N)]
+    force_filter: float = 0.01  # time constant of the low-pass on the contact forces, in [s]
+    payload: float  # largest mass on its back that the controller has no model of, in [kg]
+    force_noise: float  # largest standard deviation of the force sensors' noise, in [N]
     held: dict[str, float] = field(default_factory=dict)
     length_scale: float = 1.0
 
@@ -154,22 +125,17 @@ class Gains:
     """Gains of a stabilizer.
 
     Attributes:
-        integral: Its rate per error, in [1/s].
-        tilt: Rate of a sole's tilt per error of its torque, in [rad/(s N m)].
-        level: Rate at which soles return to level, in [1/s].
         height: Rate of the feet's difference in height per error of the difference of their
             forces, in [m/(s N)].
-        even: Rate at which that difference decays, in [1/s].
-        filter: Time constant of the low-pass on forces and torques, in [s].
     """
 
     capture: float = 2.0
-    integral: float = 1.0
-    tilt: float
-    level: float = 0.5
+    integral: float = 1.0  # its rate per error, in [1/s]
+    tilt: float  # rate of a sole's tilt per error of its torque, in [rad/(s N m)]
+    level: float = 0.5  # rate at which soles return to level, in [1/s]
     height: float
-    even: float = 1.0
-    filter: float = 0.02
+    even: float = 1.0  # rate at which that difference decays, in [1/s]
+    filter: float = 0.02  # time constant of the low-pass on forces and torques, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -177,12 +143,7 @@ class Humanoid:
     """A humanoid that walks on two soles.
 
     Attributes:
-        rest: Joint positions near those in which it stands, in [rad].
-        centre: Height of the centre of mass over the soles, in [m].
-        apart: Half of the distance between the feet, in [m].
         stride: Longest step forwards and sideways, in [m], and its turn, in [rad].
-        payload: Largest mass that the controller has no model of, in [kg].
-        force_noise: Largest standard deviation of the force sensors' noise, in [N].
         reach: Largest deviation of each moving joint of the upper body from its rest, in [rad].
     """
 
@@ -190,15 +151,15 @@ class Humanoid:
     name: str
     drives: Drivetrain
     effectors: tuple[Sole, ...]
-    rest: tuple[float, ...]
-    centre: float
-    apart: float
+    rest: tuple[float, ...]  # joint positions near those in which it stands, in [rad]
+    centre: float  # height of the centre of mass over the soles, in [m]
+    apart: float  # half of the distance between the feet, in [m]
     stride: tuple[float, float, float]
     pace: float = 1.0
     gains: Gains
     carrier: str
-    payload: float
-    force_noise: float
+    payload: float  # largest mass that the controller has no model of, in [kg]
+    force_noise: float  # largest standard deviation of the force sensors' noise, in [N]
     size: float = 1.0
     held: dict[str, float] = field(default_factory=dict)
     reach: tuple[float, ...] = ()
@@ -224,8 +185,7 @@ class Humanoid:
         )
 
 
-Simulated: TypeAlias = Arm | Humanoid | Quadruped
-"""A robot of any family."""
+Simulated: TypeAlias = Arm | Humanoid | Quadruped  # A robot of any family
 
 
 def _repeated(values: float | Sequence[float], count: int) -> tuple[float, ...]:
@@ -417,8 +377,7 @@ def _read() -> Mapping[str, Simulated]:
     return MappingProxyType(made)
 
 
-WIDE = _read()
-"""All robots of the wide domains, by name."""
+WIDE = _read()  # all robots of the wide domains, by name
 ROBOTS: Mapping[str, Simulated] = MappingProxyType(
     {
         name: WIDE[name]

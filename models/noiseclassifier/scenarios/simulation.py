@@ -26,30 +26,20 @@ if TYPE_CHECKING:
 
 RECIPE, WIDE_RECIPE = 3, 2
 """Versions of the simulations; they increase whenever a seed gives another run than before."""
-SHORTEST = 3.0
-"""Least duration of a scenario, in which every defect can act, in [s]."""
+SHORTEST = 3.0  # least duration of a scenario, in which every defect can act, in [s]
 GOOD = "good"
 """Name of a run of wide domains without a fault, the twin of all others of its robot and seed."""
-FIRST = 10_000
-"""Least seed of wide domains: names of their runs differ from those of the scenarios."""
-DURATION = 6.0
-"""Of a run of wide domains, in [s]."""
-SLOW = 2000.0
-"""Rate at which most of these runs are kept, in [Hz]."""
-FAST_SHARE = 0.15
-"""Share of the seeds whose runs are kept at 10 kHz."""
-LAG = 0.6
-"""Most phase that delay and filters take from a velocity loop at its crossover, in [rad]."""
-LOOP_MARGIN = 0.5
-"""Most of the damping that they take from a position loop."""
-SOFT = 0.5
-"""Scale of the position gains below which a robot moves as one with soft drives."""
-SAME = 0.1
-"""Contacts of a run and of its twin are the same if they start so close together, in [s]."""
+FIRST = 10_000  # least seed of wide domains: names of their runs differ from those of the scenarios
+DURATION = 6.0  # of a run of wide domains, in [s]
+SLOW = 2000.0  # rate at which most of these runs are kept, in [Hz]
+FAST_SHARE = 0.15  # share of the seeds whose runs are kept at 10 kHz
+LAG = 0.6  # most phase that delay and filters take from a velocity loop at its crossover, in [rad]
+LOOP_MARGIN = 0.5  # most of the damping that they take from a position loop
+SOFT = 0.5  # scale of the position gains below which a robot moves as one with soft drives
+SAME = 0.1  # contacts of a run and of its twin are the same if they start so close together, in [s]
 RATTLE = 0.15
 """Share of a fault-free motion above ``FAST`` from which on its drives rattle: no good run."""
-FAST, AUDIBLE = 40.0, 0.3
-"""Lowest frequency of rattling, in [Hz], and its least level, in [rad/s]."""
+FAST, AUDIBLE = 40.0, 0.3  # lowest frequency of rattling, in [Hz], and its least level, in [rad/s]
 
 
 @dataclass(frozen=True)

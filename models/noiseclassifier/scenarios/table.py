@@ -16,8 +16,7 @@ BANDS: tuple[tuple[int, int], ...] = (
     (900, 1000),
 )  # fmt: skip
 """The paper's bands of oscillation, in [Hz]."""
-MOTIONS = {"humanoid": Walk, "quadruped": Trot, "arm": Picks}
-"""Motions of the scenarios, by family."""
+MOTIONS = {"humanoid": Walk, "quadruped": Trot, "arm": Picks}  # motions of the scenarios, by family
 _EACH = "each-band"
 
 

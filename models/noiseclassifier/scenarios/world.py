@@ -46,11 +46,7 @@ def reduced_model(robot: Reducible) -> Any:
 
 
 def configuration(model: Any, joints: Array) -> Array:
-    """Pinocchio's configuration of a robot with a fixed base.
-
-    Args:
-        joints: Joint positions, shape (joints,), in [rad].
-    """
+    """Pinocchio's configuration of a robot with a fixed base."""
     if model.nq == model.nv:
         return joints
     return np.asarray(pin.integrate(model, pin.neutral(model), joints))
@@ -108,27 +104,18 @@ def _moved(placement: Any, scale: float) -> Any:
 
 @dataclass(frozen=True, kw_only=True)
 class Physics:
-    """Physical properties that a URDF lacks.
+    """Physical properties that a URDF lacks."""
 
-    Attributes:
-        timestep: In [s].
-        armature: Inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg].
-        damping: Viscous friction of each joint, shape (joints,), in [N m s] or [N s/m].
-        friction: Coulomb friction of each joint, shape (joints,), in [N m] or [N].
-        contact: Time constant of a contact, in [s].
-    """
-
-    timestep: float
-    armature: Array
-    damping: Array
-    friction: Array
-    contact: float = 0.005
+    timestep: float  # in [s]
+    armature: Array  # inertia of each drive at its joint, shape (joints,), in [kg m²] or [kg]
+    damping: Array  # viscous friction of each joint, shape (joints,), in [N m s] or [N s/m]
+    friction: Array  # coulomb friction of each joint, shape (joints,), in [N m] or [N]
+    contact: float = 0.005  # time constant of a contact, in [s]
     grip: float = 0.8
 
 
 SPHERE = mujoco.mjtGeom.mjGEOM_SPHERE
-ROBOT, WORLD = 1, 2
-"""Contact groups: the robot collides with the world, never with itself."""
+ROBOT, WORLD = 1, 2  # contact groups: the robot collides with the world, never with itself
 
 
 def add_effector(
@@ -511,11 +498,7 @@ def pinocchio_base(pose: Array, velocity: Array) -> tuple[Array, Array]:
 
 
 def real_model(model: Any, frame: str, point: Array, imperfections: Imperfections) -> Any:
-    """A robot's model with its real masses, unknown to its controller.
-
-    Args:
-        point: Where it hangs, in the frame's axes, shape (3,), in [m].
-    """
+    """A robot's model with its real masses, unknown to its controller."""
     import pinocchio as pin
 
     real = model.copy()
@@ -531,8 +514,7 @@ def real_model(model: Any, frame: str, point: Array, imperfections: Imperfection
     return real
 
 
-GRAVITY = 9.81
-"""In [m/s²]."""
+GRAVITY = 9.81  # in [m/s²]
 
 
 def centre_of_mass(zmp: Array, rate: float) -> Array:
