@@ -114,7 +114,7 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
         remark = f"Labelled at {rate:g} Hz, the rate of model {name}."
     start = float(run.time[0])
     lasting = nc.Lasting(run.rate, start=start)
-    labels = classifier.classify_pieces(_watched(run, lasting), run.rate, start=start)
+    labels = classifier.classify_pieces(_watched(run, lasting), run.rate, start=start, whole=True)
     lasting.finish()
     if not len(labels):
         raise CannotTellError(

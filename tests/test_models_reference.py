@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import noiseclassifier as nc
+from noiseclassifier import reference as module
 from noiseclassifier.framefeatures import frame_features
-from noiseclassifier.reference import LEAST, MOST, NORMAL, Reference, RunningReference
+from noiseclassifier.reference import LEAST, MOST, NORMAL, Reference, Rest, RunningReference
 
 RECIPE = replace(nc.ANY, rounds=5)
 RATES = (80.0, 125.0, 500.0, 1000.0)
@@ -182,3 +183,33 @@ def test_what_follows_changes_no_feature_of_the_frames_before(cut):
     regular = shorter % profile.hop == 0  # a last frame is flush with the end
     np.testing.assert_array_equal(shorter[regular], starts[whole])
     np.testing.assert_array_equal(fewer[regular], features[whole])
+
+
+def test_flagged_frames_are_compared_with_the_rest_of_the_signal():
+    good, rest = frames(count=60), Rest()
+    flagged = np.arange(60) >= 45
+    for first in range(0, 60, 7):
+        rest.add(good[first : first + 7], flagged[first : first + 7])
+    places, features = rest.relative(flagged)
+    np.testing.assert_array_equal(places, np.arange(45, 60))
+    expected = Reference.of(good[:45]).relative(good[45:])
+    np.testing.assert_array_equal(features, np.hstack((good[45:], expected)))
+
+
+def test_a_signal_without_a_rest_is_compared_with_its_past_alone():
+    rest = Rest()
+    assert rest.relative(np.zeros(0, bool)) is None
+    rest.add(frames(count=20), np.ones(20, bool))
+    assert rest.relative(np.ones(20, bool)) is None
+    assert rest.relative(np.zeros(20, bool)) is None
+
+
+def test_memory_of_the_rest_does_not_grow_with_the_signal(monkeypatch):
+    monkeypatch.setattr(module, "KEPT", 50)
+    good, rest = frames(count=2000), Rest()
+    failures = np.arange(2000) % 400 == 3
+    for first in range(0, 2000, 13):
+        rest.add(good[first : first + 13], failures[first : first + 13])
+    assert len(rest._features) <= 2 * 50 + 13 + failures.sum()
+    places, _ = rest.relative(failures)
+    np.testing.assert_array_equal(places, np.flatnonzero(failures))

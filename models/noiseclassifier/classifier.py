@@ -17,7 +17,7 @@ from noiseclassifier.features import features, standard
 from noiseclassifier.framefeatures import frames_of
 from noiseclassifier.labels import UNKNOWN, Labels
 from noiseclassifier.profile import NOMINAL, Profile
-from noiseclassifier.reference import Reference, reference_of
+from noiseclassifier.reference import Reference, Rest, reference_of
 from noiseclassifier.signals import Signals, feeds
 from noiseclassifier.types import Array, Index, Mask, Real, Words
 
@@ -191,16 +191,22 @@ class Classifier:
         rate: float,
         *,
         start: float = 0.0,
+        whole: bool = False,
     ) -> Labels:
         """Label all frames of a signal that comes in pieces, the same as those of the whole one.
 
         Memory does not grow with the signal, but for the labels.
+
+        Features are relative to the past of the signal, which is silent before a robot's first
+        step. Where the signal is whole, what is found has to stand out from the rest of it, too: of
+        the decisions relative to the past and to the rest, that of the lower failure score counts.
 
         Args:
             pieces: The noise estimate, shape (samples,), or signals by name, each of that shape,
                 and False in gaps, shape (samples,); one piece or more.
             rate: As `classify` takes it.
             start: Time of the first sample, in [s].
+            whole: Whether what is found is compared with the rest of the signal.
 
         Returns:
             Start, stop, class and scores of each frame.
@@ -214,17 +220,37 @@ class Classifier:
         starts: list[Index] = []
         decisions: list[Array] = []
         waiting = np.empty((0, len(self.mean)))
+        rest = Rest() if whole and self.profile.reference and self.reference is None else None
+
+        def decide(plain: Array) -> None:
+            decisions.append(self.decide(plain))
+            if rest is not None:
+                own = plain[:, : plain.shape[1] // 2]  # the other half is relative to the past
+                rest.add(own, self._choose(decisions[-1]) != "ok")
+
         for first, plain in frames_of(pieces, self.profile, self.reference):
             starts.append(first)
             waiting = np.concatenate((waiting, plain)) if len(waiting) else plain
             # The rounding of a decision depends on how many frames are decided at once.
-            if whole := len(waiting) // CHUNK * CHUNK:
-                decisions.append(self.decide(waiting[:whole]))
-                waiting = waiting[whole:]
+            if count := len(waiting) // CHUNK * CHUNK:
+                decide(waiting[:count])
+                waiting = waiting[count:]
         if len(waiting) or not decisions:
-            decisions.append(self.decide(waiting))
-        found = np.concatenate(decisions)
-        return self.labels(found, np.concatenate(starts), rate, start=start)
+            decide(waiting)
+        found, begins = np.concatenate(decisions), np.concatenate(starts)
+        labels = self.labels(found, begins, rate, start=start)
+        again = rest.relative(labels.flagged) if rest is not None else None
+        if again is None:
+            return labels
+        places, features = again
+        other = self.decide(features)
+        fewer = self._failure(other) < self._failure(found[places])
+        found[places[fewer]] = other[fewer]
+        return self.labels(found, begins, rate, start=start)
+
+    def _failure(self, decisions: Array) -> Array:
+        """Score of any failure, shape (frames,)."""
+        return np.asarray(self._score(decisions)[:, 1:].sum(axis=1))
 
     def labels(self, decisions: Array, starts: Index, rate: float, *, start: float) -> Labels:
         """Labels of frames from their decision values.

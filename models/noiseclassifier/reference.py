@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from noiseclassifier.types import Array
+from noiseclassifier.types import Array, Index, Mask
 
 LEAST = 0.15
 """Added to each spread, in [Np]: features of a robot that stands hardly vary at all."""
@@ -88,6 +88,59 @@ class RunningReference:
         # E |x| of a normal distribution is 0.8 of its standard deviation.
         apart = np.minimum(np.abs(frame - self._location), 3.0 * self._spread) / 0.8
         self._spread += (apart - self._spread) / (self._frames + FIRST_FRAMES)
+
+
+KEPT = 6000
+"""Frames that are kept of a whole signal at most, beside those that may be failures: 10 minutes."""
+FEWEST = 10
+"""Frames of the rest of a signal that make a reference."""
+
+
+class Rest:
+    """Features of a whole signal by which its findings are compared with the rest of it.
+
+    Kept are those of all frames that may be failures, and of others evenly spread, so that memory
+    does not grow with the signal.
+    """
+
+    def __init__(self) -> None:
+        self._step, self._count = 1, 0
+        self._place, self._failure = np.empty(0, np.intp), np.empty(0, bool)
+        self._features: Array | None = None
+
+    def add(self, features: Array, failure: Mask) -> None:
+        """Take the features of the next frames, shape (frames, features)."""
+        place = self._count + np.arange(len(features))
+        self._count += len(features)
+        held = features[:0] if self._features is None else self._features
+        self._place = np.concatenate((self._place, place))
+        self._failure = np.concatenate((self._failure, failure))
+        self._features = np.concatenate((held, features))
+        if np.count_nonzero(~self._failure) > 2 * KEPT:
+            self._step *= 2
+        kept = self._failure | (self._place % self._step == 0)
+        if not kept.all():
+            self._place, self._failure = self._place[kept], self._failure[kept]
+            self._features = self._features[kept]
+
+    def relative(self, flagged: Mask) -> tuple[Index, Array] | None:
+        """Features of flagged frames relative to all others.
+
+        Args:
+            flagged: Whether a frame belongs to a finding, shape (frames,), only such that may be
+                failures.
+
+        Returns:
+            Places of the flagged frames, and their features as they are and relative to the median
+            of the others; None if one of both is missing.
+        """
+        own = flagged[self._place]
+        if self._features is None or not own.any() or np.count_nonzero(~own) < FEWEST:
+            return None
+        reference = Reference.of(self._features[~own])
+        features = self._features[own]
+        both = np.concatenate((features, reference.relative(features)), axis=1)
+        return self._place[own], both
 
 
 def _relative(features: Array, location: Array, spread: Array) -> Array:
