@@ -1,0 +1,115 @@
+"""What a command reads is never replaced by what it writes, whatever name the file has."""
+
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+from generalmodel import run_at
+
+from inspector import assets
+from inspector.cli import COMMANDS
+from noisemodel import OutputError
+from noisemodel.atomic import also_reading, reading, refuse_read, replacing
+
+RUN = ("run.npz", "--model", "model.npz", "--robot", "arm.urdf")
+LOG = ("log.csv", "--mapping", "map.toml", "--desired", "desired.csv")
+OF_RUN, OF_LOG = ("run.npz", "model.npz", "arm.urdf"), ("log.csv", "map.toml", "desired.csv")
+FOLDERS = ("good", "worse", "--model", "model.npz")
+OF_FOLDERS = ("good/0.npz", "worse/0.npz", "model.npz")
+TABLE = [
+    ("view", RUN, "-o {}.rrd", OF_RUN),
+    ("view", RUN, "-o {}.html", OF_RUN),
+    ("view", RUN, "-o {}.png", OF_RUN),
+    ("noise", RUN[:1], "--csv {}", OF_RUN[:1]),
+    ("noise", ("--compare", "run.npz"), "--csv {}", OF_RUN[:1]),
+    ("noise", ("--compare", "run.npz"), "--save {}.rrd", OF_RUN[:1]),
+    ("noise", ("--compare", "run.npz"), "--picture {}.png", OF_RUN[:1]),
+    ("listen", RUN[:1], "-o {}.wav", OF_RUN[:1]),
+    ("live", ("--rate", "100", "--model", "model.npz"), "--save {}.rrd", ("model.npz",)),
+    ("classify", RUN, "--write json={}", OF_RUN),
+    ("classify", LOG, "--write json={}", OF_LOG),
+    ("classify", ("good",), "--write json={}", ("good/0.npz", "good/1.npz")),
+    ("classify", RUN, "--resume {}", OF_RUN),
+    ("diff", FOLDERS, "--write json={}", OF_FOLDERS),
+    ("smoothness", ("good",), "--picture {}.png", ("good/0.npz",)),
+    ("import", LOG, "-o {}.npz", OF_LOG),
+    ("import", (*LOG, "-o", "new.npz"), "--save-mapping {}", OF_LOG),
+    ("export", RUN, "-o {}.csv", OF_RUN),
+    ("export", (*RUN[:1], "--annotate", "labels.txt"), "-o {}.npz", ("run.npz", "labels.txt")),
+    ("train", ("run.npz",), "-o {}.npz", ("run.npz",)),
+    ("tune", ("good", "--validation", "run.npz"), "-o {}", ("run.npz",)),
+    ("tune", ("good", "--validation", "run.npz", "-o", "new"), "--train {}.npz", ("run.npz",)),
+    ("evaluate", ("model.npz", "run.npz"), "-o {}", ("run.npz", "model.npz")),
+    ("evaluate", ("model.npz", "run.npz"), "--picture {}.png", ("run.npz", "model.npz")),
+]
+"""Commands, what they read, an output, and the files that it must not replace."""
+WITHOUT = {"robots", "audit", "simulate", "help", "expect", "adapt", "baseline", "accept"}
+"""Commands that write nothing, or read nothing, or are tested elsewhere."""
+CASES = [(command, read, output, each) for command, read, output, files in TABLE for each in files]
+
+
+@pytest.fixture
+def place(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("good", "worse"):
+        (tmp_path / name).mkdir()
+        for seed in range(2):
+            run_at(125.0, seed=seed).save(tmp_path / name / f"{seed}.npz")
+    run_at(125.0).save(tmp_path / "run.npz")
+    shutil.copy(assets.model_files()[0], tmp_path / "model.npz")
+    time = np.arange(400) / 100
+    for name in ("log.csv", "desired.csv"):
+        rows = "".join(f"{each:g},{np.sin(each):g}\n" for each in time)
+        (tmp_path / name).write_text(f"time,a.velocity\n{rows}")
+    (tmp_path / "map.toml").write_text('format = "noise-mapping/1"\n')
+    (tmp_path / "labels.txt").write_text("0.5\t1.5\timpact\n")
+    (tmp_path / "arm.urdf").write_text('<robot name="arm"><link name="base"/></robot>')
+    return tmp_path
+
+
+@pytest.mark.parametrize(("command", "read", "output", "name"), CASES)
+def test_an_output_never_replaces_a_file_that_is_read(
+    place, monkeypatch, command, read, output, name
+):
+    before = (place / name).read_bytes()
+    option, _, link = output.partition(" ")
+    target = link.partition("=")[2] or link
+    os.link(place / name, place / target.format("linked"))
+    monkeypatch.setattr(sys.stdin, "isatty", lambda: False)
+    status, _, err = call(command, *read, option, link.format("linked"), "--overwrite")
+    assert status in (3, 5)  # 5: those of a folder are listed after the work is begun
+    assert (place / name).read_bytes() == before
+    assert f"{target.format('linked')}: is read, too; choose another name" in err
+
+
+def test_each_command_that_reads_and_writes_is_in_the_table():
+    others = WITHOUT | {"config", "merge", "history"}
+    assert {command for command, *_ in TABLE} == set(COMMANDS) - others
+
+
+def test_a_file_that_is_read_is_known_by_links_and_in_folders_that_are_logs(tmp_path):
+    run, bag = tmp_path / "run.npz", tmp_path / "bag"
+    bag.mkdir()
+    for each in (run, bag / "bag.db3", tmp_path / "other"):
+        each.touch()
+    (tmp_path / "link").symlink_to(run)
+    also_reading([run])  # outside of a command: a program may replace what it read
+    with replacing(run, overwrite=True) as temporary:
+        temporary.touch()
+    with reading([run]):
+        also_reading([bag])
+        for each in (run, tmp_path / "link", bag / "bag.db3"):
+            with pytest.raises(OutputError, match="is read, too"):
+                refuse_read(each)
+            with (
+                pytest.raises(OutputError, match="is read, too"),
+                replacing(each, overwrite=True) as temporary,
+            ):
+                temporary.touch()
+        for each in (tmp_path / "other", tmp_path / "new", Path("/dev/null")):
+            refuse_read(each)
+    refuse_read(run)
