@@ -1,5 +1,6 @@
 """What teams copy into their jobs, run as far as it can be without the hosts."""
 
+import json
 import os
 import re
 import shlex
@@ -32,7 +33,11 @@ def job(tmp_path):
 
     def run(*command, **variables):
         path = f"{tmp_path / 'bin'}{os.pathsep}{os.environ['PATH']}"
-        env = os.environ | {"PATH": path, "PYTHONPATH": str(ROOT)} | variables
+        env = (
+            os.environ
+            | {"PATH": path, "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"}
+            | variables
+        )
         return subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True)
 
     run.folder = tmp_path
@@ -58,31 +63,78 @@ def bash(script):
     return "bash", "--noprofile", "--norc", "-eo", "pipefail", "-c", script
 
 
-def classify(job, **inputs):
-    """Run the step of the action that classifies."""
+def check(job, **inputs):
+    """Run the step of the action that checks; outputs by name besides."""
     (job.folder / "temp").mkdir(exist_ok=True)
-    variables = {"RUNS": "logs", "OPTIONS": "", "REPORT": "noise-report"} | inputs
-    files = {"RUNNER_TEMP": "temp", "GITHUB_STEP_SUMMARY": "summary.md"}
-    return job(*bash(steps()["Classify"]["run"]), **variables, **files)
+    variables = {
+        "RUNS": "logs",
+        "OPTIONS": "",
+        "REPORT": "noise-report",
+        "DIFF": "",
+        "NAME": "noise",
+    }
+    files = {"RUNNER_TEMP": "temp", "GITHUB_STEP_SUMMARY": "summary.md", "GITHUB_OUTPUT": "outputs"}
+    (job.folder / "outputs").write_text("")
+    done = job(*bash(steps()["Check"]["run"]), **(variables | inputs), **files)
+    return done, (job.folder / "outputs").read_text()
 
 
 def test_the_action_annotates_summarises_and_keeps_a_page(job):
     (job.folder / "summary.md").write_text("before\n")
-    done = classify(job)
+    done, outputs = check(job)
     assert done.returncode == 1, done.stderr
     assert "::error file=logs/demo.npz::findings: impact from 1.78 s" in done.stdout
-    assert "logs/demo.npz: findings [general]" in done.stdout.splitlines()
+    assert "logs/demo.npz   FAIL   4.0 s, 7 joints, 10000 Hz" in done.stdout.splitlines()
     summary = (job.folder / "summary.md").read_text()
-    assert summary.startswith("before\n<!-- noise-inspector -->\n### Noise: 1 run: 1 with findings")
+    assert summary.startswith("before\n<!-- noise-inspector noise -->\n### Noise: 1 run: 1 with")
     assert (job.folder / "noise-report" / "index.html").exists()
+    status, report, begin, first, *_, end = outputs.splitlines()
+    assert (status, report, begin) == ("status=1", "report=noise-report", f"findings<<{end}")
+    assert first.startswith("logs/demo.npz   FAIL")
+    assert json.loads((job.folder / "temp" / "noise-noise.sarif").read_text())["version"] == "2.1.0"
+
+
+def test_the_action_takes_names_with_spaces_and_nothing_that_is_typed_is_a_command(job):
+    odd = "logs/a b's $(touch pwned) `touch pwned`; touch pwned.npz"
+    (job.folder / "logs" / "demo.npz").rename(job.folder / odd)
+    options = "--min-duration '0.01' --no-expect"
+    done, _ = check(job, RUNS=shlex.quote(odd), OPTIONS=options, REPORT="the page", NAME="nightly")
+    assert done.returncode == 1, done.stderr
+    assert "touch pwned.npz   FAIL" in done.stdout
+    assert (job.folder / "the page" / "index.html").exists()
+    assert not (job.folder / "pwned").exists()
+    for hostile in ("--help", "--model=/etc/passwd"):  # are names of runs, not options
+        assert check(job, RUNS=hostile)[0].returncode == 3
+    for inputs in (
+        {"RUNS": "'logs"},
+        {"OPTIONS": "'--no-expect"},
+        {"NAME": "a b"},
+        {"NAME": "../x"},
+    ):
+        done, outputs = check(job, **inputs)
+        assert (done.returncode, outputs) == (2, "")
+        assert done.stdout.startswith("::error::")
+
+
+def test_a_misspelt_option_ends_with_2_and_shows_no_verdict_of_an_earlier_use(job):
+    assert check(job)[0].returncode == 1
+    done, outputs = check(job, OPTIONS="--fail-on-clas impact")
+    assert done.returncode == 2
+    assert "--fail-on-clas" in done.stderr
+    assert "FAIL" not in done.stdout + outputs
+    assert outputs.startswith("status=2\n")
 
 
 @pytest.mark.slow
-def test_the_action_passes_when_all_is_expected_and_takes_options(job):
+def test_the_action_passes_when_all_is_expected_and_compares_with_runs_before(job):
     allow(job)
-    done = classify(job)
+    done, _ = check(job)
     assert (done.returncode, done.stderr) == (0, "")
-    assert classify(job, OPTIONS="--no-expect --min-score 0.1").returncode == 1
+    assert check(job, OPTIONS="--no-expect --min-duration 0.01")[0].returncode == 1
+    (job.folder / "logs" / "expect.toml").unlink()
+    done, outputs = check(job, DIFF="logs")
+    assert done.returncode in (0, 4), done.stderr
+    assert outputs.startswith(f"status={done.returncode}\n")
 
 
 def test_the_action_gives_each_input_to_a_step_and_installs_what_it_is_part_of():
@@ -90,6 +142,7 @@ def test_the_action_gives_each_input_to_a_step_and_installs_what_it_is_part_of()
     text = (ROOT / "action.yml").read_text()
     used = set(re.findall(r"inputs\.(\w+)", text))
     assert used == set(action["inputs"])
+    assert set(action["outputs"]) == {"status", "findings", "report"}
     assert '"$GITHUB_ACTION_PATH[report]"' in steps()["Install"]["run"]
     # What users type reaches scripts as variables only.
     assert not [step for step in steps().values() if "${{" in step.get("run", "")]
@@ -102,11 +155,16 @@ def test_the_action_gives_each_input_to_a_step_and_installs_what_it_is_part_of()
 def test_the_comment_of_the_action_is_made_once_and_then_replaced(job, known, method):
     tool(job.folder, "gh", f'echo "$@" >> calls; [ "$2" = --paginate ] && echo "{known}"; exit 0')
     places = {"COMMENTS": "repos/o/r/issues/7/comments", "COMMENT": "repos/o/r/issues/comments"}
-    done = job(*bash(steps()["Comment"]["run"]), RUNNER_TEMP="temp", **places)
+    variables = {"RUNNER_TEMP": "temp", "NAME": "nightly"} | places
+    (job.folder / "temp").mkdir()
+    assert job(*bash(steps()["Comment"]["run"]), **variables).returncode == 0
+    assert not (job.folder / "calls").exists()  # nothing to say
+    (job.folder / "temp" / "noise-nightly.md").touch()
+    done = job(*bash(steps()["Comment"]["run"]), **variables)
     assert done.returncode == 0, done.stderr
     asked, sent = (job.folder / "calls").read_text().splitlines()
-    assert "<!-- noise-inspector -->" in asked
-    assert sent == f"api --method {method} --field body=@temp/noise.md --silent"
+    assert "<!-- noise-inspector nightly -->" in asked
+    assert sent == f"api --method {method} --field body=@temp/noise-nightly.md --silent"
 
 
 def test_the_workflow_uses_inputs_that_the_action_has():

@@ -93,7 +93,7 @@ def start(place, name, **settings):
         return subprocess.run(
             [sys.executable, "-m", "inspector", name, *COMMANDS[name]],
             cwd=place,
-            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"},
             check=False,
             stdin=stream,
             stderr=subprocess.PIPE,

@@ -386,7 +386,7 @@ def imported_by(*arguments):
     )
     done = subprocess.run(
         [sys.executable, "-c", code],
-        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        env=os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"},
         capture_output=True,
         text=True,
         check=True,
