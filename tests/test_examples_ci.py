@@ -51,7 +51,8 @@ def tool(folder, name, line):
 
 
 def allow(job):
-    (job.folder / "logs" / "expect.toml").write_text('[[allow]]\nclass = "impact"\n')
+    accept = ("inspector", "accept", "logs", "--reason", "the touch is wanted", "--in-ci")
+    assert job(*accept).returncode == 0
 
 
 def steps():
@@ -97,7 +98,7 @@ def test_the_action_annotates_summarises_and_keeps_a_page(job):
 def test_the_action_takes_names_with_spaces_and_nothing_that_is_typed_is_a_command(job):
     odd = "logs/a b's $(touch pwned) `touch pwned`; touch pwned.npz"
     (job.folder / "logs" / "demo.npz").rename(job.folder / odd)
-    options = "--min-duration '0.01' --no-expect"
+    options = "--min-duration '0.01' --no-reference"
     done, _ = check(job, RUNS=shlex.quote(odd), OPTIONS=options, REPORT="the page", NAME="nightly")
     assert done.returncode == 1, done.stderr
     assert "touch pwned.npz   FAIL" in done.stdout
@@ -107,7 +108,7 @@ def test_the_action_takes_names_with_spaces_and_nothing_that_is_typed_is_a_comma
         assert check(job, RUNS=hostile)[0].returncode == 3
     for inputs in (
         {"RUNS": "'logs"},
-        {"OPTIONS": "'--no-expect"},
+        {"OPTIONS": "'--no-reference"},
         {"NAME": "a b"},
         {"NAME": "../x"},
     ):
@@ -130,8 +131,7 @@ def test_the_action_passes_when_all_is_expected_and_compares_with_runs_before(jo
     allow(job)
     done, _ = check(job)
     assert (done.returncode, done.stderr) == (0, "")
-    assert check(job, OPTIONS="--no-expect --min-duration 0.01")[0].returncode == 1
-    (job.folder / "logs" / "expect.toml").unlink()
+    assert check(job, OPTIONS="--no-reference --min-duration 0.01")[0].returncode == 1
     done, outputs = check(job, DIFF="logs")
     assert done.returncode in (0, 4), done.stderr
     assert outputs.startswith(f"status={done.returncode}\n")

@@ -45,7 +45,7 @@ def test_a_kind_that_does_not_exist_is_a_usage_error():
 
 
 @pytest.mark.parametrize(
-    "command", [["classify", "run.npz", "--format"], ["simulate", "dataset", "--format"]]
+    "command", [["classify", "run.npz", "--format"], ["audit", "run.npz", "--format"]]
 )
 def test_a_choice_that_does_not_exist_is_answered_with_those_that_do(command):
     result = CliRunner().invoke(app, [*command, "xml"], env={"COLUMNS": "300"})

@@ -47,7 +47,7 @@ TABLE = [
     ("evaluate", ("model.npz", "run.npz"), "--picture {}.png", ("run.npz", "model.npz")),
 ]
 """Commands, what they read, an output, and the files that it must not replace."""
-WITHOUT = {"robots", "audit", "simulate", "help", "expect", "adapt", "baseline", "accept"}
+WITHOUT = {"robots", "audit", "simulate", "help", "accept"}
 """Commands that write nothing, or read nothing, or are tested elsewhere."""
 CASES = [(command, read, output, each) for command, read, output, files in TABLE for each in files]
 

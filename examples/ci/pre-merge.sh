@@ -5,7 +5,7 @@ inspector classify "$@" --report "$report"
 status=$?
 case $status in
   0) echo "noise: nothing new" ;;
-  1) echo "noise: findings, see $report/index.html; meant to be there? inspector expect" ;;
+  1) echo "noise: findings, see $report/index.html; meant to be there? inspector accept" ;;
   4) echo "noise: some runs cannot be told, see above"; status=0 ;;  # delete `status=0` to be strict
   *) echo "noise: not checked, exit status $status" ;;
 esac
