@@ -79,13 +79,13 @@ def commands(run: Path) -> dict[str, list[str]]:
     """What is measured, by name."""
     folder, file = run.parent, str(run)
     return {
-        "classify": ["classify", "--no-expect", file],
+        "classify": ["classify", "--no-reference", file],
         "audit": ["audit", file],
         "report": ["view", file, "-o", str(folder / "run.html"), "--overwrite"],
         "view": ["view", file, "--save", str(folder / "run.rrd"), "--overwrite"],
         "noise": ["noise", file],
         "diff": ["diff", file, file],
-        "expect": ["expect", file, "-o", str(folder / "expect.toml"), "--overwrite"],
+        "accept": ["accept", file, "--reason", "good", "-o", str(folder / "reference")],
     }
 
 

@@ -1,8 +1,8 @@
-"""A fixture of pytest that asserts that runs are quiet, or no worse than a stored reference.
+"""A fixture of pytest that fails where runs are louder than accepted ones.
 
-`noise.assert_quiet(run)` and `noise.assert_no_worse(run)` fail with the finding, and leave a
-recording and a picture below ``noise-artefacts``. ``pytest --noise-update`` stores references.
-Files are named after tests, so that the processes of pytest-xdist do not meet.
+`noise.check(run)` compares a run with the nearest ``reference/``, and leaves a recording and a
+picture of a failure below ``noise-artefacts``. ``pytest --noise-accept "reason"`` accepts the runs
+instead. Files are named after tests, so that the processes of pytest-xdist do not meet.
 """
 
 import hashlib
@@ -17,7 +17,9 @@ import pytest
 if TYPE_CHECKING:
     from inspector.analysis.analyse import Analysis
     from inspector.library import Library
-    from inspector.regression.difference import Difference
+    from inspector.reference.judging import Comparison
+    from inspector.reference.store import Reference
+    from inspector.verdict import Verdict
     from noiseclassifier import Event
     from noisemodel import Run
 
@@ -35,14 +37,14 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     """Add the options."""
     group = parser.getgroup("noise", "noise of robots (noise-inspector)")
     group.addoption(
-        "--noise-update",
-        action="store_true",
-        help="store the runs of noise.assert_no_worse as its reference, and compare nothing",
+        "--noise-accept",
+        metavar="REASON",
+        help="accept the runs of noise.check into the reference, and compare nothing",
     )
     group.addoption(
         "--noise-reference",
         metavar="DIR",
-        help="folder of the references; by default noise-reference beside each test file",
+        help="the store of references; by default the nearest reference/, or one beside the test",
     )
     group.addoption(
         "--noise-artefacts",
@@ -59,12 +61,12 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.fixture
 def noise(request: pytest.FixtureRequest) -> "Noise":
-    """Assertions on the noise of runs: `assert_quiet`, `assert_no_worse`."""
+    """An assertion on the noise of runs: `check`."""
     return Noise(request)
 
 
 class Noise:
-    """Assertions on the noise of runs, for one test.
+    """An assertion on the noise of runs, for one test.
 
     Args:
         request: Of the test.
@@ -74,116 +76,111 @@ class Noise:
         self._node, self._config = request.node, request.config
         self._count = 0
 
-    def assert_quiet(
-        self, run: "Run | str | Path", *, allow: "str | Iterable[Allowed]" = ()
-    ) -> "Analysis":
-        """Fail if a run has a finding, or cannot be classified.
+    def check(
+        self,
+        runs: "Run | str | Path | Sequence[Run | str | Path]",
+        *,
+        name: str = "",
+        allow: "str | Iterable[Allowed]" = (),
+    ) -> "list[Verdict]":
+        """Fail if a run is louder than accepted ones, or has a finding where there are none.
 
         Args:
-            run: A run, or its file.
+            runs: A run or its file, or several repetitions.
+            name: Name of the scenario; that of the test unless given.
             allow: A class of findings that may be there, or several; or class, start and stop in
                 [s] of a stretch that such a finding has to lie in. "cannot-tell" allows runs that
                 no model can classify.
 
         Returns:
-            The analysis.
+            The verdicts; none with ``--noise-accept``, which accepts the runs.
         """
         __tracebackhide__ = True
-        from inspector.analysis.analyse import analyse, analyse_file, with_links
         from inspector.analysis.status import Status
-
-        allowed = self._allowed(allow)
-        recording, picture = self._artefacts(self._names()[0])
-        with _readable():
-            if isinstance(run, (str, Path)):
-                found, name = analyse_file(Path(run), self._library), str(run)
-            else:
-                analysis = analyse(run, self._library, name=self._node.name)
-                found, name = with_links(analysis, "normal"), "the run"
-        if found.status is Status.CANNOT_TELL and Status.CANNOT_TELL not in allowed:
-            pytest.fail(f"cannot tell whether {name} is quiet: {found.reason}", pytrace=False)
-        events = [event for event in found.findings if not _allows(allowed, event)]
-        if not events:
-            return found
-        from inspector.recording.run import write
-
-        write(found, recording, overwrite=True)
-        if picture:
-            from inspector.report.picture import picture as drawn
-
-            picture.write_bytes(drawn(found))
-        plural = "" if len(events) == 1 else "s"
-        lines = [f"{len(events)} finding{plural} in {name}, by model {found.model}"]
-        lines += [f"  {_sentence(event)}" for event in events]
-        self._fail(lines, recording, picture)
-        return found
-
-    def assert_no_worse(
-        self, runs: "Run | str | Path | Sequence[Run | str | Path]", *, name: str = ""
-    ) -> "Difference | None":
-        """Fail if runs have findings that are new or louder, or levels that are significantly so.
-
-        Findings are compared from one run on. Levels take repetitions, five of the reference and
-        five now: a list of runs of one scenario, which differ in their noise or their seed.
-
-        Args:
-            runs: A run or its file, or a list of repetitions.
-            name: Name of the reference; that of the test unless given.
-
-        Returns:
-            The difference; None with ``--noise-update``, which stores the runs as reference.
-        """
-        __tracebackhide__ = True
-        from inspector.regression.difference import Verdict, difference
-        from inspector.regression.measure import measure
-        from inspector.regression.pairing import Pairing, repetitions
         from noisemodel import Run
 
-        stem, folder = self._names(name)
+        allowed = self._allowed(allow)
+        scenario = self._scenario(name)
         given = [runs] if isinstance(runs, (Run, str, Path)) else list(runs)
         if not given:
-            raise ValueError("no run to compare with the reference; expected one at least")
+            raise ValueError("no run to check; expected one at least")
         with _readable():
             loaded = [each if isinstance(each, Run) else Run.load(each) for each in given]
-        stored = sorted(folder.glob("*.npz")) if folder.is_dir() else []
-        if self._config.getoption("--noise-update"):
-            _store(loaded, folder, stored)
-            return None
-        if not stored:
-            told = f"no reference in {folder}; `pytest --noise-update` stores this run as one"
-            pytest.fail(told, pytrace=False)
-        recording, picture = self._artefacts(stem)
-        targets = [recording.with_name(f"{stem}-run-{n + 1}.npz") for n in range(len(loaded))]
-        paths = [
-            target if isinstance(each, Run) else Path(each)
-            for each, target in zip(given, targets, strict=True)
-        ]
-        for target in targets:
-            target.unlink(missing_ok=True)
-        now = list(zip(loaded, paths, strict=True))
-        with _readable():
-            before = [(Run.load(path), path) for path in stored]
-            sides = [[measure(*each, self._library) for each in side] for side in (before, now)]
-        scenario = repetitions(stem, *sides)
-        found = difference(Pairing("test", (scenario,), ()))
-        if found.unreadable:
-            bad = found.unreadable[0]
-            pytest.fail(f"cannot compare with {folder}: {bad.path} {bad.problem}", pytrace=False)
-        if not found.new and found.verdict is not Verdict.WORSE:
-            return found
-        from inspector.regression.report import write_pair
+            reference = self._reference()
+        if reason := self._config.getoption("--noise-accept"):
+            with _readable():
+                self._accept(loaded, given, scenario, reference, reason)
+            return []
+        verdicts = []
+        for run, source in zip(loaded, given, strict=True):
+            shown = "the run" if isinstance(source, Run) else str(source)
+            with _readable():
+                analysis, verdict, comparison = self._judged(run, scenario, reference)
+            events = [event for event in verdict.failing if not _allows(allowed, event)]
+            if verdict.status is Status.CANNOT_TELL and Status.CANNOT_TELL not in allowed:
+                told = f"cannot tell whether {shown} is quiet: {analysis.reason}"
+                pytest.fail(told, pytrace=False)
+            if events or verdict.missing:
+                self._fail(analysis, verdict, events, comparison, shown)
+            verdicts.append(verdict)
+        return verdicts
 
-        (row,) = found.scenarios
-        for (run, path), target in zip(now, targets, strict=True):
-            if path == target:
-                run.save(target)
-        write_pair(row, recording, picture, self._library, overwrite=True)
-        number = f"{len(found.new)} new or louder finding{'s' * (len(found.new) > 1)}"
-        worse = row.verdict is Verdict.WORSE
-        lines = [f"worse than {folder}: {row.reason if worse else number}"]
-        lines += [f"  {finding}" for finding in found.new]
-        self._fail([*lines, *row.remarks], recording, picture)
-        return found
+    def _judged(
+        self, run: "Run", scenario: str, reference: "Reference"
+    ) -> "tuple[Analysis, Verdict, Comparison | None]":
+        """Analysis of a run, the verdict on it, and how it compares; None without a reference."""
+        from datetime import date
+
+        from inspector.analysis.analyse import analyse, with_links
+        from inspector.reference.judging import compare
+        from inspector.reference.levels import levels
+        from inspector.reference.verdicts import beside, judge
+        from inspector.verdict import Verdict
+
+        analysis = with_links(analyse(run, self._library, name=self._node.name), "normal")
+        verdict = Verdict.of(Path(scenario), analysis)
+        if not reference.scenarios:
+            return analysis, judge(verdict, today=date.today()), None
+        comparison = compare(levels(run, name=scenario), reference.scenarios)
+        verdict = beside(analysis, verdict, comparison, reference)
+        return analysis, judge(verdict, reference, today=date.today()), comparison
+
+    def _reference(self) -> "Reference":
+        """What was accepted; nothing if there is no store yet."""
+        from inspector.reference.store import FOLDER, Reference, find
+
+        named = self._config.getoption("--noise-reference")
+        folder = Path(self._node.path).parent
+        store = self._config.rootpath / named if named else find(folder) or folder / FOLDER
+        return Reference.load(store) if store.exists() else Reference(store, (), stored=True)
+
+    def _accept(
+        self,
+        runs: "Sequence[Run]",
+        given: "Sequence[Run | str | Path]",
+        scenario: str,
+        reference: "Reference",
+        reason: str,
+    ) -> None:
+        """Accept runs as repetitions of a scenario."""
+        from inspector.reference.levels import levels
+        from inspector.reference.store import accept_into, digest, wanted_in, who
+
+        files = [f"{self._node.nodeid} {place}" for place in range(1, len(runs) + 1)]
+        files = [
+            str(each) if isinstance(each, (str, Path)) else file
+            for each, file in zip(given, files, strict=True)
+        ]
+        measured = [
+            levels(run, name=scenario, file=file, sha256=digest(run))
+            for run, file in zip(runs, files, strict=True)
+        ]
+        events = {
+            file: self._judged(run, scenario, type(reference)(reference.path))[1].events
+            for run, file in zip(runs, files, strict=True)
+        }
+        found = wanted_in(measured, events)
+        accept_into(reference.path, measured, wanted=found, reason=reason, by=who(), renames=False)
 
     def _allowed(self, allow: "str | Iterable[Allowed]") -> tuple[Allowed, ...]:
         """What may be there, of classes that there are."""
@@ -217,25 +214,17 @@ class Noise:
             self._config.stash[_LIBRARY] = load_library(files)
         return self._config.stash[_LIBRARY]
 
-    def _names(self, name: str = "") -> tuple[str, Path]:
-        """Name of the artefacts of an assertion, and folder of its reference."""
-        whole = self._node.nodeid
-        file, colons, test = whole.partition("::")
-        own = f"{file.rpartition('/')[2]}{colons}{test}"
+    def _scenario(self, name: str = "") -> str:
+        """Name of the scenario of a check: that of the test unless given."""
+        self._count += 1
         if name:
-            stem = alone = _file_name(name, plain=name == _slug(name))
-        else:
-            self._count += 1
-            which = "" if self._count == 1 else f"-{self._count}"
-            stem, alone = f"{name_of(whole)}{which}", f"{name_of(own)}{which}"
-        named = self._config.getoption("--noise-reference")
-        if named:
-            return stem, self._config.rootpath / named / stem
-        return stem, Path(self._node.path).parent / "noise-reference" / alone
+            return name
+        which = "" if self._count == 1 else f"-{self._count}"
+        return f"{name_of(self._node.nodeid)}{which}"
 
     def _artefacts(self, stem: str) -> tuple[Path, Path | None]:
         """Paths of recording and picture, earlier ones removed; no picture without matplotlib."""
-        from inspector.regression.picture import drawable
+        from importlib.util import find_spec
 
         named = self._config.getoption("--noise-artefacts") or "noise-artefacts"
         folder = self._config.rootpath / named
@@ -243,16 +232,43 @@ class Noise:
         paths = folder / f"{stem}.rrd", folder / f"{stem}.png"
         for path in paths:
             path.unlink(missing_ok=True)
-        return paths[0], paths[1] if drawable() else None
+        return paths[0], paths[1] if find_spec("matplotlib") else None
 
-    def _fail(self, lines: Sequence[str], recording: Path, picture: Path | None) -> None:
-        """Fail with some lines and where to look."""
+    def _fail(
+        self,
+        analysis: "Analysis",
+        verdict: "Verdict",
+        events: "Sequence[Event]",
+        comparison: "Comparison | None",
+        shown: str,
+    ) -> None:
+        """Fail with the findings, and leave a recording and a picture."""
         __tracebackhide__ = True
+        from inspector.recording.run import write
+        from inspector.report.findings import sentence
+
+        stem = name_of(self._node.nodeid)
+        recording, picture = self._artefacts(stem if self._count < 2 else f"{stem}-{self._count}")
+        write(analysis, recording, overwrite=True)
+        if picture and comparison is not None:
+            from inspector.reference.difference import picture as over_reference
+
+            picture.write_bytes(over_reference(comparison, f"{shown}: {comparison}"))
+        elif picture:
+            from inspector.report.picture import picture as drawn
+
+            picture.write_bytes(drawn(analysis))
+        number = len(events) + len(verdict.missing)
+        by = f", {verdict.beside.words}" if verdict.beside else f", by model {analysis.model}"
+        lines = [f"{number} finding{'s' * (number != 1)} in {shown}{by}"]
+        lines += [f"  {sentence(verdict, event)}" for event in events]
+        lines += [f"  {each}" for each in verdict.missing]
         left = {"recording": recording, **({"picture": picture} if picture else {})}
         for what, path in left.items():
             self._node.user_properties.append((f"noise_{what}", str(path)))
-        shown = [f"{what}: {path}" for what, path in left.items()]
-        pytest.fail("\n".join([*lines, *shown]), pytrace=False)
+        lines += [f"{what}: {path}" for what, path in left.items()]
+        lines += ['meant to be so? pytest --noise-accept "reason" accepts it']
+        pytest.fail("\n".join(lines), pytrace=False)
 
 
 @contextmanager
@@ -277,22 +293,6 @@ def _allows(allowed: Iterable[Allowed], event: "Event") -> bool:
         else each[0] == event.label and each[1] <= event.start and event.stop <= each[2]
         for each in allowed
     )
-
-
-def _sentence(event: "Event") -> str:
-    from noiseclassifier.labels import interval
-
-    return f"{event.label} from {interval(event.start, event.stop)}{event.novelty}"
-
-
-def _store(runs: Sequence["Run"], folder: Path, stored: Iterable[Path]) -> None:
-    """Write runs in the place of those that were stored."""
-    folder.mkdir(parents=True, exist_ok=True)
-    targets = [folder / f"run-{number}.npz" for number in range(1, len(runs) + 1)]
-    for run, target in zip(runs, targets, strict=True):
-        run.save(target, overwrite=True)
-    for path in set(stored) - set(targets):
-        path.unlink()
 
 
 def name_of(test: str) -> str:

@@ -86,7 +86,7 @@ def test_nothing_is_pickled():
         ("noiseclassifier.scenarios", ["rerun", "typer", "sklearn", "mujoco", "inspector"]),
         ("inspector.cli", ["rerun", "sklearn", "mujoco", "pinocchio", "scipy", "numpy"]),
         ("inspector.verdict", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
-        ("inspector.regression.measure", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
+        ("inspector.reference.difference", [*SLOW[1:], "scipy", "numpy.random", "pyarrow"]),
     ],
 )
 def test_importing_a_package_imports_no_more_than_it_should(package, never):

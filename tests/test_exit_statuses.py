@@ -25,15 +25,13 @@ COMMANDS = {
     "listen": ("run.npz", "-o", "out/run.wav"),
     "robots": (),
     "classify": ("run.npz",),
-    "expect": ("run.npz", "-o", "out/expect.toml"),
+    "accept": ("run.npz", "--reason", "good", "-o", "out/reference"),
     "diff": ("good", "good"),
     "audit": ("run.npz",),
     "smoothness": ("good",),
     "import": ("log.csv", "-o", "out/run.npz"),
     "export": ("run.npz", "-o", "out/run.csv"),
     "train": ("annotated", "-o", "out/model.npz"),
-    "adapt": ("good", "-o", "out/adapted.npz"),
-    "baseline": ("good", "-o", "out/baseline.npz"),
     "tune": (
         "fast",
         "--profile",
@@ -151,4 +149,4 @@ def test_a_command_ends_with_70_and_a_traceback_at_a_bug(place, name, monkeypatc
         status, out, err = call(name, *COMMANDS[name])
     assert status == 70
     assert "ZeroDivisionError: a bug" in out + err
-    assert not [each for each in (place / "out").iterdir() if name != "expect"]
+    assert not [each for each in (place / "out").iterdir() if name != "accept"]

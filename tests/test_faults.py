@@ -38,11 +38,8 @@ FILES = {
     "compare picture": ("noise", "--compare", "run.npz", "--picture", "out/compare.png"),
     "listen": ("listen", "run.npz", "-o", "out/run.wav"),
     "labels": ("export", "run.npz", "--labels", "annotated", "-o", "out/labels.txt"),
-    "baseline": ("baseline", "good", "-o", "out/baseline.npz"),
-    "adapt": ("adapt", "good", "-o", "out/adapted.npz"),
     "classify": ("classify", "good", "--write", "json=out/verdicts.json"),
     "resume": ("classify", "good", "--resume", "out/state.jsonl"),
-    "expect": ("expect", "good", "-o", "out/expect.toml"),
     "smoothness": ("smoothness", "good", "--picture", "out/smoothness.png"),
     "simulate": ("simulate", "run", "panda", "-o", "out/simulated.npz"),
     "live": ("live", "--rate", "1000", "--save", "out/live.rrd"),
@@ -54,6 +51,7 @@ FOLDERS = {
     "labels-to": ("classify", "good", "--labels-to", "out"),
     "report": ("classify", "good", "--report", "out"),
     "diff": ("diff", "good", "good", "--report", "out"),
+    "accept": ("accept", "good", "--reason", "good", "-o", "out"),
 }
 """Commands that write a folder."""
 

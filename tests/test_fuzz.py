@@ -23,7 +23,7 @@ LAWFUL = settings(
     database=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
-LATE = ("baseline", "model, small", "resume state", "tune state")
+LATE = ("model, small", "resume state", "tune state")
 """Readers whose whole files take seconds to make."""
 
 

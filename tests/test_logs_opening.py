@@ -243,17 +243,6 @@ def test_every_command_that_takes_a_run_takes_a_log(tmp_path, monkeypatch, comma
         assert "read as 1 joint (elbow): velocity" in (out + err).replace("Read", "read")
 
 
-def test_a_baseline_is_trained_on_logs_as_on_run_files(tmp_path):
-    time = np.arange(30_000) / 1000
-    noise = np.random.default_rng(0).normal(0, 0.01, (2, len(time)))
-    for name, extra in zip(("a", "b"), noise, strict=True):
-        velocity = np.cos(time) + extra
-        write(tmp_path / f"{name}.csv", {"time": time, "elbow.velocity": velocity})
-    status, _, err = call("baseline", tmp_path, "-o", tmp_path / "model.npz")
-    assert status == 0, err
-    assert "a.csv: read as 1 joint (elbow): velocity" in err
-
-
 def test_a_log_is_analysed_from_python(tmp_path):
     analysis = inspector.analyse(log(tmp_path))
     assert analysis.assumed.startswith(READ)

@@ -186,12 +186,6 @@ def test_a_signal_of_another_rate_is_refused(ours, rate):
         ours.classify(np.zeros(500), rate)
 
 
-def test_a_baseline_is_not_trained_on_classes():
-    profile = replace(OURS, estimator="baseline")
-    with pytest.raises(nc.ProfileError, match="learns from good runs alone: call models.lea"):
-        nc.Classifier.train(nc.Dataset.of(DATA, OURS), profile)
-
-
 def test_one_class_is_not_enough_to_learn():
     alone = nc.Dataset.of(DATA[:1], OURS)
     with pytest.raises(nc.DatasetError, match="two classes or more of .*; the frames are ok"):

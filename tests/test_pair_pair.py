@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from inspector.assets import demo_run, model_files
+from inspector.compare.alignment import Align, align
 from inspector.compare.changes import (
     by_band,
     by_class,
@@ -21,7 +22,6 @@ from inspector.compare.changes import (
 from inspector.compare.pair import PairError, alike, compare, part
 from inspector.compare.recording import write
 from inspector.library import load_library
-from inspector.pair.alignment import Align, align
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
 

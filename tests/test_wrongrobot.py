@@ -82,8 +82,7 @@ COMMANDS = [
     ["view", "-o", "run.html"],
     ["listen", "-o", "run.wav"],
     ["export", "-o", "run.csv"],
-    ["baseline", "-o", "model.npz"],
-    ["adapt", "-o", "model.npz"],
+    ["accept", "--reason", "good"],
 ]
 
 

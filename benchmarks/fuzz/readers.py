@@ -420,12 +420,6 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         "run, in pieces": Reader("arrays", _run_file, _read_pieces, CLASSIFY, before=_in_pieces),
         "model": Reader("bytes", _model, _read_model, WITH_MODEL),
         "model, small": Reader("arrays", _small_model, _read_model, WITH_MODEL),
-        "baseline": Reader(
-            "arrays",
-            _by_command("b.npz", "baseline", "{folder}/good.npz", "-o", "{out}"),
-            _read_model,
-            WITH_MODEL,
-        ),
         "labels, NoisyTest": _labels(
             "labels.toml",
             "[data]\nchunk_ranges = [[0.0, 0.5], [0.6, -1.0]]\nchunk_labels = ['ok', 'impact']\n",

@@ -33,7 +33,7 @@ GROUPS = {
     "rows": ("live rows, CSV", "live rows, JSON"),
     "tables": ("CSV", "CSV, semicolons", "Parquet", "HDF5", "LeRobot info", "LeRobot data"),
     "arrays": ("run", "run, in pieces", "npz of arrays", "MuJoCo's npz", "npy", "sample"),
-    "models": ("model, small", "baseline"),
+    "models": ("model, small",),
     "bags": tuple(name for name in READERS if name.startswith(("MCAP", "ROS"))),
     "robots": ("URDF", "MJCF", "STL", "STL, text", "OBJ", "DAE"),
 }

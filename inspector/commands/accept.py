@@ -38,7 +38,6 @@ def accept(
     The exit status is 2 with CI=true, 3 if a run cannot be read, 5 if the store cannot be written.
     """
     import os
-    from datetime import date
     from fnmatch import fnmatchcase
 
     from inspector import assets
@@ -49,11 +48,9 @@ def accept(
     from inspector.reference.store import (
         FOLDER,
         NAME,
-        Reference,
-        accepted,
+        accept_into,
         find,
         measured,
-        save,
         wanted_in,
         who,
     )
@@ -69,9 +66,6 @@ def accept(
     store = (
         output or find(first) or (first if first.is_file() else first.absolute()).parent / FOLDER
     )
-    before = Reference(store, (), stored=True)
-    if os.path.lexists(store / NAME):
-        before = Reference.load(store)
     levels = measured(runs, ctx.obj)
     if only:
         levels = [each for each in levels if any(fnmatchcase(each.name, one) for one in only)]
@@ -86,15 +80,13 @@ def accept(
     classified = classify_files(found, library, reading=ctx.obj, jobs=jobs)
     verdicts = list(progress(classified, "accept", total=len(found)))
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
-    after, changes = accepted(
-        before,
+    after, changes = accept_into(
+        store,
         levels,
         wanted=wanted_in(levels, {str(each.path): each.events for each in verdicts}),
         reason=reason.strip(),
         by=by or who(),
-        today=date.today(),
     )
-    save(after, store)
     for each in verdicts:
         for event in each.events:
             typer.echo(

@@ -2,15 +2,32 @@
 
 from dataclasses import replace
 from enum import StrEnum
-from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from inspector.analysis.status import OUTPUT_LOST, Unknown, worst
-from inspector.commands.options import BadInput, Dask, ModelFiles, Overwrite, jobs_or_dask
+from inspector.commands.options import (
+    BadInput,
+    Dask,
+    ModelFiles,
+    NumberOfJobs,
+    OnBadInput,
+    Overwrite,
+    ReportUrl,
+    UnknownFrames,
+    Write,
+    jobs_or_dask,
+)
 from inspector.commands.outputs import files_of, tried, written
+
+if TYPE_CHECKING:
+    from inspector.library import Library
+    from inspector.reference.difference import Difference
+
+RECORDING, PICTURE, NUMBERS = FILES = ("worst.rrd", "worst.png", "diff.json")
+"""The files of --report."""
 
 
 class Format(StrEnum):
@@ -31,127 +48,120 @@ class FailOn(StrEnum):
     ANY = "any"
 
 
+Before = Annotated[
+    Path, typer.Argument(help="Runs before the change: a folder, or one.", show_default=False)
+]
+After = Annotated[
+    Path, typer.Argument(help="Runs after the change: a folder, or one.", show_default=False)
+]
+
+
 def diff(
-    reference: Annotated[
-        Path, typer.Argument(help="Runs before the change: a folder, or one.", show_default=False)
-    ],
-    candidate: Annotated[
-        Path, typer.Argument(help="Runs after the change: a folder, or one.", show_default=False)
-    ],
+    reference: Before,
+    candidate: After,
     format: Annotated[Format, typer.Option("--format", help="Output format.")] = Format.TEXT,  # noqa: A002
     fail_on: Annotated[
         FailOn,
-        typer.Option(
-            "--fail-on",
-            help="Exit status 1 at new or louder findings, at a verdict worse, or at any: both,"
-            " and runs that only the reference has.",
-        ),
+        typer.Option("--fail-on", help="New or louder findings, scenarios that are worse, or any."),
     ] = FailOn.WORSE,
     margin: Annotated[
-        float, typer.Option(min=1.0, help="A change within this is the same, in dB.")
-    ] = 6.0,
+        float, typer.Option(min=0.0, help="Least margin from which a run is louder, in dB.")
+    ] = 0.0,
     report: Annotated[
         Path | None,
         typer.Option(
-            "--report",
-            help="Write recording and picture of the worst pair and diff.json to this folder.",
+            "--report", help="Write recording, picture and diff.json of the worst to this folder."
         ),
     ] = None,
-    report_url: Annotated[
-        str, typer.Option("--report-url", help="Where this folder is published, for its picture.")
-    ] = "",
-    write: Annotated[
-        list[str] | None,
-        typer.Option("--write", help="FORMAT=FILE: write another format as well; repeatable."),
-    ] = None,
-    on_bad_input: Annotated[
-        BadInput,
-        typer.Option("--on-bad-input", help="A file that cannot be read: fails, or ignored."),
-    ] = BadInput.FAIL,
-    jobs: Annotated[int, typer.Option("--jobs", "-j", min=1, help="Parallel runs.")] = 1,
+    report_url: ReportUrl = "",
+    write: Write = None,
+    on_bad_input: OnBadInput = BadInput.FAIL,
+    jobs: NumberOfJobs = 1,
     dask: Dask = "",
     model: ModelFiles = None,
     robot: Annotated[
-        bool, typer.Option("--robot/--no-robot", help="Compare the links of known robots.")
+        bool, typer.Option("--robot/--no-robot", help="Draw the robot in the recording.")
     ] = True,
-    unknown: Annotated[
-        Unknown,
-        typer.Option(help="Frames out of distribution, two or more: a finding, or ignored."),
-    ] = Unknown.FINDING,
+    unknown: UnknownFrames = Unknown.FINDING,
     overwrite: Overwrite = False,
 ) -> None:
-    """Compare runs with a reference: better, same or worse.
+    """Compare runs with earlier ones: worse, better or same.
 
-    Runs are paired by scenario and seed of their meta, or by file name:
-    walk-1 and walk-2 are repetitions. "Worse" takes 5 and 5 of a scenario.
-    Findings of a scenario that only the candidate has are new.
+    A scenario is worse if it is louder after the change than each run before. Scenarios that are
+    missing, renamed, cut or frozen fail too.
 
-    Exit status:
-
-      0  nothing that --fail-on names
-      1  worse, new findings, or runs that are missing, as --fail-on says
-      2  wrong usage
-      3  bad input: a file cannot be read, nothing can be paired, or no cluster is reached
-      4  cannot tell: too few repetitions of every scenario
-      5  output lost: an output could not be written
-     70  internal error: a bug, with its traceback on standard error
-
-    Of several, the worst: 70, 5, 3, 1, 4, 0.
+    Exit status: 0 as before, 1 worse, 2 wrong usage, 3 bad input, 4 cannot tell, 5 output lost.
     """
     from inspector import assets
     from inspector.library import load_library
-    from inspector.progress import progress
-    from inspector.regression import output
-    from inspector.regression import report as reporting
-    from inspector.regression.difference import Gate, difference
-    from inspector.regression.measure import Measured, Unreadable, measure_files
-    from inspector.regression.pairing import Pairing, files_in, paired
+    from inspector.reference.difference import Gate, difference
+    from inspector.reference.output import FORMATS
     from inspector.report.cases import published
 
-    where = jobs_or_dask(jobs, dask)
     files = files_of(write or [], list(Format), overwrite=overwrite)
     if report:
-        reporting.prepare(report, overwrite=overwrite)
+        _prepare(report, overwrite=overwrite)
     library = load_library(assets.model_files(model))
-    sides = [files_in(path) for path in (reference, candidate)]
-    runs = [*sides[0], *sides[1]]
-    measured = list(
-        progress(
-            measure_files(runs, library, links=robot, unknown=unknown, jobs=where),
-            "diff",
-            total=len(runs),
-        )
+    found = difference(
+        reference,
+        candidate,
+        library,
+        margin=margin,
+        unknown=unknown,
+        jobs=jobs_or_dask(jobs, dask),
     )
-    split = len(sides[0])
-    before, after = (
-        [run for run in side if isinstance(run, Measured)]
-        for side in (measured[:split], measured[split:])
-    )
-    unreadable = [run for run in measured if isinstance(run, Unreadable)]
-    for bad in unreadable:
+    for bad in found.failed:
         typer.echo(f"{bad.trace}inspector: {bad.path}: {bad.problem}", err=True)
-    roots = (reference, candidate)
-    pairing = paired(before, after, roots) if before and after else Pairing("file name", ())
-    found = difference(pairing, margin=margin, unreadable=unreadable)
     gate = Gate(
         new=fail_on is not FailOn.WORSE,
         worse=fail_on is not FailOn.NEW,
-        unreadable=on_bad_input is BadInput.FAIL,
-        missing=fail_on is FailOn.ANY,
+        failed=on_bad_input is BadInput.FAIL,
     )
-    drawn = report / reporting.PICTURE if report and found.scenarios else None
+    drawn = report / PICTURE if report and any(row.worst for row in found.rows) else None
     address = published(drawn, report, report_url)
     found = replace(found, gate=gate, picture=drawn, picture_url=address)
-    told: list[str] = []
     lost: list[str] = []
-    if report and found.scenarios:
-        save = partial(reporting.write, found, report, library, robot=robot, overwrite=overwrite)
-        lost += tried(lambda: told.append(save()), str(report))
-    lost += written(found, output.FORMATS, format, files, overwrite=overwrite)
-    for line in told:
-        typer.echo(line, err=format is not Format.TEXT)
-    for bad in found.unreadable[len(unreadable) :]:
-        typer.echo(f"inspector: {bad.path}: {bad.problem}", err=True)
+    if report:
+        lost += tried(lambda: _report(found, report, library, robot, overwrite), str(report))
+    lost += written(found, FORMATS, format, files, overwrite=overwrite)
     for line in lost:
         typer.echo(f"inspector: output lost: {line}", err=True)
     raise typer.Exit(worst([found.exit_status, *([OUTPUT_LOST] if lost else [])]))
+
+
+def _prepare(folder: Path, *, overwrite: bool) -> None:
+    """Make the folder of the report, before long work is done for it."""
+    from inspector.errors import InspectorError
+    from inspector.report import html
+    from noisemodel.atomic import refuse_existing
+
+    html.require()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InspectorError(f"{folder}: cannot be made a folder ({error.strerror})") from error
+    for name in FILES:
+        refuse_existing(folder / name, overwrite=overwrite)
+
+
+def _report(
+    found: "Difference", folder: Path, library: "Library", robot: bool, overwrite: bool
+) -> None:
+    """Write the worst scenario as recording and picture, and all numbers."""
+    from inspector.compare.pair import compare
+    from inspector.compare.recording import write
+    from inspector.reference.difference import picture
+    from inspector.reference.output import as_json
+    from noisemodel.atomic import replacing
+
+    with replacing(folder / NUMBERS, overwrite=overwrite) as temporary:
+        temporary.write_text(f"{as_json(found)}\n", encoding="utf-8")
+    row = next((row for row in found.rows if row.worst is not None and row.before), None)
+    if row is None or row.worst is None:
+        return
+    after = Path(row.worst.run.run)
+    pair = compare(row.before[0], after, library, robot=robot)
+    write(pair, folder / RECORDING, overwrite=overwrite)
+    with replacing(folder / PICTURE, overwrite=overwrite) as temporary:
+        title = f"{row.name}: {row.outcome}, {row.reason}; {after.name}"
+        temporary.write_bytes(picture(row.worst, title))

@@ -306,10 +306,10 @@ def _two(
     kind: str,
     overwrite: bool,
 ) -> None:
+    from inspector.compare.alignment import Align
     from inspector.compare.changes import changes, summary
     from inspector.compare.pair import compare
     from inspector.compare.recording import write
-    from inspector.pair.alignment import Align
 
     pair = compare(*runs, library, how=Align(how), robot=robot, kind=kind)
     write(pair, target, overwrite=overwrite)

@@ -13,10 +13,10 @@ import numpy as np
 
 import noisemodel as nm
 from inspector.analysis.analyse import Analysis, analyse, robot_known, with_links
+from inspector.compare.alignment import Align, Alignment, align
 from inspector.errors import InspectorError
 from inspector.library import Library
 from inspector.logs.read import Opened, open_run
-from inspector.pair.alignment import Align, Alignment, align
 from noisemodel import Block, Run, decimated
 from noisemodel import robot as robots
 from noisemodel.links import LinkNoise, vibrating

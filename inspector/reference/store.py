@@ -4,12 +4,14 @@ People read and edit the TOML in a review: what is required, wanted and waived. 
 the .npz files, whose hashes the TOML holds: a file that was changed is refused.
 """
 
+import fcntl
 import hashlib
 import json
 import os
 import re
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import date, datetime
 from functools import lru_cache
@@ -20,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from inspector.errors import FileError, InspectorError
-from inspector.logs.read import Reading, open_source, sources
+from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.reference.judging import (
     Comparison,
     Expected,
@@ -170,14 +172,22 @@ def measured(paths: Sequence[Path], reading: Reading | None = None) -> list[Leve
     for path in paths:
         for source in sources([path], reading)[0]:
             try:
-                opened = open_source(source, reading)
+                found.append(levels_of(source, path if path.is_dir() else None, reading))
             except NoiseModelError as error:
                 raise InspectorError(str(error)) from error
-            name = scenario_of(opened.run, source.shown, path if path.is_dir() else None)
-            found.append(
-                levels(opened.run, name=name, file=str(source.shown), sha256=opened.sha256)
-            )
     return found
+
+
+def levels_of(source: Source, root: Path | None, reading: Reading | None = None) -> Levels:
+    """Measure the levels of a run that was found in a folder.
+
+    Raises:
+        InspectorError: If it cannot be read.
+        NoiseModelError: If it makes no run.
+    """
+    opened = open_source(source, reading)
+    name = scenario_of(opened.run, source.shown, root)
+    return levels(opened.run, name=name, file=str(source.shown), sha256=opened.sha256)
 
 
 def of_runs(runs: Sequence[Levels]) -> tuple[Scenario, ...]:
@@ -217,6 +227,46 @@ def calibrated(scenario: Scenario) -> Scenario:
     )
 
 
+def accept_into(
+    folder: Path,
+    runs: Sequence[Levels],
+    *,
+    wanted: Mapping[str, Sequence[Expected]],
+    reason: str,
+    by: str,
+    renames: bool = True,
+) -> "tuple[Reference, list[Change]]":
+    """Accept runs into a store, which is made if it does not exist, while nobody else does.
+
+    Raises:
+        StoreError: If the store is damaged.
+        OutputError: If it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        held = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(held, fcntl.LOCK_EX)
+        there = os.path.lexists(folder / NAME)
+        before = Reference.load(folder) if there else Reference(folder, (), stored=True)
+        after, changes = accepted(
+            before,
+            runs,
+            wanted=wanted,
+            reason=reason,
+            by=by,
+            today=date.today(),
+            renames=renames,
+        )
+        save(after, folder)
+    finally:
+        os.close(held)
+    return after, changes
+
+
 @dataclass(frozen=True)
 class Change:
     """What accepting does to a scenario, in a line.
@@ -241,6 +291,7 @@ def accepted(
     reason: str,
     by: str,
     today: date,
+    renames: bool = True,
 ) -> tuple[Reference, list[Change]]:
     """Accept runs: their scenarios are added or replaced, all others stay.
 
@@ -254,6 +305,7 @@ def accepted(
         reason: Why they are accepted.
         by: Who accepts them.
         today: When.
+        renames: Whether a scenario whose logs are gone may have got another name.
 
     Returns:
         The reference, and what changes.
@@ -272,6 +324,9 @@ def accepted(
                 if each.name not in given
                 and share_of_motion(new.repetitions[-1], each.repetitions[-1]) > 0.8
                 and each.robot == new.robot
+                # A scenario whose logs are still there is another one with the same motion.
+                and renames
+                and not any(Path(one.run).exists() for one in each.repetitions)
             ]
             if former:
                 old = kept.pop(former[0].name)
@@ -342,6 +397,11 @@ def wanted_in(
     return found
 
 
+def digest(run: Run) -> str:
+    """SHA-256 of a run that is no file: of its velocities."""
+    return hashlib.sha256(np.asarray(run.velocity).tobytes()).hexdigest()
+
+
 def who() -> str:
     """The name of the user; empty if the system has none."""
     import getpass
@@ -361,15 +421,11 @@ def save(reference: Reference, folder: Path) -> None:
 
     Args:
         reference: What is accepted.
-        folder: The folder, made if it does not exist.
+        folder: The folder.
 
     Raises:
         OutputError: If it cannot be written.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be made a folder ({error.strerror})") from error
     lines = [
         "# What is normal for each scenario, written by `inspector accept`; the levels are in the",
         "# .npz files. People may edit what is required, wanted and waived.",

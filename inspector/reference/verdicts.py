@@ -42,10 +42,12 @@ class References:
     Attributes:
         loaded: References by their path.
         of: Path of the reference of each run that has one.
+        names: Scenario of each run, where it is known.
     """
 
     loaded: Mapping[Path, Reference] = field(default_factory=dict)
     of: Mapping[Path, Path] = field(default_factory=dict)
+    names: Mapping[Path, str] = field(default_factory=dict)
 
     @classmethod
     def found(
@@ -69,10 +71,9 @@ class References:
         if path is None or analysis.audit is None:
             return verdict
         reference = self.loaded[path]
-        name = scenario_of(analysis.run, verdict.path)
-        root = _root(verdict.path, path)
-        if reference.named(name) is None:
-            name = scenario_of(analysis.run, verdict.path, root)
+        name = self.names.get(verdict.path, "") or scenario_of(analysis.run, verdict.path)
+        if not self.names and reference.named(name) is None:
+            name = scenario_of(analysis.run, verdict.path, _root(verdict.path, path))
         run = levels(analysis.run, name=name, file=str(verdict.path))
         return beside(analysis, verdict, compare(run, reference.scenarios), reference)
 

@@ -1,1 +1,0 @@
-"""Where one run lies on the time axis of another."""
