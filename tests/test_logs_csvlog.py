@@ -99,7 +99,7 @@ HEAD = "time,a.velocity,b.velocity\n"
             'time,"a.velocity\n0,1\n',
             r"row 1: the name 'a.velocity\\n0,1' cannot be printed; is a q",
         ),
-        ("clock,a.velocity\n0,1\n1,1\n", "there are no stamps; name their column"),
+        ("clock,a.velocity\n0,1\n1,1\n", "there are no stamps; give the log's rate"),
         ("0.0,1.0\n0.1,1.0\n", "row 1: there is no header; .* such as --columns time,q1 "),
         ("0,00;1,0\n0,04;1,0\n", "row 1: there is no header; the first row has 2 numbers"),
         ("0.0,1.0,2.0\n\n0.1,1.0\n", "row 1: there is no header; the first row has 3 numbers"),

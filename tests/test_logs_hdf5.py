@@ -83,7 +83,7 @@ def test_any_file_is_read_by_mapping(tmp_path):
 
 def test_what_is_missing_is_an_error_of_one_line(tmp_path):
     path = write(tmp_path / "log.hdf5", {"demo_0": {"obs/joint_pos": POSITION}})
-    with pytest.raises(LogError, match="there are no stamps; name their column"):
+    with pytest.raises(LogError, match="there are no stamps; give the log's rate"):
         read_log(path)
     expected = "log.hdf5: obs/joint_pos may be relative to a default pose (Isaac Lab)"
     assert expected in read_log(path, rate=50).remarks

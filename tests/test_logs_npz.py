@@ -106,7 +106,7 @@ def test_a_robot_names_the_columns_of_an_array_that_fits_it(tmp_path):
         (
             {"dof_vel": VELOCITY},
             [],
-            r"there are no stamps; name their column",
+            r"there are no stamps; give the log's rate",
         ),
         (
             {"speed": VELOCITY, "t": TIME},

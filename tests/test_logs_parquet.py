@@ -51,7 +51,7 @@ def test_what_does_not_fit_is_an_error_of_one_line(tmp_path):
     with pytest.raises(LogError, match="column 'joint_pos' has lists of different lengths"):
         read_log(wide(tmp_path, time=TIMES, joint_pos=ragged))
     path = wide(tmp_path, joint_pos=list(POSITION))
-    with pytest.raises(LogError, match=r"there are no stamps; name their column"):
+    with pytest.raises(LogError, match=r"there are no stamps; give the log's rate"):
         read_log(path)
     assert read_log(path, rate=100).run.rate == 100.0
     message = r"'joint_pos' has 3 columns, --joints names 2; take a part of it .*\[0:2\]"

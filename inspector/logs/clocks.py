@@ -209,8 +209,8 @@ def counted_stamps(
             f"{what}: {found:g} Hz, at which positions and velocities fit{but}; --rate sets another"
         )
     else:
-        how = "" if stamps.name else "name their column (--map time=COLUMN), or "
-        raise LogError(path, f"{what}; {how}give the log's rate, in samples per second: --rate HZ")
+        how = "" if stamps.name else ", or name their column: --map time=COLUMN"
+        raise LogError(path, f"{what}; give the log's rate, in samples per second: --rate HZ{how}")
     return replace(stamps, time=stamps.time / rate, unit="seconds", remark=remark)
 
 

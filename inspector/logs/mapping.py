@@ -345,8 +345,9 @@ def tracks_of(
 def no_motion(path: Path, names: Sequence[str], instead: str = "") -> LogError:
     """Error of a log of which no column is known: what to type, and the columns that it has."""
     example = pattern_for(names)
-    how = f", such as {example}" if example else instead
-    return LogError(path, f"{NO_MOTION}{how}; columns are {listed([n for n in names if n])}")
+    how = f"no position or velocity of a joint; map columns, such as {example}"
+    columns = listed([name for name in names if name])
+    return LogError(path, f"{how if example else NO_MOTION + instead}; columns are {columns}")
 
 
 def _naming_remarks(

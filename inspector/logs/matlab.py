@@ -32,7 +32,7 @@ NESTED = (1, 2)
 DEPTH = 20
 """Structs and cells within each other."""
 
-DATA = ("Data", "data", "values", "Values", "signals/values", "Position", "y")
+DATA = ("signals/values", "Data", "data", "Values", "values")
 """Fields of a timeseries, or of what Simulink logs as a struct, that hold the signal itself."""
 STAMPS = ("Time", "time", "t")
 

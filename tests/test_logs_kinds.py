@@ -1,0 +1,449 @@
+"""Logs in the manner of 39 public ones: read right as they are, or by the first hint, or refused.
+
+``python tests/test_logs_kinds.py`` prints the table of the documentation.
+"""
+
+import re
+import shlex
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from samplelogs import Talk, joint_states, write_bag, write_lerobot
+
+from inspector import read_log
+from inspector.errors import InspectorError
+from inspector.logs.motion import contradictions
+
+DEG = 180 / np.pi
+
+
+SAMPLES = 1200
+
+
+def motion(joints, rate, samples=SAMPLES, seed=0):
+    """Time, positions and velocities of joints that swing, and targets ahead of them."""
+    random = np.random.default_rng(seed)
+    time = np.arange(samples) / rate
+    speed = min(2.0, rate / 60) * random.uniform(0.5, 1.0, joints)
+    phase, size = random.uniform(0, 6, joints), random.uniform(0.4, 1.2, joints)
+    angle = 2 * np.pi * speed * time[:, None] + phase
+    return time, size * np.sin(angle), size * 2 * np.pi * speed * np.cos(angle)
+
+
+def csv(path, header, *columns, mark=","):
+    """Columns, each of shape (samples,) or (samples, several), under a header, if there is one."""
+    table = np.column_stack(columns)
+    integers = [np.all(each == np.rint(each)) for each in table.T]
+    rows = [
+        mark.join(
+            str(int(cell)) if whole else repr(float(cell))
+            for cell, whole in zip(row, integers, strict=True)
+        )
+        for row in table
+    ]
+    path.write_text("\n".join([*([header] if header else []), *rows]) + "\n")
+    return path
+
+
+def names(pattern, joints, first=1):
+    return ",".join(pattern.replace("#", str(number)) for number in range(first, first + joints))
+
+
+def interleaved(columns, joints):
+    return ",".join(each.replace("#", str(number)) for number in range(joints) for each in columns)
+
+
+T7, Q7, V7 = motion(7, 1000.0)
+T12, Q12, V12 = motion(12, 500.0)
+T6, Q6, V6 = motion(6, 125.0)
+T1, Q1, V1 = motion(1, 500.0)
+
+
+def gen3(folder, runaway=False):
+    commanded = Q7 + 0.01
+    if runaway:
+        commanded[-20:, 1] = -(10.0 ** np.linspace(2, 235, 20))
+    header = ",".join(
+        ("Time", *(names(f"{each}#", 7) for each in ("Position", "Velocity", "Torque", "TorqueSm")))
+    )
+    header += "," + names("PositionCmptd#", 7) + "," + names("VelocityCmptd#", 7)
+    parts = (np.arange(SAMPLES) + 1, Q7, V7, Q7, Q7, commanded, V7)
+    return csv(folder / "gen3.csv", header, *parts)
+
+
+def go1_tracking(folder):
+    target = np.repeat(Q12[::10], 10, axis=0) * DEG
+    table = np.stack((target, Q12 * DEG, target - Q12 * DEG), axis=2).reshape(SAMPLES, -1)
+    legs = [f"{leg}_{n}" for leg in ("FR", "FL", "RR", "RL") for n in range(3)]
+    header = "timestamp,real_time," + ",".join(
+        f"{leg}_{each}" for leg in legs for each in ("target", "actual", "error")
+    )
+    return csv(folder / "go1.csv", header, T12, 1.7e9 + T12, table)
+
+
+def go1_policy(folder):
+    legs = ",".join(f"{leg}_{n}" for leg in ("FR", "FL", "RR", "RL") for n in range(3))
+    return csv(folder / "policy.csv", f"timestamp,{legs}", 1101 + np.arange(SAMPLES), Q12)
+
+
+def motor(folder):
+    header = "Time,Position,Velocity,Position Error,Velocity Setpoint,Velocity Error,Target Torque"
+    zeros = np.zeros((SAMPLES, 1))
+    steps = np.repeat([[0.0], [40.0]], SAMPLES // 2, axis=0)
+    parts = (T1, Q1 * DEG, V1 * DEG * 0.1, zeros, steps, zeros, zeros, steps)
+    return csv(folder / "motor.csv", f"{header},Target Pos", *parts)
+
+
+def exoskeleton(folder):
+    header = "Timestamp,Output Angle [deg],Angular Velocity [dps],Gravity Torque [Nm],Is Holding"
+    return csv(folder / "one.csv", header, T1, Q1 * DEG, V1 * DEG, Q1, np.zeros(SAMPLES))
+
+
+def ur5(folder, frozen=False):
+    table = np.hstack((Q6, V6, 10 * Q6))
+    if frozen:
+        table[800:] = table[800]
+    return csv(folder / "ur5.csv", "", T6, table, mark=" ")
+
+
+def rtde(folder, doubled=False):
+    columns = ["actual_q", "actual_qd", "actual_TCP_pose", *["target_current"] * doubled]
+    header = ",".join(names(f"{each}_#", 6, 0) for each in columns)
+    extra = [Q6] if not doubled else [Q6, Q6]
+    if doubled:
+        header = header.replace("target_current_1", "target_current_0")
+    time, position, velocity = motion(6, 125.0 if doubled else 50.0)
+    if doubled:
+        return csv(folder / "rtde.csv", f"timestamp,{header}", time, position, velocity, *extra)
+    return csv(folder / "rtde.csv", header, position, velocity, *extra)
+
+
+def bare(header, joints, rate=100.0, before=(), after=0):
+    """A writer of positions under names of joints alone, and of columns that are none."""
+
+    def write(folder):
+        time, position, _ = motion(joints, rate)
+        other = np.random.default_rng(1).normal(size=(SAMPLES, after))
+        stamped = [time] if header.lower().startswith("time") else []
+        return csv(folder / "bare.csv", header, *stamped, *before, position, other)
+
+    return write
+
+
+def mat(folder, *, struct=False, seven=False):
+    time, position, velocity = motion(6, 250.0)
+    variables = {"t": time[:, None], "q": position, "qd": velocity}
+    if seven:
+        h5py = pytest.importorskip("h5py")
+        path = folder / "log.mat"
+        with h5py.File(path, "w", userblock_size=512) as file:
+            for name, each in variables.items():
+                file[f"run/{name}"] = each.T
+                file[f"run/{name}"].attrs["MATLAB_class"] = np.bytes_("double")
+        with path.open("r+b") as stream:
+            stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+        return path
+    from scipy.io import savemat
+
+    turned = {name: each.T for name, each in variables.items()}
+    savemat(folder / "log.mat", {"run": turned} if struct else variables)
+    return folder / "log.mat"
+
+
+def timeseries(folder):
+    """A signal logged by Simulink as a structure with time."""
+    from scipy.io import savemat
+
+    time, position, _ = motion(6, 250.0)
+    signals = {"values": position, "label": "q"}
+    savemat(folder / "log.mat", {"q": {"time": time[:, None], "signals": signals}})
+    return folder / "log.mat"
+
+
+def panda_bag(folder):
+    talk = Talk(ros1=True)
+    time, position, velocity = motion(7, 30.0)
+    stamps = (1_700_000_000 * 10**9 + np.round(time * 1e9)).astype(int)
+    joints = [f"panda_joint{number}" for number in range(1, 8)]
+    messages = joint_states(talk, stamps, joints, position=position, velocity=velocity)
+    return write_bag(folder / "panda.bag", talk, {"/joint_states": messages})
+
+
+def g1(folder):
+    joints = [f"kLeftJoint{number}" for number in range(14)]
+    return write_lerobot(folder / "g1", [motion(14, 30.0)[1]], names=joints, v3=False)
+
+
+def so101(folder):
+    joints = [f"{name}.pos" for name in ("shoulder_pan", "shoulder_lift", "elbow_flex", "gripper")]
+    return write_lerobot(folder / "so101", [30 * motion(4, 30.0)[1]], names=joints)
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of log, and what becomes of it.
+
+    Attributes:
+        title: Whose log is written so.
+        header: Its columns, or what it holds.
+        write: Writes one.
+        rate: The true rate, in [Hz], which a hint may ask for.
+        joints: Names of the joints; none of a log that is refused for good.
+        signals: The signals that are read.
+        said: Part of what is said.
+        hint: What the first message says to type; empty where nothing has to be.
+        told: Part of what is told of a contradiction.
+    """
+
+    title: str
+    header: str
+    write: Callable[[Path], Path]
+    rate: float
+    joints: tuple[str, ...] = ()
+    signals: str = "position, velocity"
+    said: str = ""
+    hint: str = ""
+    told: str = ""
+
+
+def numbered(pattern, count, first=1):
+    return tuple(names(pattern, count, first).split(","))
+
+
+LEGS = tuple(f"{leg}_{n}" for leg in ("FR", "FL", "RR", "RL") for n in range(3))
+QD = ",".join(("time", names("q#", 6), names("dq#", 6), names("tau#", 6)))
+BARE = "names of joints alone, taken for positions"
+FITS = "at which positions and velocities fit"
+ALL = "position, velocity, effort, position_desired, velocity_desired"
+HZ = "--rate HZ"
+
+KINDS = (
+    Kind(
+        "Kinova Gen3, a counter as Time",
+        "Time,Position1…,Velocity1…,Torque1…,PositionCmptd1…,VelocityCmptd1…",
+        gen3, 1000.0, numbered("joint_#", 7), ALL, f"'Time' counts samples: 1000 Hz, {FITS}",
+    ),
+    Kind(
+        "Kinova Gen3 whose command runs away", "PositionCmptd2 of -1e+235",
+        lambda folder: gen3(folder, runaway=True), 1000.0, numbered("joint_#", 7), ALL,
+        "no position in any unit: 20 samples of position desired left out",
+    ),
+    Kind(
+        "Unitree Go1, targets and errors", "timestamp,real_time,FR_0_target,FR_0_actual,…",
+        go1_tracking, 500.0, LEGS, "position, position_desired", BARE, "--degrees",
+    ),
+    Kind(
+        "Unitree Go1, a policy's counter", "timestamp,FR_0,FR_1…", go1_policy, 50.0, LEGS,
+        "position", "counts samples: 50 Hz, as --rate says", HZ,
+    ),
+    Kind(
+        "a motor whose velocity is a tenth of the slope",
+        "Time,Position,Velocity,Position Error,Velocity Setpoint,…,Target Pos", motor, 500.0,
+        ("joint_0",), "position, velocity, position_desired, velocity_desired",
+        hint="--degrees", told="are 0.1 times the slopes of their positions",
+    ),
+    Kind(
+        "one joint, words and units", "Timestamp,Output Angle [deg],Angular Velocity [dps]…",
+        exoskeleton, 500.0, ("joint_0",), said="converted from dps",
+    ),
+    Kind(
+        "UR5, no header", "19 numbers", ur5, 125.0, numbered("joint_#", 6),
+        "position, velocity, effort", hint=f"--columns {QD}",
+    ),
+    Kind(
+        "UR5 whose logger froze", "the last row for 3.2 s", lambda folder: ur5(folder, frozen=True),
+        125.0, numbered("joint_#", 6), "position, velocity, effort", "the log froze",
+        hint=f"--columns {QD}",
+    ),
+    Kind(
+        "dVRK, no header", "q1…q7 dq1…dq7 tau1…tau7",
+        lambda folder: csv(folder / "dvrk.txt", "", *motion(7, 200.0)[1:], Q7, mark=" "), 200.0,
+        numbered("joint_#", 7), "position, velocity, effort", f"200 Hz, {FITS}",
+        "--columns q1,q2,q3,q4,q5,q6,q7,dq1",
+    ),
+    Kind(
+        "a quadruped, no header", "12 numbers",
+        lambda folder: csv(folder / "legs.csv", "", motion(12, 200.0)[1]), 200.0,
+        numbered("joint_#", 12), "position", hint="--columns q1,q2,q3,q4,q5,q6,q7,q8",
+    ),
+    Kind(
+        "WAM, no header", "a .dat: time, 7 positions, 7 velocities",
+        lambda folder: csv(folder / "wam.dat", "", *motion(7, 500.0), mark="\t"), 500.0,
+        numbered("joint_#", 7), hint="--columns time,q1,q2,q3,q4,q5,q6,q7,dq1",
+    ),
+    Kind(
+        "UR by RTDE, no stamps", "actual_q_0…,actual_qd_0…,actual_TCP_pose_0…", rtde, 50.0,
+        numbered("joint_#", 6, 0), said=f"there are no stamps: 50 Hz, {FITS}",
+    ),
+    Kind(
+        "UR by RTDE, two columns of one name", "…,target_current_0,target_current_0",
+        lambda folder: rtde(folder, doubled=True), 125.0, numbered("joint_#", 6, 0),
+    ),
+    Kind(
+        "KUKA, joints and a pose", "time,joint_0…joint_6,x,y,z,qw…",
+        bare(f"time,{names('joint_#', 7, 0)},x,y,z,qw,qx,qy,qz", 7, after=7), 100.0,
+        numbered("joint_#", 7, 0), "position", BARE,
+    ),
+    Kind(
+        "numbered joints, seconds", "Time (s),Joint1…Joint7",
+        bare(f"Time (s),{names('Joint#', 7)}", 7), 100.0, numbered("Joint#", 7), "position", BARE,
+    ),
+    Kind("two joints", "timestamp,joint1,joint2", bare("timestamp,joint1,joint2", 2), 100.0,
+         ("joint1", "joint2"), "position", BARE),
+    Kind(
+        "Z1, a state machine", "Time(s),FSM_State,Joint1…6,End_X(m)…",
+        lambda folder: csv(
+            folder / "z1.csv", f"Time(s),FSM_State,{names('Joint#', 6)},End_X(m),End_Y(m)",
+            T6, np.full(SAMPLES, 2.0), Q6, Q6[:, :2],
+        ),
+        125.0, numbered("Joint#", 6), "position", BARE,
+    ),
+    Kind("short names, no stamps", "j1…j6", bare(names("j#", 6), 6), 100.0, numbered("j#", 6),
+         "position", BARE, HZ),
+    Kind(
+        "UR by words, no stamps", "shoulder,upper_arm,forearm,wrist_1…",
+        bare("shoulder,upper_arm,forearm,wrist_1,wrist_2,wrist_3", 6), 100.0,
+        ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3"), "position", BARE, HZ,
+    ),
+    Kind(
+        "seven axes, joint by joint, no stamps", "joint_0_pos,joint_0_vel,joint_0_torque,…",
+        lambda folder: csv(
+            folder / "axes.csv",
+            interleaved(("joint_#_pos", "joint_#_vel", "joint_#_torque"), 7) + ",contact_force",
+            np.stack((*motion(7, 50.0)[1:], Q7), axis=2).reshape(SAMPLES, -1), np.zeros(SAMPLES),
+        ),
+        50.0, numbered("joint_#", 7, 0), "position, velocity, effort", f"50 Hz, {FITS}",
+    ),
+    Kind(
+        "Z1, 12 numbers that are no slopes of each other", "12 numbers",
+        lambda folder: csv(folder / "z1.csv", "", Q6, motion(6, 125.0, seed=5)[1]), 125.0,
+        numbered("joint_#", 12), "position", hint="--columns q1,q2,q3,q4,q5,q6,q7",
+    ),
+    Kind(
+        "ANYmal, desired and measured by words", "t,q_des_0…,q_meas_0…,dq_meas_0…",
+        lambda folder: csv(
+            folder / "anymal.csv",
+            ",".join(("t", *(names(f"{e}_#", 12, 0) for e in ("q_des", "q_meas", "dq_meas")))),
+            T12, Q12, Q12, V12,
+        ),
+        500.0, numbered("joint_#", 12, 0), "position, velocity, position_desired",
+    ),
+    Kind(
+        "set points by many words", "time,j1_sp,j1_act,j2_sp,j2_act",
+        lambda folder: csv(
+            folder / "set.csv", "time,j1_sp,j1_act,j2_sp,j2_act", T6,
+            np.repeat(Q6[:, :2], 2, axis=1),
+        ),
+        125.0, ("j1", "j2"), "position, position_desired", BARE,
+    ),
+    Kind(
+        "encoders by number", "time,enc_1…enc_6,temp_1…",
+        lambda folder: csv(
+            folder / "enc.csv", f"time,{names('enc_#', 6)},{names('temp_#', 6)}", T6, Q6, 20 + Q6
+        ),
+        125.0, numbered("joint_#", 6), "position",
+        hint="--map 'position.joint_{joint}=enc_{joint}'",
+    ),
+    Kind("MATLAB 5, variables", "t, q, qd", mat, 250.0, numbered("joint_#", 6, 0)),
+    Kind("MATLAB 5, a struct, transposed", "run.t, run.q, run.qd",
+         lambda folder: mat(folder, struct=True), 250.0, numbered("joint_#", 6, 0)),
+    Kind("MATLAB 7.3, a struct", "run.t, run.q, run.qd", lambda folder: mat(folder, seven=True),
+         250.0, numbered("joint_#", 6, 0)),
+    Kind("Simulink, a structure with time", "q.time, q.signals.values", timeseries, 250.0,
+         numbered("joint_#", 6, 0), "position"),
+    Kind("Panda, a ROS 1 bag", "sensor_msgs/JointState", panda_bag, 30.0,
+         numbered("panda_joint#", 7)),
+    Kind("LeRobot v2.1, a G1", "observation.state, action", g1, 30.0,
+         numbered("kLeftJoint#", 14, 0), "position, position_desired"),
+    Kind(
+        "LeRobot v3, an SO-101", "observation.state", so101, 30.0,
+        ("shoulder_pan", "shoulder_lift", "elbow_flex"), "position, position_desired",
+        hint="--units degrees",
+    ),
+    Kind("poses alone", "time,x,y,z,a,b,c",
+         lambda folder: csv(folder / "rsi.csv", "time,x,y,z,a,b,c", T6, Q6), 125.0,
+         hint="no position or velocity of a joint"),
+    Kind("efforts alone", "time,tau1…",
+         lambda folder: csv(folder / "tau.csv", f"time,{names('tau#', 6)}", T6, Q6), 125.0,
+         hint="no position or velocity of a joint"),
+)  # fmt: skip
+"""The table; rows without joints are refused for good."""
+
+
+def followed(message, rate):
+    """Options that the first message says to type, taken literally; HZ is the true rate."""
+    options = {}
+    command = message.replace(HZ, f"--rate {rate:g}").replace("; ", " ").replace(", or ", " ")
+    if quoted := re.findall(r"such as --map ('[^']*'|\S+)", command):
+        options["mapping"] = [shlex.split(quoted[0])[0]]
+    if found := re.search(r"--columns (\S+)", command):
+        options["columns"] = tuple(found[1].rstrip(";,").split(","))
+    if (found := re.search(r"--rate ([\d.]+)", command)) and "but --rate" not in command:
+        options["rate"] = float(found[1])
+    if found := re.search(r"--units (\w+)|say --(degrees)", command):
+        options["units"] = found[1] or found[2]
+    return options
+
+
+def read(kind, folder):
+    """The import of a log as it is or by the first hint, and that hint."""
+    path = kind.write(folder)
+    try:
+        return read_log(path), ""
+    except InspectorError as error:
+        if not kind.joints:
+            return None, str(error)
+        options = followed(str(error), kind.rate)
+        return read_log(path, **options), str(error)
+
+
+@pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.title)
+def test_a_log_is_read_right_as_it_is_or_by_the_first_hint(tmp_path, kind):
+    imported, hint = read(kind, tmp_path)
+    assert kind.hint in hint
+    assert bool(hint) == bool(kind.hint), hint
+    if not kind.joints:
+        return
+    run, said = imported.run, "; ".join(imported.remarks)
+    assert run.joint_names == kind.joints
+    assert run.rate == pytest.approx(kind.rate, rel=1e-5)
+    logged = [
+        name
+        for name in ALL.split(", ")
+        if getattr(run, name) is not None and name not in run.meta.get("differentiated", {})
+    ]
+    assert ", ".join(logged) == kind.signals
+    assert kind.said in said
+    told = " ".join(contradictions(run))
+    assert kind.told in told
+    assert bool(told) == bool(kind.told), told
+
+
+def row(kind, folder):
+    """A line of the table in the documentation."""
+    imported, hint = read(kind, folder)
+    typed = f"`{kind.hint.replace('|', chr(92) + '|')}`" if kind.joints and hint else "nothing"
+    if imported is None:
+        return f"| {kind.title} | `{kind.header}` | refused: {kind.hint} | | |"
+    remarks = [each.partition(": ")[2] or each for each in imported.remarks]
+    said = "; ".join(remarks).replace("|", "\\|") or "nothing"
+    return f"| {kind.title} | `{kind.header}` | {typed} | {said} | {kind.signals} |"
+
+
+def table():
+    """The table of kinds in Markdown."""
+    with tempfile.TemporaryDirectory() as folder:
+        rows = []
+        for number, kind in enumerate(KINDS):
+            place = Path(folder) / str(number)
+            place.mkdir()
+            rows.append(row(kind, place))
+    return "\n".join(["| log | columns | typed | said | read |", "|---|---|---|---|---|", *rows])
+
+
+if __name__ == "__main__":
+    print(table())
