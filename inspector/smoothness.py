@@ -28,7 +28,7 @@ import numpy as np
 
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status
-from inspector.audit.placeholder import without_placeholder
+from inspector.audit_signals import without_placeholder
 from inspector.errors import InspectorError, without_path
 from inspector.hold import hold_length, without_hold
 from inspector.library import Library

@@ -18,7 +18,7 @@ from inspector.analysis.analyse import Analysis, analyse, analyse_noise, with_li
 from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run, model_files
 from inspector.audit import audit
-from inspector.audit.placeholder import without_placeholder
+from inspector.audit_signals import without_placeholder
 from inspector.library import load_library
 from inspector.report import html, markdown
 from inspector.report.findings import WORDS

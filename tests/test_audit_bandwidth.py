@@ -2,10 +2,15 @@ import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfilt
 
-from inspector.audit.bandwidth import ENCODER_NOISE, bandwidth
-from inspector.audit.differentiation import CENTRAL, SMOOTH, differentiator_of
-from inspector.audit.quantisation import step_of
-from inspector.audit.spectrum import spectrum
+from inspector.audit_signals import (
+    CENTRAL,
+    ENCODER_NOISE,
+    SMOOTH,
+    bandwidth,
+    differentiator_of,
+    spectrum,
+    step_of,
+)
 from inspector.hold import hold_length
 from noisemodel import Run
 

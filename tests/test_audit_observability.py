@@ -5,8 +5,15 @@ from scipy.signal import butter, sosfilt
 from test_audit_bandwidth import motion, noise, run_of
 
 from inspector.assets import demo_run, model_files
-from inspector.audit import Observability, audit, shortcomings, summary
-from inspector.audit.observability import OSCILLATIONS, band_edges, has_frame
+from inspector.audit import (
+    OSCILLATIONS,
+    Observability,
+    audit,
+    band_edges,
+    has_frame,
+    shortcomings,
+    summary,
+)
 from inspector.library import CannotTellError, label_run, load_library
 from inspector.verdict import Status, classify_file, exit_status
 from noiseclassifier import Profile

@@ -17,7 +17,7 @@ import noiseclassifier as nc
 import noisemodel as nm
 from inspector.analysis.status import IGNORED, Status, Unknown
 from inspector.audit import Audit, audit, shortcomings, summary
-from inspector.audit.placeholder import without_placeholder
+from inspector.audit_signals import without_placeholder
 from inspector.errors import InspectorError
 from inspector.hold import without_hold
 from inspector.levels import velocity_levels

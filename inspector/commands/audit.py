@@ -38,8 +38,7 @@ def audit(
       4  cannot tell: a log can show no failure class
     """
     from inspector import assets
-    from inspector.audit.formats import as_json, text
-    from inspector.audit.logs import audit_all
+    from inspector.audit import as_json, audit_all, text
     from inspector.library import load_library
 
     reading: Reading = ctx.obj

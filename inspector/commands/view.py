@@ -202,7 +202,7 @@ def _page(
 ) -> None:
     """Write one HTML page about a run: pictures, tables, sound."""
     from inspector.analysis.analyse import analyse_file
-    from inspector.audit.formats import text
+    from inspector.audit import text
     from inspector.report import html
 
     html.require()

@@ -1,0 +1,514 @@
+"""Audit of a log: gaps, bandwidth, warnings, and which failure classes it can show.
+
+The limits of a class:
+
+- *Its bands.* The paper puts oscillations at 20 to 1000 Hz (its table of scenarios: multi-sines of
+  20-30 up to 900-1000 Hz). It gives no band for impacts and high accelerations, which are short and
+  broad: theirs is that of the model, from its first band to its last.
+- *The model.* A run is labelled by the general model at the rate of its values, or by the model of
+  the nearest rate at or below. Outside of its bands nothing is observable; below all models the
+  status is *cannot tell*.
+- *The log.* Its bandwidth: the Nyquist frequency, or less with a zero-order hold, differentiation
+  or a filter.
+- *Two bands.* Fewer than two of the model's bands are no spectrum; `LogBands` has the same limit.
+- *The frame.* A model labels frames (the paper's 0.4 s) that touch no gap; there has to be one.
+
+A class is observable if all of its band is, partly if two bands of the model or more are, or if
+some are at the quantisation floor: then a failure must exceed that.
+"""
+
+import json
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import noiseclassifier as nc
+from inspector.audit_signals import Bandwidth, bandwidth, copies, placeholder, unit_warnings
+from inspector.errors import InspectorError, without_path
+from inspector.hold import hold_length, without_hold
+from inspector.library import Library, for_robot, nearest, signals_of
+from inspector.logs.read import Reading, left_out, open_source, sources
+from inspector.text import counted, plain
+from inspector.wrongrobot import check_joints, limit_warnings
+from noiseclassifier import Profile
+from noiseclassifier.logbands import FEWEST, HIGHEST, LOWEST
+from noisemodel import NoiseModelError, Run
+from noisemodel.ondemand import pieces
+from noisemodel.run import part
+from noisemodel.types import Array, Mask
+
+OSCILLATIONS = (20.0, 1000.0)
+"""The paper's band of oscillations (table of scenarios, 11 to 19), in [Hz]."""
+
+MASKED = "quantisation masks amplitudes"
+"""What the reason begins with where a class is observable in all of its band, if it is loud."""
+
+
+class Observability(StrEnum):
+    """Degrees to which a class is observable."""
+
+    OBSERVABLE = "observable"
+    PARTLY = "partly"
+    CANNOT_TELL = "cannot tell"
+
+
+@dataclass(frozen=True)
+class ClassObservability:
+    """Observability of one failure class.
+
+    Attributes:
+        label: The class.
+        observability: The degree.
+        low: Lowest frequency at which it is observable, in [Hz]; 0 if there is none.
+        high: Highest frequency at which it is observable, in [Hz]; 0 if there is none.
+        needed: Sample rate that makes all of it observable, or any of it, in [Hz]; None where a
+            higher one would not help.
+        reason: Cause of the limit, a clause; empty for what is observable.
+    """
+
+    label: str
+    observability: Observability
+    low: float = 0.0
+    high: float = 0.0
+    needed: float | None = None
+    reason: str = ""
+
+    def __str__(self) -> str:
+        """Format as a line."""
+        band = f", {plain(self.low)} to {plain(self.high, 4)} Hz" if self.high else ""
+        reason = f": {self.reason}" if self.reason else ""
+        needed = f"; needs {self.needed:g} Hz" if self.needed else ""
+        return f"{self.label}: {self.observability}{band}{reason}{needed}"
+
+
+def observable_classes(
+    bandwidth: Bandwidth,
+    valid: Mask,
+    library: Library,
+    signals: Collection[str],
+    *,
+    rate: float,
+) -> tuple[ClassObservability, ...]:
+    """Determine the observability of each failure class."""
+    logged = 2 * bandwidth.nyquist
+    try:
+        name, chosen = nearest(library, rate, signals, logged=logged)
+    except nc.ModelsError as error:
+        classes = dict.fromkeys(name for model in library.values() for name in _failures(model))
+        if isinstance(error, nc.MissingSignalError):
+            return tuple(
+                ClassObservability(label, Observability.CANNOT_TELL, reason=str(error))
+                for label in classes
+            )
+        slowest = min(map(_lowest, library.values()), default=None)
+        reason = f"{rate:g} Hz is below the rate of every model"
+        return tuple(
+            ClassObservability(label, Observability.CANNOT_TELL, needed=slowest, reason=reason)
+            for label in classes
+        )
+    profile = chosen.profile
+    labels = [label for label in chosen.classes if label != "ok"]
+    if not has_frame(valid, profile.duration * logged):
+        reason = f"no stretch of {profile.duration:g} s without a gap"
+        return tuple(
+            ClassObservability(label, Observability.CANNOT_TELL, reason=reason) for label in labels
+        )
+    general = isinstance(library[name], nc.General)
+    return tuple(
+        _observability(label, bandwidth, profile, library, general=general) for label in labels
+    )
+
+
+def has_frame(valid: Mask, length: float) -> bool:
+    """Whether a stretch without a gap is as long as a frame."""
+    gaps = np.flatnonzero(np.concatenate(([True], ~valid, [True])))
+    return bool((np.diff(gaps) - 1).max() >= length * (1 - 1e-3))
+
+
+def _observability(
+    label: str,
+    bandwidth: Bandwidth,
+    profile: Profile,
+    library: Library,
+    *,
+    general: bool,
+) -> ClassObservability:
+    edges = band_edges(profile)
+    wanted = OSCILLATIONS if label == "oscillations" else (edges[0], edges[-1])
+    low, high = max(wanted[0], edges[0]), min(wanted[1], edges[-1], bandwidth.usable)
+    if np.sum((edges[:-1] < high) & (edges[1:] <= high) & (edges[1:] > low)) < FEWEST:
+        needed = _rate_for(low, library) if bandwidth.usable >= bandwidth.nyquist else None
+        return ClassObservability(
+            label, Observability.CANNOT_TELL, needed=needed, reason=bandwidth.limit
+        )
+    if high < wanted[1]:
+        # A general model has the bands that the log has.
+        by_model = edges[-1] <= bandwidth.usable and not general
+        reason = f"the model of {profile.rate:g} Hz ends there" if by_model else bandwidth.limit
+        needed = _rate_for(wanted[1], library)
+        helps = bandwidth.usable >= bandwidth.nyquist and needed > 2 * bandwidth.nyquist
+        return ClassObservability(
+            label, Observability.PARTLY, low, high, needed if helps else None, reason
+        )
+    if bandwidth.floor_from is not None and bandwidth.floor_from < high:
+        reason = (
+            f"{MASKED} below {bandwidth.floor_amplitude:.2g} rad/s"
+            f" above {plain(bandwidth.floor_from)} Hz"
+        )
+        return ClassObservability(label, Observability.PARTLY, low, high, reason=reason)
+    return ClassObservability(label, Observability.OBSERVABLE, low, high)
+
+
+def band_edges(profile: Profile) -> Array:
+    """Edges of the frequency bands of a profile, shape (edges,), in [Hz]."""
+    if profile.bands == "log":
+        return np.array(profile.edges)
+    # Bin 0 is the mean; the first after it is the paper's f_min (Sec. III-A).
+    bin_width = profile.rate / profile.window
+    return np.arange(1.0, profile.bins, 3.0) * bin_width
+
+
+def _failures(model: nc.Model) -> tuple[str, ...]:
+    """All classes of a model but the first, which is `ok`."""
+    known = model.recipe if isinstance(model, nc.General) else model.profile
+    return known.classes[1:]
+
+
+def _lowest(model: nc.Model) -> float:
+    """Lowest rate that a model takes, in [Hz]."""
+    return LOWEST if isinstance(model, nc.General) else model.rate
+
+
+def _rate_for(frequency: float, library: Library) -> float:
+    """Lowest rate at which a model has a band up to a frequency; without one, twice the latter."""
+    reaching = []
+    for model in library.values():
+        if isinstance(model, nc.General):
+            edges = band_edges(model.recipe.bound(HIGHEST))
+            # A band is there from twice its upper edge on.
+            above = edges[edges >= frequency]
+            reaching += [max(LOWEST, float(np.ceil(2 * each))) for each in above[:1]]
+        elif band_edges(model.profile)[-1] >= frequency:
+            reaching.append(model.rate)
+    return min(reaching, default=2 * frequency)
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Gaps of a run.
+
+    Attributes:
+        count: Number of gaps.
+        total: Their total duration, in [s].
+        longest: Duration of the longest, in [s].
+    """
+
+    count: int = 0
+    total: float = 0.0
+    longest: float = 0.0
+
+    def __str__(self) -> str:
+        """Format as a clause."""
+        if not self.count:
+            return "no gaps"
+        gaps = counted(self.count, "gap")
+        return f"{gaps}, {self.total:.3g} s in all, {self.longest:.3g} s the longest"
+
+
+@dataclass(frozen=True)
+class Audit:
+    """Rate, gaps, bandwidth and observable classes of a run.
+
+    Attributes:
+        rate: Sample rate, in [Hz].
+        duration: In [s].
+        joints: Number of joints.
+        jitter: Deviation of the stamps' steps before they were made uniform, root mean square and
+            largest, in [s]; None if the run's ``meta`` has none.
+        gaps: Its gaps.
+        bandwidth: Its bandwidth.
+        warnings: Signs of wrong units, copies, zero-order hold or filters; a clause each.
+        notes: Differentiation, quantisation, missing signals; a clause each.
+        classes: Observability of each failure class.
+    """
+
+    rate: float
+    duration: float
+    joints: int
+    jitter: tuple[float, float] | None
+    gaps: Gaps
+    bandwidth: Bandwidth
+    warnings: tuple[str, ...]
+    notes: tuple[str, ...]
+    classes: tuple[ClassObservability, ...]
+
+    @property
+    def observable(self) -> bool:
+        """Whether a failure class is observable, at least partly."""
+        return any(each.observability is not Observability.CANNOT_TELL for each in self.classes)
+
+
+def audit(run: Run, library: Mapping[str, nc.Model], *, slower: Run | None = None) -> Audit:
+    """Audit a run.
+
+    Gaps are counted in the whole run; signals are examined in an excerpt of it.
+
+    Raises:
+        UnknownJointError: If the run names a joint that its robot lacks.
+    """
+    check_joints(run.joint_names, run.robot)
+    check_joints(run.desired_joint_names, run.robot)
+    part = excerpt(run)
+    reach = bandwidth(part)
+    return Audit(
+        rate=run.rate,
+        duration=run.duration,
+        joints=len(run.joint_names),
+        jitter=_jitter(run),
+        gaps=gaps_of(run),
+        bandwidth=reach,
+        warnings=(*_warnings(part, reach), *limit_warnings(run)),
+        notes=tuple(_notes(part, reach)),
+        classes=observable_classes(
+            reach,
+            run.mask,
+            for_robot(library, run.robot),
+            signals_of(part),
+            rate=(slower or without_hold(run)).rate,
+        ),
+    )
+
+
+def _jitter(run: Run) -> tuple[float, float] | None:
+    noted = run.meta.get("jitter")
+    values = [noted.get(key) for key in ("rms", "max")] if isinstance(noted, Mapping) else []
+    match values:
+        case [float(rms), float(largest)]:
+            return rms, largest
+    return None
+
+
+def _warnings(run: Run, reach: Bandwidth) -> Iterator[str]:
+    yield from unit_warnings(run)
+    if clause := placeholder(run):
+        yield f"{clause}: it is left out"
+    for copy in copies(run):
+        whose = "all joints" if len(copy.joints) == len(run.joint_names) else ", ".join(copy.joints)
+        samples = f"{abs(copy.lag)} sample{'' if abs(copy.lag) == 1 else 's'}"
+        when = f", {samples} {'later' if copy.lag > 0 else 'earlier'}" if copy.lag else ""
+        yield f"measured {copy.signal} of {whose} is the desired one{when}: one is a copy"
+    if reach.hold > 1:
+        yield (
+            f"measured values have a zero-order hold of {reach.hold:.3g} samples:"
+            f" they come at {plain(run.rate / reach.hold, 4)} Hz"
+        )
+    if reach.corner:
+        yield f"velocities look filtered from {plain(reach.corner)} Hz on"
+
+
+def _notes(run: Run, reach: Bandwidth) -> Iterator[str]:
+    if reach.differentiator:
+        yield (
+            f"velocities are differentiated positions ({reach.differentiator.name}),"
+            f" attenuated above {plain(reach.differentiator.corner(run.rate))} Hz"
+        )
+    if run.velocity_desired is None:
+        yield "there is no desired motion"
+    elif (hold := hold_length(run.velocity_desired, run.mask)) > 1:
+        yield (
+            f"desired velocities have a zero-order hold of {hold:.3g} samples"
+            f" ({plain(run.rate / hold, 4)} Hz)"
+        )
+    if reach.floor_from is not None:
+        unit = "rad" if reach.differentiator else "rad/s"
+        yield (
+            f"above {plain(reach.floor_from)} Hz the spectrum is at the quantisation floor"
+            f" (step {reach.step:.2g} {unit}), which masks oscillations up to"
+            f" {reach.floor_amplitude:.2g} rad/s"
+        )
+    elif reach.quiet_from is not None:
+        yield (
+            f"above {plain(reach.quiet_from)} Hz the level is below any encoder's noise: filtered,"
+            " or simulated without sensor noise"
+        )
+
+
+def gaps_of(run: Run) -> Gaps:
+    """Count the stretches that a run marks as not valid."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([True], run.mask, [True]))))
+    lengths = np.diff(edges)[::2] / run.rate
+    if not len(lengths):
+        return Gaps()
+    return Gaps(len(lengths), float(lengths.sum()), float(lengths.max()))
+
+
+LONGEST = 60_000
+"""Samples of an excerpt: a minute at 1 kHz."""
+
+
+def excerpt(run: Run) -> Run:
+    """Cut out the part of a run around its fastest motion, which limits the cost of long runs.
+
+    Returns:
+        The run itself if it is short; else a part of it with its joints' motion alone.
+    """
+    if len(run.time) <= LONGEST:
+        return run
+    fastest, highest = 0, -1.0
+    for rows in pieces(run.velocity):
+        moving = run.velocity[rows]
+        speed = np.where(run.mask[rows], np.einsum("sj,sj->s", moving, moving), -1.0)
+        if speed.max() > highest:
+            fastest, highest = rows.start + int(speed.argmax()), float(speed.max())
+    start = min(max(0, fastest - LONGEST // 2), len(run.time) - LONGEST)
+    motion_alone: dict[str, Any] = {
+        "effort": None,
+        "base_pose": None,
+        "base_velocity": None,
+        "stages": {},
+    }
+    return part(run, start, start + LONGEST, **motion_alone)
+
+
+# As text and JSON
+
+ROUNDING = 1e-9
+"""Deviation of a stamp that is rounding, in [s]: stamps have nanoseconds at best."""
+
+
+def text(name: str, audit: Audit, assumed: str = "") -> str:
+    """An audit as text."""
+    head = f"{name}: {audit.duration:.2f} s, {counted(audit.joints, 'joint')}"
+    return "\n".join([head, *([f"  {assumed}"] if assumed else []), *_text_lines(audit)])
+
+
+def summary(audit: Audit, *, classes: bool = True) -> tuple[str, ...]:
+    """Write the one or two lines that a report has for an audit: classes, then warnings."""
+    warnings = f"Warnings: {'; '.join(audit.warnings)}." if audit.warnings else ""
+    return tuple(line for line in (_sentence(audit) if classes else "", warnings) if line)
+
+
+def shortcomings(audit: Audit) -> tuple[str, ...]:
+    """Write the summary of an audit, and nothing without warnings or limits."""
+    limited = any(each.observability is not Observability.OBSERVABLE for each in audit.classes)
+    return summary(audit) if audit.warnings or limited else ()
+
+
+def as_json(
+    found: Mapping[str, Audit], failed: Mapping[str, str], assumed: Mapping[str, str]
+) -> str:
+    """Write audits as ``noise-audit/2``."""
+    runs = [
+        {**_plain(name, audit), "assumed": assumed.get(name, "")} for name, audit in found.items()
+    ]
+    runs += [{"run": name, "message": message} for name, message in failed.items()]
+    return json.dumps({"format": "noise-audit/2", "runs": runs}, indent=2)
+
+
+def _text_lines(audit: Audit) -> Iterator[str]:
+    off = "stamps are uniform"
+    if audit.jitter and audit.jitter[1] >= ROUNDING:
+        rms, largest = (1e3 * value for value in audit.jitter)
+        off = f"stamps were off by {rms:.3g} ms rms, {largest:.3g} ms at most"
+    yield f"  rate: {audit.rate:g} Hz, {off}"
+    yield f"  missing: {audit.gaps}"
+    yield f"  bandwidth: up to {plain(audit.bandwidth.usable, 4)} Hz ({audit.bandwidth.limit})"
+    yield from (f"  warning: {warning}" for warning in audit.warnings)
+    yield from (f"  note: {note}" for note in audit.notes)
+    yield from (f"  {each}" for each in audit.classes)
+
+
+def _sentence(audit: Audit) -> str:
+    """Write a sentence on what cannot be seen, or that all classes can."""
+    if not audit.classes:
+        return ""
+    limited: dict[tuple[str, str], list[str]] = {}
+    for each in audit.classes:
+        if each.observability is not Observability.OBSERVABLE:
+            limited.setdefault(_limit(each, audit), []).append(each.label)
+    clauses = [f"{lead}{_and(labels)} {rest}" for (lead, rest), labels in limited.items()]
+    if not clauses:
+        clauses = [f"the log can show {_and([each.label for each in audit.classes])}"]
+    sentence = "; ".join(clauses)
+    return f"{sentence[0].upper()}{sentence[1:]}."
+
+
+def _limit(each: ClassObservability, audit: Audit) -> tuple[str, str]:
+    """What cannot be seen of a class: the words before and after its name."""
+    if each.observability is Observability.CANNOT_TELL:
+        needed = f"; requires {each.needed:g} Hz" if each.needed else ""
+        return "", f"cannot be observed ({each.reason}{needed})"
+    if each.reason.startswith(MASKED):
+        return "", f"only from {plain(each.low)} to {plain(each.high, 4)} Hz ({each.reason})"
+    above = f"above {plain(each.high, 4)} Hz cannot be seen"
+    reach = audit.bandwidth
+    if each.reason == reach.limit and reach.usable == reach.nyquist / reach.hold:
+        return f"at {plain(2 * reach.usable, 4)} Hz, ", above
+    needed = f"; all of it requires {each.needed:g} Hz" if each.needed else ""
+    return "", f"{above} ({each.reason}{needed})"
+
+
+def _and(words: list[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+
+
+def _plain(name: str, audit: Audit) -> dict[str, Any]:
+    reach = audit.bandwidth
+    return {
+        "run": name,
+        "rate": audit.rate,
+        "duration": audit.duration,
+        "joints": audit.joints,
+        "jitter": dict(zip(("rms", "max"), audit.jitter, strict=True)) if audit.jitter else None,
+        "gaps": asdict(audit.gaps),
+        "bandwidth": {
+            "usable": reach.usable,
+            "limit": reach.limit,
+            "zero_order_hold": reach.hold,
+            "differentiated": reach.differentiator.name if reach.differentiator else None,
+            "filtered_from": reach.corner,
+            "quantisation_step": reach.step,
+            "quantisation_floor_from": reach.floor_from,
+            "quiet_from": reach.quiet_from,
+        },
+        "warnings": list(audit.warnings),
+        "notes": list(audit.notes),
+        "classes": [asdict(each) for each in audit.classes],
+    }
+
+
+# Of files
+
+
+class Audits(NamedTuple):
+    """Audits of many files, each by the name of its run."""
+
+    found: dict[str, Audit]
+    """Of what could be read."""
+    failed: dict[str, str]
+    """Why a file cannot be read."""
+    assumed: dict[str, str]
+    """What was assumed when a log was read, in a line; empty of a run file."""
+    others: str
+    """Which files of folders were not taken for logs; empty if there are none."""
+
+
+def audit_all(paths: Sequence[Path], library: Library, reading: Reading | None = None) -> Audits:
+    """Audit all runs of many files; one bad file never stops the rest."""
+    runs, others = sources(paths, reading)
+    found: dict[str, Audit] = {}
+    failed: dict[str, str] = {}
+    assumed: dict[str, str] = {}
+    for source in runs:
+        name = str(source.shown)
+        try:
+            opened = open_source(source, reading)
+            found[name] = audit(opened.run, library)
+            assumed[name] = opened.assumed
+        except (InspectorError, NoiseModelError) as error:
+            failed[name] = without_path(error, source.path)
+    return Audits(found, failed, assumed, left_out(others))

@@ -1,0 +1,636 @@
+"""What signals of a log tell about how they were made: rates, filters, steps, units, copies."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from inspector.hold import hold_length
+from inspector.logs.motion import contradictions
+from noiseclassifier import LogBands
+from noisemodel import Run
+from noisemodel.differentiate import ORDER, WINDOW, stretches
+from noisemodel.ondemand import pieces
+from noisemodel.types import Array, Mask, Real
+
+# Spectrum
+
+SEGMENT = 0.4
+"""Shortest segment that is transformed: the paper's frame (Sec. III-A), in [s]."""
+
+FEWEST_SAMPLES = 128
+"""Fewest samples of a segment, so that slow logs have a spectrum too."""
+
+MOST = 256
+"""Most segments that are averaged, evenly spread, which limits the cost of long logs."""
+
+PER_OCTAVE = 4
+"""Bands of a smoothed spectrum in an octave."""
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """A one-sided power spectral density.
+
+    Attributes:
+        frequency: Above 0, rising, shape (frequency,), in [Hz].
+        density: Of each joint, shape (frequency, joints), in [(rad/s)²/Hz].
+        rate: Of the samples, in [Hz].
+    """
+
+    frequency: Array
+    density: Array
+    rate: float
+
+    @property
+    def total(self) -> Array:
+        """Sum over the joints, as the noise counts them, shape (frequency,), in [(rad/s)²/Hz]."""
+        return np.asarray(self.density.sum(axis=1))
+
+
+def spectrum(velocity: Real, rate: float, valid: Mask) -> Spectrum | None:
+    """Estimate the spectrum of joint velocities by Welch's method.
+
+    Args:
+        velocity: Shape (samples, joints), in [rad/s].
+        rate: Sample rate, in [Hz].
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        The spectrum without its value at 0 Hz; None if no stretch between gaps is long enough.
+    """
+    length = max(FEWEST_SAMPLES, round(SEGMENT * rate))
+    starts = [
+        start
+        for stretch in stretches(valid, len(valid))
+        for start in range(stretch.start, stretch.stop - length + 1, length // 2)
+    ]
+    if not starts:
+        return None
+    chosen = np.unique(np.linspace(0, len(starts) - 1, min(MOST, len(starts))).round().astype(int))
+    window = np.hanning(length + 1)[:-1]
+    power = np.zeros((velocity.shape[1], length // 2 + 1))
+    for index in chosen:
+        segment = velocity[starts[index] : starts[index] + length].T.astype(np.float64, order="C")
+        power += _square(np.fft.rfft(window * _detrended(segment)))
+    # P. Welch, IEEE Trans. Audio Electroacoust. 15 (1967): one-sided, per hertz
+    density: Array = 2.0 * power / (len(chosen) * rate * np.square(window).sum())
+    frequency = np.arange(1.0, length // 2 + 1.0) * (rate / length)
+    return Spectrum(np.asarray(frequency, dtype=np.float64), density.T[1:], rate)
+
+
+def smoothed(
+    frequency: Array, density: Array, middle: Callable[[Array], float]
+) -> tuple[Array, Array]:
+    """Level of a spectrum in quarters of an octave.
+
+    Returns:
+        Middle of each quarter that has a value, in [Hz], and its level, in [dB]; shape (bands,).
+    """
+    steps = np.round(np.log2(frequency / frequency[-1]) * PER_OCTAVE)
+    places = np.unique(steps)
+    level = [10.0 * np.log10(middle(density[steps == step]) + 1e-300) for step in places]
+    return frequency[-1] * 2.0 ** (places / PER_OCTAVE), np.array(level)
+
+
+def _detrended(segment: Array) -> Array:
+    """Subtract the least-squares line, so that slow motion does not leak to higher frequencies."""
+    ramp = np.linspace(-1.0, 1.0, segment.shape[1])
+    slope = segment @ ramp / np.square(ramp).sum()
+    return np.asarray(segment - segment.mean(axis=1)[:, None] - slope[:, None] * ramp)
+
+
+def _square(amplitude: NDArray[np.complex128]) -> Array:
+    return np.asarray(np.square(amplitude.real) + np.square(amplitude.imag))
+
+
+# Velocities that were differentiated
+
+EXACT = 1e-12
+"""Largest deviation of a difference of positions, as a share of the largest velocity."""
+
+COMPARED = 5000
+"""Samples that are compared, evenly spread, or a few more."""
+
+COARSE = 1e-4
+"""Largest share of floating-point rounding in a velocity that is compared."""
+
+
+@dataclass(frozen=True)
+class Differentiator:
+    """Method by which velocities were computed from positions.
+
+    Attributes:
+        name: The method.
+        weights: Of the positions before and after, evenly about the middle, times the rate;
+            shape (taps,).
+    """
+
+    name: str
+    weights: tuple[float, ...]
+
+    def response(self, frequency: Array, rate: float) -> Array:
+        """Frequency response: velocity by position.
+
+        Args:
+            frequency: Shape (frequency,), in [Hz].
+            rate: Sample rate, in [Hz].
+
+        Returns:
+            Amplitude of the velocity by that of the position, shape (frequency,), in [1/s].
+        """
+        taps = np.arange(len(self.weights)) - (len(self.weights) - 1) / 2
+        turns = np.exp(2j * np.pi * np.outer(frequency, taps) / rate)
+        return np.asarray(rate * np.abs(turns @ np.array(self.weights)))
+
+    def corner(self, rate: float) -> float:
+        """-3 dB frequency of the method, in [Hz]."""
+        frequency = np.linspace(0.0, rate / 2, 1001)[1:]
+        kept = self.response(frequency, rate) / (2 * np.pi * frequency)
+        lost = kept < np.sqrt(0.5)
+        return float(frequency[np.argmax(lost)] if lost.any() else rate / 2)
+
+
+def _savitzky_golay() -> tuple[float, ...]:
+    """Weights of the polynomial's slope in the middle, as `noisemodel.differentiate` takes it."""
+    places = np.arange(WINDOW) - WINDOW // 2
+    fit = np.linalg.pinv(np.vander(places, ORDER + 1, increasing=True).astype(np.float64))
+    return tuple(fit[1].tolist())
+
+
+BACKWARD = Differentiator("difference to the sample before", (-1.0, 1.0))
+FORWARD = Differentiator("difference to the sample after", (-1.0, 1.0))
+CENTRAL = Differentiator("difference of the samples before and after", (-0.5, 0.0, 0.5))
+SMOOTH = Differentiator(f"Savitzky-Golay, window {WINDOW}, order {ORDER}", _savitzky_golay())
+
+
+def derived(run: Run, signal: str) -> bool:
+    """Whether a run's ``meta`` states that a signal was differentiated at import."""
+    differentiated = run.meta.get("differentiated")
+    return isinstance(differentiated, Mapping) and signal in differentiated
+
+
+def differentiator_of(run: Run) -> Differentiator | None:
+    """Method by which a run's velocities were differentiated from its positions.
+
+    Returns:
+        The method, by the run's ``meta`` or as a difference that holds in 99 of 100 samples; None
+        where velocities were measured, or neither is known.
+    """
+    if derived(run, "velocity"):
+        return SMOOTH
+    if run.position is None or len(run.time) < 3:
+        return None
+    inner = np.flatnonzero(run.mask[:-2] & run.mask[1:-1] & run.mask[2:]) + 1
+    inner = inner[:: max(1, len(inner) // COMPARED)]
+    moves = np.ptp(run.velocity[run.mask], axis=0) > 0
+    if not (len(inner) and moves.any()):
+        return None
+    before, here, after = (
+        run.position[inner + step][:, moves].astype(np.float64) for step in (-1, 0, 1)
+    )
+    velocity = run.velocity[inner][:, moves].astype(np.float64)
+    grain = max(np.finfo(run.position.dtype).eps, np.finfo(run.velocity.dtype).eps)
+    rounding = 4.0 * grain * max(np.abs(run.position).max() * run.rate, np.abs(velocity).max())
+    tolerance = rounding + EXACT * np.abs(velocity).max()
+    if tolerance > COARSE * np.sqrt(np.mean(np.square(velocity))):
+        return None
+    found = {
+        BACKWARD: (here - before) * run.rate,
+        FORWARD: (after - here) * run.rate,
+        CENTRAL: (after - before) * run.rate / 2,
+    }
+    return next((how for how, v in found.items() if _same(v - velocity, tolerance)), None)
+
+
+def _same(difference: Array, tolerance: float) -> bool:
+    return bool(np.mean(np.abs(difference) <= tolerance) >= 0.99)
+
+
+# Quantisation
+
+MOST_SAMPLES = 20_000
+"""Most samples of a signal that are used, evenly spread."""
+
+LEVELS = 8
+"""Fewest different values of a signal that have a step."""
+
+WHOLE = 0.02
+"""Largest deviation of the distance of two values from a whole number of steps."""
+
+
+def step_of(values: Real) -> float:
+    """Quantisation step of a signal.
+
+    Returns:
+        The step of which all values are multiples, in the signal's unit; 0 if there is none.
+    """
+    thinned = values[:: max(1, len(values) // MOST_SAMPLES)].astype(np.float64)
+    distances = np.diff(np.unique(thinned))
+    distances = distances[distances > 1e-12 * np.abs(thinned).max()]  # below: a sum's rounding
+    if len(distances) < LEVELS - 1:
+        return 0.0
+    steps = distances / distances.min()
+    fits = np.mean(np.abs(steps - np.rint(steps)) <= WHOLE) >= 0.99
+    return float(distances.min()) if fits else 0.0
+
+
+def steps_of(run: Run, differentiator: Differentiator | None) -> Array:
+    """Quantisation steps of the signal from which a run's velocities come.
+
+    Returns:
+        Steps of the positions if those were differentiated, else of the velocities, 0 where there
+        are none, shape (joints,), in [rad] or [rad/s].
+    """
+    signal = run.position if differentiator and run.position is not None else run.velocity
+    return np.array([step_of(values) for values in signal[run.mask].T])
+
+
+def quantisation_noise(
+    steps: Array, spectrum: Spectrum, differentiator: Differentiator | None
+) -> Array:
+    """Spectrum of the quantisation noise of velocities.
+
+    Returns:
+        Sum over the joints, shape (frequency,), in [(rad/s)²/Hz].
+    """
+    # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
+    white = float(np.square(steps).sum()) / 12.0 / (spectrum.rate / 2)
+    frequency = spectrum.frequency
+    gain = np.ones(len(frequency))
+    if differentiator:
+        gain = differentiator.response(frequency, spectrum.rate)
+    return np.asarray(white * np.square(gain))
+
+
+def floor_frequency(spectrum: Spectrum, floor: Array) -> float:
+    """Frequency above which a spectrum is less than twice its noise floor, in amplitude.
+
+    Returns:
+        The frequency, in [Hz]; the Nyquist frequency if the spectrum stays above.
+    """
+    frequency, level = smoothed(spectrum.frequency, spectrum.total, np.mean)
+    _, lowest = smoothed(spectrum.frequency, floor, np.mean)
+    above = np.flatnonzero(level > lowest + 6.0)
+    # The last band is left out: anti-aliasing filters end there.
+    above = above[above < len(level) - 1]
+    first = int(above[-1]) + 1 if len(above) else 0
+    return float(frequency[first]) if first < len(level) - 1 else spectrum.rate / 2
+
+
+# Bandwidth
+
+ENCODER_NOISE = LogBands().floor
+"""Least amplitude in one window of the shipped models: no encoder has less noise, in [rad/s]."""
+
+RESOLUTION = 1.0 / LogBands().window
+"""Frequency resolution of one window of those models, in [Hz]."""
+
+
+@dataclass(frozen=True)
+class Bandwidth:
+    """The frequencies that a log holds.
+
+    Attributes:
+        nyquist: Half the sample rate, in [Hz].
+        hold: Length of the zero-order hold of measured values, in samples; 1 without one.
+        differentiator: How velocities were computed from positions; None if they were measured.
+        corner: -3 dB frequency of a filter, in [Hz]; None without a sign of one.
+        step: Largest quantisation step, in [rad/s], or in [rad] of the positions that were
+            differentiated; 0 without one.
+        floor_from: Frequency above which the spectrum is at the quantisation floor, in [Hz]; None
+            if it stays above, or the run is too short for a spectrum.
+        floor_amplitude: Largest oscillation that quantisation masks at ``floor_from``, in [rad/s].
+        quiet_from: Frequency above which the level is below any encoder's noise, in [Hz]; None if
+            it stays above.
+    """
+
+    nyquist: float
+    hold: float = 1.0
+    differentiator: Differentiator | None = None
+    corner: float | None = None
+    step: float = 0.0
+    floor_from: float | None = None
+    floor_amplitude: float = 0.0
+    quiet_from: float | None = None
+
+    @property
+    def limits(self) -> dict[str, float]:
+        """Upper limits of the bandwidth by their cause, in [Hz]."""
+        rate = 2 * self.nyquist
+        limits = {f"half the rate of {rate:g} Hz": self.nyquist}
+        if self.hold > 1:
+            limits[f"zero-order hold of {self.hold:.3g} samples"] = self.nyquist / self.hold
+        if self.differentiator:
+            limits["velocities were differentiated"] = self.differentiator.corner(rate)
+        if self.corner:
+            limits["the log looks filtered"] = self.corner
+        return limits
+
+    @property
+    def usable(self) -> float:
+        """Lowest of the limits, in [Hz]."""
+        return min(self.limits.values())
+
+    @property
+    def limit(self) -> str:
+        """Cause of the lowest limit."""
+        return min(self.limits, key=lambda name: self.limits[name])
+
+
+def bandwidth(run: Run) -> Bandwidth:
+    """Measure the bandwidth of a run.
+
+    Returns:
+        Its bandwidth; without filter and quantisation floor, which require a spectrum, if no
+        stretch between gaps lasts 0.4 s and 128 samples.
+    """
+    differentiator, hold = differentiator_of(run), hold_length(run.velocity, run.mask)
+    if run.position is not None and differentiator:
+        hold = max(hold, hold_length(run.position, run.mask))
+    plain = Bandwidth(run.rate / 2, hold, differentiator)
+    found = spectrum(run.velocity, run.rate, run.mask)
+    if found is None or not found.total.any():
+        return plain
+    steps = steps_of(run, differentiator)
+    noise = quantisation_noise(steps, found, differentiator)
+    # A sine of amplitude a in a band of width b has the mean density a² / 2b.
+    encoders = np.full(len(noise), ENCODER_NOISE**2 / (2 * RESOLUTION))
+    floor, quiet = floor_frequency(found, noise), floor_frequency(found, encoders)
+    place = min(int(np.searchsorted(found.frequency, floor)), len(noise) - 1)
+    # Hold and differentiation attenuate high frequencies too, without a filter.
+    attenuated = hold > 1 or differentiator is not None
+    return Bandwidth(
+        run.rate / 2,
+        hold,
+        differentiator,
+        corner=None if attenuated else corner(found, np.maximum(noise, encoders)),
+        step=float(steps.max()),
+        floor_from=floor if floor < run.rate / 2 else None,
+        floor_amplitude=(
+            float(np.sqrt(2 * RESOLUTION * noise[place])) if floor < run.rate / 2 else 0.0
+        ),
+        quiet_from=quiet if quiet < run.rate / 2 else None,
+    )
+
+
+FLAT = 4.5
+"""Most variation in a flat octave, less than the 6 of a first-order filter, in [dB]."""
+
+STEEP = 9.0
+"""Least slope of a filter: below second order's 12, above the 6 with which encoders and drives
+attenuate white noise, in [dB] an octave."""
+
+DROP = 15.0
+"""Least attenuation of a filter within two octaves or up to the Nyquist frequency, in [dB]."""
+
+LOUD = 0.03
+"""Root mean square from which an octave is vibration, not background noise: no filter ends it. The
+threshold of the scenarios' labels, in [rad/s]."""
+
+
+def corner(spectrum: Spectrum, floor: Array) -> float | None:
+    """Find the corner frequency of a filter.
+
+    A robot's spectrum falls from its motion to the noise of sensors and drives, which is flat or
+    falls gently. A filter shows as an octave of that noise that is flat, and a fall that is steep
+    and extends to the Nyquist frequency or into the ``floor``. A vibration in one band falls
+    steeply too, but is louder, or ends on noise.
+
+    Returns:
+        Its -3 dB frequency, in [Hz]; None if there is no sign of a filter.
+    """
+    frequency, level = smoothed(spectrum.frequency, spectrum.total, np.median)
+    _, lowest = smoothed(spectrum.frequency, floor, np.median)
+    above = level > lowest + 3.0
+    for place in range(len(frequency) - 2, PER_OCTAVE - 1, -1):
+        flat = level[place - PER_OCTAVE : place + 1]
+        end = min(place + 2 * PER_OCTAVE, len(frequency) - 1)
+        drop = level[place] - level[end]
+        octaves = np.log2(frequency[end] / frequency[place])
+        if not above[place] or np.ptp(flat) > FLAT or drop < max(DROP, STEEP * octaves):
+            continue
+        octave = 10.0 ** (np.median(flat) / 10.0) * frequency[place] / 2
+        if octave < LOUD**2 and _goes_on(level, above, place):
+            plateau = float(np.median(flat))
+            return float(frequency[np.flatnonzero(level[: place + 1] >= plateau - 3.0)[-1]])
+    return None
+
+
+def _goes_on(level: Array, above: Mask, place: int) -> bool:
+    """Whether what follows ``place`` falls, octave by octave, into the floor or up to the end."""
+    below = np.flatnonzero(~above[place:])
+    end = place + int(below[0]) if len(below) else len(level) - 1
+    starts = np.arange(place + 1, end - PER_OCTAVE + 1)
+    falls = level[starts] - level[starts + PER_OCTAVE]
+    return bool((falls >= STEEP).all())
+
+
+# Copies, units, and placeholders
+
+FARTHEST = 10
+"""Largest lag of a copy, before or after, in samples."""
+
+EXAMINED = 1000
+"""Samples in motion that are compared, evenly spread, or a few more."""
+
+SAME = 0.99
+"""Least share of equal samples, bit for bit, among those in motion."""
+
+
+@dataclass(frozen=True)
+class Copy:
+    """A measured signal that equals the desired one.
+
+    Attributes:
+        signal: "position" or "velocity".
+        joints: Its joints.
+        lag: Samples by which the measured signal comes after the desired one.
+    """
+
+    signal: str
+    joints: tuple[str, ...]
+    lag: int
+
+
+def copies(run: Run) -> tuple[Copy, ...]:
+    """Find desired signals that equal measured ones, perhaps some samples apart."""
+    found = []
+    for signal in ("position", "velocity"):
+        measured, desired = getattr(run, signal), getattr(run, f"{signal}_desired")
+        if measured is None or desired is None or derived(run, signal):
+            continue
+        actual, wanted = (np.ascontiguousarray(each[run.mask].T) for each in (measured, desired))
+        lags = {}
+        for name in (name for name in run.joint_names if name in run.desired_joint_names):
+            lag = _lag(
+                actual[run.joint_names.index(name)], wanted[run.desired_joint_names.index(name)]
+            )
+            if lag is not None:
+                lags[name] = lag
+        if lags:
+            found.append(Copy(signal, tuple(lags), min(lags.values(), key=abs)))
+    return tuple(found)
+
+
+def _lag(measured: Real, desired: Real) -> int | None:
+    """Find the shift at which two signals are equal, None if there is none."""
+    samples = len(measured)
+    changes = np.flatnonzero(desired[1:] != desired[:-1])
+    for lag in sorted(range(-FARTHEST, FARTHEST + 1), key=abs):
+        ends = np.searchsorted(changes, (max(-lag, 0), samples - max(lag, 0) - 1))
+        moving = changes[slice(*ends)]
+        moving = moving[:: max(1, len(moving) // EXAMINED)]
+        equal = np.count_nonzero(measured[moving + lag] == desired[moving])
+        if len(moving) >= FARTHEST and equal >= SAME * len(moving):
+            return lag
+    return None
+
+
+TURNS = 4 * np.pi
+"""Largest plausible position of a joint that is not continuous, in [rad]."""
+
+FAST = 100.0
+"""Largest plausible velocity of a joint, in [rad/s]."""
+
+ROUND_ENDS = (1.0, 100.0)
+"""Ends of the ranges that positions are normalised to."""
+
+
+def unit_warnings(run: Run) -> Iterator[str]:
+    """Warnings about values that look like another unit, a clause each."""
+    if not run.joint_names:
+        return
+    yield from contradictions(run)
+    if run.position is not None:
+        yield from _angles(run, np.abs(run.position[run.mask]).max(axis=0))
+    speeds = np.abs(run.velocity[run.mask]).max(axis=0)
+    fast = int(np.argmax(speeds))
+    if speeds[fast] > FAST:
+        yield (
+            f"velocities look like degrees or turns per minute"
+            f" ({run.joint_names[fast]} reaches {speeds[fast]:.4g})"
+        )
+
+
+def _angles(run: Run, reach: Array) -> Iterator[str]:
+    """Warnings about positions that reach too far, or stop at round numbers."""
+    largest = float(reach.max())
+    if largest in ROUND_ENDS and _stops_at(run, largest) >= 2:
+        yield f"positions look normalised: several joints stop at {largest:g}"
+        return
+    moving = np.ptp(run.velocity[run.mask], axis=0) > 0
+    far = (reach > TURNS / 2) & moving
+    enough = np.sum(far) > 1 or (reach[far] > TURNS).any()
+    if enough and 2 * np.sum(far) >= max(1, np.sum(moving)):
+        other = " or normalised" if largest <= max(ROUND_ENDS) else ""
+        joint = run.joint_names[int(np.argmax(reach))]
+        yield f"positions look like degrees{other} ({joint} reaches {largest:.4g})"
+
+
+def _stops_at(run: Run, end: float) -> int:
+    """Count the joints that are at one position, to the bit, for two samples in a row."""
+    assert run.position is not None
+    there = np.abs(run.position) == end
+    return int(np.sum((there[1:] & there[:-1]).any(axis=0)))
+
+
+MOVES = 0.1
+"""Speed from which a joint moves, in [rad/s] or [m/s]: pushes on a standing arm peak below."""
+MOVING_TIME = 2.0
+"""Stretch of time in which it has to move, in [s]."""
+MOVING_SHARE = 0.75
+"""Share of that time: a motion reverses now and then, a push is over sooner."""
+CHANGE = 1e-6
+"""Change of a desired position from which it changes, in [rad] or [m]."""
+AT_ONCE = 1_000_000
+"""Samples that are counted at once."""
+FAINTEST = 0.05
+"""Most quantisation noise of a differentiated velocity, RMS in [rad/s]: faults begin there."""
+
+
+def placeholder(run: Run) -> str:
+    """Check whether the desired velocity is not the desired motion.
+
+    Controllers that take position targets write zeros in its place. They are a placeholder if the
+    desired position changes meanwhile, or if some joint is faster than 0.1 rad/s for three quarters
+    of any two seconds. The zeros of a robot that has to stand remain, also when it is pushed.
+    A velocity that was differentiated from desired positions is none if their quantisation steps
+    alone make more than 0.05 rad/s of it.
+
+    Returns:
+        A clause that says so; empty if the desired velocity is one, or there is none.
+    """
+    desired = run.velocity_desired
+    if desired is None or not desired.size:
+        return ""
+    if any(np.any(desired[rows]) for rows in pieces(desired)):
+        return _coarse(run)
+    if _changes(run):
+        return "the desired velocity is zero throughout while the desired position changes"
+    if _moves(run):
+        return (
+            "the desired velocity is zero throughout while joints move at more than"
+            f" {MOVES:g} rad/s for seconds"
+        )
+    return ""
+
+
+def without_placeholder(run: Run) -> tuple[Run, str]:
+    """Leave a desired velocity out that is a placeholder.
+
+    Returns:
+        The run, without its desired velocity if that is a placeholder, and a sentence that says
+        so; the run itself and an empty text otherwise.
+    """
+    clause = placeholder(run)
+    if not clause:
+        return run, ""
+    said = f"{clause[0].upper()}{clause[1:]}: it was left out."
+    return replace(run, velocity_desired=None), said
+
+
+def _changes(run: Run) -> bool:
+    """Whether the desired position changes."""
+    if run.position_desired is None:
+        return False
+    wanted = run.position_desired
+    low, high = np.full(wanted.shape[1], np.inf), np.full(wanted.shape[1], -np.inf)
+    for rows in pieces(wanted):
+        part = wanted[rows][run.mask[rows]]
+        low = np.minimum(low, part.min(axis=0, initial=np.inf))
+        high = np.maximum(high, part.max(axis=0, initial=-np.inf))
+    return bool((high - low).max() > CHANGE)
+
+
+def _coarse(run: Run) -> str:
+    """Say that desired positions have steps too large to be differentiated; empty if not."""
+    if not derived(run, "velocity_desired") or run.position_desired is None:
+        return ""
+    valid = np.flatnonzero(run.mask)
+    thinned = valid[:: max(1, len(valid) // MOST_SAMPLES)]
+    step = max(step_of(position) for position in run.position_desired[thinned].T)
+    # B. Widrow, IRE Trans. Circuit Theory 3 (1956): white noise of power step² / 12.
+    noise = step / 12**0.5 * run.rate * float(np.linalg.norm(SMOOTH.weights))
+    if noise <= FAINTEST:
+        return ""
+    return (
+        f"the desired velocity has {noise:.2g} rad/s of noise, since it was differentiated from"
+        f" positions in steps of {step:.2g} rad"
+    )
+
+
+def _moves(run: Run) -> bool:
+    """Whether some joint is faster than ``MOVES`` for most of some ``MOVING_TIME``."""
+    size = round(MOVING_TIME * run.rate)
+    if len(run.time) < size or not run.joint_names:
+        return False
+    fast = run.mask.copy()
+    for rows in pieces(run.velocity):
+        fast[rows] &= np.abs(run.velocity[rows]).max(axis=1) > MOVES
+    for first in range(0, len(fast) - size + 1, AT_ONCE):
+        count = np.append(0, np.cumsum(fast[first : first + AT_ONCE + size]))
+        if (count[size:] - count[:-size]).max() >= MOVING_SHARE * size:
+            return True
+    return False
