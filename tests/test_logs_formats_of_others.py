@@ -5,21 +5,15 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from commandline import call
 
-import noiseclassifier as nc
 from inspector import read_log
 from inspector.errors import LogError
-from inspector.logs.clocks import RATES, SLOWEST_SECONDS
-from inspector.logs.motion import FARTHEST, NORMALISED
 from noisemodel import Run
-
-PAGE = Path(__file__).parents[1] / "docs" / "logs.md"
 
 TIME = np.arange(21) / 100
 EPOCH = 1_700_000_000
@@ -544,25 +538,7 @@ def test_there_are_enough_formats_of_different_names():
     assert len({each.title for each in FORMATS}) == len(FORMATS)
 
 
-def test_the_page_has_exactly_the_formats_that_are_tested():
-    page = PAGE.read_text(encoding="utf-8").split("## Formats\n")[1].split("\n## ")[0]
-    rows = [line for line in page.splitlines() if line.startswith("| ")][1:]
-    assert rows == [each.row for each in FORMATS]
-
-
-def test_the_page_states_the_limits_of_the_rules():
-    page = PAGE.read_text(encoding="utf-8")
-    for words in (
-        f"from {RATES[0]:g} Hz to {RATES[1] / 1e3:g} kHz",
-        f"up to {SLOWEST_SECONDS:g} s",
-        f"goes beyond {FARTHEST:g}°",
-        f"beyond {NORMALISED:g}",
-        f"within {100 * nc.profile.NOMINAL:g} %",
-    ):
-        assert words in page, words
-
-
-def test_what_is_typed_on_the_page_is_what_the_command_takes(tmp_path):
+def test_what_is_typed_is_what_the_command_takes(tmp_path):
     for number, each in enumerate(each for each in FORMATS if each.typed):
         path = tmp_path / f"log{number}.csv"
         path.write_text(each.text)
