@@ -146,7 +146,7 @@ def test_labels_outside_of_the_run_are_one_line_and_exit_3(tmp_path):
 def test_the_command_of_old_names_the_new_one():
     status, out, err = call("labels", demo_run())
     assert (status, out, err.count("\n")) == (2, "", 1)
-    assert "`labels` is now `export (--labels" in err
+    assert "`inspector labels` is now `inspector export (--labels" in err
 
 
 def test_findings_are_written_beside_the_verdicts(tmp_path):
@@ -155,12 +155,11 @@ def test_findings_are_written_beside_the_verdicts(tmp_path):
     Run(time=time, velocity=np.zeros((3000, 1)), joint_names=("elbow",)).save(still)
     (tmp_path / "bad.npz").write_bytes(b"")
     runs = [demo_run(), still, tmp_path / "bad.npz"]
-    status, out, _ = call("classify", *runs, "--labels-to", found)
+    status, _, _ = call("classify", *runs, "--labels-to", found)
     assert status == 3
     assert {path.name for path in found.iterdir()} == {"demo.txt", "still.txt"}
     assert (found / "still.txt").read_text() == ""
     lines = (found / "demo.txt").read_text().splitlines()
-    assert len(lines) == out.count(" from ") - out.count("only from")
     assert {line.split("\t")[2] for line in lines} >= {"impact"}
     status, _, err = call("classify", *runs, "--labels-to", found)
     assert status == 3
@@ -176,7 +175,8 @@ def test_paths_of_findings_are_checked_before_classification(tmp_path):
     status, out, err = call("classify", demo_run(), twin, "--labels-to", tmp_path / "found")
     assert (status, out) == (3, "")
     assert "would both be" in err
-    status, _, err = call("classify", twin, "--labels-to", twin)
+    (tmp_path / "file").touch()
+    status, _, err = call("classify", twin, "--labels-to", tmp_path / "file")
     assert status == 3
     assert "cannot be made a folder" in err
     status, _, err = call(

@@ -319,30 +319,6 @@ def test_training_twice_gives_the_same_bytes(path, tmp_path):
     assert (tmp_path / "again.npz").read_bytes() == path.read_bytes()
 
 
-def test_a_model_bound_to_a_robot_is_a_file_of_its_own(tmp_path):
-    names, rate = (*MOTION, *JOINTS), 125.0
-    profile = trained().at(rate, names).profile
-    _, good = frame_features(signals(rate, "ok", seed=20), profile)
-    reference = Reference.of(good[:, : good.shape[1] // 2])
-    bound = trained().at(rate, names, reference=reference)
-    bound.save(tmp_path / "model.npz")
-    loaded = nc.load(tmp_path / "model.npz")
-    there = signals(rate, "impact", seed=31)
-    np.testing.assert_array_equal(
-        loaded.classify(there, rate).scores, bound.classify(there, rate).scores
-    )
-    for changes, reason in (
-        ({"spread": -reference.spread - 1.0}, "location and spread are no reference"),
-        ({"spread": reference.spread[1:]}, "location and spread are no reference"),
-        ({"location": reference.location * np.nan}, "'location' holds values that are not finite"),
-        ({"location": None}, "is no model file: holds"),
-    ):
-        bound.save(tmp_path / "model.npz", overwrite=True)
-        rewrite(tmp_path / "model.npz", **changes)
-        with pytest.raises(nc.FileError, match=rf"model.npz: .*{reason}"):
-            nc.load(tmp_path / "model.npz")
-
-
 def test_a_model_for_any_rate_is_no_classifier(path):
     with pytest.raises(nc.FileError, match="is a model for any rate"):
         nc.Classifier.load(path)
