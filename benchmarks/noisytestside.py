@@ -100,7 +100,7 @@ class Ours:
         import noiseclassifier as nc
 
         self._models, self._folder = nc, folder
-        self._profile = nc.noisytest.profile_from_config(folder / "noisytest-config.json")
+        self._profile = nc.Profile.noisytest()
 
     def tasks(self) -> dict[str, Callable[[], Any]]:
         """The tasks, by name."""

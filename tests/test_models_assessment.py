@@ -18,7 +18,7 @@ from predicted_runs import (
 
 import noiseclassifier as nc
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.evaluation.assessment import WORDS, measure, number, table
+from noiseclassifier.evaluation.assessment import measure, number, table
 from noiseclassifier.evaluation.intervals import Estimate, Resampling
 from noiseclassifier.evaluation.matching import Unanswered, are_probabilities, failure_score
 from noiseclassifier.evaluation.measures import Reliability
@@ -224,27 +224,6 @@ def test_lines_are_short_and_lists_too():
     text = str(measure(many(40, ["ok"] * 47)))
     assert max(map(len, text.splitlines())) <= 120
     assert "and 75 more" in text
-
-
-def test_a_table_of_arrow_has_all_measures_in_long_form():
-    many_robots = [predicted(f"go2/good-{seed:03d}", GOOD) for seed in range(6)]
-    found = measure([*many(6), *many_robots])
-    table = found.to_arrow()
-    assert table.column_names[:4] == ["of", "measure", "class", "robot"]
-    rows = {tuple(row[name] for name in WORDS): row for row in table.to_pylist()}
-    assert len(rows) == len(table)
-    recall = rows["frames", "recall", "impact", None, None, None]
-    expected = found.frames.recall["impact"].as_dict()
-    assert {name: recall[name] for name in expected} == expected
-    f1 = found.protocol.alike["class_f1"]
-    assert rows["protocol", "class_f1", None, None, None, None]["value"] == f1.value
-    assert rows["protocol", "recall_felt", None, "talos", None, None]["value"] == 1.0
-    assert rows["chance", "class_f1", None, None, None, None]["value"] < f1.value
-    assert {row["class"] for row in rows.values()} == {None, *CLASSES}
-    for domain, ranked in found.protocol.ranked.items():
-        auc = rows["protocol", "auc", None, None, domain, None]
-        assert auc["value"] == pytest.approx(ranked.auc, nan_ok=True)
-    assert found.protocol.ranked
 
 
 def test_probabilities_differ_from_margins():

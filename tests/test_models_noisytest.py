@@ -1,5 +1,4 @@
 import hashlib
-import json
 from contextlib import suppress
 from math import inf
 
@@ -10,7 +9,6 @@ from hypothesis import strategies as st
 
 import noiseclassifier as nc
 from noiseclassifier.noisytest import (
-    profile_from_config,
     read_annotations,
     read_folder,
     read_recording,
@@ -183,63 +181,3 @@ def test_an_empty_folder_is_refused(tmp_path):
         list(read_folder(tmp_path))
     with pytest.raises(nc.FileError, match="is no folder"):
         list(read_folder(tmp_path / "none"))
-
-
-def config(path, **sections):
-    path.write_text(json.dumps({name: {"arguments": each} for name, each in sections.items()}))
-    return path
-
-
-def test_noisytests_configuration_becomes_a_profile(tmp_path):
-    path = config(
-        tmp_path / "config.json",
-        import_preprocessor={"keywords_to_target_data": {"rattle": 1, "ok": 0}},
-        feature_preprocessor={"fft_stride_length": 401},
-        model={"regularization": 1, "kernel_gamma": 0.001, "kernel": "linear"},
-    )
-    profile = profile_from_config(path)
-    assert (profile.name, profile.bands) == ("noisytest", "comb")
-    assert profile.classes == ("ok", "rattle")
-    assert (profile.stride, profile.regularization, profile.gamma) == (401, 1, 0.001)
-    assert profile.kernel == "linear"
-
-
-def test_an_empty_configuration_is_noisytests_default(tmp_path):
-    path = tmp_path / "config.json"
-    path.write_text("{}")
-    assert profile_from_config(path) == nc.Profile.noisytest("rbf")
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("{", "is no JSON"),
-        ("[]", "the configuration is .*, expected a JSON object"),
-        ('{"modell": {}}', "unknown key 'modell' in the configuration; it takes import_pre"),
-        ('{"model": {"args": {}}}', "unknown key 'args' in model; it takes arguments"),
-        ('{"model": {"arguments": {"C": 1}}}', "unknown key 'C' in model; it takes regularization"),
-        ('{"model": {"arguments": {"kernel": "poly"}}}', "kernel is 'poly', expected one of"),
-        ('{"model": {"arguments": {"kernel_gamma": "scale"}}}', "gamma is 'scale', expected a fin"),
-        (
-            '{"feature_preprocessor": {"arguments": {"fft_sample_length": 512}}}',
-            "expected a multiple of three",
-        ),
-        (
-            '{"import_preprocessor": {"arguments": {"keywords_to_target_data": {"ok": 1}}}}',
-            "expected labels with the numbers 0, 1, 2",
-        ),
-        (
-            '{"import_preprocessor": {"arguments": {"keywords_to_target_data": {"bad":0,"ok":1}}}}',
-            "classes are bad, ok, expected 'ok' and others",
-        ),
-    ],
-)
-def test_what_is_wrong_with_a_configuration_is_named(tmp_path, text, reason):
-    path = tmp_path / "config.json"
-    path.write_text(text)
-    with pytest.raises(nc.FileError, match=rf"config.json: .*{reason}"):
-        profile_from_config(path)
-
-
-def test_the_stand_ins_configuration_is_the_golden_profile(lola):
-    assert profile_from_config(lola / "noisytest-config.json") == nc.Profile.noisytest("rbf")

@@ -7,7 +7,6 @@ from noiseclassifier.recording import (
     folds,
     group_of,
     held_out,
-    leave_one_out,
     robot_of,
     seen,
 )
@@ -82,18 +81,6 @@ def test_the_test_set_is_fixed_by_names_alone():
     assert share == pytest.approx(0.25, abs=0.015)
     assert not any(held_out(group, 0.0) for group in GROUPS)
     assert all(held_out(group, 1.0) for group in GROUPS)
-
-
-def test_each_robot_is_left_out_once():
-    robots = [robot_of(run) for run in RUNS]
-    split = leave_one_out(robots)
-    assert [name for name, _, _ in split] == ["go2", "panda", "talos"]
-    for name, train, test in split:
-        assert {robots[i] for i in test} == {name}
-        assert name not in {robots[i] for i in train}
-        assert len(train) + len(test) == len(RUNS)
-    with pytest.raises(nc.DatasetError, match=r"one robot .* of 1 \(go2\); expected two"):
-        leave_one_out(["go2", "go2"])
 
 
 TRAIN = {"talos/straight-001": "aa", "run7": "bb", "standin": ""}

@@ -48,7 +48,6 @@ READERS = {
     "tuned.jsonl": read_tuning,
     "noisytest.toml": noisytest.read_annotations,
     "noisytest.log": nc.read_log,
-    "noisytest-config.json": noisytest.profile_from_config,
     "dataset.json": lambda path: Folder.opened(path.parent),
 }
 EXPECTED = (InspectorError, nc.ModelsError, DatasetError)

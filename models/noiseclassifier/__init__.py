@@ -46,7 +46,6 @@ from noiseclassifier.recording import (
     folds,
     group_of,
     held_out,
-    leave_one_out,
 )
 from noiseclassifier.signals import NOISE, Signals
 from noiseclassifier.stream import Stream
@@ -98,7 +97,6 @@ __all__ = [
     "frames_of",
     "group_of",
     "held_out",
-    "leave_one_out",
     "load",
     "match",
     "merged",

@@ -1,26 +1,21 @@
-"""NoisyTest's folders, configuration, and ``.log``: a row of time and noise for each sample."""
+"""NoisyTest's folders, and its ``.log``: a row of time and noise for each sample."""
 
 import hashlib
 import stat
 import warnings
 from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import replace
 from math import inf
 from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
 
-from noiseclassifier.errors import AnnotationError, FileError, ProfileError, RateError
-from noiseclassifier.jsontext import from_json, from_toml, text_of
-from noiseclassifier.profile import CLASSES, TOLERANCE, Profile
+from noiseclassifier.errors import AnnotationError, FileError, RateError
+from noiseclassifier.jsontext import from_toml, text_of
+from noiseclassifier.profile import TOLERANCE
 from noiseclassifier.recording import Block, Recording
 from noiseclassifier.types import Array
 
-LARGE = 1_000_000
-"""Files of so many bytes or more are read by Arrow: a quarter of NumPy's time, after 45 ms for its
-import."""
 LONGEST_LINE = 2**16
 """Characters of a line: far more than those of two numbers and a comment."""
 
@@ -67,9 +62,6 @@ def _check_regular(path: str | Path) -> None:
 
 def _read_fast(path: str | Path) -> Array | None:
     """Array by a compiled reader; None if it fails, or the rows are ragged."""
-    with suppress(OSError):
-        if Path(path).stat().st_size >= LARGE and (columns := _read_by_arrow(path)) is not None:
-            return columns
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -81,30 +73,6 @@ def _read_fast(path: str | Path) -> Array | None:
             return None
         except OSError as error:
             raise FileError(path, f"cannot be read ({error.strerror or error})") from error
-
-
-def _read_by_arrow(path: str | Path) -> Array | None:
-    """Array of rows with one blank, below comments; None of any other layout."""
-    import pyarrow
-    from pyarrow import csv
-
-    start = 0
-    with Path(path).open("rb") as stream:
-        while stream.readline(LONGEST_LINE).startswith(b"#"):
-            start = stream.tell()
-        stream.seek(start)
-        try:
-            table = csv.read_csv(
-                stream,
-                read_options=csv.ReadOptions(use_threads=False, column_names=["time", "noise"]),
-                parse_options=csv.ParseOptions(delimiter=" ", quote_char=False),
-                convert_options=csv.ConvertOptions(
-                    column_types=dict.fromkeys(("time", "noise"), pyarrow.float64()), null_values=[]
-                ),
-            )
-        except pyarrow.ArrowInvalid:
-            return None
-    return np.stack([column.to_numpy() for column in table.columns], axis=1)
 
 
 def _lines(path: str | Path, stream: TextIO) -> Iterator[str]:
@@ -156,18 +124,6 @@ def _check_time(path: str | Path, time: Array) -> None:
             f" {time[row]:.9g} s, then {time[row + 1]:.9g} s, where a step is {step:.6g} s",
         )
 
-
-_SETTINGS = {
-    "import_preprocessor": {
-        "keywords_to_target_data": "classes",
-        "samples_per_frame": "length",
-        "time_frame_stride": "hop",
-        "input_data_sample_rate": "rate",
-    },
-    "feature_preprocessor": {"fft_sample_length": "window", "fft_stride_length": "stride"},
-    "model": {"regularization": "regularization", "kernel": "kernel", "kernel_gamma": "gamma"},
-}
-"""Settings of a profile by NoisyTest's names, by section of its configuration."""
 
 END = -1.0
 """A stop that stands for the end of the recording."""
@@ -252,37 +208,6 @@ def parse_annotations(text: str) -> Iterator[Block]:
         yield _block(span, label, f"chunk {count}")
 
 
-def profile_from_config(path: str | Path) -> Profile:
-    """Profile of NoisyTest's JSON configuration, with NoisyTest's defaults.
-
-    Args:
-        path: The file, say ``noisytest-config.json``.
-
-    Returns:
-        A profile with NoisyTest's quirks.
-
-    Raises:
-        FileError: If the file is no such configuration, or a name in it is unknown.
-    """
-    try:
-        config = from_json(text_of(path))
-    except OSError as error:
-        raise FileError(path, f"cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise FileError(path, f"is no JSON ({error})") from error
-    settings = Profile.noisytest().as_dict()
-    for section, content in _known(path, config, _SETTINGS, "the configuration").items():
-        arguments = _known(path, content, ("arguments",), section).get("arguments", {})
-        names = _SETTINGS[section]
-        for key, value in _known(path, arguments, names, section).items():
-            settings[names[key]] = _classes(path, value) if names[key] == "classes" else value
-    try:
-        profile = Profile.of(settings)
-    except ProfileError as error:
-        raise FileError(path, str(error)) from error
-    return replace(profile, open_end=round(0.1 * profile.rate))
-
-
 def _block(span: Any, label: Any, where: str) -> Block:
     numbers = isinstance(span, list) and [
         type(each) in (int, float) and -LATEST < each < LATEST for each in span
@@ -293,25 +218,3 @@ def _block(span: Any, label: Any, where: str) -> Block:
         )
     start, stop = float(span[0]), float(span[1])
     return Block(start, inf if stop == END else stop, label)
-
-
-def _known(path: str | Path, table: Any, names: Any, where: str) -> dict[str, Any]:
-    """A table without unknown names."""
-    if not isinstance(table, dict):
-        raise FileError(path, f"{where} is {table!r}, expected a JSON object")
-    for key in table:
-        if key not in names:
-            raise FileError(path, f"unknown key {key!r} in {where}; it takes {', '.join(names)}")
-    return table
-
-
-def _classes(path: str | Path, targets: Any) -> tuple[str, ...]:
-    """Labels in the order of their numbers, which have to be 0, 1, 2 and so on."""
-    if not targets:
-        return CLASSES
-    if not isinstance(targets, dict) or sorted(targets.values(), key=str) != [*range(len(targets))]:
-        raise FileError(
-            path,
-            f"keywords_to_target_data is {targets!r}, expected labels with the numbers 0, 1, 2…",
-        )
-    return tuple(sorted(targets, key=lambda label: int(targets[label])))

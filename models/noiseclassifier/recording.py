@@ -231,18 +231,6 @@ def folds(groups: Sequence[str], count: int) -> list[tuple[Index, Index]]:
     ]
 
 
-def leave_one_out(robots: Sequence[str]) -> list[tuple[str, Index, Index]]:
-    """Split by robot, to measure a model on robots without training runs."""
-    each = np.asarray(robots, dtype=str)
-    names = np.unique(each).tolist()
-    if len(names) < 2:
-        raise DatasetError(
-            f"one robot cannot be left out of {len(names)} ({', '.join(names) or 'none'});"
-            " expected two or more"
-        )
-    return [(name, np.flatnonzero(each != name), np.flatnonzero(each == name)) for name in names]
-
-
 def seen(train: Mapping[str, str], test: Mapping[str, str]) -> dict[str, str]:
     """Test recordings that a model was trained on, or that share their motion with such."""
     hashes = {digest: name for name, digest in train.items() if digest}

@@ -64,7 +64,22 @@ LEAST_SAMPLES = 2
 Recipe: TypeAlias = str | LogBands | Profile
 
 
-class NoiseFeatures(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):  # type: ignore[misc]
+class _Framed(BaseEstimator):  # type: ignore[misc]
+    """The settings of frames, which the transformer and the classifier share."""
+
+    def __init__(
+        self,
+        profile: Recipe = "scalar",
+        *,
+        rate: float = 1000.0,
+        settings: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.profile = profile
+        self.rate = rate
+        self.settings = settings
+
+
+class NoiseFeatures(ClassNamePrefixFeaturesOutMixin, TransformerMixin, _Framed):  # type: ignore[misc]
     """Log-band energies of frames, pooled over time, as a transformer.
 
     Args:
@@ -78,17 +93,6 @@ class NoiseFeatures(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstim
             window is a single window, whose bands are the bins of its Fourier transform.
         n_features_in_: Samples of a frame, times the number of signals.
     """
-
-    def __init__(
-        self,
-        profile: Recipe = "scalar",
-        *,
-        rate: float = 1000.0,
-        settings: Mapping[str, Any] | None = None,
-    ) -> None:
-        self.profile = profile
-        self.rate = rate
-        self.settings = settings
 
     def fit(self, X: ArrayLike, y: object = None) -> Self:
         """Choose windows and bands for the length of the frames.
@@ -118,7 +122,7 @@ def _has_probabilities(classifier: "NoiseClassifier") -> bool:
     return issubclass(ESTIMATORS[kind], Probable)
 
 
-class NoiseClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
+class NoiseClassifier(ClassifierMixin, _Framed):  # type: ignore[misc]
     """Classifier of frames: features of a profile, standardised, and its estimator.
 
     The class of a frame is that of the highest score: the alarm threshold, the unknown frames and
@@ -137,17 +141,6 @@ class NoiseClassifier(ClassifierMixin, BaseEstimator):  # type: ignore[misc]
         estimator_: One of `noiseclassifier.estimators`.
         n_features_in_: Samples of a frame, times the number of signals.
     """
-
-    def __init__(
-        self,
-        profile: Recipe = "scalar",
-        *,
-        rate: float = 1000.0,
-        settings: Mapping[str, Any] | None = None,
-    ) -> None:
-        self.profile = profile
-        self.rate = rate
-        self.settings = settings
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()

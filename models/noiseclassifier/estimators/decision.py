@@ -1,12 +1,15 @@
 """Decisions by calibrated probabilities: the class of a frame, the alarm threshold, and novelty."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import log1p
+from typing import ClassVar, Self
 
 import numpy as np
 
+from noiseclassifier.profile import Profile
 from noiseclassifier.types import Array, Index, Mask
 
 TINY = 1e-12
@@ -85,9 +88,20 @@ class Probable(ABC):
         alarm: Alarm threshold: a probability of any failure.
     """
 
+    DIMENSIONS: ClassVar[Mapping[str, int]]
+
     calibration: Array
     frequency: Array
     alarm: float
+
+    @classmethod
+    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
+        """Make an estimator from the arrays of a model file."""
+        return cls(**{name: arrays[name] for name in cls.DIMENSIONS}, alarm=profile.alarm)
+
+    def arrays(self) -> dict[str, Array]:
+        """Arrays for a model file, by name."""
+        return {name: getattr(self, name) for name in self.DIMENSIONS}
 
     @property
     def width(self) -> int:

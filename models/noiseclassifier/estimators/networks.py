@@ -10,7 +10,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar, Self, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -92,11 +92,6 @@ class Networks(Probable):
             alarm=profile.alarm,
         )
 
-    @classmethod
-    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
-        """Make networks from the arrays of a model file."""
-        return cls(**{name: arrays[name] for name in cls.DIMENSIONS}, alarm=profile.alarm)
-
     @staticmethod
     def shapes(
         arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
@@ -155,10 +150,6 @@ class Networks(Probable):
             for one, shape in zip(each, shapes, strict=True)
         )
         return weights, bias, output
-
-    def arrays(self) -> dict[str, Array]:
-        """Arrays for a model file, by name."""
-        return {name: getattr(self, name) for name in self.DIMENSIONS}
 
 
 def _log_softmax(values: Array) -> Array:

@@ -15,7 +15,7 @@ Rank Documents with Additive Ensembles of Regression Trees*, 2015).
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -182,11 +182,6 @@ class Trees(Probable):
             known=self.known[there],
         )
 
-    @classmethod
-    def of(cls, arrays: Mapping[str, Array], profile: Profile) -> Self:
-        """Make trees from the arrays of a model file."""
-        return cls(**{name: arrays[name] for name in cls.DIMENSIONS}, alarm=profile.alarm)
-
     @staticmethod
     def shapes(
         arrays: Mapping[str, Array], profile: Profile, *, features: int, classes: int
@@ -267,10 +262,6 @@ class Trees(Probable):
             self.leaf[own].ravel(),
             leaves * np.arange(trees),
         )
-
-    def arrays(self) -> dict[str, Array]:
-        """Arrays for a model file, by name."""
-        return {name: getattr(self, name) for name in self.DIMENSIONS}
 
 
 class Detector(Trees):

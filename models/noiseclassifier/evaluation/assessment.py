@@ -29,8 +29,6 @@ from noiseclassifier.signals import named
 FORMAT = "noise-evaluation/3"
 ADVICE = "measure it on other runs, or accept them with a remark in the report (--seen-too)"
 NO_FRAME = "no frame without a gap"
-WORDS = ("of", "measure", "class", "robot", "domain", "scenario")
-"""Columns of the table of Arrow that name a row."""
 NAME, WIDE, NARROW = 38, 26, 12
 """Widths of the columns: names, figures with intervals, plain numbers."""
 CLASS = 24
@@ -128,37 +126,6 @@ class Assessment:
             "calibration_error": self.calibration_error and self.calibration_error.as_dict(),
             "reliability": columns or None,
         }
-
-    def to_arrow(self) -> Any:
-        """All measures as a table of Arrow in long form; needs pyarrow.
-
-        Returns:
-            A ``pyarrow.Table`` with one row for each measure, and of it for each class and robot.
-            Columns: ``of`` (protocol, pooled or chance, frames or scores), ``measure``, ``class``,
-            ``robot``, ``domain``, ``scenario``, ``value``, ``low``, ``high``, ``runs`` and
-            ``groups``; null where undefined.
-        """
-        import pyarrow as pa
-
-        found = self.protocol
-        ranking = {"auc": found.auc, "pauc": found.pauc, "official_score": found.official}
-        rows = _rows("protocol", {**found.alike, **ranking, "not_answered": found.not_answered})
-        rows += _rows("pooled", found.pooled)
-        rows += _rows("chance", found.by_chance)
-        for key in ("robot", "domain"):
-            for name, part in found.by[key].items():
-                rows += _rows("protocol", part.measures, **{key: name})
-        for second, parts in (("domain", found.cells), ("scenario", found.cases)):
-            for (robot, name), part in parts.items():
-                rows += _rows("protocol", part.measures, robot=robot, **{second: name})
-        for name, ranked in found.ranked.items():
-            rows += _rows("protocol", {"auc": ranked.auc, "pauc": ranked.pauc}, domain=name)
-        rows += _rows("frames", vars(self.frames))
-        rows += _rows("scores", {"calibration_error": self.calibration_error})
-        columns = {name: pa.string() for name in WORDS}
-        columns |= {name: pa.float64() for name in ("value", "low", "high")}
-        columns |= {name: pa.int64() for name in ("runs", "groups")}
-        return pa.Table.from_pylist(rows, schema=pa.schema(columns))
 
     def __str__(self) -> str:
         return table(self)
@@ -280,19 +247,6 @@ def evaluate(classifier: Classifier, dataset: Dataset) -> Evaluation:
         dataset: Annotated frames; labels that the classifier does not have count as missed.
     """
     return Evaluation.of(dataset.labels, classifier.predict(dataset.frames), classifier.classes)
-
-
-def _rows(of: str, measures: Mapping[str, Any], **keys: str) -> list[dict[str, Any]]:
-    """Rows of the measures that are estimates, estimates by class, or plain numbers."""
-    rows = []
-    for measure, found in measures.items():
-        for label, each in found.items() if isinstance(found, dict) else [(None, found)]:
-            row = {"of": of, "measure": measure, "class": label, **keys}
-            if isinstance(each, Estimate):
-                rows.append(row | each.as_dict())
-            elif isinstance(each, (int, float)):
-                rows.append(row | {"value": None if isnan(each) else float(each)})
-    return rows
 
 
 # --- as text
