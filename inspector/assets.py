@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from inspector.errors import InspectorError
-from noisemodel.atomic import also_reading
+from noisemodel.files import also_reading
 
 HERE = Path(__file__).parent
 FOLDERS = (HERE / "assets", HERE.parent / "assets", HERE.parent)

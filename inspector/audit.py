@@ -37,8 +37,8 @@ from inspector.wrongrobot import check_joints, limit_warnings
 from noiseclassifier import Profile
 from noiseclassifier.logbands import FEWEST, HIGHEST, LOWEST
 from noisemodel import NoiseModelError, Run
-from noisemodel.ondemand import pieces
 from noisemodel.run import part
+from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask
 
 OSCILLATIONS = (20.0, 1000.0)

@@ -10,8 +10,8 @@ from inspector.hold import hold_length
 from inspector.logs.motion import contradictions
 from noiseclassifier import LogBands
 from noisemodel import Run
-from noisemodel.differentiate import ORDER, WINDOW, stretches
-from noisemodel.ondemand import pieces
+from noisemodel.run import ORDER, WINDOW, stretches
+from noisemodel.runfile import pieces
 from noisemodel.types import Array, Mask, Real
 
 # Spectrum

@@ -155,7 +155,7 @@ class LogCommand(TyperCommand):
 
     def invoke(self, ctx: Any) -> Any:
         """Turn these options into a Reading, and run the command."""
-        from noisemodel.atomic import reading
+        from noisemodel.files import reading
 
         given = {each.name: ctx.params.pop(each.name) for each in self.added}
         ctx.obj = self.reading.callback(**given)
@@ -169,7 +169,7 @@ def _protected(command: Callable[..., None]) -> Callable[..., None]:
 
     @wraps(command)
     def run(**given: Any) -> None:
-        from noisemodel.atomic import reading, refuse_read
+        from noisemodel.files import reading, refuse_read
 
         read: list[Path] = []
         written: list[Path] = []

@@ -34,7 +34,7 @@ from inspector.audit import summary
 from inspector.errors import InspectorError, OptionError
 from inspector.library import Library
 from inspector.text import cell, counted
-from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.files import refuse_existing, replacing
 from noisemodel.types import Array
 
 

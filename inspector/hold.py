@@ -8,8 +8,8 @@ import numpy as np
 
 from noiseclassifier.types import Index
 from noisemodel import Run
-from noisemodel.ondemand import OnDemand, pieces
 from noisemodel.run import SAMPLED
+from noisemodel.runfile import OnDemand, pieces
 from noisemodel.types import Mask, Real
 
 FEWEST = 10

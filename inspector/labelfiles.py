@@ -26,7 +26,7 @@ from noiseclassifier.errors import AnnotationError
 from noiseclassifier.jsontext import text_of
 from noiseclassifier.noisytest import END, parse_annotations
 from noisemodel import Block, Run
-from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.files import refuse_existing, replacing
 
 COLUMNS = ("start", "stop", "label")
 Span = Block | Event

@@ -10,7 +10,7 @@ from inspector.analysis.analyse import Analysis
 from inspector.localisation.order import SLOWEST
 from inspector.spectrogram import Spectrogram, amplitudes, in_bands
 from noisemodel.links import vibrating
-from noisemodel.ondemand import pieces
+from noisemodel.runfile import pieces
 from noisemodel.types import Array
 
 WINDOW = 0.8

@@ -38,8 +38,8 @@ from inspector.logs.read import jobs_of
 from inspector.text import cell, counted
 from inspector.verdict import EXPECTED
 from noisemodel import Run
-from noisemodel.atomic import also_reading, replacing
-from noisemodel.differentiate import stretches
+from noisemodel.files import also_reading, replacing
+from noisemodel.run import stretches
 from noisemodel.types import Array, Real
 
 if TYPE_CHECKING:

@@ -30,10 +30,9 @@ from inspector.analysis.analyse import Analysis, robot_known
 from inspector.analysis.moments import worst
 from inspector.errors import InspectorError, OptionError
 from inspector.text import plain
-from noisemodel.atomic import refuse_existing, replacing
-from noisemodel.differentiate import stretches
+from noisemodel.files import refuse_existing, replacing
 from noisemodel.noise import DENSITY, SOUND_SPEED
-from noisemodel.run import part
+from noisemodel.run import part, stretches
 from noisemodel.types import Array, Mask
 
 PLAYABLE = ("simplified", "normal", "rms")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from noisemodel.ondemand import rows_at_once
+from noisemodel.runfile import rows_at_once
 from noisemodel.types import Array, Real
 
 

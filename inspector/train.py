@@ -23,7 +23,7 @@ from inspector.wrongrobot import check_joints
 from noiseclassifier import Assessment
 from noiseclassifier.logbands import HIGHEST, LOWEST
 from noiseclassifier.profile import NOMINAL
-from noisemodel.atomic import also_reading, refuse_existing, replacing
+from noisemodel.files import also_reading, refuse_existing, replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -40,7 +40,7 @@ from noiseclassifier.tuning import (
     order,
     validate,
 )
-from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.files import refuse_existing, replacing
 from noisemodel.parallel import DIED, Jobs, in_order
 
 FORMAT = "noise-tuning/1"

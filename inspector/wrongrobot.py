@@ -12,7 +12,7 @@ import numpy as np
 
 from noisemodel import RobotError, Run, UnknownJointError, UnknownRobotError
 from noisemodel.limits import Limits, joint_limits
-from noisemodel.ondemand import pieces
+from noisemodel.runfile import pieces
 from noisemodel.types import Mask, Real
 
 FAR_POSITION = 0.25

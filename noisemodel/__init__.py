@@ -5,12 +5,10 @@ base's own axes, linear, then angular, as Pinocchio has it. Source of the noise 
 and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robots", Sec. II-A.
 """
 
-from noisemodel.block import Block
 from noisemodel.catalog import ROBOTS
 from noisemodel.compare import compare
 from noisemodel.comparison import Comparison, RobotComparison
 from noisemodel.comparisons import Comparisons, LeftOut
-from noisemodel.decimation import decimated
 from noisemodel.errors import (
     ClusterError,
     CornerError,
@@ -34,7 +32,7 @@ from noisemodel.noise import Noise
 from noisemodel.norms import by_joint, norms
 from noisemodel.recorder import Recorder
 from noisemodel.robot import Robot
-from noisemodel.run import Run
+from noisemodel.run import Block, Run, decimated, resample
 from noisemodel.simplified import simplified
 from noisemodel.speed import KINDS, surface_speed
 from noisemodel.surface import Surface
@@ -74,6 +72,7 @@ __all__ = [
     "extended_chunks",
     "link_twists",
     "norms",
+    "resample",
     "simplified",
     "surface_speed",
 ]

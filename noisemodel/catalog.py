@@ -7,12 +7,10 @@ from pathlib import Path
 from types import MappingProxyType
 
 from noisemodel.errors import RobotError, UnknownRobotError
+from noisemodel.run import is_robot_file
 
 MENAGERIE = "menagerie/"
 """What the names of MuJoCo Menagerie's robots begin with: menagerie/unitree_go2."""
-
-SUFFIXES = (".urdf", ".xml", ".mjcf")
-"""How the names of files that describe robots end."""
 
 
 @dataclass(frozen=True)
@@ -144,12 +142,7 @@ def urdf_path(name: str) -> Path:
 
 def is_name(name: str) -> bool:
     """Whether a text is a listed robot, or names one of MuJoCo Menagerie."""
-    return name in ROBOTS or (name.startswith(MENAGERIE) and not is_file_name(name))
-
-
-def is_file_name(name: str) -> bool:
-    """Whether a text is the path of a URDF or an MJCF, by its end."""
-    return name.lower().endswith(SUFFIXES)
+    return name in ROBOTS or (name.startswith(MENAGERIE) and not is_robot_file(name))
 
 
 def menagerie_names() -> dict[str, str]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from noisemodel.block import Block
+from noisemodel.run import Block
 from noisemodel.types import Array
 
 if TYPE_CHECKING:

@@ -18,11 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from noisemodel.block import Block
 from noisemodel.catalog import is_name
 from noisemodel.errors import NoiseModelError
 from noisemodel.robot import Robot
-from noisemodel.run import Run
+from noisemodel.run import Block, Run
 from noisemodel.types import Array
 
 SECONDS = 6.0

@@ -6,11 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from noisemodel.differentiate import stretches
 from noisemodel.linkpower import QUADRATIC, Index, by_moments, by_samples, second_moments
-from noisemodel.ondemand import AT_ONCE, pieces
 from noisemodel.robot import Robot
-from noisemodel.run import Run
+from noisemodel.run import Run, stretches
+from noisemodel.runfile import AT_ONCE, pieces
 from noisemodel.surface import Surface
 from noisemodel.types import Array, Mask, Real
 

@@ -17,10 +17,8 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel import xmltext
-from noisemodel.bounds import beyond, limit
-from noisemodel.cache import Arrays, cached
 from noisemodel.errors import MeshError
+from noisemodel.files import Arrays, beyond, cached, limit, parsed_xml
 from noisemodel.types import Array, Indices
 
 Mesh: TypeAlias = tuple[Array, Indices]
@@ -224,7 +222,7 @@ def _collada(data: bytes) -> Mesh:
 
     ``unit`` and ``up_axis`` are ignored, as URDF readers do.
     """
-    root = xmltext.parsed(data)
+    root = parsed_xml(data)
     named = {
         f"#{element.attrib['id']}": element for element in root.iter() if "id" in element.attrib
     }

@@ -18,9 +18,9 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel import shapes, xmltext
-from noisemodel.bounds import beyond, limit
+from noisemodel import shapes
 from noisemodel.errors import RobotError
+from noisemodel.files import beyond, limit, parsed_xml
 from noisemodel.linkshapes import LinkShape
 from noisemodel.meshpath import HINT
 from noisemodel.types import Array
@@ -190,7 +190,7 @@ def _parsed(path: Path) -> ET.Element:
     if not text.strip():
         raise RobotError(f"{path}: the MJCF is empty")
     try:
-        return xmltext.parsed(text)
+        return parsed_xml(text)
     except ValueError as error:
         raise RobotError(f"{path}: {error}") from error
 

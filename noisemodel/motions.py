@@ -8,13 +8,10 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from noisemodel.block import Block
-from noisemodel.catalog import is_file_name
-from noisemodel.differentiate import stretches
 from noisemodel.errors import NoiseModelError, RobotError, RunError, UnknownMotionError
 from noisemodel.excitation import RATE, excitation
 from noisemodel.robot import Robot
-from noisemodel.run import Run, part
+from noisemodel.run import Block, Run, is_robot_file, part, stretches
 from noisemodel.speed import check_motion
 from noisemodel.types import Array, Real
 
@@ -184,7 +181,7 @@ def _is_pair(motion: object) -> bool:
 def _is_run(source: Source) -> bool:
     """Whether a source is a run or a run file."""
     if isinstance(source, Path):
-        return not is_file_name(source.name)
+        return not is_robot_file(source.name)
     return isinstance(source, Run) or (isinstance(source, str) and source.endswith(".npz"))
 
 

@@ -1,25 +1,25 @@
-"""One call per item: here, in several processes, or on the workers of a Dask scheduler.
+"""One call per item, by joblib: here, in several processes, or on the workers of a Dask scheduler.
 
-A process that dies is replaced, and its item named; the others get their results.
-
-Processes are forked where that is safe: then they start at once, with all modules and models in
-place, and several are faster from a few items on. It is not safe with other threads in this
-process, of Python or of a library, nor on macOS, and does not exist on Windows. There joblib's loky
-starts fresh interpreters, which takes about `FRESH` seconds.
+An item with which a process dies is named, and the others get their results: joblib loses all that
+is not done with a process that dies, so what was in work then is tried again, item by item.
 """
 
-import gc
-import multiprocessing
+import logging
 import os
+import re
 import signal
-import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
+
+from noisemodel.errors import ClusterError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -27,11 +27,14 @@ Result = TypeVar("Result")
 Jobs: TypeAlias = int | str
 """How many items to work on at once in this machine, or the address of a Dask scheduler."""
 
-FRESH, FORKED = 3.0, 0.1
-"""Work in [s] below which two fresh interpreters, or two forks, are not faster than this one
-alone."""
+FRESH = 3.0
+"""Work in [s] below which two fresh interpreters are not faster than this one alone."""
 POLL = 0.5
-"""Time without a result after which `polled` yields None, in [s]."""
+"""Time after which a worker looks whether its parent is still there, in [s]."""
+REACHED, STAFFED = 10.0, 60.0
+"""Time in which a Dask scheduler has to answer, and in which it needs a worker, in [s]."""
+SOFTWARE = ("noise-inspector", "numpy")
+"""Packages whose versions have to be the client's, so that results are the same."""
 DIED = "the worker died, of lack of memory or a crash"
 """What there is to say of an item with which a worker died."""
 
@@ -62,13 +65,10 @@ def as_done(
     died: Callable[[Item], Result],
     work: float = float("inf"),
 ) -> Iterator[tuple[int, Result]]:
-    """Results of a function as they are ready, from several processes if requested.
-
-    If a process dies, those of its items that may be the cause are tried again one by one, each
-    alone; the item with which a process dies then gets the result of ``died``.
+    """Results of a function as they are ready.
 
     Args:
-        function: What to call; where processes cannot be forked it must be importable.
+        function: What to call; importable where it runs.
         items: Its arguments.
         jobs: Number of processes; 1 is this one, which nothing survives. Or the address of a Dask
             scheduler, ``tcp://HOST:PORT``.
@@ -79,110 +79,153 @@ def as_done(
         The index of an item, and its result.
 
     Raises:
-        ClusterError: If the Dask scheduler cannot be reached, or is lost.
+        ClusterError: If the Dask scheduler cannot be reached, or is lost, or has no workers, or
+            some with other software or without the client's folder.
     """
-    for found in polled(function, items, jobs=jobs, died=died, work=work):
-        if found is not None:
-            yield found
-
-
-def polled(
-    function: Callable[[Item], Result],
-    items: Sequence[Item],
-    *,
-    jobs: Jobs,
-    died: Callable[[Item], Result],
-    work: float = float("inf"),
-) -> Iterator[tuple[int, Result] | None]:
-    """Results as `as_done` yields them, and None when there was none for `POLL` seconds."""
     if isinstance(jobs, str):
-        from noisemodel.cluster import on_cluster
-
-        yield from on_cluster(function, items, address=jobs, died=died, poll=POLL)
-        return
-    if min(jobs, len(items)) < 2 or work < (FORKED if _forks() else FRESH):
-        yield from enumerate(map(function, items))
+        if items:
+            with _cluster(jobs) as client:
+                variables = {k: v for k, v in os.environ.items() if k.startswith("NOISE_")}
+                there = partial(_there, function, str(Path.cwd()), variables)
+                yield from _results(there, items, died, backend="dask", client=client)
         return
     jobs = min(jobs, len(items))
-    waiting = list(range(len(items)))[::-1]
+    if jobs < 2 or work < FRESH:
+        yield from enumerate(map(function, items))
+        return
+    begin = {"initializer": _begin, "initargs": (os.getpid(),)}
+    yield from _results(function, items, died, backend="loky", n_jobs=jobs, **begin)
+
+
+def _results(
+    function: Callable[[Item], Result],
+    items: Sequence[Item],
+    died: Callable[[Item], Result],
+    **settings: Any,
+) -> Iterator[tuple[int, Result]]:
+    from joblib import Parallel, delayed, parallel_config
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    call = delayed(_called)
+    waiting = list(range(len(items)))
     suspects: list[int] = []
     while waiting or suspects:
         alone = bool(suspects)
-        todo, width = (suspects, 1) if alone else (waiting, 2 * jobs)
-        pool = _pool(function, 1 if alone else jobs)
-        running: dict[Future[Any], int] = {}
+        todo = [suspects.pop(0)] if alone else waiting
+        running: list[int] = []
+
+        def calls(todo: list[int] = todo, running: list[int] = running) -> Iterator[Any]:
+            for index in todo:
+                running.append(index)
+                yield call(function, items[index], index)
+
+        with parallel_config(**settings):
+            parallel = Parallel(batch_size=1, return_as="generator_unordered")
         broken = False
+        done = set()
+        results = parallel(calls())
         try:
-            while (todo or running) and not broken:
-                try:
-                    while todo and len(running) < width:
-                        future = pool.submit(_call, items[todo[-1]])
-                        running[future] = todo.pop()
-                except BrokenProcessPool:
-                    broken = True
-                done, _ = wait(running, timeout=POLL, return_when=FIRST_COMPLETED)
-                if not done:
-                    yield None
-                for future in done:
-                    try:
-                        result = future.result()
-                    except BrokenProcessPool:
-                        broken = True
-                    else:
-                        yield running.pop(future), result
+            for index, result in results:
+                done.add(index)
+                yield index, result
+        except BrokenProcessPool:
+            broken = True
         finally:
-            for future in running:
-                future.cancel()
-            pool.shutdown(wait=True)
+            with warnings.catch_warnings(action="ignore"):  # of what is cancelled
+                results.close()
+        left = [index for index in running if index not in done]
         if alone and broken:
-            for index in running.values():
-                yield index, died(items[index])
-        else:
-            suspects += sorted(running.values(), reverse=True)
+            yield todo[0], died(items[todo[0]])
+        elif not alone:
+            suspects = left
+            waiting = todo[len(running) :]
 
 
-def _forks() -> bool:
-    """Whether a fork is safe: of a process with other threads one may hold a lock for ever."""
-    return sys.platform == "linux" and len([*Path("/proc/self/task").iterdir()]) == 1
+def _called(function: Callable[[Any], Any], item: Any, index: int) -> tuple[int, Any]:
+    return index, function(item)
 
 
-def _pool(function: Callable[..., Any], jobs: int) -> Executor:
-    threads = max(1, (os.cpu_count() or 1) // jobs)
-    if _forks():
-        return ProcessPoolExecutor(
-            jobs, multiprocessing.get_context("fork"), _begin, (function, threads, os.getpid())
-        )
-    from joblib.externals.loky import ProcessPoolExecutor as Fresh
-
-    given = (function, threads, os.getpid())
-    pool: Executor = Fresh(jobs, timeout=60, initializer=_begin, initargs=given)
-    return pool
-
-
-_function: Callable[[Any], Any]
-
-
-def _begin(function: Callable[[Any], Any], threads: int, parent: int) -> None:
-    """Prepare a worker: it has the function, and as many threads as there are cores for it.
-
-    It ends with its parent, which may be killed at any moment.
-    """
-    from threadpoolctl import threadpool_limits
-
-    global _function
-    _function = function
-    gc.freeze()  # a collection that visits what was forked would copy its pages
-    threadpool_limits(threads)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent stops its workers
+def _begin(parent: int) -> None:
+    """Prepare a process, which ends with its parent, and leaves interrupts to it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
 def _end_with(parent: int) -> None:
-    """End this process when its parent is another one."""
     while os.getppid() == parent:
         time.sleep(POLL)
     os._exit(1)
 
 
-def _call(item: Any) -> Any:
-    return _function(item)
+@contextmanager
+def _cluster(address: str) -> Iterator[Any]:
+    """A client of a scheduler that has a worker; Dask's own messages are left out."""
+    if find_spec("distributed") is None:
+        raise ClusterError(
+            "a Dask cluster needs distributed, which is not installed;"
+            " run `pip install 'noise-inspector[cluster]'`"
+        )
+    if not re.fullmatch(r"\w+://.+:\d+", address):
+        raise ClusterError(f"{address!r} is no address of a Dask scheduler, tcp://HOST:PORT")
+    from distributed import CancelledError, Client, KilledWorker
+
+    for name in ("distributed", "distributed.client"):
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        client = Client(address, timeout=REACHED, set_as_default=False)
+    except (OSError, ValueError) as error:
+        raise ClusterError(
+            f"{address}: no Dask scheduler answers there; start one with `dask scheduler`,"
+            " and name the address that it prints"
+        ) from error
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=STAFFED)
+        except TimeoutError as error:
+            raise ClusterError(
+                f"{address}: the Dask scheduler has no worker after {STAFFED:.0f} s; start some"
+                f" with `dask worker {address} --nthreads 1`"
+            ) from error
+        _check_software(client, address)
+        try:
+            yield client
+        except KilledWorker as error:
+            raise ClusterError(f"{address}: {DIED}; what it worked on is not known") from error
+        except (OSError, CancelledError) as error:
+            if isinstance(error, OSError) and client.status == "running":
+                raise
+            lost = f"{address}: the connection to the Dask scheduler is lost"
+            raise ClusterError(lost) from error
+
+
+def _check_software(client: Any, address: str) -> None:
+    """Refuse workers that have not the same software, or none."""
+    for name in SOFTWARE:
+        here = _version(name)
+        for worker, found in client.run(_version, name, on_error="return").items():
+            there = "none" if isinstance(found, Exception) else found
+            if there != here:
+                raise ClusterError(
+                    f"{address}: worker {worker} has {name} {there}, here is {here};"
+                    " install the same on all"
+                )
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # run from its folder
+        return "none"
+
+
+def _there(
+    function: Callable[[Item], Result], folder: str, variables: Mapping[str, str], item: Item
+) -> Result:
+    """Call a function on a Dask worker as the client would: in its folder, with its settings."""
+    os.environ.update(variables)
+    if not Path(folder).is_dir():
+        raise ClusterError(
+            f"a worker has no folder {folder}; it must see the same files, by the same paths"
+        )
+    os.chdir(folder)
+    return function(item)

@@ -1,6 +1,6 @@
 """A recorder for a loop of one's own: samples are pushed one by one and become a run."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import TracebackType
@@ -9,21 +9,25 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from noisemodel import differentiate
 from noisemodel.catalog import ROBOTS
 from noisemodel.errors import RunError, UnknownJointError, hint
 from noisemodel.robot import Robot
-from noisemodel.run import Run
+from noisemodel.run import (
+    LONGEST,
+    SHORTEST,
+    UNIFORM,
+    Run,
+    continuous_quaternions,
+    resample,
+    with_velocities,
+)
 from noisemodel.types import Array, Mask
 
 Values: TypeAlias = ArrayLike | Mapping[str, float]
 
-WIDTHS = {"base_pose": 7, "base_velocity": 6}
+WIDTHS = {"base_pose": 7, "base_velocity": 6, "time": 1}
 FIRST_SAMPLES = 1024
 """Samples that there is room for at first; the room doubles when it is full."""
-
-UNIFORM = 1e-3
-"""Largest deviation of a step from the median, as a share of it, of stamps that are kept."""
 
 GAP = 5.0
 """Length of a step, in median ones, above which it is a gap."""
@@ -48,7 +52,7 @@ class Recorder:
         meta: What else is known, for the run.
 
     Raises:
-        RunError: If the rate is not above 0.
+        RunError: If the rate is none that a run may have.
         RobotError: If the robot cannot be read.
         UnknownJointError: If it lacks one of the joints.
 
@@ -70,8 +74,9 @@ class Recorder:
         desired_joint_names: Sequence[str] = (),
         meta: Mapping[str, Any] | None = None,
     ) -> None:
-        if not (np.isfinite(rate) and rate > 0):
-            raise RunError(f"rate: {rate:g} Hz, expected a number above 0")
+        if not 1 / LONGEST <= rate <= 1 / SHORTEST:
+            low, high = 1 / LONGEST, 1 / SHORTEST
+            raise RunError(f"rate: {rate:g} Hz, expected {low:g} Hz to {high:g} Hz")
         known: tuple[str, ...] = ()
         self._robot: str | None = None
         if robot is not None:
@@ -172,7 +177,7 @@ class Recorder:
         signals = {name: np.where(valid[:, None], each, 0.0) for name, each in signals.items()}
         if "base_pose" in signals:
             signals["base_pose"][~valid, 6] = 1.0  # a quaternion also in gaps
-        filled, differentiated = differentiate.fill_in({"time": time, "valid": valid, **signals})
+        filled, differentiated = with_velocities({"time": time, "valid": valid, **signals})
         fields: dict[str, Any] = dict(filled)
         if differentiated:
             meta["differentiated"] = differentiated
@@ -217,18 +222,27 @@ class Recorder:
 
     def _row(self, name: str, values: Values) -> Array:
         """Values of a sample, checked."""
-        known = () if name in (*WIDTHS, "time") else self._joints
+        known = () if name in WIDTHS else self._joints
         names = known = self._desired if name.endswith("_desired") else known
         if isinstance(values, Mapping):
             names = known or tuple(values)
-            _check_names(name, values, names)
+            for joint in values:
+                if joint not in names:
+                    raise RunError(
+                        f"{name}: no joint {joint!r}{hint(joint, names)};"
+                        f" expected {', '.join(names)}"
+                    )
+            if missing := [joint for joint in names if joint not in values]:
+                raise RunError(
+                    f"{name}: missing for {', '.join(missing)}; joint_names=… names fewer"
+                )
             row = np.array([values[joint] for joint in names], dtype=np.float64)
         else:
             try:
                 row = np.asarray(values, dtype=np.float64)
             except (TypeError, ValueError) as error:
                 raise RunError(f"{name}: {values!r}, expected a number for each joint") from error
-        width = 1 if name == "time" else WIDTHS.get(name, len(names))
+        width = WIDTHS.get(name, len(names))
         if row.ndim != 1 or (width and len(row) != width):
             what = f"({', '.join(names[:10])}{', …' if len(names) > 10 else ''})" if names else ""
             how = "; joint_names=… names others" if names and row.ndim == 1 else ""
@@ -237,7 +251,7 @@ class Recorder:
             )
         if name == "time" and not np.isfinite(row[0]):
             raise RunError(f"time: {row[0]} in sample {self._count + 1}")
-        if not known and name not in (*WIDTHS, "time"):
+        if not known and name not in WIDTHS:
             self._joints = names or tuple(f"joint{number + 1}" for number in range(len(row)))
             self._desired = self._desired or self._joints
         return row
@@ -274,49 +288,24 @@ class Recorder:
         rms = float(np.sqrt(np.mean(deviations**2)))
         meta["jitter"] = {"rms": rms, "max": float(np.abs(deviations).max())}
         time = np.arange(int(stamps[-1] * rate + UNIFORM) + 1) / rate
-        found = {name: np.zeros((len(time), each.shape[1])) for name, each in signals.items()}
-        reached = np.zeros(len(time), dtype=bool)
-        known, kept = stamps[valid], {name: each[valid] for name, each in signals.items()}
+        known = stamps[valid]
         edges = [0, *(np.flatnonzero(np.diff(known) > GAP * step) + 1), len(known)]
-        for start, stop in pairwise(edges):
-            if stop - start < 2:
-                continue
-            inside = (time >= known[start]) & (time <= known[stop - 1])
-            reached |= inside
-            for name, each in kept.items():
-                part = _continuous(name, each[start:stop])
-                found[name][inside] = _interpolated(name, known[start:stop], part, time[inside])
+        between = [slice(*each) for each in pairwise(edges)]
+        found = {}
+        reached = np.zeros(len(time), dtype=bool)
+        for name, each in signals.items():
+            kept = _continuous(name, each[valid], between)
+            found[name], reached = resample(known, kept, time, between=between)
+        if "base_pose" in found:
+            norm = np.linalg.norm(found["base_pose"][:, 3:], axis=1, keepdims=True)
+            found["base_pose"][:, 3:] /= np.where(norm > 0, norm, 1.0)
         return time, reached, found
 
 
-def _check_names(name: str, values: Iterable[str], names: Sequence[str]) -> None:
-    given = tuple(values)
-    for joint in given:
-        if joint not in names:
-            raise RunError(
-                f"{name}: no joint {joint!r}{hint(joint, names)}; expected {', '.join(names)}"
-            )
-    missing = [joint for joint in names if joint not in given]
-    if missing:
-        raise RunError(f"{name}: missing for {', '.join(missing)}; joint_names=… names fewer")
-
-
-def _continuous(name: str, values: Array) -> Array:
-    """Angles without turns, and quaternions of the sign nearer to the sample before."""
-    if name.startswith("position"):
-        return np.asarray(np.unwrap(values, axis=0))
-    if name == "base_pose":
-        flips = np.einsum("si,si->s", values[1:, 3:], values[:-1, 3:]) < 0
-        signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
-        return np.hstack((values[:, :3], values[:, 3:] * signs[:, None]))
+def _continuous(name: str, values: Array, between: Sequence[slice]) -> Array:
+    """Angles without turns, and quaternions without flips, stretch by stretch."""
+    for part in between if name.startswith("position") else ():
+        values[part] = np.unwrap(values[part], axis=0)
+    for part in between if name == "base_pose" else ():
+        values[part, 3:] = continuous_quaternions(values[part, 3:])
     return values
-
-
-def _interpolated(name: str, stamps: Array, values: Array, time: Array) -> Array:
-    """Values at other instants: monotone between samples (PCHIP), without overshoot."""
-    from scipy.interpolate import PchipInterpolator
-
-    found = np.asarray(PchipInterpolator(stamps, values, axis=0)(time))
-    if name == "base_pose":
-        found[:, 3:] /= np.linalg.norm(found[:, 3:], axis=1, keepdims=True)
-    return found

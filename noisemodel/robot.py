@@ -15,7 +15,7 @@ from noisemodel import catalog, mjcf, urdf
 from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRobotError
 from noisemodel.joints import Joint, table_of
 from noisemodel.mjcf import Mjcf
-from noisemodel.run import Run
+from noisemodel.run import Run, is_robot_file
 from noisemodel.types import Array, Real
 from noisemodel.urdf import Mimic
 
@@ -233,7 +233,7 @@ def locate(name: str | Path) -> Path:
             return path
     if catalog.is_name(str(name)):
         return catalog.menagerie_path(str(name))
-    if catalog.is_file_name(str(name)):
+    if is_robot_file(str(name)):
         kind = "URDF" if path.suffix.lower() == ".urdf" else "MJCF"
         raise RobotError(f"{path}: there is no such {kind} file")
     raise UnknownRobotError(str(name), catalog.ROBOTS)

@@ -1,10 +1,13 @@
-"""The run: one recording of one robot, checked when it is made."""
+"""The run: one recording of one robot, checked when it is made, and what becomes of its signals."""
 
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Self, cast
@@ -12,11 +15,10 @@ from typing import Any, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel import checks, differentiate, runfile
-from noisemodel.block import Block
-from noisemodel.catalog import is_file_name
+from noisemodel import runfile
 from noisemodel.errors import RunError, RunFileError
-from noisemodel.ondemand import OnDemand, rows_at_once
+from noisemodel.files import beyond, limit
+from noisemodel.runfile import OnDemand, pieces, rows_at_once
 from noisemodel.types import Array, Mask, Real
 
 SAMPLED = (
@@ -31,6 +33,51 @@ SAMPLED = (
     "base_velocity",
 )
 """The fields of a run that hold a row or a value for each sample; ``stages`` hold such fields."""
+
+MOTION = ("velocity", "velocity_desired", "effort", "base_velocity")
+"""The fields of a run that a classifier takes signals of."""
+
+ROBOT_FILES = (".urdf", ".xml", ".mjcf")
+"""How the names of files that describe robots end."""
+
+UNIFORM = 1e-3
+"""How far a time step may lie from the median step, as a share of it (run file, version 1)."""
+
+SHORTEST, LONGEST = 1e-9, 1e9
+"""Steps of time that a run may have, in [s]."""
+
+LATEST = 9e9
+"""Times of a run lie closer to 0, in [s]: 285 years, what nanoseconds in 64 bits can count."""
+
+LARGEST = 1e15
+"""Signals are smaller: the squares of much larger ones overflow, and no robot has such."""
+
+WINDOW, ORDER = 7, 3
+METHOD = f"Savitzky-Golay, window {WINDOW}, order {ORDER}"
+SOURCES = {"velocity": "position", "velocity_desired": "position_desired"}
+"""The joint velocities and the positions that each can be differentiated from."""
+
+EDGE = 10
+"""Samples at the lower rate that the low-pass filter of `decimated` reaches to either side."""
+
+
+class NotUniformError(RunError):
+    """A run whose time is not uniform: a log, to be resampled."""
+
+
+@dataclass(frozen=True, order=True)
+class Block:
+    """A stretch of time with a label, which is opaque to the noise model.
+
+    Attributes:
+        start: Time of its first sample, in [s].
+        stop: Time of its end, in [s].
+        label: The class that an annotator or a simulator gave it.
+    """
+
+    start: float
+    stop: float
+    label: str
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -85,20 +132,20 @@ class Run:
         assign(self, "blocks", tuple(sorted(self.blocks)))
         assign(self, "stages", MappingProxyType(dict(self.stages)))
         assign(self, "meta", MappingProxyType(dict(self.meta)))
-        checks.check_time(self.time)
+        check_time(self.time)
         if self.valid is None:
             assign(self, "valid", np.ones(len(self.time), dtype=bool))
-        checks.check_valid(self.mask, len(self.time))
-        checks.check_names("joint_names", self.joint_names)
+        check_valid(self.mask, len(self.time))
+        check_names("joint_names", self.joint_names)
         if not self.joint_names and self.base_velocity is None:
             raise RunError("joint_names: there are no joints, and the base does not move")
-        checks.check_names("desired_joint_names", self.desired_joint_names)
-        checks.check_words("stages", self.stages)
+        check_names("desired_joint_names", self.desired_joint_names)
+        check_words("stages", self.stages)
         for name, signal, width in self._signals():
-            checks.check_signal(name, signal, (len(self.time), width))
+            check_signal(name, signal, (len(self.time), width))
         if self.base_pose is not None:
-            checks.check_quaternions(self.base_pose, self.mask)
-        checks.check_blocks(self.blocks, self.time)
+            check_quaternions(self.base_pose, self.mask)
+        check_blocks(self.blocks, self.time)
 
     def _signals(self) -> list[tuple[str, Real, int]]:
         """List name, array and expected width of each signal that is there."""
@@ -131,7 +178,7 @@ class Run:
     @cached_property
     def rate(self) -> float:
         """Nominal sample rate: the inverse of the median step, in [Hz]."""
-        return float(f"{1.0 / checks.median_step(self.time):.9g}")
+        return float(f"{1.0 / median_step(self.time):.9g}")
 
     @property
     def duration(self) -> float:
@@ -225,21 +272,32 @@ class Run:
             raise RunFileError(path, str(error)) from error
 
 
-MOTION = ("velocity", "velocity_desired", "effort", "base_velocity")
-"""The fields of a run that a classifier takes signals of."""
+def part(run: Run, first: int, stop: int, **changes: Any) -> Run:
+    """Samples of a run from a first one to the one after the last, without its blocks.
+
+    ``changes`` are other fields of the part, as ``dataclasses.replace`` takes them.
+
+    Raises:
+        RunError: If the part has fewer than two samples, or gaps alone.
+    """
+    samples = slice(first, stop)
+    fields: dict[str, Any] = {
+        name: None if getattr(run, name) is None else getattr(run, name)[samples]
+        for name in SAMPLED
+    }
+    stages = {name: stage[samples] for name, stage in run.stages.items()}
+    return replace(run, **(fields | {"stages": stages, "blocks": ()} | changes))
 
 
 def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
     """Take the motion of a run piece by piece, each of which fits into memory.
 
-    The pieces are not checked again: one may be a gap alone. They have the rate of the run.
+    The pieces are not checked again: one may be a gap alone. They have the rate and the names of
+    the run, and the fields ``MOTION`` alone.
 
     Args:
         run: The run.
         samples: Of a piece; what is megabytes unless given.
-
-    Yields:
-        A piece, with the same names and the fields ``MOTION`` alone.
     """
     whole: dict[str, Any] = {
         **{name: getattr(run, name) for name in ("joint_names", "desired_joint_names")},
@@ -257,32 +315,25 @@ def pieces_of(run: Run, *, samples: int | None = None) -> Iterator[Run]:
         yield piece
 
 
-def part(run: Run, first: int, stop: int, **changes: Any) -> Run:
-    """Samples of a run, without its blocks.
+def stretches(valid: Mask | None, samples: int) -> Iterator[slice]:
+    """Go through the stretches between gaps that hold two samples or more."""
+    if valid is None:
+        valid = np.ones(samples, dtype=bool)
+    edges = [0, *(np.flatnonzero(np.diff(valid)) + 1), samples]
+    for start, stop in pairwise(edges):
+        if valid[start] and stop - start > 1:
+            yield slice(start, stop)
 
-    Args:
-        run: The run.
-        first: Index of the first sample.
-        stop: Index after the last one.
-        changes: Other fields of the part, as ``dataclasses.replace`` takes them.
 
-    Returns:
-        The part, with the same names and meta.
+def is_robot_file(name: str) -> bool:
+    """Whether a text is the path of a URDF or an MJCF, by its end."""
+    return name.lower().endswith(ROBOT_FILES)
 
-    Raises:
-        RunError: If the part has fewer than two samples, or gaps alone.
-    """
-    samples = slice(first, stop)
-    fields: dict[str, Any] = {
-        name: None if getattr(run, name) is None else getattr(run, name)[samples]
-        for name in SAMPLED
-    }
-    stages = {name: stage[samples] for name, stage in run.stages.items()}
-    return replace(run, **(fields | {"stages": stages, "blocks": ()} | changes))
+
+# The run file: a run as arrays, and back.
 
 
 def _arrays(run: Run, *, folder: Path) -> dict[str, Any]:
-    """Turn a run into the arrays of a run file."""
     signals = {name: signal for name, signal, _ in run._signals()}
     arrays = {
         "format": runfile.FORMAT,
@@ -296,7 +347,8 @@ def _arrays(run: Run, *, folder: Path) -> dict[str, Any]:
     if not run.mask.all():
         arrays["valid"] = run.mask
     if run.robot is not None:
-        arrays["robot"] = _robot_from(folder, run.robot)
+        moves = is_robot_file(run.robot) and not Path(run.robot).is_absolute()
+        arrays["robot"] = os.path.relpath(run.robot, folder) if moves else run.robot
     if run.blocks:
         arrays["block_start"] = np.array([block.start for block in run.blocks])
         arrays["block_stop"] = np.array([block.stop for block in run.blocks])
@@ -305,7 +357,6 @@ def _arrays(run: Run, *, folder: Path) -> dict[str, Any]:
 
 
 def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, Any]:
-    """Turn the arrays of a run file into the fields of a run."""
     signals = {
         name: array
         for name, array in arrays.items()
@@ -318,10 +369,10 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
             "array 'velocity' is missing, and 'position' to differentiate too;"
             f" the file has {', '.join(arrays)}"
         )
-    checks.check_time(signals["time"])
+    check_time(signals["time"])
     if "valid" in signals:
-        checks.check_valid(signals["valid"], len(signals["time"]))
-    signals, differentiated = differentiate.fill_in(signals)
+        check_valid(signals["valid"], len(signals["time"]))
+    signals, differentiated = with_velocities(signals)
     meta = _meta(arrays)
     if differentiated:
         meta["differentiated"] = differentiated
@@ -329,34 +380,21 @@ def _fields(arrays: Mapping[str, NDArray[Any]], *, folder: Path) -> dict[str, An
     samples, joints = len(signals["time"]), velocity.shape[-1]
     if velocity.ndim == 2 and len(velocity) != samples and joints == samples:
         joints = len(velocity)  # transposed, which the error states
+    unnamed = [f"joint{number + 1}" for number in range(joints)]
+    robot = str(arrays.get("robot", ""))
     return {
         **signals,
-        "joint_names": _names(arrays, "joint_names", [f"joint{i + 1}" for i in range(joints)]),
-        "desired_joint_names": _names(arrays, "desired_joint_names", []),
+        "joint_names": tuple(map(str, arrays.get("joint_names", unnamed))),
+        "desired_joint_names": tuple(map(str, arrays.get("desired_joint_names", ()))),
         "stages": {
             name.removeprefix(runfile.STAGE): array
             for name, array in arrays.items()
             if name.startswith(runfile.STAGE)
         },
-        "robot": _robot(arrays, folder),
+        "robot": str(folder / robot) if is_robot_file(robot) else robot or None,
         "blocks": _blocks(arrays),
         "meta": meta,
     }
-
-
-def _names(arrays: Mapping[str, NDArray[Any]], name: str, default: list[str]) -> tuple[str, ...]:
-    return tuple(str(joint) for joint in arrays.get(name, default))
-
-
-def _robot(arrays: Mapping[str, NDArray[Any]], folder: Path) -> str | None:
-    robot = str(arrays.get("robot", ""))
-    return str(folder / robot) if is_file_name(robot) else robot or None
-
-
-def _robot_from(folder: Path, robot: str) -> str:
-    """Path of a URDF or an MJCF relative to the folder of the run file."""
-    moves = is_file_name(robot) and not Path(robot).is_absolute()
-    return os.path.relpath(robot, folder) if moves else robot
 
 
 def _blocks(arrays: Mapping[str, NDArray[Any]]) -> tuple[Block, ...]:
@@ -387,3 +425,388 @@ def _meta(arrays: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
     if not isinstance(meta.get("differentiated", {}), dict):
         raise RunError("meta: expected a JSON object as differentiated")
     return meta
+
+
+# What makes a run valid.
+
+
+def median_step(time: Array) -> float:
+    """Median of the steps of time, in [s]; time has shape (samples,)."""
+    return float(np.median(np.diff(time), overwrite_input=True))  # no second copy
+
+
+def check_time(time: Array) -> None:
+    """Refuse a time that is not finite, not rising or not uniform, naming the row."""
+    if time.ndim != 1 or len(time) < 2:
+        raise RunError(f"time: shape {time.shape}, expected (samples,) with at least 2 samples")
+    finite = np.isfinite(time)
+    if not finite.all():
+        raise RunError(f"time: {time[~finite][0]} in row {int(np.argmin(finite))}")
+    rising = time[1:] > time[:-1]
+    if not rising.all():
+        row = int(np.argmin(rising)) + 1
+        how = "stands still" if time[row] == time[row - 1] else "runs backwards"
+        raise RunError(f"time: {how} in row {row} ({time[row - 1]:.9g} s, then {time[row]:.9g} s)")
+    step = median_step(time)
+    if not SHORTEST <= step <= LONGEST:
+        raise RunError(
+            f"time: the median step is {step:g} s, expected {SHORTEST:g} s to {LONGEST:g} s"
+        )
+    if (farthest := max(abs(time[0]), abs(time[-1]))) > LATEST:
+        raise RunError(f"time: {farthest:.9g} s, expected seconds, {LATEST:g} at most")
+    # Stamps far from zero cannot be finer than their own spacing.
+    tolerance = max(UNIFORM * step, 2 * np.spacing(farthest))
+    for rows in pieces(time):
+        steps = np.diff(time[rows.start : rows.stop + 1])
+        uneven = np.abs(steps - step) > tolerance
+        if uneven.any():
+            row = int(np.argmax(uneven))
+            raise NotUniformError(
+                f"time: not uniform, the step to row {rows.start + row + 1} is {steps[row]:.6g} s"
+                f" where the median is {step:.6g} s; `inspector import` resamples such logs (and"
+                " float32 is too coarse)"
+            )
+
+
+def check_words(array: str, words: Iterable[str]) -> None:
+    """Refuse words that are empty or hold what cannot be printed on one line."""
+    for word in words:
+        if not word or not word.isprintable():
+            raise RunError(f"{array}: {word!r} is no name; it is empty or cannot be printed")
+
+
+def check_names(array: str, names: Sequence[str]) -> None:
+    """Refuse names that are no words or repeat."""
+    check_words(array, names)
+    if len(names) > limit("joints"):
+        raise RunError(f"{array}: {len(names)} joints, {beyond('joints')}")
+    twice = sorted(name for name, count in Counter(names).items() if count > 1)
+    if twice:
+        raise RunError(f"{array}: {', '.join(twice)} named twice")
+
+
+def check_signal(name: str, signal: Real, shape: tuple[int, int]) -> None:
+    """Refuse a signal of another kind or shape, or with values that are not finite."""
+    if signal.dtype.kind != "f":
+        raise RunError(f"{name}: holds {signal.dtype}, expected floating-point numbers")
+    if signal.shape != shape:
+        turned = signal.ndim == 2 and signal.shape[1] == shape[0] != signal.shape[0]
+        hint = "; samples come first, is it transposed?" if turned else ""
+        raise RunError(f"{name}: shape {signal.shape}, expected {shape}{hint}")
+    if isinstance(signal, OnDemand):
+        if signal.checked:
+            return
+        signal.checked = True
+    largest = np.float64(LARGEST)  # no float16
+    for rows in pieces(signal):
+        values = signal[rows]
+        finite = (values > -largest) & (values < largest)
+        if finite.all():
+            continue
+        row, column = np.argwhere(~finite)[0]
+        value, place = values[row, column], f"row {rows.start + row}, column {column}"
+        if np.isfinite(value):
+            raise RunError(f"{name}: {value:g} in {place}; expected numbers below {LARGEST:g}")
+        raise RunError(f"{name}: {value} in {place}; mark gaps with valid = false and zeros")
+
+
+def check_valid(valid: Mask, samples: int) -> None:
+    """Refuse a mask that is not one boolean per sample, or that leaves nothing."""
+    if valid.dtype != np.bool_ or valid.shape != (samples,):
+        raise RunError(
+            f"valid: shape {valid.shape} of {valid.dtype}, expected {(samples,)} of bool"
+        )
+    if not valid.any():
+        raise RunError("valid: false in every sample, no sample is left")
+
+
+def check_blocks(blocks: Sequence[Block], time: Array) -> None:
+    """Refuse blocks that are empty, lie outside of the run or overlap."""
+    check_words("block_label", (block.label for block in blocks))
+    step = (time[-1] - time[0]) / (len(time) - 1)
+    for block in blocks:
+        if not block.start < block.stop:
+            raise RunError(
+                f"block {block.label!r}: starts at {block.start:.6g} s, stops at {block.stop:.6g} s"
+            )
+        if block.start < time[0] - step or block.stop > time[-1] + 2 * step:
+            raise RunError(
+                f"block {block.label!r}: {block.start:.6g} s to {block.stop:.6g} s lies outside of"
+                f" the run, {time[0]:.6g} s to {time[-1]:.6g} s"
+            )
+    for before, after in pairwise(blocks):
+        if after.start < before.stop - step:
+            raise RunError(
+                f"blocks overlap: {before.label!r} until {before.stop:.6g} s"
+                f" and {after.label!r} from {after.start:.6g} s"
+            )
+
+
+def check_quaternions(pose: Real, valid: Mask) -> None:
+    """Refuse poses whose quaternions are not of length 1 (in valid samples)."""
+    for rows in pieces(pose):
+        norm = np.linalg.norm(pose[rows][:, 3:], axis=1)
+        wrong = (np.abs(norm - 1) > 0.01) & valid[rows]
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            raise RunError(
+                f"base_pose: the quaternion in row {rows.start + row} has norm {norm[row]:.3g},"
+                " expected 1 (order x, y, z, w)"
+            )
+
+
+# Velocities from positions, where a log holds none.
+
+
+def with_velocities(
+    signals: Mapping[str, NDArray[Any]],
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Add the velocities that are missing and can be differentiated.
+
+    Args:
+        signals: Arrays of a run file by name, ``time`` among them.
+
+    Returns:
+        The signals with velocities added, and by the name of each added one how it was made.
+
+    Raises:
+        RunError: If positions do not fit the time, or are not finite.
+    """
+    time, filled = signals["time"], dict(signals)
+    valid = signals.get("valid", np.ones(len(time), dtype=bool))
+    for velocity, position in SOURCES.items():
+        if velocity not in signals and position in signals:
+            source = signals[position]
+            check_signal(position, source, (len(time), source.shape[1]))
+            filled[velocity] = joint_velocity(time, source, valid)
+    if "base_velocity" not in signals and "base_pose" in signals:
+        pose = signals["base_pose"]
+        check_signal("base_pose", pose, (len(time), 7))
+        check_quaternions(pose, valid)
+        filled["base_velocity"] = base_velocity(time, pose, valid)
+    how = {name: METHOD for name in filled if name not in signals}
+    return filled, how
+
+
+def joint_velocity(time: Array, position: Real, valid: Mask | None = None) -> Array:
+    """Differentiate joint positions; angles that wrap are made continuous first.
+
+    Args:
+        time: Uniform, shape (samples,), in [s].
+        position: Shape (samples, joints), in [rad] or [m].
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        Velocities, shape (samples, joints), in [rad/s] or [m/s]; 0 in gaps and in stretches
+        of a single sample.
+    """
+    step = median_step(time)
+
+    def slope(values: Real) -> Array:
+        return _slope(np.unwrap(values.astype(np.float64), axis=0), step)
+
+    return _by_stretch(slope, position, position.shape[1], valid)
+
+
+def base_velocity(time: Array, pose: Real, valid: Mask | None = None) -> Array:
+    """Differentiate the pose of a floating base.
+
+    Args:
+        time: Uniform, shape (samples,), in [s].
+        pose: x, y, z and quaternion x, y, z, w, shape (samples, 7), in [m].
+        valid: False in gaps, shape (samples,).
+
+    Returns:
+        Linear, then angular velocity in the base's own axes, shape (samples, 6),
+        in [m/s] and [rad/s].
+    """
+    step = median_step(time)
+    return _by_stretch(lambda values: _body_twist(values.astype(np.float64), step), pose, 6, valid)
+
+
+def _by_stretch(
+    derivative: Callable[[Real], Array], signal: Real, width: int, valid: Mask | None
+) -> Array:
+    """Derivative of each stretch between gaps, on demand of a signal on demand."""
+
+    def whole(rows: slice) -> Array:
+        found = np.zeros((rows.stop - rows.start, width))
+        values = signal[rows]
+        for stretch in stretches(None if valid is None else valid[rows], len(found)):
+            found[stretch] = derivative(values[stretch])
+        return found
+
+    def rows(first: int, stop: int) -> Array:
+        # The fit reaches three samples to each side, and a window at the end of a stretch.
+        low, high = max(0, first - WINDOW), min(len(signal), stop + WINDOW)
+        return whole(slice(low, high))[first - low : stop - low]
+
+    if isinstance(signal, OnDemand):
+        return cast(Array, OnDemand((len(signal), width), np.float64, rows))
+    return whole(slice(0, len(signal)))
+
+
+def _body_twist(pose: Array, step: float) -> Array:
+    quaternion = pose[:, 3:] / np.linalg.norm(pose[:, 3:], axis=1, keepdims=True)
+    quaternion = continuous_quaternions(quaternion)
+    vector, scalar = quaternion[:, :3], quaternion[:, 3:]
+    rate = _slope(quaternion, step)
+    # omega = 2 vec(conj(q) q_dot), v = R(q)^T p_dot
+    angular = 2 * (scalar * rate[:, :3] - vector * rate[:, 3:] - np.cross(vector, rate[:, :3]))
+    world = _slope(pose[:, :3], step)
+    across = 2 * np.cross(-vector, world)
+    linear = world + scalar * across + np.cross(-vector, across)
+    return np.hstack((linear, angular))
+
+
+def continuous_quaternions(quaternion: Array) -> Array:
+    """Q and -q are one rotation: of shape (samples, 4), with the sign nearer to the one before."""
+    flips = np.einsum("si,si->s", quaternion[1:], quaternion[:-1]) < 0
+    signs = np.concatenate(([1.0], np.cumprod(np.where(flips, -1.0, 1.0))))
+    return np.asarray(quaternion * signs[:, None])
+
+
+def _slope(values: Array, step: float) -> Array:
+    """Differentiate by Savitzky and Golay; short stretches by differences."""
+    if len(values) < WINDOW:
+        return np.asarray(np.gradient(values, step, axis=0))
+    from scipy.signal import savgol_filter
+
+    return np.asarray(savgol_filter(values, WINDOW, ORDER, deriv=1, delta=step, axis=0))
+
+
+# Other rates and instants.
+
+
+def resample(
+    stamps: Array,
+    values: Real,
+    instants: Array,
+    *,
+    between: Sequence[slice] | None = None,
+    slack: float = 0.0,
+) -> tuple[Array, Mask]:
+    """Values at other instants: monotone between samples (PCHIP), without overshoot.
+
+    Angles have to be continuous, see ``numpy.unwrap``.
+
+    Args:
+        stamps: Times of the samples, increasing, shape (samples,), in [s].
+        values: Shape (samples, columns).
+        instants: Increasing, shape (instants,), in [s].
+        between: The samples of each stretch between gaps; all are one unless given.
+        slack: How far outside of a stretch an instant still belongs to it, in [s].
+
+    Returns:
+        Values, 0 in gaps, shape (instants, columns), and whether an instant is in none,
+        shape (instants,).
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    found = np.zeros((len(instants), values.shape[1]))
+    reached = np.zeros(len(instants), dtype=bool)
+    for stretch in between or [slice(0, len(stamps))]:
+        known = stamps[stretch]
+        if len(known) > 1:
+            first = int(np.searchsorted(instants, known[0] - slack))
+            stop = int(np.searchsorted(instants, known[-1] + slack, side="right"))
+            if first < stop:
+                curve = PchipInterpolator(known, values[stretch], axis=0)
+                found[first:stop] = curve(instants[first:stop])
+                reached[first:stop] = True
+    return found, reached
+
+
+def decimated(run: Run, rate: float) -> Run:
+    """The run at a lower rate: its velocities, low-pass filtered and decimated.
+
+    The noise of a run at a lower rate is computed after this: it is not the decimated noise.
+
+    Args:
+        run: The run.
+        rate: The lower sample rate, in [Hz].
+
+    Returns:
+        A run with its velocities alone (measured, desired, base, stages), its names, blocks and
+        meta. Samples that the filter took partly from a gap are marked as not valid.
+
+    Raises:
+        RunError: If ``rate`` is above that of the run, or leaves fewer than two samples.
+    """
+    ratio = Fraction(rate / run.rate).limit_denominator(1000)  # jitter of 0.1 % is none
+    if not 0 < ratio <= 1:
+        raise RunError(f"a run of {run.rate:g} Hz cannot be decimated to {rate:g} Hz")
+    samples = int(len(run.time) * ratio)
+    if samples < 2:
+        raise RunError(f"{run.duration:.3g} s of motion are too short for {rate:g} Hz")
+    if ratio == 1:
+        return run
+
+    def optional(signal: Real | None) -> Real | None:
+        return None if signal is None else _lower(signal, ratio)
+
+    time = run.time[0] + np.arange(samples) / rate
+    valid = np.ones(samples, dtype=bool)
+    for gap in np.flatnonzero(~run.mask).tolist():
+        center = int(gap * ratio)
+        valid[max(0, center - EDGE) : center + EDGE + 1] = False
+    velocity = _without_gaps(_lower(run.velocity, ratio), valid)
+    return replace(
+        run,
+        time=time,
+        velocity=velocity,
+        velocity_desired=optional(run.velocity_desired),
+        base_velocity=optional(run.base_velocity),
+        stages={name: _lower(stage, ratio) for name, stage in run.stages.items()},
+        position=None,
+        position_desired=None,
+        effort=None,
+        base_pose=None,
+        valid=valid,
+    )
+
+
+def _lower(signal: Real, ratio: Fraction) -> Real:
+    """A signal at a share of its rate, on demand of one on demand."""
+    from scipy.signal import resample_poly
+
+    up, down = ratio.numerator, ratio.denominator
+    samples = int(len(signal) * ratio)
+    if not isinstance(signal, OnDemand):
+        exact = signal.astype(np.float64)
+        return np.asarray(resample_poly(exact, up, down, axis=0, padtype="line")[:samples])
+    # What "line" means: before and after the signal goes on as from its first to its last sample.
+    first, last = (signal[at : at + 1].astype(np.float64) for at in (0, len(signal) - 1))
+    slope = (last - first) / (len(signal) - 1)
+    reach = EDGE * max(up, down) // (up * down) + 2  # of the filter, in `down` samples
+
+    def block(start: int, stop: int) -> Array:
+        low, high = (start // up - reach) * down, (-(-stop // up) + reach) * down
+        before = first + slope * np.arange(low, 0)[:, None]
+        after = last + slope * np.arange(1, high - len(signal) + 1)[:, None]
+        inside = signal[max(0, low) : min(high, len(signal))].astype(np.float64)
+        around = np.concatenate((before, inside, after))
+        found = resample_poly(around, up, down, axis=0)
+        return np.asarray(found[start - low // down * up :][: stop - start])
+
+    def rows(start: int, stop: int) -> Array:
+        size = max(1, int(rows_at_once(signal) * ratio))
+        edges = [*range(start, stop, size), stop]
+        return np.concatenate([block(*each) for each in pairwise(edges)] or [block(start, stop)])
+
+    return cast(Real, OnDemand((samples, signal.shape[1]), np.float64, rows))
+
+
+def _without_gaps(signal: Real, valid: Mask) -> Real:
+    """A signal with zeros in gaps."""
+    if not isinstance(signal, OnDemand):
+        signal[~valid] = 0.0
+        return signal
+    return cast(
+        Real,
+        OnDemand(
+            signal.shape,
+            signal.dtype,
+            lambda first, stop: signal[first:stop] * valid[first:stop, None],
+        ),
+    )

@@ -1,19 +1,29 @@
-"""The run file, version 1: which arrays it has, and how they are read, checked and written."""
+"""Run files and other .npz files, read within limits, and arrays that stay in their file.
 
+Sizes are checked before an array is made: a file of some kilobytes may state any. A run of an hour
+at 10 kHz is gigabytes an array. What goes through a run piece by piece (`pieces`) takes the memory
+of a piece, whether its arrays are in memory or in a file.
+"""
+
+import lzma
+import os
+import stat
+import struct
 import zipfile
 import zlib
-from collections.abc import Mapping
-from math import inf
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from math import inf, prod
 from pathlib import Path
-from typing import IO, Any
+from threading import Lock
+from typing import IO, Any, TypeVar, cast
 
 import numpy as np
+from numpy.lib import format as npy
+from numpy.lib.mixins import NDArrayOperatorsMixin
 from numpy.typing import NDArray
 
-from noisemodel import archive
-from noisemodel.atomic import replacing
 from noisemodel.errors import OutputError, RunFileError, hint
-from noisemodel.ondemand import OnDemand
+from noisemodel.files import replacing
 
 FORMAT = "noise-run/1"
 STAGE = "stage_"
@@ -39,36 +49,76 @@ ARRAYS: Mapping[str, tuple[str, tuple[str, ...]]] = {
 }
 """The arrays of a run file: the kind of number or text that each holds, and its axes."""
 
+STAGE_ARRAY = ("f", ("samples", "joints"))
+KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
+
 COMPRESSIBLE = 0.8
 """Arrays are compressed if that leaves less than this share of their size."""
 STRETCH, STRETCHES = 4096, 16
 """Bytes of a stretch on which compression is tried, and how many there are."""
 
-STAGE_ARRAY = ("f", ("samples", "joints"))
-KIND_WORDS = {"f": "numbers", "b": "booleans", "U": "text"}
-
-
 LARGE = 2**26
 """Bytes from which an array can stay in the file."""
 
+AT_ONCE = 2**23
+"""Bytes of an array that are read at once."""
+
+MAX_UNPACKED = "NOISE_MAX_UNPACKED"
+"""Environment variable with another limit than ``UNPACKED``, in bytes."""
+
+UNPACKED = 512 * 2**20
+"""Bytes that any compressed file may unpack to."""
+
+RATIO = 20
+"""A large file may unpack to so many times its own size; the numbers of logs hardly shrink."""
+
+DAMAGE = (
+    *(EOFError, MemoryError, RuntimeError, UnicodeDecodeError),
+    *(struct.error, zlib.error, lzma.LZMAError),
+)
+"""What zipfile and NumPy raise on archives that are broken, encrypted, of a kind that zipfile does
+not read, or state a wrong size."""
+
+TEXT = 64 * 2**20
+"""Most bytes of a text that is read at once."""
+
+PIECE = 2**20
+"""Bytes that are unpacked at once."""
+
+MARKS = 256
+"""Places of a packed array from which it can be unpacked again, each of about 45 KB."""
+
+METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""Those of NumPy; others of zipfile unpack a few bytes to gigabytes at once."""
+
+Result = TypeVar("Result")
+
+
+class ArchiveError(ValueError):
+    """A file that is no archive of plain arrays, is damaged, or unpacks to more than is read."""
+
+
+class ObjectArrayError(ArchiveError):
+    """An array of Python objects, which is never unpickled."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        super().__init__(f"Object arrays cannot be loaded: {name} holds Python objects")
+
 
 def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
-    """Read the arrays of a run file.
+    """Read the arrays of a run file; integers become floating-point where numbers are expected.
 
     Args:
         path: The file.
-        on_demand: Whether large arrays stay in the file, see `noisemodel.ondemand`.
-
-    Returns:
-        Its arrays by name; integers become floating-point where numbers are expected.
+        on_demand: Whether large arrays stay in the file, see `OnDemand`.
 
     Raises:
         RunFileError: If the file cannot be read, is no archive of plain arrays, names an
             unknown array, holds another kind of array, or is of another version.
     """
     try:
-        names = archive.names_in(path)
-        for name in names:
+        for name in names_in(path):
             if name not in ARRAYS and not name.startswith(STAGE):
                 raise RunFileError(
                     path,
@@ -76,15 +126,16 @@ def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
                     f" or position, and of {', '.join(ARRAYS)} and {STAGE}<name> what there is;"
                     " anything else belongs into meta",
                 )
-        arrays = archive.read(path, on_demand=LARGE if on_demand else inf)
+        arrays = read_npz(path, on_demand=LARGE if on_demand else inf)
         found = {name: _plain(path, name, _reading(path, each)) for name, each in arrays.items()}
-    except archive.ObjectArrayError as error:
+    except ObjectArrayError as error:
+        kind = KIND_WORDS[ARRAYS.get(error.name, STAGE_ARRAY)[0]]
         raise RunFileError(
             path,
             f"not a run file: {error.name} holds a Python object, such as None; leave it out, or"
-            f" save {_kind(error.name)}",
+            f" save {kind}",
         ) from error
-    except (OSError, archive.ArchiveError) as error:
+    except (OSError, ArchiveError) as error:
         raise _unread(path, error) from error
     version = str(found.get("format", FORMAT))
     if version != FORMAT:
@@ -92,7 +143,7 @@ def read(path: Path, *, on_demand: bool = False) -> dict[str, NDArray[Any]]:
     return found
 
 
-def _unread(path: Path, error: OSError | archive.ArchiveError) -> RunFileError:
+def _unread(path: Path, error: OSError | ArchiveError) -> RunFileError:
     if isinstance(error, OSError):
         return RunFileError(path, f"cannot be read ({error.strerror or error})")
     csv = "; `inspector import` makes a run of a CSV log" if path.suffix == ".csv" else ""
@@ -108,54 +159,10 @@ def _reading(path: Path, array: Any) -> Any:
     def rows(first: int, stop: int) -> NDArray[Any]:
         try:
             return read(first, stop)
-        except (OSError, archive.ArchiveError) as error:
+        except (OSError, ArchiveError) as error:
             raise _unread(path, error) from error
 
     return OnDemand(array.shape, array.dtype, rows)
-
-
-def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
-    """Write the arrays of a run file, compressed, whole or not at all.
-
-    Args:
-        path: The file to write.
-        arrays: Arrays by name.
-        overwrite: Whether a file that exists may be replaced.
-
-    Raises:
-        OutputError: If the file exists or cannot be written.
-    """
-    with replacing(path, overwrite=overwrite) as temporary:
-        try:
-            with temporary.open("wb") as stream:
-                _pack(stream, arrays)
-        except ValueError as error:
-            raise OutputError(f"{path}: cannot be written ({archive.one_line(error)})") from error
-
-
-def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
-    """Write what ``np.savez_compressed`` would, in a tenth of its time.
-
-    Compression hardly makes the noise of a log smaller, and to undo it takes most of the time of
-    loading: what it would not make smaller by a fifth is left as it is, and the quickest will do.
-    """
-    with zipfile.ZipFile(stream, "w", compresslevel=1) as packed:
-        for name, array in arrays.items():
-            packed.compression = zipfile.ZIP_DEFLATED if _shrinks(array) else zipfile.ZIP_STORED
-            with packed.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
-                np.lib.format.write_array(member, np.asanyarray(array), allow_pickle=False)
-
-
-def _shrinks(array: Any) -> bool:
-    """Whether compression pays, tried on some stretches that are spread over an array."""
-    data = np.atleast_1d(array).ravel(order="K").view(np.uint8)
-    starts = np.linspace(0, max(0, len(data) - STRETCH), STRETCHES).astype(int)
-    tried = b"".join(data[start : start + STRETCH].tobytes() for start in starts.tolist())
-    return len(zlib.compress(tried, 1)) < COMPRESSIBLE * len(tried)
-
-
-def _kind(name: str) -> str:
-    return KIND_WORDS[ARRAYS.get(name, STAGE_ARRAY)[0]]
 
 
 def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
@@ -171,3 +178,382 @@ def _plain(path: Path, name: str, array: NDArray[Any]) -> NDArray[Any]:
     if array.dtype.kind != wanted:
         raise RunFileError(path, f"{name} holds {array.dtype}, expected {KIND_WORDS[wanted]}")
     return array
+
+
+def write(path: Path, arrays: Mapping[str, Any], *, overwrite: bool) -> None:
+    """Write the arrays of a run file whole or not at all: as ``np.savez_compressed``, but faster.
+
+    Compression hardly makes the noise of a log smaller, and to undo it takes most of the time of
+    loading: what it would not make smaller by a fifth is left as it is, and the quickest will do.
+
+    Raises:
+        OutputError: If the file exists or cannot be written.
+    """
+    with replacing(path, overwrite=overwrite) as temporary:
+        try:
+            with temporary.open("wb") as stream:
+                _pack(stream, arrays)
+        except ValueError as error:
+            raise OutputError(f"{path}: cannot be written ({one_line(error)})") from error
+
+
+def _pack(stream: IO[bytes], arrays: Mapping[str, Any]) -> None:
+    with zipfile.ZipFile(stream, "w", compresslevel=1) as packed:
+        for name, array in arrays.items():
+            packed.compression = zipfile.ZIP_DEFLATED if _shrinks(array) else zipfile.ZIP_STORED
+            with packed.open(f"{name}.npy", "w", force_zip64=True) as member:  # dated 1980
+                npy.write_array(member, np.asanyarray(array), allow_pickle=False)
+
+
+def _shrinks(array: Any) -> bool:
+    """Whether compression pays, tried on some stretches that are spread over an array."""
+    data = np.atleast_1d(array).ravel(order="K").view(np.uint8)
+    starts = np.linspace(0, max(0, len(data) - STRETCH), STRETCHES).astype(int)
+    tried = b"".join(data[start : start + STRETCH].tobytes() for start in starts.tolist())
+    return len(zlib.compress(tried, 1)) < COMPRESSIBLE * len(tried)
+
+
+class OnDemand(NDArrayOperatorsMixin):
+    """An array of which rows are read when they are needed.
+
+    It can stand in for a NumPy array. Slices and indices of rows read these; whatever else is done
+    with it reads it whole, once, and keeps it in memory.
+
+    Args:
+        shape: Its shape, rows first.
+        dtype: Type of its numbers.
+        read: Reads rows from a first one up to the one after the last.
+
+    Attributes:
+        checked: Whether its values were checked; they are not checked again.
+    """
+
+    def __init__(
+        self, shape: tuple[int, ...], dtype: Any, read: Callable[[int, int], NDArray[Any]]
+    ) -> None:
+        self.shape, self.dtype, self.read = shape, np.dtype(dtype), read
+        self.ndim, self.size = len(shape), prod(shape)
+        self.nbytes = self.size * int(self.dtype.itemsize)
+        self.checked = False
+        self._whole: NDArray[Any] | None = None
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, key: Any) -> NDArray[Any]:
+        """Read rows, or parts of rows; the result is in memory."""
+        rows, *others = key if isinstance(key, tuple) else (key,)
+        if isinstance(rows, slice):
+            start, stop, step = rows.indices(len(self))
+            if step == 1:
+                found = self.read(start, max(start, stop))
+            else:
+                found = self._rows(np.arange(start, stop, step))
+        elif isinstance(rows, np.ndarray) and rows.ndim == 1 and rows.dtype.kind in "biu":
+            found = self._rows(np.flatnonzero(rows) if rows.dtype.kind == "b" else rows)
+        else:
+            return np.asarray(np.asarray(self)[key])
+        return found[:, *others] if others else found
+
+    def _rows(self, rows: NDArray[Any]) -> NDArray[Any]:
+        """Rows by their indices, the file being read once if these rise."""
+        found = np.empty((len(rows), *self.shape[1:]), self.dtype)
+        rows = np.where(rows < 0, rows + len(self), rows)
+        size = rows_at_once(self)
+        first = 0
+        while first < len(rows):
+            low = int(rows[first])
+            outside = np.flatnonzero((rows[first:] < low) | (rows[first:] >= low + size))
+            stop = first + int(outside[0]) if len(outside) else len(rows)
+            chosen = rows[first:stop] - low
+            found[first:stop] = self.read(low, low + int(chosen.max()) + 1)[chosen]
+            first = stop
+        return found
+
+    def astype(self, dtype: Any, **_: Any) -> "OnDemand":
+        """The array in another type, on demand too."""
+        return OnDemand(self.shape, dtype, lambda first, stop: self.read(first, stop).astype(dtype))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        if self._whole is None:
+            whole = self._whole = self.read(0, len(self))
+            self.read = lambda first, stop: whole[first:stop]
+        return self._whole if dtype is None else self._whole.astype(dtype, copy=False)
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **settings: Any) -> Any:
+        """Compute with the whole array."""
+        plain = [np.asarray(each) if isinstance(each, OnDemand) else each for each in inputs]
+        return getattr(ufunc, method)(*plain, **settings)
+
+    def __getattr__(self, name: str) -> Any:
+        """Anything else that an array has, of the whole array."""
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return getattr(np.asarray(self), name)
+
+
+def rows_at_once(array: Any) -> int:
+    """Rows of an array that are taken at once: at least one."""
+    row: int = array.dtype.itemsize * prod(array.shape[1:])
+    return max(1, AT_ONCE // max(1, row))
+
+
+def pieces(array: Any, multiple: int = 1) -> Iterator[slice]:
+    """Rows of an array, piece by piece; all but the last have a multiple of so many rows."""
+    size = max(1, rows_at_once(array) // multiple) * multiple
+    for first in range(0, len(array), size):
+        yield slice(first, min(first + size, len(array)))
+
+
+def read_npz(
+    path: Path, names: Collection[str] | None = None, *, on_demand: float = inf
+) -> dict[str, NDArray[Any]]:
+    """Read the arrays of an .npz file by their names.
+
+    Args:
+        path: The file.
+        names: Those that are read, all unless given.
+        on_demand: Larger arrays stay in the file, in bytes: an `OnDemand` stands in for each,
+            unless it has one axis or is packed column by column. They raise ArchiveError or OSError
+            where they are read.
+
+    Raises:
+        ArchiveError: If it is no archive of plain arrays, has two of one name, is damaged, or
+            unpacks to more than `check_unpacked` allows.
+        OSError: If it cannot be opened.
+    """
+
+    def arrays(archive: zipfile.ZipFile) -> dict[str, NDArray[Any]]:
+        found = {}
+        for member in archive.infolist():
+            name = member.filename.removesuffix(".npy")
+            if names is None or name in names:
+                with archive.open(member) as stream:
+                    kept = None
+                    if member.file_size > on_demand:
+                        kept = _kept(path, stream, name, member)
+                    if kept is None:
+                        found[name] = read_array(stream, name, member.file_size)
+                    else:
+                        found[name] = cast(NDArray[Any], kept)
+        return found
+
+    return _opened(path, arrays)
+
+
+def names_in(path: Path) -> tuple[str, ...]:
+    """Names of the arrays of an .npz file; raises as `read_npz`."""
+    return _opened(
+        path, lambda archive: tuple(name.removesuffix(".npy") for name in archive.namelist())
+    )
+
+
+def read_array(stream: IO[bytes], name: str, size: int) -> NDArray[Any]:
+    """Read an array of NumPy's format from so many bytes, once its header agrees with them.
+
+    Raises:
+        ArchiveError: If it is no array, holds objects, or states another size than it has.
+    """
+    shape, fortran, dtype = _header(stream, name, size)
+    held = size - stream.tell()
+    content = np.empty(held, dtype=np.uint8)
+    view, place = content.data, 0
+    while place < held:
+        piece = stream.read(min(PIECE, held - place))
+        if not piece:
+            raise ArchiveError(f"damaged: {name} is cut off")
+        view[place : place + len(piece)] = piece
+        place += len(piece)
+    try:
+        return content.view(dtype).reshape(shape, order="F" if fortran else "C")
+    except (ValueError, OverflowError) as error:
+        raise ArchiveError(f"damaged: {name} states shape {shape}") from error
+
+
+def _header(stream: IO[bytes], name: str, size: int) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """Shape, order and type of an array, once they agree with its size."""
+    try:
+        version = npy.read_magic(stream)
+        header = {(1, 0): npy.read_array_header_1_0, (2, 0): npy.read_array_header_2_0}[version]
+        shape, fortran, dtype = header(stream)
+        length = prod(shape)
+    except Exception as error:  # NumPy lets those of its parser through: any, by the bytes
+        raise ArchiveError(f"{name} is no array ({one_line(error)})") from error
+    if dtype.hasobject:
+        raise ObjectArrayError(name)
+    held = size - stream.tell()
+    if min(shape, default=0) < 0 or length * dtype.itemsize != held or not dtype.itemsize:
+        raise ArchiveError(f"damaged: {name} states shape {shape} of {dtype}, but has {held} bytes")
+    return shape, fortran, dtype
+
+
+def _kept(path: Path, stream: IO[bytes], name: str, info: zipfile.ZipInfo) -> OnDemand | None:
+    """An array that stays in the file; None, and nothing is read, where that does not pay."""
+    shape, fortran, dtype = _header(stream, name, info.file_size)
+    begin = stream.tell()
+    if len(shape) < 2 or fortran:
+        stream.seek(0)
+        return None
+    member = _Member(path, name, info)
+    member.read(0, begin)
+    row = dtype.itemsize * prod(shape[1:])
+
+    def rows(first: int, stop: int) -> NDArray[Any]:
+        content = member.read(begin + first * row, begin + stop * row)
+        return content.view(dtype).reshape(stop - first, *shape[1:])
+
+    return OnDemand(shape, dtype, rows)
+
+
+class _Member:
+    """The bytes of a member of an archive, from any place.
+
+    The file is opened for each piece. What is packed is unpacked from the last mark before the
+    piece: a state of the decompressor, kept every so many bytes. The checksum is compared once the
+    member was read in order.
+    """
+
+    def __init__(self, path: Path, name: str, info: zipfile.ZipInfo) -> None:
+        self._path, self._name, self._info = path, name, info
+        with path.open("rb") as file:
+            self._known = _identity(file)
+            file.seek(info.header_offset)
+            lengths = struct.unpack("<26xHH", file.read(30))
+        self._begin = info.header_offset + 30 + sum(lengths)
+        self._apart = max(PIECE, info.file_size // MARKS)
+        # Places of the unpacked and the packed member, and the decompressor's state there.
+        self._marks = [(0, 0, zlib.decompressobj(-zlib.MAX_WBITS))]
+        self._last = self._marks[0]
+        self._lock = Lock()
+        self._sum, self._summed = 0, 0
+
+    def read(self, start: int, stop: int) -> NDArray[np.uint8]:
+        """Bytes from a place to another; ArchiveError if the file is damaged, or was changed."""
+        content = np.empty(max(0, stop - start), dtype=np.uint8)
+        with self._lock, self._path.open("rb") as file:
+            if _identity(file) != self._known:
+                raise ArchiveError("was changed while it was read")
+            if self._info.compress_type == zipfile.ZIP_STORED:
+                file.seek(self._begin + start)
+                count = file.readinto(content.data)
+            else:
+                try:
+                    count = self._unpack(file, start, content)
+                except DAMAGE as error:
+                    raise ArchiveError(f"damaged: {one_line(error)}") from error
+            if count < len(content):
+                raise ArchiveError(f"damaged: {self._name} is cut off")
+            if start == self._summed:
+                self._sum = zlib.crc32(content.data, self._sum)
+                self._summed = stop
+                if stop == self._info.file_size and self._sum != self._info.CRC:
+                    raise ArchiveError(f"damaged: wrong checksum of {self._name}")
+        return content
+
+    def _unpack(self, file: IO[bytes], start: int, content: NDArray[np.uint8]) -> int:
+        """Unpack what begins at a place, and count the bytes."""
+        before = [mark for mark in (*self._marks, self._last) if mark[0] <= start]
+        place, packed, state = max(before, key=lambda mark: mark[0])
+        state = state.copy()
+        file.seek(self._begin + packed)
+        stop, waiting = start + len(content), b""
+        while place < stop and not state.eof:
+            if not waiting:
+                left = self._info.compress_size - packed
+                waiting = file.read(max(0, min(PIECE, left)))
+            some = state.decompress(waiting, min(PIECE, stop - place))
+            if not some and not waiting:
+                break
+            packed += len(waiting) - len(state.unconsumed_tail)
+            waiting = state.unconsumed_tail
+            low, high = max(place, start), place + len(some)
+            if high > low:
+                content[low - start : high - start] = np.frombuffer(some, np.uint8)[low - place :]
+            place = high
+            if place >= self._marks[-1][0] + self._apart:
+                self._marks.append((place, packed, state.copy()))
+        self._last = place, packed, state
+        return max(0, place - start)
+
+
+def _identity(file: IO[bytes]) -> tuple[int, ...]:
+    """What changes with a file."""
+    status = os.fstat(file.fileno())
+    return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
+
+
+def _opened(path: Path, use: Callable[[zipfile.ZipFile], Result]) -> Result:
+    check_regular(path)
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _check(archive.infolist(), path.stat().st_size)
+            return use(archive)
+    except zipfile.BadZipFile as error:
+        raise ArchiveError(one_line(error)) from error
+    except DAMAGE as error:
+        raise ArchiveError(f"damaged: {one_line(error)}") from error
+
+
+def _check(members: Iterable[zipfile.ZipInfo], packed: int) -> None:
+    members = list(members)
+    check_unpacked(sum(member.file_size for member in members), packed)
+    seen = set()
+    for member in members:
+        name = member.filename.removesuffix(".npy")
+        if name in seen:
+            raise ArchiveError(f"has two arrays named {name!r}")
+        if not name.isprintable():
+            raise ArchiveError(f"has an array named {name!r}")
+        seen.add(name)
+        if member.compress_type not in METHODS:
+            raise ArchiveError(f"{name} is compressed by another method than NumPy's")
+
+
+def check_regular(path: Path) -> None:
+    """Refuse a device, pipe or socket, which may have no end.
+
+    Raises:
+        ArchiveError: If it is one.
+        OSError: If there is no such file.
+    """
+    mode = path.stat().st_mode
+    if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+        raise ArchiveError("is no regular file; save what it holds to one")
+
+
+def read_text(path: Path) -> str:
+    """Text of a regular file in UTF-8 of up to ``TEXT`` bytes.
+
+    Raises:
+        ArchiveError: If it is no regular file, too long, or not text in UTF-8.
+        OSError: If it cannot be read.
+    """
+    check_regular(path)
+    if (size := path.stat().st_size) > TEXT:
+        raise ArchiveError(f"{size} bytes, the limit is {TEXT}")
+    try:
+        return path.read_text(encoding="utf-8")
+    except UnicodeDecodeError as error:
+        raise ArchiveError("not text in UTF-8") from error
+
+
+def check_unpacked(unpacked: int, packed: int) -> None:
+    """Refuse what would unpack to more than ``UNPACKED`` bytes and ``RATIO`` times its size.
+
+    Raises:
+        ArchiveError: If it would.
+    """
+    stated = os.environ.get(MAX_UNPACKED, str(UNPACKED))
+    if not stated.isdecimal():
+        raise ArchiveError(f"{MAX_UNPACKED} is {stated!r}, expected bytes")
+    most = max(int(stated), RATIO * packed)
+    if unpacked > most:
+        raise ArchiveError(
+            f"unpacks to {unpacked / 1e9:.3g} GB from {packed / 1e6:.3g} MB, the limit is"
+            f" {most / 1e9:.3g} GB; --max-unpacked GB (or {MAX_UNPACKED}=bytes) raises it"
+        )
+
+
+def one_line(error: BaseException) -> str:
+    """The words of an error, or its name."""
+    return " ".join(str(error).split()) or type(error).__name__

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import linkshapes, meshes, meshpath
-from noisemodel.cache import cached
 from noisemodel.errors import GeometryError, MeshError, MissingMeshError
+from noisemodel.files import cached
 from noisemodel.linkshapes import LinkShape
 from noisemodel.robot import Robot
 from noisemodel.subspace import turning_axis

@@ -5,9 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
-from noisemodel import xmltext
-from noisemodel.bounds import beyond, limit
 from noisemodel.errors import RobotError
+from noisemodel.files import beyond, limit, parsed_xml
 
 MAX_BYTES = 64 * 2**20
 NUMBERS = {"xyz": 3, "rpy": 3, "ixx": 1, "iyy": 1, "izz": 1, "ixy": 1, "ixz": 1, "iyz": 1}
@@ -68,7 +67,7 @@ def read(path: Path) -> Urdf:
     if not text.strip():
         raise RobotError(f"{path}: the URDF is empty")
     try:
-        root = xmltext.parsed(text)
+        root = parsed_xml(text)
     except ValueError as error:
         raise RobotError(f"{path}: {error}") from error
     if root.tag != "robot":

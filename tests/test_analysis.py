@@ -26,7 +26,7 @@ from inspector.report.formats import FORMATS
 from inspector.verdict import Verdict, classify_file, exit_status
 from noiseclassifier import Event, Labels
 from noisemodel import Robot, Run
-from noisemodel.differentiate import METHOD, joint_velocity
+from noisemodel.run import METHOD, joint_velocity
 
 LIBRARY = load_library(model_files())
 RATE = 1000.0

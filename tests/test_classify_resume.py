@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
+import workers
 from commandline import call
 
 from inspector import assets, verdict
@@ -25,7 +26,7 @@ from inspector.logs.read import Reading, Source, open_source
 from inspector.verdict import Evidence, StateError, Verdict, classify_files, digest, kept
 from inspector.version import program_version
 from noiseclassifier import Event
-from noisemodel import OutputError, parallel
+from noisemodel import OutputError
 
 ROOT = Path(__file__).parents[1]
 COUNT = 24
@@ -183,7 +184,7 @@ def test_a_state_of_other_settings_or_no_state_is_refused(tmp_path):
 
 def test_a_run_that_kills_its_worker_is_named_and_the_others_are_classified(runs, monkeypatch):
     monkeypatch.setattr(verdict, "open_source", die_of_seven)
-    monkeypatch.setattr(parallel, "_forks", lambda: True)  # as of the command line by itself
+    workers.simulate(monkeypatch)
     status, out, err = call("classify", runs, "-j", 2)
     assert status == 70
     assert out.splitlines()[-1].startswith(f"{COUNT} runs: 1 internal error, {COUNT - 1} with")
@@ -192,7 +193,7 @@ def test_a_run_that_kills_its_worker_is_named_and_the_others_are_classified(runs
 
 def die_of_seven(source, reading=None):
     if source.path.name == "07.npz":
-        os._exit(137)
+        workers.die()
     return open_source(source, reading)
 
 

@@ -14,7 +14,7 @@ from generalmodel import run_at
 
 from inspector import cli
 from inspector.assets import demo_run
-from noisemodel import Block, checks
+from noisemodel import Block
 
 ROOT = Path(__file__).parents[1]
 ROWS = "time,a.velocity\n" + "".join(f"{k / 100},{k % 70 / 70}\n" for k in range(400))
@@ -145,7 +145,7 @@ def test_a_command_ends_with_70_and_a_traceback_at_a_bug(place, name, monkeypatc
         monkeypatch.setattr("noiseclassifier.noisytest.parse_annotations", broken)
         status, out, err = call(name, *COMMANDS[name])
     else:
-        monkeypatch.setattr(checks, "check_time", broken)
+        monkeypatch.setattr("noisemodel.run.check_time", broken)
         status, out, err = call(name, *COMMANDS[name])
     assert status == 70
     assert "ZeroDivisionError: a bug" in out + err

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+import workers
 from commandline import call
 
 import inspector.tune
@@ -182,12 +183,12 @@ def test_a_point_that_kills_its_worker_is_named_and_the_search_resumes(
 
     def die(profiles, trial):
         if profiles[0].stride == 50:
-            os._exit(137)
+            workers.die()
         return measure(profiles, trial)
 
     with monkeypatch.context() as patch:
         patch.setattr(inspector.tune, "measure", die)
-        patch.setattr(parallel, "_forks", lambda: True)
+        workers.simulate(patch)
         status, _, err = tune(data, output, "-j", 2)
     assert status == 3
     point = "stride=50, gamma=0.001, regularization=0.1"

@@ -1,5 +1,4 @@
 import dataclasses
-import os
 import pickle
 import sys
 from collections import Counter
@@ -8,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import workers
 from chains import BAR, chain, motion
 
 from noisemodel import (
@@ -317,11 +317,11 @@ def test_a_robot_that_kills_its_worker_is_left_out(tmp_path, monkeypatch):
     comparing = sys.modules["noisemodel.compare"]
 
     def die(name, *others):
-        return os._exit(137) if name == "ur5" else compare_one(name, *others)
+        return workers.die() if name == "ur5" else compare_one(name, *others)
 
     compare_one = comparing._compare
     monkeypatch.setattr(comparing, "_compare", die)
-    monkeypatch.setattr(parallel, "_forks", lambda: True)
+    workers.simulate(monkeypatch)
     found = compare([arm(tmp_path, *ARM), "ur5"], kinds=FEW, jobs=2)
     assert len(found) == 1
     assert [(each.name, each.reason) for each in found.left_out] == [("ur5", parallel.DIED)]

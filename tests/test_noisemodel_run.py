@@ -1,13 +1,34 @@
+"""What makes a run valid: both sides of each limit, and errors as they are printed whole."""
+
+import re
+from contextlib import nullcontext
 from dataclasses import fields, replace
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from noisemodel import Block, Run, RunError, ondemand
-from noisemodel.ondemand import OnDemand
-from noisemodel.run import part, pieces_of
+from noisemodel import Block, Run, RunError, RunFileError, decimated, runfile
+from noisemodel.run import (
+    METHOD,
+    NotUniformError,
+    base_velocity,
+    check_blocks,
+    check_names,
+    check_quaternions,
+    check_signal,
+    check_time,
+    check_valid,
+    check_words,
+    joint_velocity,
+    part,
+    pieces_of,
+    stretches,
+    with_velocities,
+)
+from noisemodel.runfile import OnDemand
 
 TIME = np.arange(100) / 1000
 
@@ -290,7 +311,7 @@ def test_the_motion_of_a_floating_base_comes_before_that_of_the_joints():
 
 @pytest.mark.parametrize("samples", [1, 7, 99, 100, 101, None])
 def test_the_pieces_of_a_run_are_its_motion(monkeypatch, samples):
-    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 8 * 30 + 5)
+    monkeypatch.setattr(runfile, "AT_ONCE", 8 * 8 * 30 + 5)
     whole = filled()
     found = list(pieces_of(whole, samples=samples))
     sizes = [len(piece.time) for piece in found]
@@ -306,3 +327,511 @@ def test_the_pieces_of_a_run_are_its_motion(monkeypatch, samples):
         assert (piece.blocks, piece.stages) == ((), {})
     (alone,) = pieces_of(run())
     assert (alone.effort, alone.base_velocity, alone.robot) == (None, None, None)
+
+
+FINEST = 2.0**-33
+"""Spacing of numbers just below 2**20."""
+
+
+def refused(message, error=RunError):
+    """Expect an error with this whole text."""
+    return pytest.raises(error, match=f"^{re.escape(message)}$")
+
+
+@pytest.fixture
+def cut(monkeypatch):
+    """Pieces of four rows, of one column of floats."""
+    monkeypatch.setattr(runfile, "AT_ONCE", 4 * 8)
+
+
+@pytest.mark.parametrize("shape", [(), (0,), (1,), (2, 1), (2, 2)])
+def test_a_time_has_one_axis_and_two_samples_at_least(shape):
+    with refused(f"time: shape {shape}, expected (samples,) with at least 2 samples"):
+        check_time(np.zeros(shape))
+    check_time(np.arange(2.0))
+
+
+@pytest.mark.parametrize(
+    ("time", "message"),
+    [
+        ([0.0, 0.5, np.nan, np.inf, 2.0], "time: nan in row 2"),
+        ([0.0, np.inf, np.nan], "time: inf in row 1"),
+        ([0.0, 0.5, 1.0, 1.0, 1.5], "time: stands still in row 3 (1 s, then 1 s)"),
+        (
+            [0.0, 0.5, 1.0, 0.987654321, 0.987654321],
+            "time: runs backwards in row 3 (1 s, then 0.987654321 s)",
+        ),
+    ],
+)
+def test_the_first_row_of_a_time_that_is_wrong_is_named(time, message):
+    with refused(message):
+        check_time(np.array(time))
+
+
+@pytest.mark.parametrize(
+    ("step", "message"),
+    [
+        (1e-9, ""),
+        (0.9e-9, "9e-10"),
+        (1e9, ""),
+        (1e9 + 1, "1e+09"),
+    ],
+)
+def test_steps_of_time_are_from_a_nanosecond_to_1e9_seconds(step, message):
+    whole = f"time: the median step is {message} s, expected 1e-09 s to 1e+09 s"
+    with refused(whole) if message else nullcontext():
+        check_time(np.array([0.0, step]))
+
+
+@pytest.mark.parametrize("share", [0.9e-3, -0.9e-3, 1.1e-3, -1.1e-3])
+def test_a_step_may_lie_a_thousandth_from_the_median(share):
+    time = np.arange(20) / 4
+    time[7:] += share / 4
+    time[9:] += 2 * share / 4 * (abs(share) > 1e-3)
+    text = (
+        f"time: not uniform, the step to row 7 is {0.25 * (1 + share):.6g} s where the median is"
+        " 0.25 s; `inspector import` resamples such logs (and float32 is too coarse)"
+    )
+    wrong = abs(share) > 1e-3
+    with refused(text, NotUniformError) if wrong else nullcontext():
+        check_time(time)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize(("by", "uniform"), [(4, True), (-4, True), (5, False), (-5, False)])
+def test_stamps_far_from_zero_may_lie_two_of_their_own_spacings_from_the_median(
+    mirrored, by, uniform
+):
+    """Only the outermost stamp has a spacing of 2 FINEST: the tolerance is 4 FINEST."""
+    steps = np.full(9, 200.0)
+    steps[4] += by
+    time = 2.0**20 - FINEST * np.append(np.cumsum(steps[::-1])[::-1], 0.0)
+    with nullcontext() if uniform else pytest.raises(NotUniformError, match="row 5 is"):
+        check_time(-time[::-1] if mirrored else time)
+
+
+@pytest.mark.parametrize("row", range(1, 12))
+def test_an_uneven_step_is_named_in_every_piece_of_the_time(cut, row):
+    time = np.arange(12.0)
+    time[row:] += 0.5
+    with pytest.raises(NotUniformError, match=f"the step to row {row} is 1.5 s"):
+        check_time(time)
+
+
+@pytest.mark.parametrize("word", ["", "a\nb", "\x00"])
+def test_words_are_printable_and_not_empty(word):
+    check_words("stages", ["a b", "ö"])
+    with refused(f"stages: {word!r} is no name; it is empty or cannot be printed"):
+        check_words("stages", ["a", word])
+
+
+def test_names_that_repeat_are_all_named(monkeypatch):
+    with refused("joint_names: a, c named twice"):
+        check_names("joint_names", ["c", "b", "a", "c", "a", "a"])
+    monkeypatch.setenv("NOISE_LIMIT_JOINTS", "3")
+    check_names("joint_names", ["a", "b", "c"])
+    with refused("joint_names: 4 joints, the limit is 3 (--limit joints=N raises it)"):
+        check_names("joint_names", ["a", "b", "c", "d"])
+
+
+@pytest.mark.parametrize(
+    ("shape", "turned"),
+    [
+        ((2, 5), True),
+        ((7, 5), True),
+        ((2, 4), False),
+        ((5, 5), False),
+        ((5, 3), False),
+        ((5,), False),
+        ((1, 5, 1), False),
+        ((2, 2, 5), False),
+        ((2, 5, 2), False),
+    ],
+)
+def test_signals_of_another_shape_are_refused_and_samples_that_come_last_are_named(shape, turned):
+    hint = "; samples come first, is it transposed?" if turned else ""
+    with refused(f"effort: shape {shape}, expected (5, 2){hint}"):
+        check_signal("effort", np.zeros(shape), (5, 2))
+
+
+def test_signals_are_of_floating_point_numbers_of_any_size():
+    for kind in (np.float16, np.float32, np.float64):
+        check_signal("effort", np.ones((5, 2), dtype=kind), (5, 2))
+    for wrong in (np.int64, np.complex128):
+        with refused(f"effort: holds {wrong.__name__}, expected floating-point numbers"):
+            check_signal("effort", np.ones((5, 2), dtype=wrong), (5, 2))
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize("row", [0, 1, 4, 6, 8])
+def test_a_value_that_is_not_finite_or_of_1e15_is_named_in_every_piece(cut, sign, row):
+    signal = np.full((9, 2), sign * (1e15 - 1))
+    check_signal("effort", signal, (9, 2))
+    for value, said in (
+        (1e15, f"{sign * 1e15:g} in row {row}, column 1; expected numbers below 1e+15"),
+        (np.inf, f"{sign * np.inf} in row {row}, column 1; mark gaps with valid = false and zeros"),
+        (np.nan, f"nan in row {row}, column 1; mark gaps with valid = false and zeros"),
+    ):
+        wrong = signal.copy()
+        wrong[row, 1] = sign * value
+        wrong[row + 1 :, 0] = 2e15
+        with refused(f"effort: {said}"):
+            check_signal("effort", wrong, (9, 2))
+
+
+def test_a_signal_on_demand_is_read_for_its_check_once_and_its_shape_always(cut):
+    read = []
+
+    def rows(first, stop):
+        read.append((first, stop))
+        return np.zeros((stop - first, 1))
+
+    signal = OnDemand((9, 1), np.float64, rows)
+    for _ in range(2):
+        check_signal("effort", signal, (9, 1))
+        assert read == [(0, 4), (4, 8), (8, 9)]
+    with refused("effort: shape (9, 1), expected (9, 2)"):
+        check_signal("effort", signal, (9, 2))
+
+
+def test_a_mask_is_a_boolean_for_each_sample_and_leaves_one_at_least():
+    check_valid(np.arange(5) == 3, 5)
+    for wrong in (np.ones(5), np.ones(4, dtype=bool), np.ones((5, 1), dtype=bool)):
+        text = f"valid: shape {wrong.shape} of {wrong.dtype}, expected (5,) of bool"
+        with refused(text):
+            check_valid(wrong, 5)
+    with refused("valid: false in every sample, no sample is left"):
+        check_valid(np.zeros(5, dtype=bool), 5)
+
+
+@pytest.mark.parametrize(
+    ("blocks", "message"),
+    [
+        ([(9.5, 13.0, "ok")], ""),
+        (
+            [(9.49, 11.0, "ok")],
+            "block 'ok': 9.49 s to 11 s lies outside of the run, 10 s to 12 s",
+        ),
+        (
+            [(11.0, 11.5, "ok"), (11.5, 13.01, "late")],
+            "block 'late': 11.5 s to 13.01 s lies outside of the run, 10 s to 12 s",
+        ),
+        ([(10.0, 11.0, "ok"), (10.5, 12.0, "impact"), (12.0, 13.0, "ok")], ""),
+        (
+            [(10.0, 11.0, "ok"), (11.0, 12.0, "impact"), (11.49, 13.0, "last")],
+            "blocks overlap: 'impact' until 12 s and 'last' from 11.49 s",
+        ),
+        ([(11.0, 11.0, "ok")], "block 'ok': starts at 11 s, stops at 11 s"),
+        ([(11.5, 11.25, "ok")], "block 'ok': starts at 11.5 s, stops at 11.25 s"),
+        ([(11.0, 12.0, "")], "block_label: '' is no name; it is empty or cannot be printed"),
+    ],
+)
+def test_blocks_may_lie_a_step_before_a_run_two_after_it_and_overlap_by_one(blocks, message):
+    time = 10.0 + np.arange(5) / 2
+    with refused(message) if message else nullcontext():
+        check_blocks([Block(*block) for block in blocks], time)
+
+
+@pytest.mark.parametrize("row", range(9))
+@pytest.mark.parametrize("norm", [0.989, 1.011, 0.991, 1.009])
+def test_quaternions_have_a_length_of_one_to_a_hundredth_in_every_piece(monkeypatch, row, norm):
+    monkeypatch.setattr(runfile, "AT_ONCE", 4 * 7 * 8)
+    turn = np.array([0.1, -0.7, 0.5, 0.5])
+    pose = np.tile([3.0, 4.0, 5.0, *turn], (9, 1))
+    valid = np.ones(9, dtype=bool)
+    check_quaternions(pose, valid)
+    pose[row, 3:] *= norm
+    pose[row + 1 :, 3:] *= norm
+    wrong = abs(norm - 1) > 0.01
+    text = (
+        f"base_pose: the quaternion in row {row} has norm {norm:.3g}, expected 1 (order x, y, z, w)"
+    )
+    with refused(text) if wrong else nullcontext():
+        check_quaternions(pose, valid)
+    check_quaternions(pose, np.arange(9) < row)
+
+
+def run_of(hertz, *, rate=10_000, seconds=3.0, **fields):
+    time = 5.0 + np.arange(round(rate * seconds)) / rate
+    velocity = np.sin(2 * np.pi * hertz * (time - 5.0))[:, None]
+    return Run(time=time, velocity=velocity, joint_names=("elbow",), **fields)
+
+
+@pytest.mark.parametrize("rate", [5000.0, 1000.0, 2500.0, 300.0])
+def test_a_slow_motion_is_unchanged(rate):
+    slow = decimated(run_of(20.0), rate)
+    assert slow.rate == pytest.approx(rate)
+    inner = slice(20, -20)
+    expected = np.sin(2 * np.pi * 20.0 * (slow.time - 5.0))
+    np.testing.assert_allclose(slow.velocity[inner, 0], expected[inner], atol=3e-3)
+    assert slow.time[0] == 5.0
+
+
+def test_frequencies_above_the_lower_nyquist_frequency_are_removed_not_folded():
+    slow = decimated(run_of(900.0), 1000.0)
+    assert np.abs(slow.velocity[20:-20]).max() < 1e-2
+
+
+def test_a_constant_velocity_stays_constant_to_the_edges():
+    time = np.arange(10_000) / 10_000
+    run = Run(time=time, velocity=np.full((10_000, 1), 2.0), joint_names=("a",))
+    np.testing.assert_allclose(decimated(run, 1000.0).velocity, 2.0, atol=2e-3)
+
+
+def test_all_velocities_are_decimated_and_nothing_else_is_kept():
+    run = run_of(20.0)
+    run = run_of(
+        20.0,
+        velocity_desired=run.velocity,
+        stages={"planned": run.velocity},
+        position=run.velocity,
+        effort=run.velocity,
+        base_velocity=np.tile(run.velocity, 6),
+        base_pose=np.tile([0.0, 0, 0, 0, 0, 0, 1], (len(run.time), 1)),
+        blocks=(Block(5.0, 6.0, "ok"),),
+        meta={"seed": 1},
+        robot="panda",
+    )
+    slow = decimated(run, 1000.0)
+    np.testing.assert_array_equal(slow.velocity, slow.velocity_desired)
+    np.testing.assert_array_equal(slow.velocity, slow.stages["planned"])
+    assert slow.base_velocity.shape == (3000, 6)
+    assert (slow.position, slow.effort, slow.base_pose) == (None, None, None)
+    assert (slow.blocks, dict(slow.meta), slow.robot) == (run.blocks, {"seed": 1}, "panda")
+
+
+def test_what_a_gap_reaches_into_is_not_valid():
+    valid = np.ones(30_000, dtype=bool)
+    valid[15_000:15_100] = False
+    slow = decimated(run_of(20.0, valid=valid), 1000.0)
+    assert not slow.valid[1490:1520].any()
+    assert slow.valid[:1490].all()
+    assert slow.valid[1520:].all()
+    assert (slow.velocity[~slow.valid] == 0).all()
+
+
+def test_the_same_rate_changes_nothing():
+    run = run_of(20.0)
+    assert decimated(run, 10_000.0) is run
+
+
+def test_a_rate_is_never_raised():
+    with pytest.raises(RunError, match="a run of 1000 Hz cannot be decimated to 2000 Hz"):
+        decimated(run_of(20.0, rate=1000), 2000.0)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1000.0])
+def test_a_lower_rate_is_above_zero(rate):
+    with pytest.raises(RunError, match=f"^a run of 10000 Hz cannot be decimated to {rate:g} Hz$"):
+        decimated(run_of(20.0), rate)
+
+
+def test_two_samples_are_left_at_least():
+    assert len(decimated(run_of(20.0, seconds=0.002), 1000.0).time) == 2
+    with pytest.raises(RunError, match=r"^0.0019 s of motion are too short for 1000 Hz$"):
+        decimated(run_of(20.0, seconds=0.0019), 1000.0)
+
+
+@pytest.mark.parametrize("gap", [0, 7, 150, 2995, 2999])
+def test_ten_samples_to_either_side_of_a_gap_are_not_valid(gap):
+    valid = np.ones(30_000, dtype=bool)
+    valid[10 * gap + 3] = False
+    slow = decimated(run_of(20.0, valid=valid), 1000.0)
+    lost = np.flatnonzero(~slow.valid)
+    assert lost.tolist() == [*range(max(0, gap - 10), min(3000, gap + 11))]
+    assert (slow.velocity[lost] == 0.0).all()
+
+
+@pytest.mark.parametrize(("up", "down"), [(1, 3), (2, 5), (1, 25), (4, 5)])
+def test_rows_that_are_decimated_on_demand_are_those_of_the_whole(monkeypatch, up, down):
+    monkeypatch.setattr(runfile, "AT_ONCE", 8 * 20)
+    run = run_of(90.0, rate=1000, seconds=0.503, valid=np.arange(503) != 300)
+    shifted = replace(run, velocity=run.velocity + 3.0 + np.linspace(0.0, 5.0, 503)[:, None])
+    there = OnDemand((503, 1), np.float64, lambda first, stop: shifted.velocity[first:stop])
+    whole = decimated(shifted, 1000.0 * up / down)
+    kept = decimated(replace(shifted, velocity=there), 1000.0 * up / down)
+    assert isinstance(kept.velocity, OnDemand)
+    samples = 503 * up // down
+    assert kept.velocity.shape == whole.velocity.shape == (samples, 1)
+    for first in (0, 1, 2, 3, 7, samples // 2, samples - 5, samples - 1):
+        for stop in (first, first + 1, first + 4, samples):
+            found = kept.velocity[first:stop]
+            np.testing.assert_allclose(found, whole.velocity[first:stop], atol=1e-12)
+    np.testing.assert_array_equal(kept.valid, whole.valid)
+
+
+RATE = 1000.0
+LONG = np.arange(2000) / RATE
+
+
+def swing(time, frequency=5.0):
+    """Position of a joint that swings, and its velocity."""
+    phase = 2 * np.pi * frequency * time
+    return np.sin(phase)[:, None], (2 * np.pi * frequency * np.cos(phase))[:, None]
+
+
+def tumble(time):
+    """Pose of a base that moves and turns at constant rates, and its body velocity."""
+    twist = np.array([0.3, -0.2, 0.1, 1.0, 5.0, -2.0])
+    motion = pin.Motion(twist)
+    poses = [pin.SE3ToXYZQUAT(pin.exp6(motion * float(t))) for t in time]
+    return np.array(poses), np.tile(twist, (len(time), 1))
+
+
+def test_a_swinging_joint_is_differentiated_to_a_thousandth():
+    position, velocity = swing(LONG)
+    error = np.abs(joint_velocity(LONG, position) - velocity).max()
+    assert error < 1e-3 * np.abs(velocity).max()
+
+
+def test_angles_that_wrap_give_no_spike():
+    angle = np.outer(LONG, [20.0])
+    wrapped = (angle + np.pi) % (2 * np.pi) - np.pi
+    assert np.allclose(joint_velocity(LONG, wrapped), 20.0, rtol=0, atol=1e-8)
+
+
+def test_nothing_is_differentiated_across_a_gap():
+    position, velocity = swing(LONG)
+    valid = (LONG < 0.5) | (LONG > 0.7)
+    position[~valid] = 0.0
+    found = joint_velocity(LONG, position, valid)
+    assert np.array_equal(found[~valid], np.zeros((int((~valid).sum()), 1)))
+    assert np.abs(found - velocity)[valid].max() < 1e-3 * np.abs(velocity).max()
+
+
+def test_short_stretches_are_differentiated_by_differences():
+    position = np.outer(LONG[:6], [2.0])
+    valid = np.array([True, True, True, False, False, True])
+    assert np.allclose(joint_velocity(LONG[:6], position, valid).T, [[2, 2, 2, 0, 0, 0]], atol=1e-9)
+
+
+def test_stretches_lie_between_gaps():
+    valid = np.array([0, 1, 1, 0, 1, 0, 1, 1, 1], dtype=bool)
+    assert list(stretches(valid, 9)) == [slice(1, 3), slice(6, 9)]
+    assert list(stretches(None, 9)) == [slice(0, 9)]
+
+
+def test_a_tumbling_base_has_its_body_velocity():
+    pose, twist = tumble(LONG)
+    assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
+
+
+def test_quaternions_that_flip_their_sign_give_no_spike():
+    pose, twist = tumble(LONG)
+    pose[700:1300, 3:] *= -1
+    assert np.allclose(base_velocity(LONG, pose), twist, rtol=0, atol=1e-6)
+
+
+def test_a_half_turn_between_two_samples_does_not_silence_the_rest():
+    pose = np.tile([0, 0, 0, 0, 0, 0, 1.0], (20, 1))
+    pose[5:, 3:] = [1.0, 0, 0, 0]
+    pose[:, 0] = np.arange(20) / RATE
+    linear = base_velocity(LONG[:20], pose)[:, :3]
+    assert np.allclose(np.linalg.norm(linear, axis=1), 1.0, atol=1e-9)
+
+
+def test_a_run_of_positions_alone_has_velocities_and_states_their_source(tmp_path):
+    position, velocity = swing(LONG)
+    pose, twist = tumble(LONG)
+    np.savez(
+        tmp_path / "run.npz", time=LONG, position=position, position_desired=position,
+        base_pose=pose,
+    )  # fmt: skip
+    run = Run.load(tmp_path / "run.npz")
+    for found in (run.velocity, run.velocity_desired):
+        assert np.abs(found - velocity).max() < 1e-3 * np.abs(velocity).max()
+    assert np.allclose(run.base_velocity, twist, rtol=0, atol=1e-6)
+    assert run.meta["differentiated"] == {
+        "velocity": METHOD,
+        "velocity_desired": METHOD,
+        "base_velocity": METHOD,
+    }
+
+
+def test_velocities_that_are_there_are_left_alone(tmp_path):
+    position, velocity = swing(LONG)
+    np.savez(tmp_path / "run.npz", time=LONG, position=position, velocity=2 * velocity)
+    run = Run.load(tmp_path / "run.npz")
+    assert np.array_equal(run.velocity, 2 * velocity)
+    assert "differentiated" not in run.meta
+
+
+@pytest.mark.parametrize(
+    ("arrays", "message"),
+    [
+        ({"position": np.ones((3, 2))}, r"position: shape \(3, 2\), expected \(2000, 2\)"),
+        (
+            {"position": np.where(LONG == 0.003, np.nan, 1.0)[:, None]},
+            "position: nan in row 3, column 0; mark gaps with valid = false",
+        ),
+        (
+            {"velocity": np.ones((2000, 1)), "base_pose": np.ones((2000, 6))},
+            r"base_pose: shape \(2000, 6\), expected \(2000, 7\)",
+        ),
+        (
+            {"velocity": np.ones((2000, 1)), "base_pose": np.zeros((2000, 7))},
+            "the quaternion in row 0 has norm 0, expected 1",
+        ),
+    ],
+)
+def test_positions_that_cannot_be_differentiated_are_refused(tmp_path, arrays, message):
+    np.savez(tmp_path / "run.npz", time=LONG, **arrays)
+    with pytest.raises(RunFileError, match=message):
+        Run.load(tmp_path / "run.npz")
+
+
+@pytest.mark.parametrize("derivative", [joint_velocity, base_velocity])
+def test_rows_that_are_differentiated_on_demand_are_those_of_the_whole(derivative):
+    time, read = LONG[:60], []
+    pose, _ = tumble(time)
+    pose[30:, 3:] *= -1
+    valid = np.ones(60, dtype=bool)
+    valid[[7, 20, 23, 40, 41]] = False
+    whole = derivative(time, pose, valid)
+
+    def rows(first, stop):
+        assert 0 <= first <= stop <= 60
+        read.append((first, stop))
+        return pose[first:stop]
+
+    kept = derivative(time, OnDemand((60, 7), np.float64, rows), valid)
+    assert isinstance(kept, OnDemand)
+    assert (kept.shape, kept.dtype) == (whole.shape, np.float64)
+    for first in range(0, 60, 3):
+        for stop in (first + 1, first + 5, 60):
+            found = kept[first:stop]
+            np.testing.assert_allclose(found, whole[first:stop], atol=1e-9)
+    assert max(stop - first for first, stop in read[::3]) <= 1 + 2 * 7
+    without = derivative(time, OnDemand((60, 7), np.float64, rows))
+    np.testing.assert_allclose(without[10:20], derivative(time, pose)[10:20], atol=1e-9)
+
+
+def test_a_base_on_a_straight_and_level_way_has_the_velocity_along_its_own_axes():
+    """A quarter turn about z: what is x in the world is -y of the base."""
+    pose = np.tile([0, 0, 0, 0, 0, np.sqrt(0.5), np.sqrt(0.5)], (20, 1))
+    pose[:, :3] = np.outer(LONG[:20], [2.0, 3.0, 5.0])
+    expected = np.tile([3.0, -2.0, 5.0, 0, 0, 0], (20, 1))
+    np.testing.assert_allclose(base_velocity(LONG[:20], pose), expected, atol=1e-9)
+    np.testing.assert_allclose(base_velocity(LONG[:20], 1.005 * pose), 1.005 * expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 6, 7, 8])
+def test_a_parabola_is_differentiated_exactly_by_seven_samples_and_inside_by_fewer(samples):
+    time = np.arange(samples) / 4
+    found = joint_velocity(time, 0.1 * time[:, None] ** 2)[:, 0]
+    exact = slice(None) if samples >= 7 else slice(1, -1)
+    np.testing.assert_allclose(found[exact], 0.2 * time[exact], atol=1e-12)
+    assert (abs(found[0]) > 0.02) == (samples < 7)
+
+
+def test_what_is_missing_is_filled_in_and_its_method_told():
+    time, position = LONG[:20], np.outer(LONG[:20], [3.0])
+    signals = {"time": time, "velocity": position, "position_desired": 2 * position}
+    filled, how = with_velocities(signals)
+    assert set(filled) == {*signals, "velocity_desired"}
+    np.testing.assert_allclose(filled["velocity_desired"], 6.0)
+    assert how == {"velocity_desired": "Savitzky-Golay, window 7, order 3"}
+    assert filled["velocity"] is position
+    filled, how = with_velocities({"time": time, "position": position, "valid": time != time[2]})
+    assert filled["velocity"][:4, 0].round(9).tolist() == [3.0, 3.0, 0.0, 3.0]
+    assert set(how) == {"velocity"}

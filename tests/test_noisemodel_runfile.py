@@ -1,17 +1,22 @@
+"""Arrays in archives: what is read of them, from any place, and what is refused."""
+
+import io
 import json
 import os
 import re
+import struct
 import zipfile
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from numpy.lib import format as npy
 
-from noisemodel import Block, OutputError, Run, RunFileError, archive, runfile
-from noisemodel.ondemand import OnDemand
+from noisemodel import Block, OutputError, Run, RunFileError, runfile
+from noisemodel.runfile import ArchiveError, OnDemand, pieces, rows_at_once
 
 TIME = np.arange(40) / 1000
 VELOCITY = np.ones((40, 2))
@@ -269,33 +274,13 @@ def test_an_archive_that_unpacks_to_too_much_is_not_unpacked(tmp_path, monkeypat
     path = tmp_path / "bomb.npz"
     np.savez_compressed(path, time=TIME, velocity=np.zeros((40, 1000)))
     assert path.stat().st_size < 10_000
-    monkeypatch.setattr(archive, "UNPACKED", 10**5)
+    monkeypatch.setattr(runfile, "UNPACKED", 10**5)
     with pytest.raises(
         RunFileError, match=r"unpacks to 0.000321 GB from 0.00\d+ MB, the limit is 0.0001 GB; --max"
     ):
         Run.load(path)
     monkeypatch.setenv("NOISE_MAX_UNPACKED", "400000")
     assert Run.load(path).velocity.shape == (40, 1000)
-
-
-def test_an_array_that_states_more_than_there_is_is_refused(tmp_path):
-    path = tmp_path / "run.npz"
-    header = "{'descr': '<f8', 'fortran_order': False, 'shape': (1000000000000,), }".ljust(117)
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("time.npy", b"\x93NUMPY\x01\x00\x76\x00" + header.encode() + b"\n")
-    with pytest.raises(RunFileError, match=r"damaged: time states shape \(1000000000000,\)"):
-        Run.load(path)
-
-
-@pytest.mark.parametrize("shape", ["(-1,)", "(-1, -1)", "(0, -1)"])
-def test_an_array_of_a_negative_size_is_refused(tmp_path, shape):
-    path = tmp_path / "run.npz"
-    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".ljust(117)
-    with zipfile.ZipFile(path, "w") as archive:
-        content = b"\x93NUMPY\x01\x00\x76\x00" + header.encode() + b"\n"
-        archive.writestr("time.npy", content + bytes(0 if "0" in shape else 8))
-    with pytest.raises(RunFileError, match=re.escape(f"damaged: time states shape {shape}")):
-        Run.load(path)
 
 
 def test_a_folder_and_a_missing_file_are_named(tmp_path):
@@ -458,14 +443,347 @@ def test_a_file_that_is_gone_when_its_rows_are_read_is_named(tmp_path, monkeypat
         velocity[3:5]
 
 
-def test_the_order_of_meta_does_not_matter_and_a_robot_is_kept_as_it_is_named(tmp_path):
-    files = []
-    for name, robot in (("talos", "talos"), ("own", str(tmp_path / "own.urdf"))):
-        for meta in ({"seed": 1, "source": "a"}, {"source": "a", "seed": 1}):
-            run = Run(time=TIME, velocity=VELOCITY, joint_names=("a", "b"), robot=robot, meta=meta)
-            files.append(tmp_path / f"{name}{len(files)}.npz")
-            run.save(files[-1])
-        assert files[-1].read_bytes() == files[-2].read_bytes()
-        assert Run.load(files[-1]).robot == robot
-        with np.load(files[-1], allow_pickle=False) as plain:
-            assert str(plain["robot"]) == robot
+STORED, DEFLATED = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED
+CUBE = np.cumsum(np.arange(60.0 * 2 * 3)).reshape(60, 2, 3)
+
+
+def refused(text):
+    """Expect an error with this whole text."""
+    return pytest.raises(ArchiveError, match=f"^{re.escape(text)}$")
+
+
+def content(array, version=(1, 0)):
+    stream = io.BytesIO()
+    npy.write_array(stream, array, version=version)
+    return stream.getvalue()
+
+
+def stated(shape, kind="<f8", data=b"", version=b"\x01\x00"):
+    """An array's header, as it may be written by anybody, and its bytes."""
+    header = f"{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}".ljust(117) + "\n"
+    return b"\x93NUMPY" + version + struct.pack("<H", len(header)) + header.encode() + data
+
+
+def packed(path, method=STORED, **members):
+    with zipfile.ZipFile(path, "w", method) as file:
+        for name, each in members.items():
+            file.writestr(f"{name}.npy", each if isinstance(each, bytes) else content(each))
+    return path
+
+
+@pytest.fixture
+def small(monkeypatch):
+    """Pieces of some bytes, and few places from which arrays are unpacked."""
+    monkeypatch.setattr(runfile, "PIECE", 50)
+    monkeypatch.setattr(runfile, "MARKS", 7)
+
+
+@pytest.mark.parametrize("order", ["C", "F"])
+@pytest.mark.parametrize("method", [STORED, DEFLATED])
+def test_arrays_are_read_in_pieces_and_larger_ones_on_demand_by_their_rows(
+    tmp_path, small, method, order
+):
+    cube = np.asarray(CUBE, order=order)
+    size = len(content(cube))
+    path = packed(tmp_path / "a.npz", method, long=np.arange(1000), cube=cube, text=np.array("a"))
+    assert runfile.names_in(path) == ("long", "cube", "text")
+    assert list(runfile.read_npz(path, ["cube", "other"])) == ["cube"]
+    for limit, stays in ((float("inf"), False), (size, False), (size - 1, True), (0, True)):
+        found = runfile.read_npz(path, on_demand=limit)
+        assert list(found) == ["long", "cube", "text"]
+        assert isinstance(found["long"], np.ndarray)
+        np.testing.assert_array_equal(found["long"], np.arange(1000))
+        assert str(found["text"]) == "a"
+        stays = stays and order == "C"
+        assert isinstance(found["cube"], OnDemand) == stays
+        for first, stop in ((0, 60), (57, 60), (3, 4), (20, 40), (7, 7), (0, 1), (59, 60)):
+            np.testing.assert_array_equal(found["cube"][first:stop], CUBE[first:stop])
+
+
+def test_whatever_is_read_of_a_packed_array_has_the_bytes_of_the_whole(tmp_path, small):
+    """Marks lie apart, and there are so many at most."""
+    random = np.random.default_rng(0)
+    whole = np.round(random.normal(size=(200, 3)), 1)
+    raw = content(whole)
+    path = packed(tmp_path / "a.npz", DEFLATED, other=np.arange(9), a=whole)
+    with zipfile.ZipFile(path) as file:
+        info = file.getinfo("a.npy")
+    member = runfile._Member(path, "a", info)
+    for start, stop in [(4000, 4900), (0, 10), *random.integers(0, len(raw), (60, 2)).tolist()]:
+        assert member.read(start, stop).tobytes() == raw[start:stop]
+    marks = [place for place, *_ in member._marks]
+    apart = len(raw) // 7
+    assert marks[0] == 0
+    assert 4 <= len(marks) <= 8
+    assert min(np.diff(marks)) >= apart
+    assert max(np.diff(marks)) < apart + 50
+    with refused("damaged: a is cut off"):
+        member.read(len(raw) - 5, len(raw) + 1)
+
+
+def test_a_wrong_checksum_is_found_when_an_array_was_read_in_order(tmp_path, small):
+    raw = content(np.tile(CUBE, (9, 1, 1)))
+    path = packed(tmp_path / "a.npz", cube=raw)
+    damaged = bytearray(path.read_bytes())
+    damaged[damaged.index(raw) + len(raw) - 1] ^= 1  # the last byte of the last row
+    path.write_bytes(damaged)
+    with refused("Bad CRC-32 for file 'cube.npy'"):
+        runfile.read_npz(path)
+    cube = runfile.read_npz(path, on_demand=0)["cube"]
+    cube[10:540]  # the sum of a part is unknown
+    cube[0:20], cube[20:300]
+    with refused("damaged: wrong checksum of cube"):
+        cube[300:540]
+
+
+def packed_again(path, raw):
+    """The member of a file that was damaged, by what stood in the file before."""
+    with zipfile.ZipFile(io.BytesIO(raw)) as file:
+        return runfile._Member(path, "table", file.getinfo("table.npy"))
+
+
+@pytest.mark.parametrize("method", [STORED, DEFLATED])
+def test_a_file_that_is_cut_or_damaged_later_is_refused(tmp_path, small, monkeypatch, method):
+    """Where nothing else shows that it was changed."""
+    monkeypatch.setattr(runfile, "_identity", lambda file: ())
+    table = np.random.default_rng(0).normal(size=(300, 2))
+    path = packed(tmp_path / "a.npz", method, table=table)
+    raw = path.read_bytes()
+    found = runfile.read_npz(path, on_demand=0)["table"]
+    assert isinstance(found, OnDemand)
+    path.write_bytes(raw[:2000])
+    np.testing.assert_array_equal(found[3:50], table[3:50])
+    with refused("damaged: table is cut off"):
+        found[100:300]
+    if method == DEFLATED:
+        begin = raw.index(b"table.npy") + len("table.npy")
+        path.write_bytes(raw[:begin] + b"\xff" * 5000)  # 7: a block of no known type
+        found = packed_again(path, raw)
+        with pytest.raises(ArchiveError, match=r"^damaged: Error -3 while decompressing data"):
+            found.read(0, 10)
+
+
+@pytest.mark.parametrize(
+    ("member", "message"),
+    [
+        (stated("(2,)", data=bytes(16)), ""),
+        (stated("(2,)", data=bytes(15)), "states shape (2,) of float64, but has 15 bytes"),
+        (stated("(2,)", data=bytes(17)), "states shape (2,) of float64, but has 17 bytes"),
+        (stated("(0,)"), ""),
+        (stated("(0, -1)"), "states shape (0, -1) of float64, but has 0 bytes"),
+        (stated("(-1, -2)", data=bytes(16)), "states shape (-1, -2) of float64, but has 16 bytes"),
+        (stated("(3,)", "|V0"), "states shape (3,) of |V0, but has 0 bytes"),
+        (stated("()", data=bytes(8)), ""),
+    ],
+)
+@pytest.mark.parametrize("limit", [0, float("inf")])
+def test_an_array_has_the_bytes_that_its_shape_states(tmp_path, member, message, limit):
+    path = packed(tmp_path / "a.npz", a=member)
+    with refused(f"damaged: a {message}") if message else nullcontext():
+        runfile.read_npz(path, on_demand=limit)
+
+
+def test_headers_of_version_one_and_two_are_read_and_no_others(tmp_path):
+    for version in ((1, 0), (2, 0)):
+        path = packed(tmp_path / "a.npz", a=content(CUBE, version))
+        np.testing.assert_array_equal(runfile.read_npz(path)["a"], CUBE)
+    with refused("a is no array ((3, 0))"):
+        runfile.read_npz(packed(tmp_path / "a.npz", a=content(CUBE, (3, 0))))
+    objects = stated("(1,)", "|O", bytes(8))
+    with refused("Object arrays cannot be loaded: a holds Python objects") as caught:
+        runfile.read_npz(packed(tmp_path / "a.npz", a=objects))
+    assert isinstance(caught.value, runfile.ObjectArrayError)
+    assert caught.value.name == "a"
+
+
+def test_an_array_that_ends_early_is_cut_off(small):
+    raw = content(np.arange(100.0))
+    np.testing.assert_array_equal(
+        runfile.read_array(io.BytesIO(raw), "a", len(raw)), np.arange(100.0)
+    )
+    with refused("damaged: a is cut off"):
+        runfile.read_array(io.BytesIO(raw[:-1]), "a", len(raw))
+
+
+def test_members_have_names_of_their_own_and_numpys_methods(tmp_path):
+    path = tmp_path / "a.npz"
+    for names, method, message in (
+        (("a.npy", "a"), STORED, "has two arrays named 'a'"),
+        (("a\tb.npy",), STORED, r"has an array named 'a\tb'"),
+        (("a.npy", "b.npy"), zipfile.ZIP_BZIP2, "a is compressed by another method than NumPy's"),
+        (("a.npy", "b.npy"), DEFLATED, ""),
+    ):
+        with zipfile.ZipFile(path, "w", method) as file:
+            for name in names:
+                file.writestr(name, content(CUBE))
+        with refused(message) if message else nullcontext():
+            assert runfile.names_in(path) == ("a", "b")
+
+
+@pytest.mark.parametrize(
+    ("unpacked", "bytes_packed", "message"),
+    [
+        (2**29, 1, ""),
+        (2**29 + 1, 1, "0.537 GB from 1e-06 MB, the limit is 0.537 GB"),
+        (2 * 10**9, 10**8, ""),
+        (2 * 10**9 + 1, 10**8, "2 GB from 100 MB, the limit is 2 GB"),
+    ],
+)
+def test_what_unpacks_to_half_a_gigabyte_or_twenty_times_its_size_is_read(
+    unpacked, bytes_packed, message
+):
+    text = f"unpacks to {message}; --max-unpacked GB (or NOISE_MAX_UNPACKED=bytes) raises it"
+    with refused(text) if message else nullcontext():
+        runfile.check_unpacked(unpacked, bytes_packed)
+
+
+def test_another_limit_of_what_is_unpacked_is_a_whole_number(tmp_path, monkeypatch):
+    path = packed(tmp_path / "a.npz", DEFLATED, a=np.zeros(5000), b=np.zeros(5000))
+    monkeypatch.setenv("NOISE_MAX_UNPACKED", str(2 * (40_000 + 128)))
+    assert len(runfile.read_npz(path)) == 2
+    monkeypatch.setenv("NOISE_MAX_UNPACKED", str(2 * (40_000 + 128) - 1))
+    with pytest.raises(ArchiveError, match=r"unpacks to 8.03e-05 GB from 0.0\d+ MB, the limit is"):
+        runfile.read_npz(path)
+    monkeypatch.setenv("NOISE_MAX_UNPACKED", "1e9")
+    with refused("NOISE_MAX_UNPACKED is '1e9', expected bytes"):
+        runfile.read_npz(path)
+
+
+def test_a_text_is_a_regular_file_in_utf_8_of_some_length(tmp_path, monkeypatch):
+    path = tmp_path / "a.urdf"
+    path.write_text("nö", encoding="utf-8")
+    monkeypatch.setattr(runfile, "TEXT", 3)
+    assert runfile.read_text(path) == "nö"
+    path.write_bytes(b"no\xf6")
+    with refused("not text in UTF-8"):
+        runfile.read_text(path)
+    path.write_text("four")
+    with refused("4 bytes, the limit is 3"):
+        runfile.read_text(path)
+    os.mkfifo(tmp_path / "pipe")
+    with refused("is no regular file; save what it holds to one"):
+        runfile.read_text(tmp_path / "pipe")
+    runfile.check_regular(tmp_path)
+
+
+VALUES = np.arange(300.0).reshape(100, 3)
+
+
+@pytest.fixture
+def read():
+    """The rows that were read, from the first to the one after the last."""
+    return []
+
+
+@pytest.fixture
+def array(read, monkeypatch):
+    """An array of 100 rows, of which 8 are read at once."""
+    monkeypatch.setattr(runfile, "AT_ONCE", 8 * 3 * 8 + 23)
+
+    def rows(first, stop):
+        read.append((first, stop))
+        return VALUES[first:stop]
+
+    return OnDemand((100, 3), np.float64, rows)
+
+
+@pytest.mark.parametrize(
+    ("key", "parts"),
+    [
+        (slice(5, 9), [(5, 9)]),
+        (slice(None), [(0, 100)]),
+        (slice(-3, None), [(97, 100)]),
+        (slice(9, 5), [(9, 9)]),
+        (slice(20, 40, 3), [(20, 27), (29, 36), (38, 39)]),
+        (slice(10, 0, -5), [(10, 11), (5, 6)]),
+        (np.array([3, 10, 4, 11, 2, 2, 99]), [(3, 11), (11, 12), (2, 3), (99, 100)]),
+        (np.array([3, 10, 4]), [(3, 11)]),
+        (np.array([4, 3]), [(4, 5), (3, 4)]),
+        (np.array([-100, 0, -93, -92, -1]), [(0, 8), (8, 9), (99, 100)]),
+        (np.array([5, 7], dtype=np.uint8), [(5, 8)]),
+        (np.isin(np.arange(100), [0, 50, 57, 58]), [(0, 1), (50, 58), (58, 59)]),
+        (np.zeros(0, dtype=int), []),
+        ((slice(5, 9), 1), [(5, 9)]),
+        ((np.array([5, 9]), slice(1, 3)), [(5, 10)]),
+    ],
+)
+def test_only_rows_that_are_needed_are_read_some_at_once(array, read, key, parts):
+    np.testing.assert_array_equal(array[key], VALUES[key])
+    assert read == parts
+
+
+@pytest.mark.parametrize("key", [7, (7, 2), [3, 4], (np.newaxis, 3), VALUES > 40])
+def test_whatever_else_is_asked_reads_the_whole_once(array, read, key):
+    for _ in range(2):
+        np.testing.assert_array_equal(array[key], VALUES[key])
+    assert read == [(0, 100)]
+
+
+def test_what_was_read_whole_is_not_read_again(array, read):
+    assert float(array.max()) == 299.0
+    np.testing.assert_array_equal(array + array[4:5], VALUES + VALUES[4])
+    np.testing.assert_array_equal(np.add.reduce(array, axis=1), VALUES.sum(axis=1))
+    np.testing.assert_array_equal(array[5:9], VALUES[5:9])
+    assert np.asarray(array) is np.asarray(array)
+    assert np.asarray(array, dtype=np.float32).dtype == np.float32
+    assert np.asarray(array, dtype=np.float64) is np.asarray(array)
+    assert read == [(0, 100)]
+
+
+def test_another_type_is_made_of_the_rows_that_are_read(array, read):
+    other = array.astype(np.int16)
+    assert (other.dtype, other.shape, other.ndim, len(other)) == (np.int16, (100, 3), 2, 100)
+    assert (other.size, other.nbytes, array.nbytes) == (300, 600, 2400)
+    part = other[4:6]
+    assert part.dtype == np.int16
+    assert part.tolist() == [[12, 13, 14], [15, 16, 17]]
+    assert read == [(4, 6)]
+    assert not other.checked
+    assert np.asarray(other).dtype == np.int16
+    np.testing.assert_array_equal(np.asarray(other), VALUES)
+
+
+@pytest.mark.parametrize(
+    ("shape", "rows"),
+    [
+        ((100, 3), 8),
+        ((100, 2, 3), 4),
+        ((100,), 25),
+        ((100, 25), 1),
+        ((100, 26), 1),
+        ((100, 0), 100),
+    ],
+)
+def test_rows_at_once_take_so_many_bytes_and_are_one_at_least(monkeypatch, shape, rows):
+    monkeypatch.setattr(runfile, "AT_ONCE", 100)
+    assert rows_at_once(np.zeros(shape, dtype=np.float32)) == rows
+
+
+@pytest.mark.parametrize(
+    ("multiple", "parts"),
+    [
+        (1, [(0, 9), (9, 18), (18, 20)]),
+        (2, [(0, 8), (8, 16), (16, 20)]),
+        (3, [(0, 9), (9, 18), (18, 20)]),
+        (5, [(0, 5), (5, 10), (10, 15), (15, 20)]),
+        (9, [(0, 9), (9, 18), (18, 20)]),
+        (10, [(0, 10), (10, 20)]),
+        (20, [(0, 20)]),
+    ],
+)
+def test_pieces_have_a_multiple_of_rows_and_end_where_the_array_does(monkeypatch, multiple, parts):
+    monkeypatch.setattr(runfile, "AT_ONCE", 110)
+    array = np.zeros((20, 3), dtype=np.float32)
+    assert [(each.start, each.stop) for each in pieces(array, multiple)] == parts
+    if multiple == 1:
+        assert [(each.start, each.stop) for each in pieces(array)] == parts
+        assert list(pieces(array[:0])) == []
+        assert list(pieces(array[:9])) == [slice(0, 9)]
+
+
+def test_a_piece_takes_megabytes():
+    """Neither a row nor the whole, so that what goes through a run takes the memory of a piece."""
+    hour = np.broadcast_to(np.float64(0.0), (3_600_000, 32))
+    sizes = [each.stop - each.start for each in pieces(hour)]
+    assert sum(sizes) == len(hour)
+    assert 10**6 < max(sizes) * 32 * 8 < 10**7

@@ -18,9 +18,9 @@ from inspector.hold import hold_length, without_hold
 from inspector.library import load_library, signal_names, signals_of
 from inspector.logs.read import open_run
 from inspector.verdict import Verdict
-from noisemodel import Run, RunError, RunFileError, archive, decimated, ondemand, runfile
-from noisemodel.ondemand import OnDemand, pieces
+from noisemodel import Run, RunError, RunFileError, decimated, runfile
 from noisemodel.run import pieces_of
+from noisemodel.runfile import OnDemand, pieces
 
 LIBRARY = load_library()
 RATE = 1000.0
@@ -30,7 +30,7 @@ RATE = 1000.0
 def small(monkeypatch):
     """Every signal stays in its file, and pieces are of some hundred samples."""
     monkeypatch.setattr(runfile, "LARGE", 0)
-    monkeypatch.setattr(ondemand, "AT_ONCE", 2**13)
+    monkeypatch.setattr(runfile, "AT_ONCE", 2**13)
 
 
 def shaken(*, samples=4000, rate=RATE, joints=3, kind=np.float64, gap=True):
@@ -80,8 +80,7 @@ def test_rows_on_demand_are_those_in_memory(tmp_path_factory, method, fortran, d
     whole = shaken(samples=700, gap=False)
     packed(path, arrays_of(whole), method=METHODS[method], fortran=fortran)
     found = Run.load(path, on_demand=True).velocity
-    kept = not fortran or method == "stored"
-    assert isinstance(found, OnDemand) == kept
+    assert isinstance(found, OnDemand) == (not fortran)
     number = st.integers(-750, 750)
     cut = slice(data.draw(number), data.draw(number), data.draw(st.sampled_from([None, 1, 3, -2])))
     inside = st.integers(-700, 699)
@@ -265,7 +264,7 @@ def test_a_file_that_changes_while_it_is_read_is_refused(tmp_path):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_samples_that_are_cut_off_are_refused(tmp_path, method, monkeypatch):
-    monkeypatch.setattr(archive, "_identity", lambda _: ())
+    monkeypatch.setattr(runfile, "_identity", lambda _: ())
     path = tmp_path / "run.npz"
     packed(path, arrays_of(shaken()), method=METHODS[method])
     run = Run.load(path, on_demand=True)
@@ -284,7 +283,7 @@ def test_names_of_signals_are_those_of_the_signals():
 
 @pytest.mark.parametrize("row", range(1, 40))
 def test_a_step_that_is_uneven_is_named_wherever_pieces_of_the_time_begin(monkeypatch, row):
-    monkeypatch.setattr(ondemand, "AT_ONCE", 8 * 8)
+    monkeypatch.setattr(runfile, "AT_ONCE", 8 * 8)
     time = np.arange(40) / 10.0
     time[row:] += 0.05
     with pytest.raises(RunError, match=rf"not uniform, the step to row {row} is 0.15 s"):

@@ -315,7 +315,7 @@ def test_a_read_only_folder_is_one_line_and_loses_nothing(own, monkeypatch):
     def refuse(*_, **__):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("noisemodel.atomic.os.open", refuse)
+    monkeypatch.setattr("noisemodel.files.os.open", refuse)
     (own / "runs" / "wave-3.npz").unlink()
     status, _, err = call("accept", own / "runs" / "wave-1.npz", "--reason", "x")
     assert status == 5

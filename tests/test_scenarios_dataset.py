@@ -2,13 +2,13 @@
 
 import errno
 import json
-import os
 import sys
 from dataclasses import replace
 from itertools import islice
 
 import numpy as np
 import pytest
+import workers
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import dataset
@@ -344,11 +344,11 @@ def test_several_processes_make_the_same_files_as_one(tmp_path):
 
 def test_a_run_that_kills_its_worker_is_named_and_all_others_are_made(tmp_path, monkeypatch):
     place, deadly = Folder.opened(tmp_path), ALL[1]
-    monkeypatch.setattr(parallel, "_forks", lambda: True)
+    workers.simulate(monkeypatch)
     monkeypatch.setattr(
         dataset,
         "simulate",
-        lambda *task, duration: os._exit(137) if Task(*task) == deadly else stub(Task(*task), 7.0),
+        lambda *task, duration: workers.die() if Task(*task) == deadly else stub(Task(*task), 7.0),
     )
     made = []
     with pytest.raises(

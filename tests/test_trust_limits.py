@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from commandline import call
 
-from noisemodel import NoiseModelError, Robot, RobotError, Run, bounds, meshes
+from noisemodel import NoiseModelError, Robot, RobotError, Run, files, meshes
 from noisemodel.errors import MeshError
 
 TIME = np.arange(40) / 100
@@ -12,8 +12,8 @@ TIME = np.arange(40) / 100
 
 @pytest.fixture(autouse=True)
 def own_environment(monkeypatch):
-    for name in bounds.LIMITS:
-        monkeypatch.setenv(f"NOISE_LIMIT_{name.upper()}", str(bounds.LIMITS[name]))
+    for name in files.LIMITS:
+        monkeypatch.setenv(f"NOISE_LIMIT_{name.upper()}", str(files.LIMITS[name]))
 
 
 def many_joints(path, count):

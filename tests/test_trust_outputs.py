@@ -13,7 +13,7 @@ from generalmodel import run_at
 from inspector import assets
 from inspector.cli import COMMANDS
 from noisemodel import OutputError
-from noisemodel.atomic import also_reading, reading, refuse_read, replacing
+from noisemodel.files import also_reading, reading, refuse_read, replacing
 
 RUN = ("run.npz", "--model", "model.npz", "--robot", "arm.urdf")
 LOG = ("log.csv", "--mapping", "map.toml", "--desired", "desired.csv")

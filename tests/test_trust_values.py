@@ -14,8 +14,8 @@ from inspector import read_log
 from inspector.analysis.level import Estimate, noise_level
 from inspector.errors import InspectorError, LogError
 from inspector.logs.mapping import ReadOptions
-from noisemodel import MeshError, Robot, RobotError, Run, RunError, cache, meshes
-from noisemodel.cache import cached
+from noisemodel import MeshError, Robot, RobotError, Run, RunError, meshes
+from noisemodel.files import cache_folder, cached
 
 TIME = np.arange(40) / 1000
 
@@ -150,18 +150,18 @@ def test_arrays_of_the_cache_that_another_user_made_are_made_anew(tmp_path, monk
     right, wrong = {"a": np.ones(3)}, {"a": 10 * np.ones(3)}
     assert cached("key", lambda: right)["a"][0] == 1
     assert cached("key", lambda: wrong)["a"][0] == 1  # it is kept
-    file = cache.folder() / "key.npz"
+    file = cache_folder() / "key.npz"
     cached("other", lambda: wrong)
-    (cache.folder() / "other.npz").replace(file)  # of another key
+    (cache_folder() / "other.npz").replace(file)  # of another key
     assert cached("key", lambda: right)["a"][0] == 1
-    (cache.folder().parent / "secret").unlink()  # as if it had been made elsewhere
+    (cache_folder().parent / "secret").unlink()  # as if it had been made elsewhere
     assert cached("key", lambda: wrong)["a"][0] == 10
 
 
 def test_a_secret_that_others_can_read_is_not_used(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     cached("key", lambda: {"a": np.ones(3)})
-    (cache.folder().parent / "secret").chmod(0o644)
+    (cache_folder().parent / "secret").chmod(0o644)
     assert cached("key", lambda: {"a": np.zeros(3)})["a"][0] == 0
 
 

@@ -36,7 +36,8 @@ from noiseclassifier.lasting import HOP as LASTING_HOP
 from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
 from noiseclassifier.lasting import WINDOW as LASTING_WINDOW
 from noiseclassifier.lasting import joined
-from noisemodel.catalog import is_file_name, is_name
+from noisemodel.catalog import is_name
+from noisemodel.run import is_robot_file
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
@@ -363,7 +364,7 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
 
 def robot_known(run: nm.Run) -> bool:
     """Whether a run names a robot that can be read by its name, or a URDF or an MJCF."""
-    return run.robot is not None and (is_name(run.robot) or is_file_name(run.robot))
+    return run.robot is not None and (is_name(run.robot) or is_robot_file(run.robot))
 
 
 def _labelled(empty: Analysis, labelled: Labelled, library: Library) -> Analysis:

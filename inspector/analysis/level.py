@@ -9,7 +9,7 @@ import noisemodel as nm
 from inspector.analysis.analyse import robot_known
 from inspector.errors import InspectorError
 from noisemodel import Run
-from noisemodel.atomic import replacing
+from noisemodel.files import replacing
 from noisemodel.types import Array, Real
 
 KINDS = ("simplified", *nm.KINDS)

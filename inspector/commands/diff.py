@@ -133,7 +133,7 @@ def _prepare(folder: Path, *, overwrite: bool) -> None:
     """Make the folder of the report, before long work is done for it."""
     from inspector.errors import InspectorError
     from inspector.report import html
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     html.require()
     try:
@@ -152,7 +152,7 @@ def _report(
     from inspector.compare.recording import write
     from inspector.reference.difference import picture
     from inspector.reference.output import as_json
-    from noisemodel.atomic import replacing
+    from noisemodel.files import replacing
 
     with replacing(folder / NUMBERS, overwrite=overwrite) as temporary:
         temporary.write_text(f"{as_json(found)}\n", encoding="utf-8")

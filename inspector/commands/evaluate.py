@@ -44,7 +44,7 @@ def evaluate(
     """Evaluate a model on annotated runs that it was not trained on."""
     from inspector import assets, train
     from noiseclassifier.evaluation.assessment import table
-    from noisemodel.atomic import refuse_existing, replacing
+    from noisemodel.files import refuse_existing, replacing
 
     for path in filter(None, (output, picture)):
         refuse_existing(path, overwrite=overwrite)

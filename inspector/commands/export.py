@@ -60,7 +60,7 @@ def export(
     from inspector.export import LAYOUTS
     from inspector.export import export as write
     from inspector.library import load_library
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     reading: Reading = ctx.obj
     if labels and annotate:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 KINDS = ("normal", "rms", "mean", "paper", "A", "B", "C")
 """Those of ``noisemodel``, which would take too long to import here."""
 LIMITS = ("joints", "columns", "triangles", "bodies")
-"""Those of ``noisemodel.bounds``, which would take too long to import here."""
+"""Those of ``noisemodel.files``, which would take too long to import here."""
 
 
 class BadInput(StrEnum):

@@ -28,7 +28,7 @@ def files_of(given: Sequence[str], known: Collection[str], *, overwrite: bool) -
         BadParameter: If one is not of that form.
         OutputError: If a file exists, or is read.
     """
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     files = {}
     for each in given:
@@ -83,7 +83,7 @@ def _print(text: str) -> None:
 
 
 def _write(path: Path, write: Callable[[Result], str], result: Result, *, overwrite: bool) -> None:
-    from noisemodel.atomic import replacing
+    from noisemodel.files import replacing
 
     with replacing(path, overwrite=overwrite) as temporary:
         temporary.write_text(f"{write(result)}\n", encoding="utf-8")

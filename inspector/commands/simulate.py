@@ -62,7 +62,7 @@ def run(
 ) -> None:
     """Simulate one run, with its failures annotated."""
     from noiseclassifier import scenarios
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     if list_:
         for name, line in scenarios.SCENARIOS.items():

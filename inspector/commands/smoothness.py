@@ -85,7 +85,7 @@ def smoothness(
     from inspector.library import load_library
     from inspector.logs.mapping import read_options
     from inspector.progress import progress
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     if picture:
         refuse_existing(picture, overwrite=overwrite)

@@ -81,7 +81,7 @@ def tune(
     from inspector.compare.picture import require
     from inspector.tune import Search
     from inspector.tune import tune as tune_profile
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     if picture:
         refuse_existing(picture, overwrite=overwrite)

@@ -81,7 +81,7 @@ def view(
     from inspector import assets
     from inspector.library import load_library
     from inspector.recording import viewer
-    from noisemodel.atomic import refuse_existing
+    from noisemodel.files import refuse_existing
 
     reading: Reading = ctx.obj
     output = output or save

@@ -22,7 +22,7 @@ from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
 from inspector.text import cell
 from noisemodel import Comparisons, RobotComparison
-from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.files import refuse_existing, replacing
 from noisemodel.links import vibrating
 from noisemodel.noise import decibel
 from noisemodel.types import Array

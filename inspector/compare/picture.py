@@ -9,9 +9,9 @@ import numpy as np
 
 from inspector.errors import InspectorError
 from noisemodel import Comparisons, RobotComparison
-from noisemodel.atomic import replacing
 from noisemodel.comparison import TERMS
 from noisemodel.comparisons import medians
+from noisemodel.files import replacing
 from noisemodel.types import Array
 
 if TYPE_CHECKING:

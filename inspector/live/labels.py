@@ -12,7 +12,7 @@ from inspector.library import Library
 from noiseclassifier import Event, Labels
 from noiseclassifier.profile import NOMINAL, TOLERANCE
 from noiseclassifier.signals import EFFORT, JOINTS, MOTION, NOISE
-from noisemodel.decimation import EDGE
+from noisemodel.run import EDGE
 from noisemodel.types import Array, Mask
 
 BETA = 5.0

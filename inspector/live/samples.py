@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from inspector.errors import InspectorError
 from inspector.recording.axes import FARTHEST
-from noisemodel.checks import LARGEST
+from noisemodel.run import LARGEST
 from noisemodel.types import Array, Mask
 
 

@@ -31,7 +31,7 @@ from inspector.live.samples import (
 from inspector.live.sink import Sink
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
 from noiseclassifier import Event, merged
-from noisemodel.bounds import beyond, limit
+from noisemodel.files import beyond, limit
 from noisemodel.limits import joint_limits
 from noisemodel.types import Array, Mask
 

@@ -15,7 +15,7 @@ from inspector.live.samples import SinkError
 from inspector.recording import viewer
 from inspector.recording.run import require_whole
 from inspector.recording.viewer import HOST, free_port
-from noisemodel.atomic import replacing
+from noisemodel.files import replacing
 
 APPLICATION = "inspector-live"
 """Not that of recordings of whole runs: the viewer keeps a layout for each application."""

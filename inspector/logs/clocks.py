@@ -20,6 +20,7 @@ from inspector.errors import LogError
 from inspector.logs.log import SAMPLES, UNIFORM, Clock, Stamps, Track
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIME_UNITS, without_unit
+from noisemodel.run import resample
 from noisemodel.types import Array, Indices, Mask, Real
 
 UNITS = {"seconds": "1", "milliseconds": "1e-3", "microseconds": "1e-6", "nanoseconds": "1e-9"}
@@ -410,14 +411,8 @@ def _beside(instants: Array, stamps: Stamps, missing: Mask, slack: float) -> Mas
 
 
 def _pchip(instants: Array, stamps: Stamps, values: Real, slack: float) -> Array:
-    from scipy.interpolate import PchipInterpolator
-
-    found = np.zeros((len(instants), values.shape[1]))
-    for part, stretch in _parts(instants, stamps, slack):
-        if part.stop > part.start:
-            known = PchipInterpolator(stamps.time[stretch], values[stretch], axis=0)
-            found[part] = known(instants[part])
-    return found
+    between = stamps.clock.stretches
+    return resample(stamps.time, values, instants, between=between, slack=slack)[0]
 
 
 def _parts(instants: Array, stamps: Stamps, slack: float) -> Iterator[tuple[slice, slice]]:

@@ -35,7 +35,7 @@ from inspector.logs.names import (
 )
 from inspector.logs.names import UNITS as SIGNAL_UNITS
 from inspector.text import counted
-from noisemodel.bounds import beyond, limit
+from noisemodel.files import beyond, limit
 from noisemodel.types import Array
 
 DELIMITERS = (";", "\t", ",", " ")

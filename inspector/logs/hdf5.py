@@ -32,7 +32,7 @@ from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import TIMES, listed
 from inspector.text import counted
 from noiseclassifier.jsontext import from_json
-from noisemodel.archive import ArchiveError, check_unpacked, one_line
+from noisemodel.runfile import ArchiveError, check_unpacked, one_line
 
 EPISODES = "data"
 """The group that holds the episodes of robomimic and Isaac Lab."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from inspector.errors import InspectorError, LogError
 from noisemodel import Run
-from noisemodel.checks import LONGEST, SHORTEST
+from noisemodel.run import LONGEST, SHORTEST
 from noisemodel.types import Array, Mask, Real
 
 SAMPLES = "samples"

@@ -28,7 +28,7 @@ from inspector.logs.names import (
 from inspector.wrongrobot import WrongRobotError
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
 from noisemodel import Robot, RobotError
-from noisemodel.atomic import replacing
+from noisemodel.files import replacing
 from noisemodel.limits import joint_limits
 from noisemodel.types import Array, Mask, Real
 

@@ -21,7 +21,7 @@ from inspector.logs.arrays import log_of, single_numbers
 from inspector.logs.log import Log, LogReader
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import time_column
-from noisemodel.archive import PIECE, ArchiveError, check_unpacked, one_line
+from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
 HEADER = 128
 """Bytes before the first variable."""

@@ -28,7 +28,7 @@ from inspector.logs.mapping import ReadOptions, tracks_of
 from inspector.logs.names import listed
 from inspector.text import counted, plain
 from noisemodel import Robot, Run
-from noisemodel.differentiate import METHOD, base_velocity, joint_velocity
+from noisemodel.run import METHOD, base_velocity, joint_velocity
 from noisemodel.types import Array, Indices, Mask, Real
 
 LARGEST_RATE_RATIO = 1.5

@@ -11,7 +11,8 @@ from inspector.errors import LogError
 from inspector.logs.arrays import episodes_of, log_of, single_numbers
 from inspector.logs.log import Log, LogReader
 from inspector.logs.mapping import ReadOptions
-from noisemodel import Run, RunError, archive, checks
+from noisemodel import Run, RunError, runfile
+from noisemodel.run import check_time
 from noisemodel.runfile import ARRAYS, STAGE
 
 OBJECTS = (
@@ -53,16 +54,16 @@ def _arrays(path: Path) -> dict[str, NDArray[Any]]:
         with path.open("rb") as stream:
             if stream.read(len(MAGIC_PREFIX)) == MAGIC_PREFIX:
                 stream.seek(0)
-                array = np.asarray(archive.read_array(stream, "it", path.stat().st_size))
+                array = np.asarray(runfile.read_array(stream, "it", path.stat().st_size))
                 names = array.dtype.names or ()
                 return {name: array[name] for name in names} if names else {ALONE: array}
-        return archive.read(path)
+        return runfile.read_npz(path)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror or error})") from error
-    except archive.ObjectArrayError as error:
+    except runfile.ObjectArrayError as error:
         problem = f"not an archive of plain arrays: {error.name!r} holds {OBJECTS}"
         raise LogError(path, problem) from error
-    except archive.ArchiveError as error:
+    except runfile.ArchiveError as error:
         raise LogError(path, f"not an archive of plain arrays: {error}") from error
 
 
@@ -72,7 +73,7 @@ def _is_run(arrays: dict[str, NDArray[Any]]) -> bool:
     if not known or "time" not in arrays:
         return False
     try:
-        checks.check_time(arrays["time"])
+        check_time(arrays["time"])
     except (RunError, TypeError):
         return False
     return True

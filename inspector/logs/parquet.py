@@ -17,7 +17,7 @@ from inspector.logs.log import SAMPLES, Field, Log, LogReader, Stamps
 from inspector.logs.mapping import ReadOptions
 from inspector.logs.names import array_signal, column_signal, listed, time_column
 from inspector.logs.parquetpages import unpacked_size
-from noisemodel.archive import ArchiveError, check_regular, check_unpacked
+from noisemodel.runfile import ArchiveError, check_regular, check_unpacked
 
 DAMAGE = (pyarrow.ArrowException, OSError, ValueError, KeyError, RuntimeError)
 """Errors that pyarrow raises for damaged files."""

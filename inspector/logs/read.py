@@ -25,10 +25,10 @@ from inspector.logs.names import BASE_SIGNALS, JOINT_SIGNALS, listed
 from inspector.text import counted, printable
 from inspector.wrongrobot import check_joints, limit_warnings, named
 from noiseclassifier.jsontext import from_json
-from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, archive
-from noisemodel.atomic import also_reading, refuse_existing, replacing
-from noisemodel.checks import NotUniformError
+from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, runfile
+from noisemodel.files import also_reading, refuse_existing, replacing
 from noisemodel.limits import joint_limits
+from noisemodel.run import NotUniformError
 
 MAGIC = {
     b"\x89MCAP0\r\n": "ros.bags",
@@ -99,12 +99,12 @@ def _is_folder(path: Path) -> bool:
 
 def _of_file(path: Path) -> str:
     try:
-        archive.check_regular(path)
+        runfile.check_regular(path)
         with path.open("rb") as stream:
             head = stream.read(16)
     except OSError as error:
         raise LogError(path, f"cannot be read ({error.strerror})") from error
-    except archive.ArchiveError as error:
+    except runfile.ArchiveError as error:
         raise LogError(path, str(error)) from error
     above = path.resolve().parents[:3]
     if head.startswith(b"PAR1") and any((each / "meta" / "info.json").is_file() for each in above):
@@ -566,8 +566,8 @@ def _run_file(path: Path, reading: Reading) -> Run | None:
         return None
     if _is_archive(path):
         try:
-            names = set(archive.names_in(path))
-        except (OSError, archive.ArchiveError):
+            names = set(runfile.names_in(path))
+        except (OSError, runfile.ArchiveError):
             names = {"time", "velocity"}  # `Run.load` says what is wrong
         if "time" not in names or not names & {"velocity", "position"}:
             return None  # arrays of a simulator
@@ -730,7 +730,7 @@ def _targets(jobs: Sequence[tuple[Path, Job]], output: Path, *, several: bool) -
 def _digest_in(target: Path) -> object:
     """What a run file was made of; None of another file."""
     try:
-        held = archive.read(target, ["meta"])["meta"]
+        held = runfile.read_npz(target, ["meta"])["meta"]
         meta = None if held.shape else from_json(str(held))
     except (OSError, ValueError, KeyError):
         return None

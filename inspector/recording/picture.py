@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from inspector.errors import InspectorError, OptionError
 from inspector.recording import viewer
 from inspector.recording.viewer import HOST, ViewerError, free_port
-from noisemodel.atomic import refuse_existing, replacing
+from noisemodel.files import refuse_existing, replacing
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient

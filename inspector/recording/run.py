@@ -21,7 +21,7 @@ from inspector.recording.layout import Contents, layout
 from inspector.recording.panels import limbs, log_bars
 from inspector.report.markdown import report
 from inspector.spectrogram import spectrogram
-from noisemodel.atomic import replacing
+from noisemodel.files import replacing
 from noisemodel.links import vibrating
 
 APPLICATION = "inspector"

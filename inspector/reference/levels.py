@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noisemodel import Run
-from noisemodel.ondemand import pieces
+from noisemodel.runfile import pieces
 from noisemodel.types import Array, Real
 
 HOP = 0.05

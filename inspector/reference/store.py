@@ -37,8 +37,8 @@ from inspector.reference.levels import LEAST_DB, SIGNALS, Levels, decoded, encod
 from inspector.text import counted
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
-from noisemodel import NoiseModelError, OutputError, Run, archive
-from noisemodel.atomic import replacing
+from noisemodel import NoiseModelError, OutputError, Run, runfile
+from noisemodel.files import replacing
 
 FOLDER, NAME = "reference", "reference.toml"
 FORMAT = "noise-reference/1"
@@ -673,8 +673,8 @@ class _Row:
                 raise StoreError(
                     path, f"was changed, or is not that of {NAME}; accept the runs again"
                 )
-            arrays = archive.read(path)
-        except (OSError, archive.ArchiveError) as error:
+            arrays = runfile.read_npz(path)
+        except (OSError, runfile.ArchiveError) as error:
             raise StoreError(path, f"cannot be read ({error})") from error
         return tuple(
             row.repetition(path, arrays, number, joints, self) for number, row in enumerate(rows)

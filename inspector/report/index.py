@@ -15,7 +15,7 @@ from inspector.report.findings import COUNTED, excused, failing
 from inspector.report.formats import summary
 from inspector.report.html import STYLE, add_text, document
 from inspector.verdict import Verdict
-from noisemodel.atomic import replacing
+from noisemodel.files import replacing
 
 PAGE = "index.html"
 PICTURES = "pictures"

@@ -94,7 +94,7 @@ EXISTS = "exists already; choose another name, or overwrite it (--overwrite)"
 def _replace(path: Path, content: bytes, *, overwrite: bool) -> None:
     """Write a file beside its place, and move it there when it is safely on the disk.
 
-    `noisemodel.atomic` offers a path for other writers; this package must not import it.
+    `noisemodel.files` offers a path for other writers; this package must not import it.
     """
     if path.is_dir():
         raise OutputError(path, "is a folder; name a file")

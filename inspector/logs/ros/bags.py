@@ -20,7 +20,7 @@ from inspector.logs.ros.messages import (
     topic_reader,
 )
 from inspector.text import counted
-from noisemodel.archive import ArchiveError, one_line
+from noisemodel.runfile import ArchiveError, one_line
 
 LATEST = 2**62
 """Stamps lie before, in [ns]; differences of later ones are no 64-bit integers."""

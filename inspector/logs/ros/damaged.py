@@ -24,7 +24,7 @@ from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk
 
 from inspector.errors import LogError
 from inspector.logs.ros.messages import Topic
-from noisemodel.archive import PIECE, ArchiveError, check_unpacked, one_line
+from noisemodel.runfile import PIECE, ArchiveError, check_unpacked, one_line
 
 STORAGES = {b"\x89MCAP0\r\n": "MCAP", b"SQLite format 3\x00": "SQLite", b"#ROSBAG V2.0": "ROS 1"}
 """Storages of bags by the first bytes of their files."""
@@ -91,7 +91,7 @@ def unpack(method: str, data: bytes) -> bytes:
         data: The chunk.
 
     Raises:
-        ArchiveError: If the bag unpacks to more than `noisemodel.archive.check_unpacked` allows.
+        ArchiveError: If the bag unpacks to more than `noisemodel.runfile.check_unpacked` allows.
     """
     if method not in METHODS:
         return data

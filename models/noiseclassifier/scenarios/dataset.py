@@ -40,9 +40,9 @@ from noiseclassifier.scenarios.simulation import (
 )
 from noiseclassifier.scenarios.table import SCENARIOS
 from noisemodel import Block, NoiseModelError, Run, decimated
-from noisemodel.archive import ArchiveError, read_text
-from noisemodel.atomic import replacing
-from noisemodel.parallel import DIED, Jobs, polled
+from noisemodel.files import replacing
+from noisemodel.parallel import DIED, Jobs, as_done
+from noisemodel.runfile import ArchiveError, read_text
 
 FORMAT, MANIFEST, TIMES, FALLEN = "noise-dataset/1", "dataset.json", "times.csv", ".fallen.json"
 LEAST_RUNS = 20  # number of runs from which too many falls are an error
@@ -418,11 +418,11 @@ def _make_at_once(folder: Folder, groups: Sequence[tuple[Task, ...]], jobs: Jobs
     dead: list[Task] = []
     while groups:
         rest = []
-        for found in polled(partial(_make_all, folder), groups, jobs=jobs, died=_died):
+        for found in as_done(partial(_make_all, folder), groups, jobs=jobs, died=_died):
             made = pending - set(folder.missing(pending))
             pending -= made
             yield from sorted(made)
-            if found is not None and not found[1]:
+            if not found[1]:
                 first, *others = folder.missing(groups[found[0]])
                 dead.append(first)
                 rest.append(tuple(others))

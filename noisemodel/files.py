@@ -1,0 +1,329 @@
+"""Files: written whole or not at all, read within limits, and the cache of what takes long."""
+
+import fcntl
+import hashlib
+import hmac
+import io
+import os
+import platform
+import re
+import stat
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from functools import cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, TypeAlias
+from uuid import uuid4
+from xml.etree import ElementTree as ET
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from noisemodel.errors import NoiseModelError, OutputError
+
+Arrays: TypeAlias = dict[str, NDArray[Any]]
+
+TEMPORARY = re.compile(r"\.noise-inspector-([0-9a-f]{8})?[0-9a-f]{8}")
+"""Names of temporary files, with the machine; those of model files, without, too."""
+ABANDONED, ABANDONED_HERE = 86_400.0, 60.0
+"""Ages from which a temporary file is one of a process that was killed, in [s]: on any machine that
+shares the folder, and on this one, whose locks are known."""
+
+LIMITS = MappingProxyType(
+    {"joints": 1000, "columns": 10_000, "triangles": 2_000_000, "bodies": 20_000}
+)
+"""Joints of a robot or a run, columns of a CSV log, triangles of a mesh, bodies and geoms of an
+MJCF."""
+
+PREFIX = "NOISE_LIMIT_"
+"""Of the environment variables with other limits: ``NOISE_LIMIT_JOINTS=2000``."""
+
+MAX_DEPTH = 500
+"""Most elements of XML within each other, as MuJoCo has it too; parsers that recurse crash on
+more."""
+MAX_ATTRIBUTES = 200
+"""Most attributes of an element; Pinocchio compares each with all others."""
+
+DIGEST = 32
+"""Bytes after a cached archive that show whether it is whole, and was made by this user for its
+key."""
+
+
+_read: dict[Path, None] | None = None
+"""What the running command reads; None outside of one, where programs decide for themselves."""
+
+
+@contextmanager
+def reading(paths: Iterable[Path]) -> Iterator[None]:
+    """Name files that are read: while the block runs, no output replaces them, by any name."""
+    global _read
+    before = _read
+    _read = {**(before or {}), **dict.fromkeys(paths)}
+    try:
+        yield
+    finally:
+        _read = before
+
+
+def also_reading(paths: Iterable[Path]) -> None:
+    """Add to the files of `reading`, such as the logs of a folder; nothing outside of its block."""
+    if _read is not None:
+        _read.update(dict.fromkeys(paths))
+
+
+def refuse_read(path: str | Path) -> None:
+    """Refuse an output that is a file that is read, or lies in a log that is a folder.
+
+    Raises:
+        OutputError: If it does, by device and inode, whatever its name is.
+    """
+    real = Path(os.path.realpath(path))
+    if not _read or not real.exists():
+        return
+    places = [place.stat() for place in (real, *real.parents)]
+    for each in _read:
+        with suppress(FileNotFoundError, PermissionError):
+            about = each.stat()
+            if any(os.path.samestat(about, place) for place in places):
+                raise OutputError(f"{path}: is read, too; choose another name for the output")
+
+
+@contextmanager
+def replacing(path: str | Path, *, overwrite: bool = False) -> Iterator[Path]:
+    """Offer a temporary path beside ``path`` that takes its place only if the block succeeds.
+
+    A link stays, and what it leads to is written. Of several that write one file at once and may
+    not replace it, one succeeds. Temporary files that no process holds are deleted from the folder:
+    after a minute without a change, or after a day if another machine may hold them.
+
+    Raises:
+        OutputError: If ``path`` exists and may not be replaced, or cannot be written.
+    """
+    path = Path(path)
+    refuse_existing(path, overwrite=overwrite)
+    if path.is_symlink():
+        path = Path(os.path.realpath(path))
+    _sweep(path.parent.absolute())
+    temporary = path.with_name(f".noise-inspector-{_machine()}{uuid4().hex[:8]}")
+    try:  # with the permissions that the umask leaves to any file
+        held = os.open(temporary, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o666)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+    try:
+        _lock(held)  # a live recording may wait for its next sample for days
+        yield temporary
+        _place(temporary, path, overwrite=overwrite)
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        temporary.unlink(missing_ok=True)
+        os.close(held)
+
+
+def refuse_existing(path: str | Path, *, overwrite: bool = False) -> None:
+    """Refuse an output before long work is done for it.
+
+    Args:
+        path: The file that will be written.
+        overwrite: Whether a file that exists may be replaced.
+
+    Raises:
+        OutputError: If ``path`` exists and may not be replaced, is a folder, a device or a pipe, is
+            read (`reading`), or has no folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise OutputError(f"{path}: is a folder; name a file")
+    if path.exists() and not path.is_file():
+        raise OutputError(f"{path}: is no regular file; name one")
+    refuse_read(path)
+    if path.exists() and not overwrite:
+        raise _exists(path)
+    if not path.parent.is_dir():
+        raise OutputError(f"{path}: cannot be written (No such file or directory: {path.parent})")
+
+
+def _lock(file: int) -> bool:
+    """Lock an open file; whether nobody else has. It ends with the process."""
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    except OSError:  # a file system without locks: age alone decides
+        return True
+    return True
+
+
+def _place(temporary: Path, path: Path, *, overwrite: bool) -> None:
+    """Give a file its final name, which another process may have taken since it was checked."""
+    if not overwrite:
+        try:
+            os.link(temporary, path)
+            return
+        except FileExistsError:
+            raise _exists(path) from None
+        except OSError:  # a file system without hard links: the name is claimed by an empty file
+            try:
+                path.open("xb").close()
+            except FileExistsError:
+                raise _exists(path) from None
+    temporary.replace(path)
+
+
+def _exists(path: Path) -> OutputError:
+    return OutputError(
+        f"{path}: exists already; choose another name, or overwrite it (--overwrite)"
+    )
+
+
+@cache
+def _sweep(folder: Path) -> None:
+    """Delete what processes that were killed have left in a folder, once per process."""
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            if found := TEMPORARY.fullmatch(entry.name):
+                age = ABANDONED_HERE if found[1] == _machine() else ABANDONED
+                with suppress(OSError):
+                    if time.time() - entry.stat().st_mtime > age and _is_left(entry.path):
+                        Path(entry.path).unlink()
+
+
+@cache
+def _machine() -> str:
+    """This machine since it was started, as 8 hexadecimal digits."""
+    try:
+        name = Path("/proc/sys/kernel/random/boot_id").read_text()
+    except OSError:
+        name = platform.node()
+    return hashlib.sha256(name.encode()).hexdigest()[:8]
+
+
+def _is_left(path: str) -> bool:
+    """Whether no process holds a temporary file."""
+    file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
+    try:
+        return _lock(file)
+    finally:
+        os.close(file)
+
+
+def limit(name: str) -> int:
+    """A limit of ``LIMITS``, or what the environment has instead.
+
+    Raises:
+        NoiseModelError: If the environment has no whole number.
+    """
+    stated = os.environ.get(f"{PREFIX}{name.upper()}", "")
+    if stated and not (stated.isascii() and stated.isdecimal() and len(stated) < 16):
+        raise NoiseModelError(f"{PREFIX}{name.upper()} is {stated!r}, expected a whole number")
+    return int(stated) if stated else LIMITS[name]
+
+
+def beyond(name: str) -> str:
+    """Words for what exceeds a limit: the limit, and how it is raised."""
+    return f"the limit is {limit(name)} (--limit {name}=N raises it)"
+
+
+def parsed_xml(text: bytes) -> ET.Element:
+    """Root element of XML in any encoding.
+
+    Raises:
+        ValueError: If the text has a document type (which may define entities, bombs among them),
+            is nested too deeply, has an element of too many attributes, or is not XML.
+    """
+    parser = expat.ParserCreate()
+    depth = 0
+
+    def refuse(*_: object) -> None:
+        raise ValueError("no document type or entities are read")
+
+    def enter(_: str, attributes: dict[str, str]) -> None:
+        nonlocal depth
+        depth += 1
+        if len(attributes) > MAX_ATTRIBUTES:
+            raise ValueError(f"an element has more than {MAX_ATTRIBUTES} attributes")
+        if depth > MAX_DEPTH:
+            raise ValueError(f"elements are nested more than {MAX_DEPTH} deep")
+
+    def leave(*_: object) -> None:
+        nonlocal depth
+        depth -= 1
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = enter
+    parser.EndElementHandler = leave
+    try:
+        parser.Parse(text, True)
+        return ET.fromstring(text)  # noqa: S314
+    except (expat.ExpatError, ET.ParseError, LookupError) as error:
+        raise ValueError(f"not XML ({error})") from error
+
+
+def cached(key: str, make: Callable[[], Arrays]) -> Arrays:
+    """Arrays by a key: from the user's cache if it has them, or else made and kept.
+
+    A cache is a convenience: a file that is damaged, or comes from elsewhere, is made anew, a
+    folder that cannot be written to is left alone. It may be deleted at any time.
+
+    Args:
+        key: All that the arrays depend on, the version of the code that makes them included; also
+            the file's name. Letters, digits and hyphens.
+        make: Makes the arrays; what it raises is passed on, and nothing is kept.
+    """
+    try:
+        file = cache_folder() / f"{key}.npz"
+    except RuntimeError:  # the user has no home folder
+        return make()
+    try:
+        content = file.read_bytes()
+        archive, digest = content[:-DIGEST], content[-DIGEST:]
+        if not hmac.compare_digest(_digest(file, archive), digest):
+            raise ValueError("damaged, or from elsewhere")
+        with np.load(io.BytesIO(archive), allow_pickle=False) as kept:
+            return dict(kept)
+    except (OSError, ValueError):
+        arrays = make()
+    with suppress(OSError, ValueError, OutputError):
+        file.parent.mkdir(parents=True, exist_ok=True)
+        stream = io.BytesIO()
+        np.savez(stream, allow_pickle=False, **arrays)
+        with replacing(file, overwrite=True) as temporary:
+            temporary.write_bytes(stream.getvalue() + _digest(file, stream.getvalue()))
+    return arrays
+
+
+def cache_folder() -> Path:
+    """The folder of cached surfaces (which need not exist).
+
+    Raises:
+        RuntimeError: If the user has no home folder.
+    """
+    base = Path(os.environ.get("XDG_CACHE_HOME", ""))
+    if not base.is_absolute():  # as the XDG base directory specification has it
+        base = Path.home() / ".cache"
+    return base / "noise-inspector" / "surfaces"
+
+
+def _digest(file: Path, archive: bytes) -> bytes:
+    """A digest that only this user can make, so that nobody else's arrays are taken for ours."""
+    return hmac.digest(_secret(file.parent.parent), file.name.encode() + archive, "sha256")
+
+
+def _secret(parent: Path) -> bytes:
+    """The user's secret, made when it is first needed; an error if others can read it."""
+    file = parent / "secret"
+    with suppress(FileExistsError):
+        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL
+        parent.mkdir(parents=True, exist_ok=True)
+        with os.fdopen(os.open(file, flags, 0o600), "wb") as stream:
+            stream.write(os.urandom(DIGEST))
+    about = file.stat()
+    if about.st_uid != os.getuid() or stat.S_IMODE(about.st_mode) & 0o077:
+        raise ValueError("others can read the secret")
+    secret = file.read_bytes()
+    if len(secret) != DIGEST:
+        raise ValueError("the secret is being written, or was cut off")
+    return secret
