@@ -116,6 +116,10 @@ def label_run(run: nm.Run, library: Library, *, slower: nm.Run | None = None) ->
     lasting = nc.Lasting(run.rate, start=start)
     labels = classifier.classify_pieces(_watched(run, lasting), run.rate, start=start, whole=True)
     lasting.finish()
+    if not (lasting.examined or len(labels.events())) and nc.lasting.MEASURED in signal_names(run):
+        raise CannotTellError(
+            f"no stretch of {nc.lasting.SHORTEST:g} s without a gap, as it takes to tell what lasts"
+        )
     if not len(labels):
         raise CannotTellError(
             f"no stretch of {classifier.profile.duration:g} s without a gap, which model {name}"

@@ -1,0 +1,97 @@
+"""The law of cutting: a verdict does not depend on what came before, and good pieces stay ok."""
+
+import numpy as np
+import pytest
+
+from inspector.analysis.analyse import analyse
+from inspector.analysis.status import Status
+from inspector.library import load_library
+from noiseclassifier.lasting import SHORTEST
+from noisemodel import Run, decimated
+
+LIBRARY = load_library(["general"])
+SECONDS, RATE = 9.0, 500.0
+
+
+def run_of(kind, *, shake=0.0, frequency=55.0, noise=2e-3, during=(3.0, 6.0)):
+    """An arm that swings or a leg that steps, and a chatter for a while."""
+    time, generator = np.arange(round(SECONDS * RATE)) / RATE, np.random.default_rng(5)
+    wanted = np.stack([0.6 * np.sin(2 * np.pi * f * time) for f in (0.3, 0.5, 0.7)], axis=1)
+    error = noise * generator.standard_normal(wanted.shape)
+    if kind == "leg":
+        for step in np.arange(0.4, SECONDS, 0.4):  # feet touch down, each time as hard
+            since = np.maximum(time - step, 0.0)
+            thump = 0.15 * np.exp(-since / 0.02) * np.sin(2 * np.pi * 20 * since)
+            error += (thump * (time >= step))[:, None]
+    inside = (time >= during[0]) & (time < during[1])
+    error[:, 1] += inside * shake * np.sqrt(2.0) * np.sin(2 * np.pi * frequency * time)
+    names = ("hip", "knee", "ankle")
+    return Run(time=time, velocity=wanted + error, velocity_desired=wanted, joint_names=names)
+
+
+@pytest.mark.parametrize("kind", ["arm", "leg"])
+@pytest.mark.parametrize("shake", [0.15, 1.0, 10.0])
+def test_chatter_that_is_found_in_its_run_is_found_without_what_comes_before(kind, shake):
+    run = run_of(kind, shake=shake)
+    (event,) = analyse(run, LIBRARY).findings
+    assert event.label == "oscillations"
+    assert (event.start, event.stop) == pytest.approx((3.0, 6.0), abs=0.3)
+    generator = np.random.default_rng(6)
+    pieces = [(event.start - 0.1, event.stop + 0.1), (3.1, 5.9), (4.0, 4.0 + SHORTEST + 0.05)]
+    pieces += [(generator.uniform(0.0, 2.9), generator.uniform(6.1, 9.0)) for _ in range(4)]
+    for start, stop in pieces:
+        found = analyse(run.cut(start, stop), LIBRARY).findings
+        assert [each.label for each in found] == ["oscillations"]
+
+
+@pytest.mark.parametrize("kind", ["arm", "leg"])
+def test_pieces_of_good_motion_are_ok(kind):
+    run, generator = run_of(kind), np.random.default_rng(7)
+    assert analyse(run, LIBRARY).status is Status.OK
+    for _ in range(10):
+        start = generator.uniform(0.0, 7.0)
+        piece = run.cut(start, start + generator.uniform(SHORTEST + 0.05, 9.0 - start))
+        assert analyse(piece, LIBRARY).status is Status.OK
+
+
+def test_a_piece_that_is_too_short_to_tell_what_lasts_is_not_ok():
+    found = analyse(run_of("arm").cut(2.0, 2.0 + SHORTEST - 0.05), LIBRARY)
+    assert found.status is Status.CANNOT_TELL
+    assert f"no stretch of {SHORTEST:g} s without a gap" in found.reason
+
+
+@pytest.mark.parametrize("shake", [0.1, 1.0, 100.0])
+def test_a_chatter_does_not_become_ok_by_being_louder_coarser_slower_or_held(shake):
+    run = run_of("arm", shake=shake, frequency=40.0, during=(-np.inf, np.inf))
+    velocity = run.velocity
+    copies = [
+        run,
+        Run(time=run.time, velocity=velocity, joint_names=run.joint_names),
+        Run(time=run.time, velocity=np.round(velocity / 0.05) * 0.05, joint_names=run.joint_names),
+        Run(
+            time=run.time,
+            velocity=velocity[np.arange(len(velocity)) // 4 * 4],
+            joint_names=run.joint_names,
+        ),
+        decimated(run, 125.0),
+    ]
+    for copy in copies:
+        found = analyse(copy, LIBRARY).findings
+        assert [each.label for each in found] == ["oscillations"]
+
+
+def test_what_ok_relies_on_is_said():
+    assert analyse(run_of("arm"), LIBRARY).message.startswith(
+        "Nothing stands out, within the run or for any robot."
+    )
+
+
+def test_the_first_motion_after_standing_is_compared_with_the_motion_that_follows():
+    run = run_of("leg")
+    still = Run(
+        time=run.time,
+        velocity=np.where(run.time[:, None] < 1.9, 1e-3 * run.velocity, run.velocity),
+        velocity_desired=np.where(run.time[:, None] < 1.9, 0.0, run.velocity_desired),
+        joint_names=run.joint_names,
+    )
+    assert analyse(still, LIBRARY).status is Status.OK
