@@ -10,11 +10,13 @@ if TYPE_CHECKING:
     from inspector.logs.motion import Imported
     from inspector.logs.read import read_log, read_logs
     from inspector.recording.notebook import show
+    from inspector.reference.store import Reference
 
 __all__ = [
     "Analysis",
     "Imported",
     "LiveSession",
+    "Reference",
     "Status",
     "Unknown",
     "analyse",
@@ -28,6 +30,7 @@ _MODULES = {
     "Analysis": "inspector.analysis.analyse",
     "Imported": "inspector.logs.motion",
     "LiveSession": "inspector.live",
+    "Reference": "inspector.reference.store",
     "Status": "inspector.analysis.status",
     "Unknown": "inspector.analysis.status",
     "analyse": "inspector.analysis.analyse",

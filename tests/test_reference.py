@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from commandline import call
 
+import inspector
 from inspector.reference import alignment, judging, store
 from inspector.reference.levels import decoded, encoded, levels, octaves
 from inspector.reference.store import Reference
@@ -321,6 +322,15 @@ def test_a_read_only_folder_is_one_line_and_loses_nothing(own, monkeypatch):
     assert status == 5
     assert "cannot be written (Permission denied)" in err
     assert (own / "reference" / "reference.toml").read_bytes() == before
+
+
+def test_a_store_inside_the_runs_is_no_log(own):
+    shutil.move(own / "reference", own / "runs" / "reference")
+    status, runs, _ = classified(own / "runs")
+    assert status == 0
+    assert len(runs) == 9
+    assert runs["pick-1"]["reference"]["scenarios"] == ["pick"]
+    assert inspector.Reference.load(own / "runs" / "reference").named("pick").robot == ""
 
 
 @pytest.mark.parametrize("name", ["adapt", "baseline", "expect"])

@@ -484,6 +484,8 @@ def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     waiting = [path]
     while waiting:  # not by recursion: folders may lie a thousand deep
         folder = waiting.pop()
+        if os.path.lexists(folder / "reference.toml"):
+            continue  # the levels of accepted runs are no logs
         try:
             inside = sorted(os.scandir(folder), key=lambda each: each.name)
         except PermissionError:

@@ -252,6 +252,7 @@ def accept_into(
             fcntl.flock(held, fcntl.LOCK_EX)
         there = os.path.lexists(folder / NAME)
         before = Reference.load(folder) if there else Reference(folder, (), stored=True)
+        runs = [replace(each, run=_from_store(each.run, folder)) for each in runs]
         after, changes = accepted(
             before,
             runs,
@@ -310,6 +311,7 @@ def accepted(
     Returns:
         The reference, and what changes.
     """
+    home = reference.path.absolute().parent
     kept = {each.name: each for each in reference.scenarios}
     changes = []
     for new in of_runs(runs):
@@ -326,7 +328,7 @@ def accepted(
                 and each.robot == new.robot
                 # A scenario whose logs are still there is another one with the same motion.
                 and renames
-                and not any(Path(one.run).exists() for one in each.repetitions)
+                and not any((home / one.run).exists() for one in each.repetitions)
             ]
             if former:
                 old = kept.pop(former[0].name)
@@ -443,6 +445,12 @@ def save(reference: Reference, folder: Path) -> None:
             r"[\w.-]+~[0-9a-f]{8}\.npz|[\w.-]+\.npz", path.name
         ):
             path.unlink(missing_ok=True)
+
+
+def _from_store(run: str, folder: Path) -> str:
+    """Path of a run relative to the folder that the store is in, so that it moves with it."""
+    home, path = folder.absolute().parent, Path(run).absolute()
+    return path.relative_to(home).as_posix() if path.is_relative_to(home) else run
 
 
 def _file_name(name: str, taken: set[str]) -> str:
