@@ -8,7 +8,7 @@ from contextlib import suppress
 from functools import cache, wraps
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 from typer.core import TyperCommand, TyperGroup
@@ -16,6 +16,9 @@ from typer.core import TyperCommand, TyperGroup
 from inspector.analysis.status import EXIT, OUTPUT_LOST, Status
 from inspector.errors import OptionError
 from inspector.text import printable
+
+if TYPE_CHECKING:
+    from inspector.config import Config
 
 
 class Entry(NamedTuple):
@@ -61,6 +64,18 @@ COMMANDS = {
         "smoothness episodes/ --picture smoothness.png",
         reads_logs=False,
     ),
+    "merge": Entry(
+        "Check",
+        "Join the results of several jobs into one.",
+        "merge one.json two.json --report noise/",
+        reads_logs=False,
+    ),
+    "history": Entry(
+        "Check",
+        "Show the results of many commits, and where they changed.",
+        "history results/ -o history.html",
+        reads_logs=False,
+    ),
     "import": Entry(
         "Import and export", "Convert logs of robots to run files.", "import log.csv -o run.npz"
     ),
@@ -93,6 +108,7 @@ COMMANDS = {
         "simulate run talos --scenario 7",
         reads_logs=False,
     ),
+    "config": Entry("Help", "Print the settings in force.", "config", reads_logs=False),
     "help": Entry(
         "Help", "Print the help of a command or a topic: logs.", "help logs", reads_logs=False
     ),
@@ -136,6 +152,12 @@ OUTPUTS = frozenset(
     )
 )
 """Names of options that are written; all other paths are read."""
+
+
+UNSET = OUTPUTS | {"overwrite", "write", "ctx", "localise", "in_ci", "help"}
+"""Names of parameters that no file of settings sets."""
+SHARED = {"model", "jobs"}
+"""Settings of all commands, besides those on reading logs."""
 
 
 class LogCommand(TyperCommand):
@@ -250,6 +272,25 @@ class _Group(TyperGroup):
             "`inspector COMMAND -h` explains a command, `inspector help logs` reading logs.",
         ]
         formatter.write("\n".join(lines) + "\n")
+
+    def settings(self, name: str, found: "Config") -> dict[str, Any]:
+        """What a file of settings has for a command, by its parameters."""
+        log: Any = self.commands["import"]
+        shared = frozenset({each.opts[0].lstrip("-") for each in log.added} | SHARED)
+        given: list[Any] = self.commands[name].params
+        own = {each.opts[0].lstrip("-"): each.name for each in given if each.name not in UNSET}
+        logs = COMMANDS[name].reads_logs or name in ("live", "smoothness")
+        return found.of(name, own, shared, applied=shared if logs else frozenset(SHARED))
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find a command, and the settings of the project for it."""
+        name, command, rest = super().resolve_command(ctx, args)
+        if name and name not in ("config", "help", "robots") and not {"-h", "--help"} & set(rest):
+            from inspector.config import find
+
+            if (found := find()) is not None:
+                ctx.default_map = {name: self.settings(name, found)}
+        return name, command, rest
 
     def invoke(self, ctx: Any) -> Any:
         """Run a command; what it says of a wrong value begins with the value."""

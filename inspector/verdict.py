@@ -33,8 +33,9 @@ from inspector.library import Library
 from inspector.logs.read import Reading, Source, open_source
 from inspector.version import program_version
 from noiseclassifier import Event
-from noiseclassifier.jsontext import from_json
+from noiseclassifier.jsontext import from_json, text_of
 from noisemodel import OutputError
+from noisemodel.atomic import also_reading
 from noisemodel.parallel import DIED, Jobs, as_done, in_order
 
 if TYPE_CHECKING:
@@ -644,6 +645,34 @@ def counts(verdicts: Iterable[Verdict]) -> dict[str, dict[str, int]]:
         "runs": {status.value: runs[status.value] for status in EXIT},
         "findings": {name: found[name] for name in ("failing", "missing", *excuses)},
     }
+
+
+RESULTS = "noise-verdict/3"
+"""Format of what `classify --write json=FILE` writes."""
+
+
+def read_results(path: Path) -> list[Verdict]:
+    """Read the verdicts of a file that `classify --write json=FILE` wrote.
+
+    Raises:
+        InspectorError: If it is no such file, or of another version.
+    """
+    also_reading([path])
+    content = None
+    try:
+        content = from_json(text_of(path))
+        form = content.get("format") if isinstance(content, dict) else None
+        if form != RESULTS:
+            raise InspectorError(f"{path}: of format {form!r}, expected {RESULTS!r}")
+        return [Verdict.from_dict(each) for each in content["runs"]]
+    except OSError as error:
+        raise InspectorError(f"{path}: cannot be read ({error.strerror})") from error
+    except InspectorError:
+        raise
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        version = content.get("version") if isinstance(content, dict) else None
+        by = f" by version {version}, this is {program_version()}" if version else ""
+        raise InspectorError(f"{path}: no results of classify{by} ({error})") from error
 
 
 @dataclass(eq=False)

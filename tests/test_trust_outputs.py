@@ -12,6 +12,7 @@ from generalmodel import run_at
 
 from inspector import assets
 from inspector.cli import COMMANDS
+from inspector.report.formats import as_json
 from noisemodel import OutputError
 from noisemodel.files import also_reading, reading, refuse_read, replacing
 
@@ -35,6 +36,7 @@ TABLE = [
     ("classify", ("good",), "--write json={}", ("good/0.npz", "good/1.npz")),
     ("classify", RUN, "--resume {}", OF_RUN),
     ("diff", FOLDERS, "--write json={}", OF_FOLDERS),
+    ("merge", ("result.json",), "--write json={}", ("result.json",)),
     ("smoothness", ("good",), "--picture {}.png", ("good/0.npz",)),
     ("import", LOG, "-o {}.npz", OF_LOG),
     ("import", (*LOG, "-o", "new.npz"), "--save-mapping {}", OF_LOG),
@@ -66,6 +68,7 @@ def place(tmp_path, monkeypatch):
         rows = "".join(f"{each:g},{np.sin(each):g}\n" for each in time)
         (tmp_path / name).write_text(f"time,a.velocity\n{rows}")
     (tmp_path / "map.toml").write_text('format = "noise-mapping/1"\n')
+    (tmp_path / "result.json").write_text(as_json([]))
     (tmp_path / "labels.txt").write_text("0.5\t1.5\timpact\n")
     (tmp_path / "arm.urdf").write_text('<robot name="arm"><link name="base"/></robot>')
     return tmp_path
@@ -87,7 +90,7 @@ def test_an_output_never_replaces_a_file_that_is_read(
 
 
 def test_each_command_that_reads_and_writes_is_in_the_table():
-    others = WITHOUT | {"config", "merge", "history"}
+    others = WITHOUT | {"config", "history"}
     assert {command for command, *_ in TABLE} == set(COMMANDS) - others
 
 

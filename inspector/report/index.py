@@ -4,6 +4,7 @@ import hashlib
 import re
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -103,6 +104,17 @@ def draw(analysis: Analysis, path: Path, *, folder: Path) -> Path:
     with replacing(target, overwrite=True) as temporary:
         temporary.write_bytes(picture(analysis))
     return target
+
+
+def with_picture(verdict: Verdict, folder: Path) -> Verdict:
+    """A verdict of another job with its picture copied into the folder, without if it is gone."""
+    picture = verdict.picture
+    if picture is None or not picture.is_file():
+        return replace(verdict, picture=None)
+    target = folder / PICTURES / picture.name
+    with replacing(target, overwrite=True) as temporary:
+        temporary.write_bytes(picture.read_bytes())
+    return replace(verdict, picture=target)
 
 
 def write(verdicts: Sequence[Verdict], folder: Path) -> Path:

@@ -1,0 +1,237 @@
+"""Results of many commits: how far each scenario is over its reference, and where that changed.
+
+A file of `classify --write json=FILE` is a commit. They are in order of their names, numbers by
+their value, and named after what stands behind the last dash: ``0061-3f2a1c9.json``.
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from inspector.errors import InspectorError
+from inspector.report.findings import groups
+from inspector.report.html import STYLE, add_text, document
+from inspector.text import counted
+from inspector.verdict import Verdict, read_results
+from noisemodel.types import Array
+
+SHORTEST = 4
+"""Commits from which a stretch has a level of its own."""
+LEAST_DB, LEAST_FINDINGS = 2.0, 0.5
+"""Smallest change that is told: of a level in [dB], and of findings per run."""
+WIDTH, HEIGHT = 900, 120
+POLICY = "default-src 'none'; style-src 'unsafe-inline'"
+LOOK = """
+svg { width: 100%; height: auto; border: 1px solid #d0d7de; } circle { fill: #0072b2; }
+line { stroke: #d55e00; stroke-width: 2; stroke-dasharray: 6 4; } .step { color: #d55e00; }
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """What became of a scenario, or of a joint in it, at each commit; NaN where it was not run."""
+
+    scenario: str
+    joint: str
+    unit: str
+    value: Array
+
+    @property
+    def name(self) -> str:
+        """How it is called."""
+        return f"{self.scenario}, {self.joint}" if self.joint else self.scenario
+
+
+@dataclass(frozen=True)
+class Change:
+    """A step at a commit, or a drift from the first to the last of several."""
+
+    first: int
+    last: int
+    by: float
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """Commits in order, series with most change first, and what could not be read."""
+
+    commits: tuple[str, ...]
+    series: tuple[Series, ...]
+    problems: tuple[str, ...]
+
+    def lines(self) -> Iterator[str]:
+        """The changes, a line each."""
+        number = len(self.commits)
+        yield f"{counted(number, 'commit')}, {self.commits[0]} to {self.commits[-1]}"
+        quiet = 0
+        for series in self.series:
+            found = changes(series)
+            quiet += not found
+            for change in found:
+                yield f"{series.name}: {self.told(series, change)}"
+        if quiet:
+            yield f"{quiet} of {len(self.series)} series without a change"
+
+    def told(self, series: Series, change: Change) -> str:
+        """A change in words."""
+        by = f"{change.by:+.1f} {series.unit}"
+        if change.first == change.last:
+            return (
+                f"{by} at {self.commits[change.first]} ({change.first + 1} of {len(self.commits)})"
+            )
+        first, last = self.commits[change.first], self.commits[change.last]
+        return f"drift of {by} from {first} to {last}"
+
+
+def read(folder: Path) -> History:
+    """Read the results of a folder; what is no result is named and left out.
+
+    Raises:
+        InspectorError: If there is none.
+    """
+    commits, results, problems = [], [], []
+    for path in sorted(folder.glob("*.json"), key=_natural):
+        try:
+            results.append(read_results(path))
+            commits.append(path.stem.rpartition("-")[2])
+        except InspectorError as error:
+            problems.append(str(error))
+    if not commits:
+        why = f"; {problems[0]}" if problems else ""
+        raise InspectorError(f"{folder}: no result of `classify --write json=FILE`{why}")
+    series = sorted(_series(results), key=lambda each: -_largest(each))
+    return History(tuple(commits), tuple(series), tuple(problems))
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """A name with its numbers as numbers."""
+    parts = re.split(r"(\d+)", path.stem)
+    return [(int(each), "") if each.isdigit() else (-1, each) for each in parts]
+
+
+def _series(results: Sequence[Sequence[Verdict]]) -> Iterator[Series]:
+    """The series of each scenario, and of the joints that a finding was in."""
+    runs: dict[str, Array] = {}
+    over: dict[str, Array] = {}
+    found: dict[tuple[str, str], Array] = {}
+    for commit, verdicts in enumerate(results):
+        for group in groups(verdicts):
+            name = str(Path(group.name).with_suffix(""))
+            runs.setdefault(name, np.full(len(results), np.nan))[commit] = len(group.verdicts)
+            for verdict in group.verdicts:
+                if verdict.beside and verdict.beside.worst is not None:
+                    level = over.setdefault(name, np.full(len(results), np.nan))
+                    level[commit] = np.fmax(level[commit], verdict.beside.worst)
+                for event in verdict.failing:
+                    where = verdict.localisations.get(event)
+                    joint = where.joints[0][0] if where and where.joints else ""
+                    for key in {(name, ""), (name, joint)}:
+                        found.setdefault(key, np.zeros(len(results)))[commit] += 1
+    yield from (Series(name, "", "dB", level) for name, level in over.items())
+    for name in runs:
+        found.setdefault((name, ""), np.zeros(len(results)))
+    yield from (
+        Series(name, joint, "findings", number / runs[name])
+        for (name, joint), number in found.items()
+    )
+
+
+def _largest(series: Series) -> float:
+    return max((abs(change.by) for change in changes(series)), default=0.0)
+
+
+def changes(series: Series) -> list[Change]:
+    """Steps and drifts of a series, in order; commits at which it was not run do not count."""
+    there = np.flatnonzero(~np.isnan(series.value))
+    value = series.value[there]
+    least = LEAST_DB if series.unit == "dB" else LEAST_FINDINGS
+    ends = [*_stretches(value), len(value)]
+    lines = [_line(value[first:last]) for first, last in pairwise(ends)]
+    found = []
+    for place, (first, last) in enumerate(pairwise(ends)):
+        start, stop = lines[place]
+        if place and abs(by := start - lines[place - 1][1]) >= least:
+            found.append(Change(int(there[first]), int(there[first]), float(by)))
+        if abs(stop - start) >= least:
+            found.append(Change(int(there[first]), int(there[last - 1]), float(stop - start)))
+    return found
+
+
+def _stretches(value: Array) -> list[int]:
+    """Where stretches begin in each of which a line describes a series.
+
+    It is cut where two lines explain it better than one, by Schwarz's criterion.
+    """
+    n = len(value)
+    places = range(SHORTEST, n - SHORTEST + 1)
+    errors = {k: _error(value[:k]) + _error(value[k:]) for k in places}
+    if not errors:
+        return [0]
+    best = min(errors, key=errors.__getitem__)
+    floor = 1e-4 * n  # of values without any noise
+    gain = n * np.log((_error(value) + floor) / (errors[best] + floor))
+    if gain < 4 * np.log(n):  # three more numbers: two of a line, and the place, found among n
+        return [0]
+    later = _stretches(value[best:])
+    return [*_stretches(value[:best]), *(best + place for place in later)]
+
+
+def _line(value: Array) -> tuple[float, float]:
+    """Values at both ends of the line through a stretch; its mean if it is no better."""
+    n = len(value)
+    if n < 2 * SHORTEST:
+        return float(value.mean()), float(value.mean())
+    slope, begin = np.polyfit(np.arange(n), value, 1)
+    constant = float(np.square(value - value.mean()).sum())
+    if n * np.log((constant + 1e-4 * n) / (_error(value) + 1e-4 * n)) < 2 * np.log(n):
+        return float(value.mean()), float(value.mean())
+    return float(begin), float(begin + slope * (n - 1))
+
+
+def _error(value: Array) -> float:
+    """Sum of squares about the line through a stretch."""
+    x = np.arange(len(value)) - (len(value) - 1) / 2
+    y = value - value.mean()
+    square = float(np.square(x).sum())
+    slope = float(x @ y) / square if square else 0.0
+    return float(np.square(y - slope * x).sum())
+
+
+def page(history: History) -> str:
+    """Write all series as one HTML page, those with most change first."""
+    html, body = document("Noise over commits", STYLE + LOOK, POLICY)
+    add_text(body, "h1", "Noise over commits")
+    add_text(body, "p", next(history.lines()), "verdict")
+    for problem in history.problems:
+        add_text(body, "p", problem, "note")
+    for series in history.series:
+        add_text(body, "h2", series.name)
+        found = changes(series)
+        for change in found:
+            add_text(body, "p", history.told(series, change), "step")
+        _draw(body, history, series, found)
+    return f"<!DOCTYPE html>\n{ET.tostring(html, encoding='unicode', method='html')}\n"
+
+
+def _draw(body: ET.Element, history: History, series: Series, found: Sequence[Change]) -> None:
+    """Draw a series: a point for each commit, a line at each step."""
+    value = series.value
+    low, high = min(0.0, float(np.nanmin(value))), max(float(np.nanmax(value)), 1.0)
+    x = (np.arange(len(value)) + 0.5) * WIDTH / len(value)
+    y = HEIGHT - 10 - (value - low) / (high - low) * (HEIGHT - 20)
+    drawn = ET.SubElement(body, "svg", viewBox=f"0 0 {WIDTH} {HEIGHT}", role="img")
+    for change in found:
+        if change.first == change.last:
+            at = f"{x[change.first] - WIDTH / len(value) / 2:.1f}"
+            ET.SubElement(drawn, "line", x1=at, x2=at, y1="0", y2=str(HEIGHT))
+    for place in np.flatnonzero(~np.isnan(value)):
+        point = ET.SubElement(drawn, "circle", cx=f"{x[place]:.1f}", cy=f"{y[place]:.1f}", r="3")
+        told = f"{history.commits[place]}: {value[place]:.1f} {series.unit}"
+        add_text(point, "title", told)
+    unit = "dB over the reference" if series.unit == "dB" else "findings per run"
+    add_text(body, "p", f"{unit}, {low:.1f} to {high:.1f}", "note")

@@ -1,0 +1,201 @@
+"""Settings of a project, results of several jobs, and results over commits."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commandline import call
+
+from inspector import history
+from inspector.analysis.status import Status
+from inspector.assets import demo_run
+from inspector.localisation.stage import Localisation
+from inspector.report.formats import as_json
+from inspector.verdict import Beside, Verdict
+from noiseclassifier import Event
+
+BLOW = Event("impact", 1.0, 1.5, 0.9)
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A repository; the working folder is one below its top."""
+    (tmp_path / ".git").mkdir()
+    (tmp_path / "sub").mkdir()
+    monkeypatch.chdir(tmp_path / "sub")
+    time = np.arange(400) / 100
+    rows = "".join(f"{each:g},{np.sin(each):g}\n" for each in time)
+    (tmp_path / "log.csv").write_text(f"time,elbow\n{rows}")
+    return tmp_path
+
+
+def test_settings_hold_for_commands_and_the_command_line_wins(project):
+    assert call("audit", "../log.csv")[0] == 3  # which signal is elbow?
+    (project / "pyproject.toml").write_text(
+        '[tool.noise-inspector]\nmap = ["velocity.elbow=elbow"]\nrate = 90.0\n'
+        '[tool.noise-inspector.audit]\nformat = "json"\n'
+        '[tool.noise-inspector.classify]\nruns = ["log.csv"]\nmin-duration = 0.5\n'
+    )
+    status, out, err = call("audit", "../log.csv")
+    assert json.loads(out), err
+    assert "  rate " not in call("audit", "../log.csv", "--format", "text")[1]
+    _, out, err = call("classify")
+    assert "/log.csv   " in out
+    assert "elbow" in err
+    status, out, _ = call("config")
+    assert (status, out.splitlines()) == (
+        0,
+        [
+            f"{project}/pyproject.toml:",
+            '  map = ["velocity.elbow=elbow"]',
+            "  rate = 90.0",
+            '  audit.format = "json"',
+            '  classify.runs = ["log.csv"]',
+            "  classify.min-duration = 0.5",
+        ],
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "problem"),
+    [
+        ("inspector.toml", 'robto = "ur5e"', "no setting 'robto' (did you mean 'robot'?)"),
+        (
+            "inspector.toml",
+            "[audit]\nfrmat = 1",
+            "[audit] no setting 'frmat' (did you mean 'format'?)",
+        ),
+        ("inspector.toml", "[audits]\nformat = 1", "no command 'audits'"),
+        ("inspector.toml", "[classify]\noverwrite = true", "[classify] no setting 'overwrite'"),
+        ("inspector.toml", '[view]\noutput = "~/.bashrc"', "[view] no setting 'output'"),
+        ("inspector.toml", "robot =", "cannot be read (Invalid value"),
+        ("pyproject.toml", "[tool.noise-inspector]\n'", "cannot be read (Expected "),
+        ("pyproject.toml", "[tool]\nnoise-inspector = 3", "[tool.noise-inspector] is no table"),
+    ],
+)
+def test_settings_that_are_not_known_are_one_line(project, name, text, problem):
+    (project / name).write_text(text)
+    status, out, err = call("config")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"inspector: {project}/{name}:")
+    assert problem in err
+
+
+def test_files_of_others_and_beyond_the_repository_are_no_settings(project):
+    (project.parent / "inspector.toml").write_text("robto = 1")
+    for text in ("[tool.other]\na = 1\n", "not = = toml", "[project]\nname = 'x'"):
+        (project / "pyproject.toml").write_text(text)
+        status, out, _ = call("config")
+        assert (status, out.startswith("no settings")) == (0, True)
+    (project.parent / "inspector.toml").unlink()
+
+
+def test_a_setting_of_a_wrong_type_is_wrong_usage(project):
+    (project / "inspector.toml").write_text('rate = "fast"')
+    status, _, err = call("audit", "../log.csv")
+    assert status == 2
+    assert "Invalid value for '--rate'" in err
+
+
+def results(path, *verdicts):
+    path.write_text(as_json(verdicts))
+    return path
+
+
+def test_results_of_jobs_are_joined_into_one_table_page_and_exit_status(tmp_path):
+    call("classify", demo_run(), "--no-reference", "--write", f"json={tmp_path / 'a.json'}",
+         "--report", tmp_path / "first")  # fmt: skip
+    quiet = [Verdict(Path(f"reach-{each}.npz"), Status.OK, "general") for each in range(3)]
+    results(tmp_path / "b.json", *quiet)
+    page = tmp_path / "page"
+    status, out, err = call("merge", tmp_path / "a.json", tmp_path / "b.json", "--report", page)
+    assert (status, err) == (1, "")
+    first, second, *_, last = out.splitlines()
+    assert first.startswith(f"{demo_run()}   FAIL   ")
+    assert second.split() == ["reach", "ok", "3", "runs"]
+    assert last == "4 runs: 1 with findings, 3 ok; findings: 1 failing"
+    (picture,) = (page / "pictures").iterdir()
+    assert f"pictures/{picture.name}" in (page / "index.html").read_text()
+    assert call("merge", tmp_path / "b.json", "--format", "json")[0] == 0
+    before = json.loads((tmp_path / "a.json").read_text())["runs"]
+    assert json.loads(call("merge", tmp_path / "a.json", "--format", "json")[1])["runs"] == before
+    output = ("--write", f"json={tmp_path / 'b.json'}", "--overwrite")
+    status, _, err = call("merge", tmp_path / "b.json", *output)
+    assert (status, "is read, too" in err) == (3, True)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        ("{", "no results of classify"),
+        ('{"format": "noise-verdict/2", "runs": []}', "of format 'noise-verdict/2', expected"),
+        ("[]", "of format None, expected"),
+        (
+            '{"format": "noise-verdict/3", "version": "0.1", "runs": [{}]}',
+            "by version 0.1, this is",
+        ),
+    ],
+)
+def test_what_is_no_result_is_one_line(tmp_path, content, problem):
+    (tmp_path / "a.json").write_text(content)
+    status, out, err = call("merge", tmp_path / "a.json")
+    assert (status, out, err.count("\n")) == (3, "", 1)
+    assert err.startswith(f"inspector: {tmp_path}/a.json: ")
+    assert problem in err
+
+
+def test_a_run_of_two_jobs_is_refused(tmp_path):
+    one, two = (results(tmp_path / n, Verdict(Path("r"), Status.OK)) for n in ("a.json", "b.json"))
+    status, _, err = call("merge", one, two)
+    assert (status, err) == (3, f"inspector: {two}: the run r is in {one}, too\n")
+
+
+def test_a_history_of_200_commits_names_two_steps_and_a_drift(tmp_path):
+    noise = np.random.default_rng(0).normal(0, 0.5, (3, 200))
+    pick, scan, calm = noise
+    pick[60:] += 6.0
+    pick[150:] -= 3.0
+    scan += np.linspace(0, 8, 200)
+    located = Localisation(joints=(("wrist", 1.0),))
+    for commit in range(200):
+        verdicts = []
+        for name, value in (("pick", pick), ("scan", scan), ("calm", calm)):
+            if name == "scan" and 20 <= commit < 30:
+                continue  # a gap
+            beside = Beside("reference", (name,), 3, {}, {}, worst=float(value[commit]))
+            for number in range(2):
+                run = Verdict(Path(f"{name}-{number}.npz"), Status.OK, beside=beside)
+                if name == "pick" and commit >= 60:
+                    run = replace(run, status=Status.FINDINGS, events=(BLOW,))
+                    run = replace(run, localisations={BLOW: located})
+                verdicts.append(run)
+        results(tmp_path / f"{commit}-c{commit:03d}.json", *verdicts)
+    found = history.read(tmp_path)
+    assert found.commits[:3] == ("c000", "c001", "c002")  # 10 comes after 9
+    series = {(each.name, each.unit): each for each in found.series}
+    first, second = history.changes(series["pick", "dB"])
+    assert (first.first, first.last, second.first, second.last) == (60, 60, 150, 150)
+    assert first.by == pytest.approx(6.0, abs=0.5)
+    assert second.by == pytest.approx(-3.0, abs=0.5)
+    (drift,) = history.changes(series["scan", "dB"])
+    assert (drift.first, drift.last) == (0, 199)
+    assert drift.by == pytest.approx(8.0, abs=0.5)
+    assert history.changes(series["calm", "dB"]) == []
+    assert [each.first for each in history.changes(series["pick, wrist", "findings"])] == [60]
+    (tmp_path / "200-broken.json").write_text("{")
+    status, out, err = call("history", tmp_path, "-o", tmp_path / "page.html")
+    assert status == 3
+    assert out.splitlines()[0] == "200 commits, c000 to c199"
+    assert "pick: +6.0 dB at c060 (61 of 200)" in out
+    assert "broken.json: no results of classify" in err
+    page = (tmp_path / "page.html").read_text()
+    assert page.index("<h2>scan</h2>") < page.index("<h2>calm</h2>")
+    assert "at c150" in page
+
+
+def test_a_folder_without_results_is_one_line(tmp_path):
+    status, _, err = call("history", tmp_path)
+    assert (status, err.count("\n")) == (3, 1)
+    assert "no result of `classify --write json=FILE`" in err
