@@ -35,7 +35,7 @@ from inspector.version import program_version
 from noiseclassifier import Event
 from noiseclassifier.jsontext import from_json, text_of
 from noisemodel import OutputError
-from noisemodel.atomic import also_reading
+from noisemodel.files import also_reading
 from noisemodel.parallel import DIED, Jobs, as_done, in_order
 
 if TYPE_CHECKING:

@@ -13,7 +13,10 @@ from commandline import call
 from generalmodel import run_at
 
 from inspector import cli
+from inspector.analysis.status import Status
 from inspector.assets import demo_run
+from inspector.report.formats import as_json
+from inspector.verdict import Verdict
 from noisemodel import Block
 
 ROOT = Path(__file__).parents[1]
@@ -27,6 +30,8 @@ COMMANDS = {
     "classify": ("run.npz",),
     "accept": ("run.npz", "--reason", "good", "-o", "out/reference"),
     "diff": ("good", "good"),
+    "merge": ("results/1-first.json",),
+    "history": ("results",),
     "audit": ("run.npz",),
     "smoothness": ("good",),
     "import": ("log.csv", "-o", "out/run.npz"),
@@ -51,6 +56,8 @@ COMMANDS = {
 SILENT_BUGS = {
     "live": "inspector.live.input.reader_of",
     "robots": "noisemodel.catalog.menagerie_names",
+    "merge": "inspector.verdict.from_json",
+    "history": "inspector.verdict.from_json",
 }
 """Where a bug is put into commands that read no run."""
 
@@ -74,6 +81,8 @@ def inputs(tmp_path_factory):
         (folder / "fast" / f"{seed}.toml").write_text(f"[data]\n{ranges}")
     shutil.copy(demo_run(), folder / "demo.npz")
     (folder / "log.csv").write_text(ROWS)
+    (folder / "results").mkdir()
+    (folder / "results" / "1-first.json").write_text(as_json([Verdict(Path("a.npz"), Status.OK)]))
     return folder
 
 
@@ -101,7 +110,7 @@ def start(place, name, **settings):
 
 
 def test_each_command_is_tried():
-    assert set(cli.COMMANDS) - {"help"} == set(COMMANDS)
+    assert set(cli.COMMANDS) - {"help", "config"} == set(COMMANDS)
 
 
 @pytest.mark.slow

@@ -25,7 +25,7 @@ def history(
     0061-3f2a1c9.json. The exit status is 3 if one cannot be read; the others are shown.
     """
     from inspector.history import page, read
-    from noisemodel.atomic import refuse_existing, replacing
+    from noisemodel.files import refuse_existing, replacing
 
     if output:
         refuse_existing(output, overwrite=overwrite)
