@@ -121,6 +121,7 @@ def domains(
     first_seed: First = 10_000,
     faults: Annotated[int, typer.Option(help="Faulty runs per robot and seed.")] = 2,
     always: Annotated[str, typer.Option(help="Faults of every robot that can have them.")] = "",
+    throughout: Annotated[int, typer.Option(help="Faults of whole runs, per robot and seed.")] = 0,
     jobs: Jobs = 1,
     list_: List = False,
 ) -> None:
@@ -135,7 +136,12 @@ def domains(
         typer.echo(f"{len(TARGETS)} to measure on only: {', '.join(TARGETS)}\n\n{DISTRIBUTION}")
         return
     chosen = wide_tasks(
-        _listed(robots), first=first_seed, seeds=seeds, faults=faults, always=_listed(always)
+        _listed(robots),
+        first=first_seed,
+        seeds=seeds,
+        faults=faults,
+        always=_listed(always),
+        throughout=throughout,
     )
     folder = Folder.opened(output, wide=True)
     _make(folder, folder.missing(chosen), jobs)

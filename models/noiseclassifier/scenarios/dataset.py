@@ -23,6 +23,7 @@ import numpy as np
 
 from noiseclassifier.scenarios.domains import DISTRIBUTION, Distribution, Domain, Logger
 from noiseclassifier.scenarios.errors import DatasetError, ScenarioError, SimulationError, unknown
+from noiseclassifier.scenarios.faults import THROUGHOUT
 from noiseclassifier.scenarios.logs import logged
 from noiseclassifier.scenarios.motions import RATE
 from noiseclassifier.scenarios.robots import ROBOTS, TARGETS, WIDE
@@ -179,14 +180,16 @@ def wide_tasks(
     seeds: int = 8,
     faults: int = FAULTY_RUNS,
     always: Sequence[str] = (),
+    throughout: int = 0,
 ) -> list[Task]:
     """The runs of a data set of wide domains, seed by seed."""
     known = {robot: faults_of(robot) for robot in robots or WIDE}
     if first < FIRST:
         raise DatasetError(f"the first seed is {first}, expected {FIRST} or more")
-    if seeds < 1 or faults < 0:
+    if seeds < 1 or faults < 0 or not 0 <= throughout <= len(THROUGHOUT):
         raise DatasetError(
-            f"{seeds} seeds with {faults} faults each, expected 1 or more, 0 or more"
+            f"{seeds} seeds with {faults} faults each and {throughout} of whole runs, expected 1 or"
+            f" more, 0 or more, and up to {len(THROUGHOUT)}"
         )
     for name in always:
         if not any(name in own for own in known.values()):
@@ -195,8 +198,17 @@ def wide_tasks(
         Task(robot, name, seed)
         for seed in range(first, first + seeds)
         for robot in known
-        for name in (GOOD, *_faults(robot, seed, faults, always))
+        for name in (
+            *(GOOD, *_faults(robot, seed, faults, always)),
+            *_whole_runs(robot, seed, throughout),
+        )
     ]
+
+
+def _whole_runs(robot: str, seed: int, count: int) -> list[str]:
+    """Names of faults that are there from the first sample to the last."""
+    rng = np.random.default_rng((seed, crc32(robot.encode()), 4))
+    return sorted(rng.choice(list(THROUGHOUT), count, replace=False).tolist())
 
 
 def _faults(robot: str, seed: int, count: int, always: Sequence[str]) -> list[str]:
@@ -240,7 +252,9 @@ class Folder:
             if path.exists() and not path.is_dir():
                 raise DatasetError(f"{path}: is a file; name a folder")
             if (path / MANIFEST).exists():
-                compared = {k: v for k, v in settings.items() if k != "recipe" or not any_recipe}
+                # The latest recipe of wide domains only adds to those before.
+                free = any_recipe or (wide and _made(path).get("recipe") in range(2, recipe))
+                compared = {k: v for k, v in settings.items() if k != "recipe" or not free}
                 _compare(path, compared)
             elif path.is_dir() and any(path.iterdir()):
                 raise DatasetError(
@@ -362,13 +376,19 @@ class Folder:
         return sorted(task for task in tasks if task)
 
 
-def _compare(path: Path, settings: dict[str, Any]) -> None:
+def _made(path: Path) -> dict[str, Any]:
+    """The settings that a folder was made with."""
     try:
         made = json.loads(_text(path / MANIFEST))
     except (ValueError, RecursionError) as error:
         raise DatasetError(f"{path / MANIFEST}: damaged ({error}); name another folder") from error
+    return made if isinstance(made, dict) else {}
+
+
+def _compare(path: Path, settings: dict[str, Any]) -> None:
+    made = _made(path)
     for key, wanted in settings.items():
-        found = made.get(key) if isinstance(made, dict) else None
+        found = made.get(key)
         if found != wanted:
             raise DatasetError(
                 f"{path}: made with {key} {json.dumps(found)}, now it is {json.dumps(wanted)};"

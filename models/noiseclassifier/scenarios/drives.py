@@ -148,7 +148,7 @@ class DomainDrives(Drives):
         self._begin, self._end = _samples(fault)
         self._added = _torque(fault, self._begin, self._end, joints)
         self._outside: Array | float = 0.0
-        self._changed = bool(np.any(fault.offset))
+        self._changed, self._worn = bool(np.any(fault.offset)), bool(np.any(fault.wear))
         self._demands: deque[Array] = deque(
             [np.zeros(joints)] * (1 + imperfections.torque_delay + round(fault.delay * RATE)),
             1 + imperfections.torque_delay + round(fault.delay * RATE),
@@ -210,6 +210,8 @@ class DomainDrives(Drives):
             stiffness, damping = self._gains
             self._stiffness = stiffness * self._fault.stiffness
             self._damping = damping * self._fault.damping
+            if self._fault.bandwidth:
+                self._alpha, self._beta = tracking_gains(self._fault.bandwidth, STEP)
         elif self._sample == self._end:
             self._stiffness, self._damping = self._gains
         motor = super().torque(position, velocity, desired, rate, feedforward)
@@ -217,6 +219,9 @@ class DomainDrives(Drives):
             motor = motor * self._fault.power
         speed = self._speed if self._elastic else velocity
         motor = motor + self._cogging * np.sin(self._teeth * self._angle + self._teeth_phase)
+        if self._worn and inside:
+            shaken = np.sin(self._domain.gear * self._angle + self._teeth_phase)
+            motor = motor + self._fault.wear * self._limit * shaken
         motor -= self._stiction * np.exp(-np.square(speed / STRIBECK)) * np.tanh(speed / 5e-3)
         added = self._added[self._sample - self._begin] if inside and len(self._added) else 0.0
         self._outside = added if self._fault.outside else 0.0
@@ -248,6 +253,8 @@ class DomainDrives(Drives):
         ripple = (self._error * np.sin(self._orders * self._angle + self._order_phase)).sum(axis=0)
         twist = self._angle + ripple - self._joint
         play = self._domain.backlash / 2
+        if self._worn and self._begin <= self._sample < self._end:
+            play += self._fault.backlash / 2
         gear = self._spring * (twist - np.clip(twist, -play, play))
         gear = gear + np.where(np.abs(twist) > play, self._loss * (self._speed - joint_speed), 0.0)
         self._speed = self._speed + STEP * (motor - gear) / self._rotor
@@ -258,7 +265,7 @@ class DomainDrives(Drives):
 def _samples(fault: DriveFault) -> tuple[int, int]:
     if fault.event is None:
         return 2**62, 2**62
-    return round(fault.event.start * RATE), round(fault.event.stop * RATE)
+    return round((fault.event.start - fault.lead) * RATE), round(fault.event.stop * RATE)
 
 
 def _torque(fault: DriveFault, begin: int, end: int, joints: int) -> Array:

@@ -34,6 +34,7 @@ Signal: TypeAlias = Callable[[Array], Array]
 Command: TypeAlias = Callable[[Array, Array, Array], tuple[Array, Array]]
 """From times, shape (samples,), targets and rates, shape (samples, joints), to both."""
 MARGIN = 0.8  # time without faults at the begin and at the end of a run, in [s]
+LEAD = 0.25  # how long before the first sample a fault of a whole run begins to act, in [s]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,6 +56,10 @@ class DriveFault:
     torque: Callable[[Array], Array] | None = None
     outside: bool = False
     command: Command | None = None
+    lead: float = 0.0  # how long before its event it begins to act, in [s]
+    bandwidth: float = 0.0  # of the velocities in the loop meanwhile, in [Hz]; 0: as they are
+    wear: Array | float = 0.0  # torque locked to the angle meanwhile, by the limit, shape (joints,)
+    backlash: float = 0.0  # further free play of elastic gears meanwhile, in [rad]
 
     @property
     def facts(self) -> Mapping[str, Any]:
@@ -882,6 +887,86 @@ ON_DRIVES: dict[str, OnDrives] = {
     "encoder-slip": OnDrives(slip),
 }
 """Faults of robots of every family, by name."""
+
+
+def _throughout(cause: str, duration: float, facts: dict[str, Any], **acts: Any) -> DriveFault:
+    """A fault that is there before the first sample, and until the last."""
+    event = Event("oscillations", cause, 0.0, duration, {**facts, "throughout": True})
+    return DriveFault(event=event, lead=LEAD, **acts)
+
+
+def high_gains(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
+    """Draw gains that are too high, for a delay that is a little longer, too."""
+    joints = _some(rng, len(drives.joints))
+    factor, delay = _log_one(rng, 2.0, 60.0), _log_one(rng, 0.2e-3, 4e-3)
+    gains = np.where(joints > 0, factor, 1.0)
+    soft = rng.uniform() < 0.3
+    facts = {"factor": factor, "delay": delay, "joints": joints.tolist()}
+    acts = {"stiffness": gains, "damping": 1.0 if soft else gains, "delay": delay}
+    return _throughout("too high gains", duration, facts, **acts)
+
+
+def long_delay(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
+    """Draw a delay that the gains do not bear."""
+    delay = _log_one(rng, 2e-3, 30e-3)
+    return _throughout("latency", duration, {"delay": delay}, delay=delay)
+
+
+def slow_filter(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
+    """Draw a filter of the velocities in the loop that is too slow for its damping."""
+    bandwidth, factor = _log_one(rng, 2.0, 40.0), _log_one(rng, 1.0, 15.0)
+    facts = {"bandwidth": bandwidth, "factor": factor}
+    return _throughout("slow filter", duration, facts, bandwidth=bandwidth, damping=factor)
+
+
+def worn(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
+    """Draw gears that are worn: they shake joints at their teeth, and have more play."""
+    joints = _some(rng, len(drives.joints))
+    wear, backlash = _log_one(rng, 0.01, 0.5), _log_one(rng, 2e-4, 1e-2)
+    facts = {"wear": wear, "backlash": backlash, "joints": joints.tolist()}
+    return _throughout("worn drives", duration, facts, wear=wear * joints, backlash=backlash)
+
+
+def steady_tone(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
+    """Draw an oscillation of the torque at one frequency."""
+    joints = _some(rng, len(drives.joints))
+    frequency, share = _log_one(rng, 15.0, 300.0), _log_one(rng, 0.01, 0.6)
+    size = share * np.array(drives.torque) * joints
+
+    def torque(since: Array) -> Array:
+        return np.outer(np.minimum(1, since / 0.05) * np.sin(2 * np.pi * frequency * since), size)
+
+    facts = {"frequency": frequency, "share": share, "joints": joints.tolist()}
+    return _throughout("oscillation of the torque", duration, facts, torque=torque)
+
+
+def steady_noise(rng: np.random.Generator, drives: Drivetrain, duration: float) -> DriveFault:
+    """Draw an octave of noise of the torque."""
+    joints = _some(rng, len(drives.joints))
+    frequency, share = _log_one(rng, 15.0, 300.0), _log_one(rng, 0.01, 0.6)
+    seed, size = int(rng.integers(2**31)), share * np.array(drives.torque) * joints
+
+    def torque(since: Array) -> Array:
+        white = np.fft.rfft(np.random.default_rng(seed).standard_normal(len(since)))
+        place = np.fft.rfftfreq(len(since), since[1] - since[0])
+        white[(place < frequency / np.sqrt(2)) | (place > frequency * np.sqrt(2))] = 0.0
+        noise = np.fft.irfft(white, len(since))
+        noise *= np.minimum(1, since / 0.05) / np.sqrt(2 * np.mean(noise**2))  # as loud as a tone
+        return np.outer(noise, size)
+
+    facts = {"frequency": frequency, "share": share, "joints": joints.tolist()}
+    return _throughout("noise of the torque", duration, facts, torque=torque)
+
+
+THROUGHOUT: dict[str, OnDrives] = {
+    "throughout-gains": OnDrives(high_gains),
+    "throughout-delay": OnDrives(long_delay),
+    "throughout-filter": OnDrives(slow_filter),
+    "throughout-wear": OnDrives(worn),
+    "throughout-tone": OnDrives(steady_tone),
+    "throughout-noise": OnDrives(steady_noise),
+}
+"""Faults of robots of every family that are there from the first sample to the last, by name."""
 
 
 class OnPlan(Protocol):

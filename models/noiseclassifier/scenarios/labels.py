@@ -18,6 +18,10 @@ after its stop, but not beyond the next event, each on the condition of its clas
 - `highaccelerations`: the deviation of a joint changes faster than `Rule.acceleration`;
 - `oscillations`: the joint that deviates most has `Rule.periods` periods or more.
 
+A fault that is there from the first sample to the last has nothing before it: it counts where the
+run is louder, in a third of an octave of a joint, than its twin within half a second, so that steps
+which come a little later than those of the twin are none.
+
 An event that starts while the cause of another one acts belongs to that one, as when a shaking tool
 knocks on the table.
 
@@ -31,13 +35,20 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from noiseclassifier.scenarios.motions import STEP, Contact, Event
 from noisemodel import Block
-from noisemodel.types import Array, Mask
+from noisemodel.types import Array, Mask, Real
 
 Span = tuple[int, int]  # first sample and the one after the last
+CONTRAST = 10 ** (3 / 10)
+"""Least ratio of the power of a fault to that of the twin's log in a band: 3 dB."""
+FRAME, HOP = 0.4, 0.1
+"""Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
+LOWEST = 10.0  # lowest frequency of the bands, in [Hz]; each is a third of an octave wide
+AROUND = 5
+"""Frames of a twin on either side of which the loudest counts, for faults of whole runs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -140,7 +151,10 @@ def annotate(
         earlier = slice(max(0, until - round(rule.before * rate)), until)
         background = float(level[earlier][~acting[earlier]].max(initial=0.0))
         least = max(rule.felt, background if event.label == "oscillations" else 0.0)
-        significant = _spans(level > least, round(rule.gap * rate))
+        loud = level > least
+        if event.facts.get("throughout"):  # nothing came before it: what counts is what it adds
+            loud &= _louder(velocity, twin, rate)
+        significant = _spans(loud, round(rule.gap * rate))
         change = np.abs(np.diff(filtered[first:end], axis=0, prepend=filtered[first : first + 1]))
         change = change.max(axis=1, initial=0.0) * rate
         own = [
@@ -172,6 +186,15 @@ def annotate(
         if b - a >= rule.shortest * rate
     ]
     return tuple(sorted(blocks)), tuple(traces)
+
+
+def _louder(velocity: Array, twin: Array, rate: float) -> Mask:
+    """Samples in frames that are louder than those of the twin around them."""
+    found = np.zeros(len(velocity), dtype=bool)
+    for number in np.flatnonzero(visible(velocity, twin, rate=rate, near=AROUND)).tolist():
+        first = round(number * HOP * rate)
+        found[first : first + round(FRAME * rate)] = True
+    return found
 
 
 def _independent(events: Sequence[Event]) -> list[Event]:
@@ -258,3 +281,43 @@ def _touches(force: Array) -> list[tuple[int, int]]:
     firsts = touching[np.concatenate(([0], pauses + 1))]
     lasts = touching[np.concatenate((pauses, [-1]))]
     return list(zip(firsts.tolist(), lasts.tolist(), strict=True))
+
+
+def visible(
+    difference: Real,
+    floor: Real,
+    *,
+    rate: float,
+    lowest: float = LOWEST,
+    centred: bool = False,
+    near: int = 0,
+) -> Mask:
+    """Frames in which a difference exceeds a floor by ``CONTRAST`` in a band of a joint.
+
+    Args:
+        difference: What a fault changes, shape (samples, joints).
+        floor: The signal without the fault, shape (samples, joints).
+        rate: Sample rate, in [Hz].
+        lowest: Lowest frequency of the bands, in [Hz].
+        centred: Whether the mean of a frame is left out.
+        near: Frames on either side of which the loudest floor counts.
+    """
+    length, hop = round(FRAME * rate), round(HOP * rate)
+    starts = np.arange(0, max(len(difference) - length, 0) + 1, hop)
+    window = np.hanning(length)[:, None]
+    frequencies = np.fft.rfftfreq(length, 1 / rate)
+    edges = lowest * 2 ** (np.arange(0, 3 * np.log2(rate / 2 / lowest) + 1) / 3)
+    edges = edges[np.r_[True, np.diff(np.searchsorted(frequencies, edges)) > 0]]
+    first = np.searchsorted(frequencies, edges)
+    first = first[first < len(frequencies)]
+    powers: tuple[list[Array], list[Array]] = [], []
+    for start in starts:
+        frame = slice(start, start + length)
+        for signal, power in zip((difference, floor), powers, strict=True):
+            part = signal[frame] - signal[frame].mean(axis=0) if centred else signal[frame]
+            lines = np.square(np.abs(np.fft.rfft(window[: len(part)] * part, axis=0)))
+            power.append(np.add.reduceat(lines, first))
+    ours, theirs = map(np.array, powers)
+    if near:
+        theirs = maximum_filter1d(theirs, 2 * near + 1, axis=0)
+    return np.asarray(((ours > CONTRAST * theirs) & (ours > 0)).any(axis=(1, 2)))

@@ -18,15 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from noiseclassifier.scenarios.domains import Logger
+from noiseclassifier.scenarios.labels import AROUND, FRAME, HOP, visible
 from noiseclassifier.scenarios.motions import PUSH
 from noisemodel import Block, Run
-from noisemodel.types import Array, Mask, Real
+from noisemodel.types import Array, Mask
 
-CONTRAST = 10 ** (3 / 10)
-"""Least ratio of the power of a fault to that of the twin's log in a band: 3 dB."""
-FRAME, HOP = 0.4, 0.1
-"""Frames in which both are compared, as the classifier's (paper, Sec. III-A), in [s]."""
-LOWEST = 10.0  # lowest frequency of the bands, in [Hz]; each is a third of an octave wide
 SLOWEST = 1.0
 """That of efforts, in [Hz]: the lowest band of a frame has its first line, at 2.5 Hz, into which
 the window spreads what is slower."""
@@ -51,6 +47,8 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
             desired = found.velocity_desired - reference.velocity_desired
             floor = reference.velocity_desired - reference.velocity
             seen |= visible(desired - difference, floor, rate=logger.rate)
+        if any(event["facts"].get("throughout") for event in run.meta.get("events", ())):
+            seen &= _louder(found, reference)
         pushed: tuple[Block, ...] = ()
         if found.effort is not None and reference.effort is not None:
             felt = visible(
@@ -72,37 +70,17 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
     )
 
 
-def visible(
-    difference: Real, floor: Real, *, rate: float, lowest: float = LOWEST, centred: bool = False
-) -> Mask:
-    """Frames in which a difference exceeds a floor by ``CONTRAST`` in a band of a joint.
+def _louder(log: Run, twin: Run) -> Mask:
+    """Frames that are louder in a band than those of the twin around them.
 
-    Args:
-        difference: What a fault changes, shape (samples, joints).
-        floor: The signal without the fault, shape (samples, joints).
-        rate: Sample rate, in [Hz].
-        lowest: Lowest frequency of the bands, in [Hz].
+    Where two walks part, steps that come later make a difference, but no noise of their own.
     """
-    length, hop = round(FRAME * rate), round(HOP * rate)
-    starts = np.arange(0, max(len(difference) - length, 0) + 1, hop)
-    window = np.hanning(length)[:, None]
-    frequencies = np.fft.rfftfreq(length, 1 / rate)
-    edges = lowest * 2 ** (np.arange(0, 3 * np.log2(rate / 2 / lowest) + 1) / 3)
-    edges = edges[np.r_[True, np.diff(np.searchsorted(frequencies, edges)) > 0]]
-    first = np.searchsorted(frequencies, edges)
-    first = first[first < len(frequencies)]
-    out = np.zeros(len(starts), dtype=bool)
-    for number, start in enumerate(starts):
-        frame = slice(start, start + length)
-        signals = difference[frame], floor[frame]
-        if centred:
-            signals = signals[0] - signals[0].mean(axis=0), signals[1] - signals[1].mean(axis=0)
-        ours, theirs = (
-            np.add.reduceat(np.square(np.abs(np.fft.rfft(window[: len(s)] * s, axis=0))), first)
-            for s in signals
-        )
-        out[number] = bool(np.any((ours > CONTRAST * theirs) & (ours > 0)))
-    return out
+    louder = visible(log.velocity, twin.velocity, rate=log.rate, near=AROUND)
+    if log.velocity_desired is not None and twin.velocity_desired is not None:
+        error = log.velocity_desired - log.velocity
+        floor = twin.velocity_desired - twin.velocity
+        louder |= visible(error, floor, rate=log.rate, near=AROUND)
+    return louder
 
 
 def _kept(blocks: Sequence[Block], seen: Mask) -> tuple[Block, ...]:
@@ -313,6 +291,7 @@ LASTS = 0.4, 1.2  # shortest and longest tone or noise, in [s]
 BLOW = 0.1  # duration of a blow, in [s]
 APART = 2.5  # from the start of a fault to that of the next, in [s]
 UNLABELLED = 0.05  # time around a fault that has no label, in [s]
+PIECE = 1.0, 4.0  # shortest and longest piece of a log that begins anywhere, in [s]
 ALL = 0.3  # share of the faults that all joints have
 
 
@@ -364,3 +343,58 @@ def fault(
         if kind == "blow":
             signal *= np.exp(-time * frequency / 3.0)
     return np.asarray(signal / max(np.sqrt(np.mean(signal**2)), 1e-9))
+
+
+def with_fault_throughout(run: Run, *, seed: int) -> Run:
+    """A good log with a tone or an octave of noise from its first sample to its last."""
+    rng = np.random.default_rng((seed, 1))
+    kind = str(rng.choice(("tone", "noise")))
+    frequency = LOWEST_ADDED * (0.45 * run.rate / LOWEST_ADDED) ** rng.uniform()
+    level = LEVELS[0] * (LEVELS[1] / LEVELS[0]) ** rng.uniform()
+    joints = np.arange(run.velocity.shape[1])
+    if rng.uniform() > ALL:
+        joints = rng.choice(joints, 1)
+    added = np.zeros(run.velocity.shape)
+    added[:, joints] = level * fault(kind, len(added), frequency, run.rate, rng)[:, None]
+    end = len(added) / run.rate
+    whole = Block(0.0, end, ADDED[kind])
+    blocks = _kept((whole,), visible(added, run.velocity, rate=run.rate))
+    labelled = sum(block.stop - block.start for block in blocks)
+    event = {"label": whole.label, "start": 0.0, "stop": end, "labelled": labelled}
+    return replace(
+        run,
+        velocity=(run.velocity + added).astype(np.float32),
+        blocks=blocks,
+        meta={**run.meta, "scenario": "added-throughout", "events": [event]},
+    )
+
+
+def beginning_anywhere(run: Run, *, seed: int) -> Run:
+    """A piece of a log: it begins in standing or in motion, or, one in two, in a failure."""
+    rng = np.random.default_rng((seed, 2))
+    end = len(run.velocity) / run.rate
+    last = max(end - PIECE[0], 0.0)
+    failures = [block for block in run.blocks if block.label != "ok" and block.start < last]
+    start = rng.uniform(0.0, last)
+    if failures and rng.uniform() < 0.5:
+        chosen = failures[int(rng.integers(len(failures)))]
+        start = min(rng.uniform(chosen.start, chosen.stop), last)
+    piece = run.cut(start, start + rng.uniform(*PIECE))
+    first = float(piece.time[0])
+    blocks = tuple(
+        replace(block, start=max(block.start - first, 0.0), stop=block.stop - first)
+        for block in piece.blocks
+    )
+    over = len(piece.time) / piece.rate
+    events = [
+        {
+            **event,
+            "start": max(event["start"] - first, 0.0),
+            "stop": min(event["stop"] - first, over),
+            "labelled": _overlap({**event, "start": event["start"] - first}, blocks),
+        }
+        for event in run.meta["events"]
+        if event["stop"] > first and event["start"] < first + over
+    ]
+    meta = {**run.meta, "events": events, "piece": [first, first + over]}
+    return replace(piece, time=piece.time - first, blocks=blocks, meta=meta)

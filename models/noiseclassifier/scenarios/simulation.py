@@ -13,7 +13,14 @@ import numpy as np
 from noiseclassifier.scenarios.domains import DISTRIBUTION, LIMITS, MOTIONS, Distribution, Domain
 from noiseclassifier.scenarios.drives import LOAD_SHARE, DomainDrives, Drives
 from noiseclassifier.scenarios.errors import DivergedError, ScenarioError, SimulationError, unknown
-from noiseclassifier.scenarios.faults import NO_DEFECT, Defect, Faults, Imperfections, drawn
+from noiseclassifier.scenarios.faults import (
+    NO_DEFECT,
+    THROUGHOUT,
+    Defect,
+    Faults,
+    Imperfections,
+    drawn,
+)
 from noiseclassifier.scenarios.labels import RULE, annotate, unplanned
 from noiseclassifier.scenarios.motions import RATE, STEP, STEPS, TICK, Event, Plan, times
 from noiseclassifier.scenarios.robots import ROBOTS, WIDE, Drivetrain, Simulated
@@ -24,8 +31,11 @@ from noisemodel.types import Array
 if TYPE_CHECKING:
     from noiseclassifier.scenarios.loop import Motion, Scene
 
-RECIPE, WIDE_RECIPE = 3, 2
-"""Versions of the simulations; they increase whenever a seed gives another run than before."""
+RECIPE, WIDE_RECIPE, FIRST_WIDE_RECIPE = 3, 3, 2
+"""Versions of the simulations; they increase whenever a seed gives another run than before.
+
+The third of wide domains only adds faults of whole runs: others are those of the second.
+"""
 SHORTEST = 3.0  # least duration of a scenario, in which every defect can act, in [s]
 GOOD = "good"
 """Name of a run of wide domains without a fault, the twin of all others of its robot and seed."""
@@ -156,7 +166,7 @@ def simulate(
     assert domain is not None
     meta |= {
         "simulator": "mujoco",
-        "recipe": f"domains {WIDE_RECIPE}",
+        "recipe": f"domains {WIDE_RECIPE if name in THROUGHOUT else FIRST_WIDE_RECIPE}",
         "domain": domain.as_dict(),
         "motion": repr(trial.setup.motion),
         "effort_limit": [domain.torque_limit * one for one in start.nominal.drives.torque],
@@ -179,14 +189,15 @@ def faults_of(robot: str, seed: int | None = None) -> tuple[str, ...]:
 def _wide_start(
     robot: str, fault: str, seed: int, duration: float | None, distribution: Distribution
 ) -> tuple[Start, Defect, float]:
-    names = (GOOD, *faults_of(robot))
+    names = (GOOD, *faults_of(robot), *THROUGHOUT)
     if fault not in names:
         raise ScenarioError(
             f"scenario {fault!r} does not exist for {robot!r}; it has {', '.join(names)}"
         )
     if seed < FIRST:
         raise ScenarioError(f"seed {seed}: expected at least {FIRST}")
-    defect = NO_DEFECT if fault == GOOD else FAULTS[WIDE[robot].family][fault]
+    known = {GOOD: NO_DEFECT, **THROUGHOUT, **FAULTS[WIDE[robot].family]}
+    defect: Defect = known[fault]
     start = Start(robot, seed, distribution=distribution)
     return start, defect, DURATION if duration is None else duration
 
