@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from noiseclassifier.scenarios.logs import ADDED, APART, LEVELS, fault, with_faults
+from noiseclassifier.scenarios.logs import (
+    ADDED,
+    APART,
+    LEVELS,
+    PIECE,
+    beginning_anywhere,
+    fault,
+    with_fault_throughout,
+    with_faults,
+)
 from noisemodel import Block, Run
 
 
@@ -60,3 +69,35 @@ def test_equal_seeds_add_equal_faults():
     assert not np.array_equal(
         with_faults(log(), seed=1).velocity, with_faults(log(), seed=2).velocity
     )
+
+
+def test_a_fault_throughout_is_there_from_the_first_sample_to_the_last():
+    for seed in range(6):
+        found = with_fault_throughout(log(), seed=seed)
+        (event,), changed = found.meta["events"], found.velocity != log().velocity
+        assert (event["start"], event["stop"]) == (0.0, 7.0)
+        assert changed[:50].any()
+        assert changed[-50:].any()
+        assert {block.label for block in found.blocks} == {"oscillations"}
+        assert event["labelled"] == pytest.approx(7.0, abs=0.2)
+    silent = with_fault_throughout(log(noise=100.0 * LEVELS[1]), seed=1)
+    assert silent.blocks == ()
+    assert silent.meta["events"][0]["labelled"] == 0.0
+
+
+def test_a_piece_of_a_log_begins_at_zero_with_what_it_has_of_labels_and_events():
+    faulty, begun = with_faults(log(), seed=5), 0
+    for seed in range(30):
+        piece = beginning_anywhere(faulty, seed=seed)
+        first, last = piece.meta["piece"]
+        assert piece.time[0] == 0.0
+        assert last - first <= PIECE[1] + 0.01
+        where = round(first * faulty.rate)
+        part = faulty.velocity[where : where + len(piece.time)]
+        np.testing.assert_array_equal(piece.velocity, part)
+        for block in piece.blocks:
+            assert 0.0 <= block.start < block.stop <= last - first + 0.01
+        whole = [b for b in faulty.blocks if b.label != "ok" and b.start < last and b.stop > first]
+        assert len(whole) == sum(block.label != "ok" for block in piece.blocks)
+        begun += any(block.label != "ok" and block.start == 0.0 for block in piece.blocks)
+    assert begun >= 8  # one in two begins in a failure

@@ -23,6 +23,7 @@ from noiseclassifier.scenarios.dataset import (
 )
 from noiseclassifier.scenarios.domains import DISTRIBUTION, Domain, Limits, Logger
 from noiseclassifier.scenarios.errors import DivergedError
+from noiseclassifier.scenarios.faults import THROUGHOUT
 from noiseclassifier.scenarios.robots import TARGETS, WIDE
 from noiseclassifier.scenarios.simulation import (
     GOOD,
@@ -102,6 +103,25 @@ def test_a_run_equals_its_twin_until_its_fault_begins(tone):
     assert np.abs(tone.velocity - twin.velocity).max() > 1e-3
 
 
+def test_a_fault_of_a_whole_run_is_there_from_its_first_sample():
+    run = simulate("panda", "throughout-gains", 10_000, duration=2.0)
+    (event,) = run.meta["events"]
+    assert (event["start"], event["stop"]) == (0.0, 2.0)
+    assert run.meta["recipe"] == "domains 3"
+    twin = simulate("panda", GOOD, 10_000, duration=2.0)
+    assert twin.meta["recipe"] == "domains 2"
+    first = round(0.2 * run.rate)
+    assert np.abs(run.velocity - twin.velocity)[:first].max() > 0.1
+    assert event["labelled"] > 1.0
+
+
+def test_faults_of_whole_runs_are_added_to_the_tasks_of_before():
+    plain, more = (wide_tasks(["ur5", "go2"], seeds=2, throughout=count) for count in (0, 2))
+    assert set(plain) < set(more)
+    assert len(more) == len(plain) + 2 * 2 * 2
+    assert {task.scenario for task in set(more) - set(plain)} <= set(THROUGHOUT)
+
+
 @pytest.mark.parametrize(
     ("arguments", "problem"),
     [
@@ -165,7 +185,7 @@ def test_a_fault_may_be_of_every_seed_besides_those_that_are_drawn():
         ({"robots": ["go2"], "always": ["push"]}, "no fault 'push' of go2"),
         ({"robots": ["pandda"]}, r"did you mean 'panda'"),
         ({"first": 0}, "the first seed is 0, expected 10000 or more"),
-        ({"seeds": 0}, "0 seeds with 2 faults each, expected 1 or more, 0 or more"),
+        ({"seeds": 0}, "0 seeds with 2 faults each and 0 of whole runs, expected 1 or"),
     ],
 )
 def test_bad_requests_are_refused(arguments, problem):

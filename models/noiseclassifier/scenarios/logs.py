@@ -47,7 +47,7 @@ def logged(run: Run, twin: Run, logger: Logger, *, seed: int) -> Run:
             desired = found.velocity_desired - reference.velocity_desired
             floor = reference.velocity_desired - reference.velocity
             seen |= visible(desired - difference, floor, rate=logger.rate)
-        if any(event["facts"].get("throughout") for event in run.meta.get("events", ())):
+        if any(event.get("facts", {}).get("throughout") for event in run.meta.get("events", ())):
             seen &= _louder(found, reference)
         pushed: tuple[Block, ...] = ()
         if found.effort is not None and reference.effort is not None:
