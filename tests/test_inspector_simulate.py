@@ -82,7 +82,7 @@ def test_help_explains_one_run_and_many(inspector):
     status, out, _ = inspector("simulate", "--help")
     assert status == 0
     assert "dataset" in out
-    assert "inspector simulate talos --scenario 7 --seed 1 -o run.npz" in " ".join(out.split())
+    assert "inspector simulate run talos --scenario 7" in " ".join(out.split())
     status, out, _ = inspector("simulate", "dataset", "--help")
     assert {"--robots", "--hours", "--only", "--first-seed"} <= set(out.split())
 

@@ -40,7 +40,6 @@ app = typer.Typer(
 
     Needs the extra `sim`. The default command is `run`.
     `inspector simulate --list` prints scenarios and robots.""",
-    epilog="Example: inspector simulate talos --scenario 7 --seed 1 -o run.npz",
 )
 List = Annotated[bool, typer.Option("--list", help="Print what there is, simulate nothing.")]
 To = Annotated[Path, typer.Option("--output", "-o", help="The folder to write.")]
