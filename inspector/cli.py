@@ -62,7 +62,6 @@ COMMANDS = {
         "Check",
         "Rank episodes of policies and demonstrations by smoothness.",
         "smoothness episodes/ --picture smoothness.png",
-        reads_logs=False,
     ),
     "merge": Entry(
         "Check",

@@ -18,9 +18,8 @@ import csv
 import io
 import json
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,16 +28,15 @@ import numpy as np
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status
 from inspector.audit_signals import without_placeholder
+from inspector.compare.picture import require
 from inspector.errors import InspectorError, without_path
 from inspector.hold import hold_length, without_hold
 from inspector.library import Library
-from inspector.logs.mapping import ReadOptions
-from inspector.logs.motion import Imported
-from inspector.logs.read import jobs_of
+from inspector.logs.read import Reading, Source, open_source, sources
 from inspector.text import cell, counted
 from inspector.verdict import EXPECTED
 from noisemodel import Run
-from noisemodel.files import also_reading, replacing
+from noisemodel.files import replacing
 from noisemodel.run import stretches
 from noisemodel.types import Array, Real
 
@@ -46,8 +44,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 FORMAT = "noise-smoothness/1"
-SUFFIXES = (".npz", ".csv", ".tsv", ".parquet", ".h5", ".hdf5", ".bag", ".mcap", ".db3")
-"""Of the files of a folder that are taken as logs."""
 FAST, TRACKED = 10.0, 4.0
 """Lowest frequencies of the level and of the tracking error, in [Hz]."""
 STANDING = 0.01
@@ -360,17 +356,7 @@ def _too_little(rate: float, duration: float, frequency: float) -> str:
     return f"{duration:.3g} s are too short for {frequency:g} Hz"
 
 
-# --- episodes of logs, folders of logs and data sets
-
-
-@dataclass(frozen=True)
-class Unread:
-    """An episode that is not read yet: its log, its name within it, and where it was named."""
-
-    log: str
-    episode: str
-    source: str
-    read: Callable[[], Imported]
+# --- episodes of logs
 
 
 @dataclass(frozen=True)
@@ -382,50 +368,30 @@ class Failed:
 
 
 def episodes_of(
-    paths: Sequence[Path], options: ReadOptions
-) -> tuple[tuple[Unread, ...], tuple[Failed, ...]]:
-    """List the episodes of logs and of folders of them, and the logs that cannot be read."""
-    found: list[Unread] = []
-    failed: list[Failed] = []
-    for source in paths:
-        logs = tuple(_logs_in(source))
-        also_reading(logs)
-        if not logs:
-            failed.append(Failed(str(source), f"holds no log ({', '.join(SUFFIXES)})"))
-        for log in logs:
-            try:
-                jobs = jobs_of(log, options)
-            except EXPECTED as error:
-                failed.append(Failed(str(log), without_path(error, Path(log))))
-                continue
-            found += [Unread(str(log), job.episode, str(source), job.read) for job in jobs]
-    return tuple(found), tuple(failed)
+    paths: Sequence[Path], reading: Reading
+) -> tuple[list[tuple[Source, Path]], list[Failed]]:
+    """List the episodes of logs and folders, each with its path as named; and what is no log."""
+    found, failed = list[tuple[Source, Path]](), list[Failed]()
+    for path in paths:
+        try:
+            found += [(each, path) for each in sources([path], reading)[0]]
+        except EXPECTED as error:
+            failed.append(Failed(str(path), without_path(error, path)))
+    return found, failed
 
 
 def scored_episodes(
-    episodes: Sequence[Unread], library: Library | None
+    episodes: Iterable[tuple[Source, Path]], reading: Reading, library: Library | None
 ) -> Iterator[Episode | Failed]:
     """Read and score episodes; one that cannot be read never stops the rest."""
-    for each in episodes:
+    for each, path in episodes:
+        log, name = str(each.path), each.episode
         try:
-            run = each.read().run
-            yield scored(run, each.log, episode=each.episode, source=each.source, library=library)
+            run = open_source(each, reading).run
+            yield scored(run, log, episode=name, source=str(path), library=library)
         except EXPECTED as error:
-            name = f"{each.log} episode {each.episode}" if each.episode else each.log
-            yield Failed(name, without_path(error, Path(each.log)))
-
-
-def _logs_in(path: Path) -> Iterator[Path]:
-    """Take a log as it is, and a folder that is none as the logs in it."""
-    # A LeRobot data set or a ROS 2 bag is a folder.
-    log = any((path / name).is_file() for name in ("meta/info.json", "metadata.yaml"))
-    if not path.is_dir() or log:
-        yield path
-        return
-    for child in sorted(path.iterdir()):
-        hidden = child.name.startswith(".")
-        if not hidden and (child.is_dir() or child.suffix.lower() in SUFFIXES):
-            yield from _logs_in(child)
+            shown = f"{log} episode {name}" if name else log
+            yield Failed(shown, without_path(error, each.path))
 
 
 # --- ranking
@@ -658,12 +624,6 @@ SPREAD = 20.0
 """Ratio of the largest to the median of positive values beyond which the axis is logarithmic."""
 
 
-def require_matplotlib() -> None:
-    """Refuse a picture before long work is done for it."""
-    if find_spec("matplotlib") is None:
-        raise InspectorError('a picture needs matplotlib; `pip install "noise-inspector[report]"`')
-
-
 def draw(episodes: Sequence[Episode], path: Path, *, overwrite: bool = False) -> None:
     """Draw a histogram of each score that an episode has, as a PNG file, a colour for each input.
 
@@ -671,7 +631,7 @@ def draw(episodes: Sequence[Episode], path: Path, *, overwrite: bool = False) ->
         InspectorError: If matplotlib is not installed, or no episode has a score.
         OutputError: If the file exists or cannot be written.
     """
-    require_matplotlib()
+    require()
     from matplotlib.figure import Figure
 
     shown = [

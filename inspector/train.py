@@ -38,14 +38,6 @@ SIMULATORS = {"mujoco", "pinocchio", "drake", "pybullet", "dm-control"}
 AnyModel = TypeVar("AnyModel", nc.Classifier, nc.General)
 
 
-class SlowRunError(InspectorError):
-    """A run that was recorded at a lower rate than a model needs."""
-
-    def __init__(self, path: Path, own: float, wanted: float, facts: Mapping[str, str]) -> None:
-        self.path, self.own, self.wanted, self.facts = path, own, wanted, facts
-        super().__init__(f"{path}: recorded at {own:g} Hz, the model needs {wanted:g} Hz")
-
-
 Read = tuple[nc.Recording | nc.Unanswered, nm.Run | None]
 """A recording, and the run file that it is of."""
 
@@ -101,16 +93,16 @@ def classified(
 
 
 def _as_classified(path: Path, rate: float | None, *, bare_too: bool) -> Read:
-    try:
-        run, _ = without_placeholder(nm.Run.load(path))
-        slower = without_hold(run)
-        if rate is None:
-            found = of_run(path, slower, min(max(slower.rate, LOWEST), HIGHEST))
-        else:
-            found = of_run(path, run if slower.rate < rate * (1 - NOMINAL) else slower, rate)
-    except SlowRunError as error:
-        reason = f"rate {error.own:g} Hz < {error.wanted:g} Hz"
-        return nc.Unanswered(_name(path, error.facts.get("robot")), error.facts, reason), None
+    run, _ = without_placeholder(nm.Run.load(path))
+    check_joints(run.joint_names, run.robot)
+    slower = without_hold(run)
+    wanted = min(max(slower.rate, LOWEST), HIGHEST) if rate is None else rate
+    held = rate is None or slower.rate >= rate * (1 - NOMINAL)
+    chosen = slower if held else run
+    if chosen.rate < wanted * (1 - NOMINAL):
+        reason = f"rate {chosen.rate:g} Hz < {wanted:g} Hz"
+        return nc.Unanswered(_name(path, run.robot), facts(run.robot, run.meta), reason), None
+    found = of_run(path, chosen, wanted)
     if not (found.blocks or "events" in run.meta or bare_too):
         raise InspectorError(f"{path}: has no annotated blocks")
     signals = nc.signals.without_zero_error(nc.signals.named(found.signal))
@@ -136,28 +128,11 @@ def _apart(
     return one if name == one.name else replace(one, name=name)
 
 
-def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> nc.Recording:
-    """Noise of a run, annotated or not.
+def of_run(path: Path, run: nm.Run, rate: float) -> nc.Recording:
+    """Noise of a run, annotated or not, decimated to a rate in [Hz] that is not above its own.
 
-    Args:
-        path: The run file.
-        run: Its content.
-        rate: The rate to decimate it to, in [Hz].
-        sha256: SHA-256 of the file; computed unless given.
-
-    Returns:
-        Its norms and joints with its blocks, if it has any, named as its file; with its robot
-        before, if the folder is named so.
-
-    Raises:
-        SlowRunError: If the run's rate is lower.
-        InspectorError: If the events of its meta are damaged.
-        UnknownJointError: If it names a joint that its robot lacks.
+    It is named as its file, with its robot before if the folder is named so.
     """
-    check_joints(run.joint_names, run.robot)
-    known = facts(run.robot, run.meta)
-    if run.rate < rate * (1 - NOMINAL):
-        raise SlowRunError(path, run.rate, rate, known)
     rate = min(rate, run.rate)
     decimated = nm.decimated(run, rate)
     return nc.Recording(
@@ -167,9 +142,9 @@ def of_run(path: Path, run: nm.Run, rate: float, *, sha256: str = "") -> nc.Reco
         blocks=tuple(nc.Block(b.start, b.stop, b.label) for b in decimated.blocks),
         start=float(decimated.time[0]),
         valid=decimated.mask,
-        sha256=sha256 or hashlib.sha256(path.read_bytes()).hexdigest(),
+        sha256=hashlib.sha256(path.read_bytes()).hexdigest(),
         events=faults(path, run.meta, run.blocks),
-        facts=known,
+        facts=facts(run.robot, run.meta),
     )
 
 

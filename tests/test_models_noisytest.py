@@ -24,10 +24,9 @@ chunk_labels = ["ok", "impact"]
 """
 
 
-@pytest.fixture(params=[0, 1_000_000], ids=["Arrow", "NumPy"])
-def log(tmp_path, monkeypatch, request):
-    """Writes a `.log` of some text, for either reader."""
-    monkeypatch.setattr("noiseclassifier.noisytest.LARGE", request.param)
+@pytest.fixture
+def log(tmp_path):
+    """Writes a `.log` of some text."""
 
     def write(text, name="walk.log"):
         path = tmp_path / name

@@ -223,7 +223,7 @@ def test_one_bad_log_is_named_and_the_others_are_ranked(folder):
 def test_a_folder_without_logs_says_what_it_looked_for(tmp_path):
     status, out, err = call("smoothness", tmp_path)
     assert (status, out) == (3, "0 episodes\n")
-    assert err.startswith(f"inspector: {tmp_path}: holds no log (.npz, .csv")
+    assert err.startswith(f"inspector: {tmp_path}: a folder without logs (.bag")
 
 
 def test_a_lerobot_data_set_is_ranked_by_episode(tmp_path):

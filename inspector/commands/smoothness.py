@@ -6,13 +6,7 @@ from typing import Annotated
 
 import typer
 
-from inspector.commands.options import (
-    Limits,
-    MaxUnpacked,
-    ModelFiles,
-    Overwrite,
-    PackageRoot,
-)
+from inspector.commands.options import ModelFiles, Overwrite
 
 
 class Format(StrEnum):
@@ -36,6 +30,7 @@ class By(StrEnum):
 
 
 def smoothness(
+    ctx: typer.Context,
     logs: Annotated[
         list[Path],
         typer.Argument(
@@ -57,22 +52,6 @@ def smoothness(
     labels: Annotated[
         bool, typer.Option("--labels/--no-labels", help="Classify episodes from 80 Hz on.")
     ] = True,
-    robot: Annotated[
-        str | None, typer.Option(help="A name that `robots` lists, a URDF or an MJCF.")
-    ] = None,
-    rate: Annotated[
-        float | None, typer.Option(min=1.0, help="Rate of the logs in [Hz], if it is known.")
-    ] = None,
-    units: Annotated[
-        str | None, typer.Option(help="Unit of angles: radians, degrees or normalised.")
-    ] = None,
-    map_: Annotated[
-        list[str] | None,
-        typer.Option("--map", help="velocity.JOINT=COLUMN or position=ARRAY[7:]; repeatable."),
-    ] = None,
-    package_root: PackageRoot = None,
-    max_unpacked: MaxUnpacked = None,
-    limit: Limits = None,
     model: ModelFiles = None,
     overwrite: Overwrite = False,
 ) -> None:
@@ -82,19 +61,18 @@ def smoothness(
     """
     from inspector import assets
     from inspector import smoothness as ranking
+    from inspector.compare.picture import require
     from inspector.library import load_library
-    from inspector.logs.mapping import read_options
     from inspector.progress import progress
     from noisemodel.files import refuse_existing
 
     if picture:
         refuse_existing(picture, overwrite=overwrite)
-        ranking.require_matplotlib()
-    del package_root, max_unpacked, limit  # have been set
-    options = read_options(map_ or (), robot=robot, rate=rate, units=units)
+        require()
     library = load_library(assets.model_files(model)) if labels else None
-    episodes, failed = ranking.episodes_of(logs, options)
-    found = progress(ranking.scored_episodes(episodes, library), "score", total=len(episodes))
+    episodes, failed = ranking.episodes_of(logs, ctx.obj)
+    scored = ranking.scored_episodes(episodes, ctx.obj, library)
+    found = progress(scored, "score", total=len(episodes))
     order = ranking.ranked([*found, *failed], by=by or "")
     write = {"text": ranking.as_text, "csv": ranking.as_csv, "json": ranking.as_json}
     typer.echo(write[format](order))
