@@ -28,6 +28,12 @@ CLASSES: dict[str, Color] = {
     UNKNOWN: (144, 144, 150),
 }
 OTHERS: tuple[Color, ...] = ((162, 144, 114), (24, 84, 252), (198, 30, 90), (138, 138, 180))
+VERDICTS: dict[str, Color] = {
+    "findings": (178, 34, 34),
+    "ok": CLASSES["ok"],
+    "cannot-tell": (96, 96, 102),
+}
+"""Behind a verdict in white letters; the words say the same."""
 NOISE: Color = (160, 196, 255)
 LEVEL: Color = (240, 228, 140)
 THRESHOLD: Color = (235, 235, 235)

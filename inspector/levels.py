@@ -1,11 +1,11 @@
 """Levels above 10 Hz in decibels, in steps of 50 ms, and the scales that all pictures share.
 
-The scales are absolute: a colour means the same level in every run, recording, pair and report, so
-that a quiet run looks quiet.
+Levels are absolute. What the colours span follows the run, of several runs the loudest; while
+samples come in, it is fixed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from noisemodel.types import Array, Mask, Real
 
 STEP = 0.05
 """Time over which a level is taken, in [s]."""
+RANGE_DB = 60.0
+"""Range of a scale that follows a run, in [dB]."""
 FLOOR_DB = -100.0
 """Least level of a velocity, below that of any encoder, in [dB re 1 rad/s]; less is raised."""
 
@@ -56,18 +58,34 @@ class Scale:
         place = np.clip(self.place(level), 0.0, 1.0)
         return self.palette(np.round(place * (shades - 1)) / (shades - 1) if shades else place)
 
+    def following(self, level: Array) -> "Scale":
+        """The scale of a run: 60 dB up to its loudest level, so that not all of it is dark.
+
+        A run more than 30 dB below this scale looks quiet all the same.
+
+        Args:
+            level: Any shape, in [dB]; what is not finite does not count.
+        """
+        loudest = float(np.max(level, initial=-np.inf, where=np.isfinite(level)))
+        high = max(10.0 * np.ceil(loudest / 10.0), self.high - 30.0)
+        return replace(self, low=float(high) - RANGE_DB, high=float(high))
+
+    def down_to(self, low: float | None) -> "Scale":
+        """The scale from a chosen level on, in [dB]; as it is if None."""
+        return self if low is None else replace(self, low=low, high=max(self.high, low + self.step))
+
     @property
     def ticks(self) -> tuple[float, ...]:
         """Levels to be labelled, in [dB], from low to high."""
         return tuple(np.arange(self.low, self.high + self.step / 2, self.step).tolist())
 
 
-JOINTS = Scale(-60.0, 20.0, "dB re 1 rad/s")
+JOINTS = Scale(-60.0, 0.0, "dB re 1 rad/s")
 """Velocity of a joint above 10 Hz; of joints that slide re 1 m/s."""
-LINKS = Scale(80.0, 140.0, "dB re 1 pW")
+LINKS = Scale(60.0, 120.0, "dB re 1 pW")
 """Sound power of a link's vibration above 10 Hz. A link of 0.1 m² is at 136 dB at 1 m/s."""
-SPECTRUM = Scale(-70.0, 10.0, "dB re 1 rad/s")
-"""Amplitude of the noise in a spectrogram; its low end can be chosen."""
+SPECTRUM = Scale(-60.0, 0.0, "dB re 1 rad/s")
+"""Amplitude of a joint's velocity in a spectrogram; its low end can be chosen."""
 
 
 def velocity_levels(

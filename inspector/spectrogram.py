@@ -30,6 +30,12 @@ class Spectrogram:
     valid: Mask
 
     @cached_property
+    def decibel(self) -> Array:
+        """Levels of the amplitudes, shape (bins, columns), in [dB]; -inf where there is none."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(20 * np.log10(self.amplitude))
+
+    @cached_property
     def level(self) -> Array:
         """Shape (bins, columns), in [dB] relative to the largest amplitude, at least -70."""
         largest = self.amplitude.max(initial=0.0) or 1.0

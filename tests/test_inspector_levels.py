@@ -82,5 +82,11 @@ def test_what_is_louder_is_never_darker(scale, shades):
 
 
 def test_ticks_span_a_scale():
-    assert JOINTS.ticks == (-60.0, -40.0, -20.0, 0.0, 20.0)
-    assert LINKS.ticks == (80.0, 100.0, 120.0, 140.0)
+    assert JOINTS.ticks == (-60.0, -40.0, -20.0, 0.0)
+    assert LINKS.ticks == (60.0, 80.0, 100.0, 120.0)
+
+
+@pytest.mark.parametrize(("loudest", "high"), [(13.0, 20.0), (-18.0, -10.0), (-90.0, -30.0)])
+def test_a_scale_follows_a_run_but_a_quiet_run_looks_quiet(loudest, high):
+    scale = JOINTS.following(np.array([-np.inf, np.nan, loudest, loudest - 30.0]))
+    assert (scale.low, scale.high, scale.unit) == (high - 60.0, high, JOINTS.unit)

@@ -261,10 +261,10 @@ def test_a_lane_ends_where_labels_are_missing():
 def test_a_hum_is_bright_in_its_band_whatever_the_blocks(size):
     rate, hertz = 5000.0, 440.0
     time = np.arange(5000) / rate
-    noise = 2.0 + 0.1 * np.sin(2 * np.pi * hertz * time)
+    noise = 2.0 + time + 0.1 * np.sin(2 * np.pi * hertz * time)
     stream, parts = SpectrogramStream(rate), []
     for first in range(0, len(noise), size):
-        piece = noise[first : first + size]
+        piece = noise[first : first + size, None]
         end = (first + len(piece)) / rate
         parts.append(stream.push(piece, np.ones(len(piece), dtype=bool), end))
     parts = [part for part in (*parts, stream.flush()) if part is not None]
@@ -281,8 +281,8 @@ def test_a_hum_is_bright_in_its_band_whatever_the_blocks(size):
 
 
 def test_silence_and_gaps_are_dark():
-    stream, noise = SpectrogramStream(1000.0), np.random.default_rng(0).standard_normal(500)
-    assert stream.push(np.zeros(500), np.ones(500, dtype=bool), 0.5).level.max() == 0.0
+    stream, noise = SpectrogramStream(1000.0), np.random.default_rng(0).standard_normal((500, 2))
+    assert stream.push(np.zeros((500, 2)), np.ones(500, dtype=bool), 0.5).level.max() == 0.0
     broken = stream.push(noise, np.arange(500) != 100, 1.0)
     assert (broken.level.max(axis=0) == 0.0).sum() >= 4  # the windows that touch the gap
     stream.skip()

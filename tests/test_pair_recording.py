@@ -92,6 +92,8 @@ COLUMNS = {
     rf"/links/{LINKS}/(before|after)": LINE,
     rf"/joints/({SIGNALS})/(before|after|change)/0": LINE,
     r"/spectrogram/(before|after|change)/\d\d": ROW,
+    r"/verdict/band": STRIP,
+    r"/verdict/words": LABELS,
     r"/sound/(before|after)": {"AssetAudio:blob", "AssetAudio:media_type"},
     r"/robot_(before|after)/motion/panda_joint\d": MOTION,
     r"/axis/\w+/(left|right)": LABELS,
@@ -220,18 +222,20 @@ def test_both_spectrograms_have_one_scale_and_the_difference_its_own(whole):
 
 def test_both_robots_are_coloured_by_one_scale_of_levels(whole):
     path, pair = whole
+    every = [link_levels(noise)[1] for noise in pair.links]
+    scale = LINK_SCALE.following(np.concatenate(every))
     for side, noise in zip(("before", "after"), pair.links, strict=True):
         mesh = f"/robot_{side}/panda/visual_geometries/panda_link5/visual_0"
         time, rgba = read(path, mesh, "Asset3D:albedo_factor")
         steps, level = link_levels(noise)
         column = int(np.searchsorted(steps, 0.7, side="right")) - 1
-        wanted = LINK_SCALE.colours(level[column, noise.links.index("panda_link5")], shades=16)
+        wanted = scale.colours(level[column, noise.links.index("panda_link5")], shades=16)
         at = int(np.searchsorted(time, 0.7, side="right")) - 1
         assert rgba[at][0].to_bytes(4, "big") == bytes(wanted)
         base = f"/robot_{side}/panda/visual_geometries/panda_link0/visual_0"
         time, (still,) = read(path, base, "Asset3D:albedo_factor")
         assert time is None
-        assert still[0].to_bytes(4, "big") == bytes(LINK_SCALE.colours(np.array(-np.inf)))
+        assert still[0].to_bytes(4, "big") == bytes(scale.colours(np.array(-np.inf)))
 
 
 def test_both_robots_are_seen_from_one_place(whole):

@@ -1,15 +1,17 @@
 """What changed between two runs: failures that are new or resolved, levels, in words."""
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from inspector.analysis.analyse import Analysis
+from inspector.analysis.loudest import worst_signal
 from inspector.compare.pair import Pair
 from inspector.report.markdown import spoken
-from inspector.spectrogram import RANGE_DB, spectrogram
+from inspector.spectrogram import Spectrogram, spectrogram
 from noiseclassifier import Event
 from noisemodel import Block
 from noisemodel.noise import REFERENCE_POWER, decibel
@@ -58,42 +60,20 @@ class ClassLevel:
     level: Level
 
 
-@dataclass(frozen=True, eq=False)
-class Spectra:
-    """Amplitudes of both noises in windows that touch no gap of either.
+def spectra(pair: Pair, joint: str = "") -> tuple[Spectrogram, Spectrogram]:
+    """Compute spectrograms of both runs in the same windows, those without a gap.
 
-    Attributes:
-        time: Centres of the windows, shape (columns,), in [s].
-        frequency: Shape (bins,), in [Hz]; the mean is left out.
-        amplitude: Before and after, shape (2, bins, columns), in [rad/s].
+    Args:
+        joint: Whose velocity above 10 Hz; the noise of all if empty.
     """
-
-    time: Array
-    frequency: Array
-    amplitude: Array
-
-    @property
-    def level(self) -> Array:
-        """Before and after, shape (2, bins, columns), in [dB re 1 rad/s].
-
-        At least that of the largest amplitude of both, less 70 dB.
-        """
-        largest = self.amplitude.max(initial=0.0) or 1.0
-        floor = largest * 10 ** (-RANGE_DB / 20)
-        return 2 * decibel(np.maximum(self.amplitude, floor))
-
-
-def spectra(pair: Pair) -> Spectra:
-    """Compute the spectrograms of both noises in the same windows."""
-    start = float(pair.time[0])
-    before, after = (
-        spectrogram(side.noise, pair.rate, start=start, valid=pair.valid) for _, side in pair.sides
-    )
-    return Spectra(
-        time=before.time[before.valid],
-        frequency=before.frequency,
-        amplitude=np.stack([each.amplitude[:, each.valid] for each in (before, after)]),
-    )
+    found = []
+    for _, side in pair.sides:
+        own = worst_signal(side, side.run.joint_names.index(joint)) if joint else side.noise
+        each = spectrogram(own, pair.rate, start=float(pair.time[0]), valid=pair.valid)
+        kept = each.valid
+        time, amplitude = each.time[kept], each.amplitude[:, kept]
+        found.append(replace(each, time=time, amplitude=amplitude, valid=kept[kept]))
+    return found[0], found[1]
 
 
 def steps(pair: Pair) -> tuple[Array, Array]:
@@ -145,13 +125,12 @@ def by_class(pair: Pair) -> tuple[ClassLevel, ...]:
 
 def by_band(pair: Pair) -> tuple[Level, ...]:
     """The level of both noises in octaves from 16 Hz, in [dB re 1 rad/s]."""
-    both, found = spectra(pair), []
-    centre = LOWEST_BAND
+    both, found, centre = spectra(pair), [], LOWEST_BAND
+    frequency, measured = both[0].frequency, len(both[0].time) > 0
     while centre < pair.rate / 2:
-        edges = centre / np.sqrt(2), centre * np.sqrt(2)
-        inside = (both.frequency >= edges[0]) & (both.frequency < edges[1])
-        if inside.any() and len(both.time):
-            power = [np.mean(np.sum(a[inside] ** 2, axis=0)) / 2 for a in both.amplitude]
+        inside = (frequency >= centre / np.sqrt(2)) & (frequency < centre * np.sqrt(2))
+        if inside.any() and measured:
+            power = [np.mean(np.sum(each.amplitude[inside] ** 2, axis=0)) / 2 for each in both]
             before, after = (_noise_level(float(each)) for each in power)
             found.append(Level(f"{centre:.4g} Hz", before, after))
         centre *= 2
@@ -341,6 +320,17 @@ SHOWN_LINKS = 10
 def report(pair: Pair) -> str:
     """Write the report of two runs."""
     return "\n\n".join(_parts(pair)) + "\n"
+
+
+def verdict(pair: Pair) -> tuple[str, str]:
+    """A key of ``colors.VERDICTS``, and whether the run after is worse, in a line."""
+    count = Counter(change.kind for change in changes(pair))
+    told = ", ".join(f"{count[kind]} {kind}" for kind in KINDS if count[kind])
+    if count[NEW] or count[LOUDER]:
+        return "findings", f"WORSE   {told}"
+    return "ok", f"BETTER   {told}" if count[RESOLVED] or count[
+        QUIETER
+    ] else f"SAME   {told}".strip()
 
 
 def summary(pair: Pair) -> str:

@@ -131,6 +131,9 @@ def write(several: Several, path: Path, *, overwrite: bool = False) -> None:
         begin = min(float(side.run.time[0]) for side in several.sides)
         end = max(float(side.run.time[-1]) for side in several.sides)
         axes.log_span(recording, begin, end)
+        failing = sum(bool(side.findings) for side in several.sides)
+        told = f"FAIL   {failing} of {len(several.names)} runs" if failing else "PASS   no finding"
+        axes.log_verdict(recording, "findings" if failing else "ok", told)
         height = _height(len(several.names))
         panels = {name: Panel(name, height * len(several.names) + axes.AXIS) for name in ROWS}
         panels["curves"] = Panel("curves", CURVE)
@@ -161,10 +164,12 @@ def layout(several: Several, panels: dict[str, Panel]) -> Blueprint:
     if sum(height for _, height in over_time) > WHOLE - CURVE:
         over_time = [(unstable.tabs(*plots.values()), panels["class"].height + TITLES)]
     over_time.append((axes.part(panel, curves), panel.height))
-    text = unstable.text("Runs", "/report", titled=False)
+    report = unstable.text("Runs", "/report", titled=False)
+    verdict = (unstable.drawing("/verdict"), axes.VERDICT)
+    text = unstable.above(verdict, (report, WHOLE - axes.VERDICT))
     rest = WHOLE - sum(height for _, height in over_time)
     if rest > TABLE + ENTRY * len(several.names) - 1.0:
-        whole = unstable.above((text, rest), *over_time)
+        whole = unstable.above(verdict, (report, rest - axes.VERDICT), *over_time)
     else:
         whole = unstable.beside((text, 30.0), (unstable.above(*over_time), 70.0))
     return unstable.blueprint(whole, TIMELINE, _loop(several))
@@ -321,12 +326,13 @@ def _log_levels(
     if len(edges) < 2:
         edges = np.array([span[0], span[0] + step])
     found = np.stack([_columns(time, level, edges) for time, level in several.levels])
-    rgba = levels.JOINTS.colours(np.nan_to_num(found, nan=-np.inf), shades=axes.SHADES)
+    scale = levels.JOINTS.following(found)
+    rgba = scale.colours(np.nan_to_num(found, nan=-np.inf), shades=axes.SHADES)
     rgba[np.isnan(found)] = axes.EMPTY
-    called = [f"{name} [{levels.JOINTS.unit}]" for name in several.names]
+    called = [f"{name} [{scale.unit}]" for name in several.names]
     _log_rows(recording, several, panel, edges, rgba, called)
     axes.log_left(recording, panel, _names(several, panel))
-    axes.log_scale(recording, panel, levels.JOINTS)
+    axes.log_scale(recording, panel, scale)
 
 
 def _columns(time: Array, level: Array, edges: Array) -> Array:

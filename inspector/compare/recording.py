@@ -14,11 +14,11 @@ from rerun.urdf import UrdfTree
 
 from inspector import colors
 from inspector.analysis.analyse import Analysis
+from inspector.analysis.loudest import worst_joint
 from inspector.colors import Color
 from inspector.compare.changes import (
     NEW,
     Change,
-    Spectra,
     by_link,
     changes,
     largest_change,
@@ -26,6 +26,7 @@ from inspector.compare.changes import (
     report,
     spectra,
     steps,
+    verdict,
     whole,
 )
 from inspector.compare.pair import Pair
@@ -42,7 +43,10 @@ from inspector.recording.panels import (
     Plot,
     Signal,
     found_stretches,
+    in_levels,
     limbs,
+    log_heat,
+    log_robot_levels,
     log_signal,
     scaled,
     signals,
@@ -51,7 +55,6 @@ from inspector.recording.run import log_report, writing
 from inspector.recording.unstable import Part
 from inspector.report.markdown import classes_of, spoken
 from inspector.sound import SMALL_RATE, common_gain, sound_of
-from inspector.spectrogram import in_bands
 from inspector.thinning import extremes
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.run import part
@@ -133,42 +136,26 @@ def log_levels(recording: rr.RecordingStream, pair: Pair, found: Sequence[Change
     return Ends(between, (-reach, reach))
 
 
-def log_spectra(recording: rr.RecordingStream, pair: Pair) -> dict[str, Panel]:
-    """Log both spectrograms and their difference, as rows of colours on a logarithmic axis."""
-    found = spectra(pair)
-    if not len(found.time):
+def log_spectra(recording: rr.RecordingStream, pair: Pair, joint: str) -> dict[str, Panel]:
+    """Log the spectrograms of a joint's velocity in both runs, and their difference."""
+    both = spectra(pair, joint)
+    if not len(both[0].time):
         return {}
-    low, high = float(found.frequency[0]), float(found.frequency[-1])
-    edges = np.geomspace(low, max(high, 1.01 * low), BANDS + 1)
-    level = [_level(found, side, edges) for side in (0, 1)]
-    shown: dict[str, tuple[Array, Scale]] = {
+    edges, level = in_levels(both[0])[0], [in_levels(each)[1] for each in both]
+    scale = SPECTRUM.following(np.stack(level))
+    level = [np.maximum(each, scale.low) for each in level]
+    shown = {
         "change": (level[1] - level[0], CHANGE),
-        "before": (level[0], SPECTRUM),
-        "after": (level[1], SPECTRUM),
+        "before": (level[0], scale),
+        "after": (level[1], scale),
     }
-    gap = np.diff(found.time)
-    half = (float(gap.min()) if len(gap) else 0.05) / 2
-    times = np.append(found.time - half, found.time[-1] + half)
-    names = [f"{centre:.0f} Hz" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1]]
     panels = {}
-    for what, (values, scale) in shown.items():
+    for what, (values, own) in shown.items():
         panel = panels[what] = Panel(f"spectrum_{what}", DETAILS)
-        shades = SHADES if what == "change" else axes.SHADES
-        rgba = scale.colours(values[::-1], shades=shades)
-        axes.log_rows(recording, f"/spectrogram/{what}", times, rgba, names=names, width=WIDTH)
-        marks = [
-            Label(float(np.log(tick / low) / np.log(edges[-1] / low)), axes.hertz(tick), 40.0)
-            for tick in axes.ticks(low, float(edges[-1]), panel)
-        ]
-        axes.log_left(recording, panel, [Label(0.5, f"spectrum\n{what}", -22.0), *marks])
-        axes.log_scale(recording, panel, scale)
+        path, title = f"/spectrogram/{what}", f"{joint or 'noise'}\n{what}"
+        shades = SHADES if own is CHANGE else axes.SHADES
+        log_heat(recording, panel, path, both[0].time, edges, values, own, title, shades=shades)
     return panels
-
-
-def _level(found: Spectra, side: int, edges: Array) -> Array:
-    """Level of each band of a side, at least the lowest of the scale, shape (bands, columns)."""
-    amplitude = in_bands(found.frequency, found.amplitude[side], edges)
-    return np.asarray(np.maximum(2 * decibel(amplitude), SPECTRUM.low))
 
 
 def _log_noise(recording: rr.RecordingStream, pair: Pair) -> tuple[float, float]:
@@ -381,13 +368,10 @@ def log_links(
 ) -> tuple[Panel, list[str]]:
     """Log the noise of links: colour both robots by it, and rows by how it changed."""
     assert pair.links is not None
+    scale = LINKS.following(np.concatenate([link_levels(noise)[1] for noise in pair.links]))
     for tree, noise in zip(trees.values(), pair.links, strict=True):
-        time, level = link_levels(noise)
-        rgba = LINKS.colours(level, shades=ROBOT_SHADES)
-        colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
-        quiet = LINKS.colours(np.array([-np.inf]))
-        robot.log_colours(recording, tree, time, colours, rest=quiet)
-    axes.log_scale(recording, KEY, LINKS, "dB re\n1 pW")
+        log_robot_levels(recording, tree, noise, scale)
+    axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     names = [level.name for level in by_link(pair)]
     for (side, _), noise in zip(pair.sides, pair.links, strict=True):
         for name in names[:BOTH]:
@@ -456,6 +440,7 @@ def layout(contents: Contents) -> Blueprint:
     report = unstable.text("Before \u2192 after", "/report")
     events = unstable.events("Changes", "/events")
     text = unstable.tabs(report, events) if contents.events else report
+    text = unstable.above((unstable.drawing("/verdict"), axes.VERDICT), (text, ABOVE))
     head: list[tuple[Part, float]] = [(text, 34.0)]
     for side, camera in contents.cameras.items():
         head.append((unstable.robot(f"Robot {side}", f"/robot_{side}", camera), 29.0))
@@ -498,8 +483,9 @@ def _details(contents: Contents) -> Part:
         parts.append(axes.part(contents.changes, plot, name="Links, change"))
     for what, panel in contents.spectra.items():
         plot = axes.row_plot(f"/spectrogram/{what}")
-        comma = ", " if what == "change" else " "
-        parts.append(axes.part(panel, plot, name=f"Spectrum{comma}{what}"))
+        parts.append(
+            axes.part(panel, plot, name=f"Spectrum{', ' if what == 'change' else ' '}{what}")
+        )
     plot = unstable.plot(
         "Noise", "/noise", axes.ALL, between=contents.ends.noise, fixed=True, titled=False
     )
@@ -556,7 +542,8 @@ def _log(
         panel, shown = log_links(recording, trees, pair)
     names = dict.fromkeys((*run.joint_names, *pair.before.run.joint_names))
     limb_plots = log_joints(recording, pair, limbs(tuple(names), trees.get("after")))
-    loop = largest_change(pair, found)
+    loop, joint = largest_change(pair, found), _joint(pair)
+    axes.log_verdict(recording, *verdict(pair))
     audible = _sounds(pair, loop[0])
     start = float(pair.time[0])
     for name, sound in audible.items():
@@ -566,7 +553,7 @@ def _log(
         joints=limb_plots,
         classes=log_changes(recording, pair, found),
         ends=log_levels(recording, pair, found),
-        spectra=log_spectra(recording, pair),
+        spectra=log_spectra(recording, pair, joint),
         changes=panel,
         links=shown,
         cameras=cameras,
@@ -574,6 +561,12 @@ def _log(
         sounds=tuple(audible),
         loop=loop,
     )
+
+
+def _joint(pair: Pair) -> str:
+    """The joint whose spectra are shown: the worst one after, if both runs have it."""
+    name = pair.after.run.joint_names[worst_joint(pair.after)]
+    return name if name in pair.before.run.joint_names else ""
 
 
 def _sounds(pair: Pair, around: float) -> dict[str, bytes]:

@@ -97,7 +97,9 @@ class Columns(NamedTuple):
 
 
 class SpectrogramStream:
-    """Levels of frequency bands on a logarithmic axis, on the scale of whole runs.
+    """Levels of the loudest joint in each band of a logarithmic axis, on a fixed scale.
+
+    Which joint will be the worst is not known while samples come in.
 
     Args:
         rate: Samples per second, in [Hz].
@@ -114,23 +116,23 @@ class SpectrogramStream:
         self._frequency = rate / self._length * np.arange(1.0, self._length // 2 + 1)
         self.edges = np.geomspace(self._frequency[0], self._frequency[-1], BANDS + 1)
         self.centres = np.sqrt(self.edges[:-1] * self.edges[1:])
-        self._samples = np.empty(0)
+        self._samples = np.empty((0, 0))
         self._valid = np.empty(0, dtype=bool)
         self._gap = False
         self._waiting: list[Columns] = []
 
-    def push(self, noise: Array, valid: Mask, end: float) -> Columns | None:
+    def push(self, velocity: Array, valid: Mask, end: float) -> Columns | None:
         """Take samples.
 
         Args:
-            noise: Shape (samples,), in [rad/s].
+            velocity: Shape (samples, joints), in [rad/s] or [m/s].
             valid: False in gaps, shape (samples,); windows that touch one are dark.
             end: Time after the last sample, in [s].
 
         Returns:
             Columns, once there are some.
         """
-        samples = np.concatenate((self._samples, noise))
+        samples = np.concatenate((self._samples.reshape(-1, velocity.shape[1]), velocity))
         valid = np.concatenate((self._valid, valid))
         count = max(0, (len(samples) - self._length) // self._hop + 1)
         used = count * self._hop
@@ -164,9 +166,14 @@ class SpectrogramStream:
 
     def _levels(self, samples: Array, valid: Mask, count: int) -> Array:
         view = np.lib.stride_tricks.sliding_window_view
-        windows = view(samples, self._length)[:: self._hop][:count]
+        windows = view(samples, self._length, axis=0)[:: self._hop][:count]
         whole = np.asarray(view(valid, self._length)[:: self._hop][:count].all(axis=1))
-        amplitude = amplitudes(windows).T * whole
+        # In a window, slow motion is a line all but: what is left of it is below 10 Hz.
+        ramp = np.arange(self._length) - (self._length - 1) / 2
+        slope = windows @ ramp / (ramp @ ramp)
+        level_windows = (windows - slope[..., None] * ramp).reshape(-1, self._length)
+        every = amplitudes(level_windows).reshape(count, windows.shape[1], -1)
+        amplitude = every.max(axis=1).T * whole
         level = 2 * decibel(in_bands(self._frequency, amplitude, self.edges))
         return np.clip(SPECTRUM.place(level), 0.0, 1.0)
 
@@ -232,7 +239,7 @@ class Drawing:
         )
         # A line of one entity each: an entity each would cost a message each.
         style_bands(recording, "/spectrogram/bands", np.sqrt(edges[:-1] * edges[1:]).tolist())
-        title = Label(0.5, "noise\nspectrum", -22.0)
+        title = Label(0.5, "spectrum,\nloudest\njoint", -22.0)
         ends = float(edges[0]), float(edges[-1])
         log_axis(recording, SPECTROGRAM_PANEL, *ends, title, axes.hertz)
         axes.log_scale(recording, SPECTROGRAM_PANEL, SPECTRUM)
@@ -374,6 +381,8 @@ class Drawing:
             document = rr.TextDocument.columns(text=[text], media_type=["text/markdown"])
             index = [at(np.array([time]))]
             self._recording.send_columns("/report", indexes=index, columns=document)
+            verdict = ("findings", f"FAIL   {title}") if title else ("ok", "PASS so far")
+            axes.log_verdict(self._recording, *verdict, time)
 
     def found(self, event: Event) -> None:
         """Add a finding to the list of events."""
@@ -460,13 +469,15 @@ def layout(contents: Contents) -> Blueprint:
         over_time.insert(0, (axes.part(contents.classes, rows), contents.classes.height))
     findings = unstable.text("Findings", "/report", titled=False)
     left = [(findings, 2.0), (unstable.events("Events", "/events"), 1.4)]
+    if contents.classes is not None:  # otherwise there is no verdict
+        left.insert(0, (unstable.drawing("/verdict"), 0.32))
     if contents.camera is not None:
         title = "Robot, links coloured by level above 10 Hz" if contents.links else "Robot"
         robot = unstable.robot(title, "/robot", contents.camera)
         if contents.links:
             key = unstable.drawing(f"/axis/{KEY.name}/right")
             robot = unstable.beside((robot, 88.0), (key, 12.0))
-        left.insert(1, (robot, 3.4))
+        left.insert(len(left) - 1, (robot, 3.4))
     whole = unstable.beside((unstable.above(*left), 36.0), (unstable.above(*over_time), 64.0))
     return unstable.blueprint(whole, TIMELINE, following=True)
 

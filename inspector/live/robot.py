@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from rerun.urdf import UrdfJoint
 
 import noisemodel as nm
@@ -153,6 +154,7 @@ class LiveRobot:
             self._kinds = scene.shapes(tree)
         self._tree = tree
         self._shades: dict[str, bytes] = {}
+        self._painted: dict[str, list[tuple[float, NDArray[np.uint8]]]] = {}
         self._paths = {
             link: [path for each in members for path in tree.get_visual_geometry_paths(each)]
             for link, members in scene.moving_links(tree).items()
@@ -228,12 +230,20 @@ class LiveRobot:
         for link, own in zip(self._paths, LINKS.colours(each, shades=SHADES), strict=True):
             if self._shades.get(link) != own.tobytes():
                 self._shades[link] = own.tobytes()
-                for path in self._paths[link]:
-                    kind = self._kinds[path]
-                    colour = {scene.COLOURED[kind]: own[None]}
-                    columns = getattr(rr, kind).columns(**colour)
-                    index = [axes.at(np.array([time]))]
-                    self._recording.send_columns(path, indexes=index, columns=columns)
+                self._painted.setdefault(link, []).append((time, own))
+        if self._at_once == 1:
+            self._paint()
+
+    def _paint(self) -> None:
+        """Draw the colours that wait."""
+        for link, changes in self._painted.items():
+            index = [axes.at(np.array([time for time, _ in changes]))]
+            shades = np.stack([own for _, own in changes])
+            for path in self._paths[link]:
+                kind = self._kinds[path]
+                columns = getattr(rr, kind).columns(**{scene.COLOURED[kind]: shades})
+                self._recording.send_columns(path, indexes=index, columns=columns)
+        self._painted = {}
 
     def show(self, time: float, position: Array, base_pose: Array | None) -> None:
         """Move the robot, once there are as many poses as a message has.
@@ -255,7 +265,8 @@ class LiveRobot:
             self.flush()
 
     def flush(self) -> None:
-        """Draw the poses that wait."""
+        """Draw the poses and colours that wait."""
+        self._paint()
         if not self._waiting:
             return
         times, places, turns = (list(each) for each in zip(*self._waiting, strict=True))

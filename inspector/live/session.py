@@ -154,7 +154,8 @@ class Worker:
         for first, stop in pairwise(edges):  # labels first: their latency counts
             piece = slice(first, stop)
             self._skip(int(lost[first]))
-            self._label(time[piece], received[piece], motion[piece], noise[piece], valid[piece])
+            self._label(time[piece], received[piece], motion[piece], valid[piece])
+            self._show_spectrum(time[piece], signals["velocity"][piece], valid[piece])
             self._colour(time[piece], {name: rows[piece] for name, rows in signals.items()})
         if self._sink.alive:
             self._drawing.changes(self._lane.expire(self._now))
@@ -236,13 +237,16 @@ class Worker:
             if self._links is not None:
                 self._links.skip()
 
-    def _label(
-        self, time: Array, received: Array, motion: Array, noise: Array, valid: Mask
-    ) -> None:
+    def _show_spectrum(self, time: Array, velocity: Array, valid: Mask) -> None:
+        known = np.where(valid[:, None], velocity, 0.0)
+        columns = self._spectrogram.push(known, valid, float(time[-1]) + 1.0 / self._rate)
+        if columns is not None and self._sink.alive:
+            self._drawing.spectrogram(columns)
+
+    def _label(self, time: Array, received: Array, motion: Array, valid: Mask) -> None:
         """Label and draw a stretch without missing samples."""
         end = float(time[-1]) + 1.0 / self._rate
         labels = self._labeller.push(motion, valid)
-        columns = self._spectrogram.push(noise, valid, end)
         if labels is not None and len(labels):
             # How far back in the stretch frames end; a lower rate lags behind.
             back = np.rint((self._labeller.elapsed - labels.stop) * self._rate).astype(int)
@@ -264,8 +268,6 @@ class Worker:
                 delay = clocks.perf_counter() - received[np.maximum(last, 0)] - before
                 self._delays.extend(delay.tolist())
                 self._show_findings(end)
-        if columns is not None and self._sink.alive:
-            self._drawing.spectrogram(columns)
 
     def _with_lasting(self, events: Sequence[Event]) -> tuple[Event, ...]:
         """Findings of the labels and of what lasts, on the clock of the samples."""

@@ -111,7 +111,9 @@ def log_events(
 
 TOP = 9.99
 """Upper end of the axis of rows."""
-INK = (205, 208, 214)
+INK, WHITE = (205, 208, 214), (255, 255, 255)
+VERDICT = 38.0
+"""Height of a verdict, in points."""
 AXIS = 18.0
 """Height of a panel's time axis, in points."""
 TEXT = 13.0
@@ -203,7 +205,8 @@ ALL = ("$origin/**", SPAN)
 
 def row_plot(path: str) -> Part:
     """Plot the rows that lie below a path."""
-    return unstable.plot("", path, ALL, between=(0.0, TOP), fixed=True, titled=False)
+    name = path.rpartition("/")[2]
+    return unstable.plot(name, path, ALL, between=(0.0, TOP), fixed=True, titled=False)
 
 
 def part(panel: Panel, plot: Part, *, name: str | None = None) -> Part:
@@ -256,6 +259,33 @@ def _log_labels(
         show_labels=True,
     )
     recording.log(path, points, static=True)
+
+
+def log_verdict(
+    recording: rr.RecordingStream, verdict: str, text: str, time: float | None = None
+) -> None:
+    """Log a verdict in white on its colour, for all times or from one on, in [s].
+
+    Args:
+        verdict: A key of ``colors.VERDICTS``.
+    """
+    band = rr.LineStrips2D(
+        [[(-99.0, 0.5), (99.0, 0.5)]],
+        colors=[colors.VERDICTS[verdict]],
+        radii=rr.Radius.ui_points(60.0),
+    )
+    words = rr.Points2D(
+        [(0.0, 0.5 - TEXT / VERDICT)],
+        labels=[text],
+        colors=[WHITE],
+        radii=rr.Radius.ui_points(0.0),
+        show_labels=True,
+    )
+    if time is not None:
+        recording.set_time(TIMELINE, duration=time)
+    for path, drawn in (("band", band), ("words", words)):
+        recording.log(f"/verdict/{path}", drawn, static=time is None)
+    recording.reset_time()
 
 
 EMPTY = (*colors.BACKGROUNDS[0], 255)

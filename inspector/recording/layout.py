@@ -31,6 +31,7 @@ class Contents:
 
     Attributes:
         text: Findings and what is known of the run, in Markdown.
+        joint: The joint of the spectrogram.
         classes: Panel of classes; None if nothing was found or annotated.
         curves: Noise, level and probability.
         spectrogram: Panel of the spectrogram.
@@ -49,6 +50,7 @@ class Contents:
     """
 
     text: str
+    joint: str
     classes: Panel | None
     curves: Sequence[Curve]
     spectrogram: Panel
@@ -82,7 +84,10 @@ def layout(contents: Contents) -> Blueprint:
 def _left(contents: Contents) -> Part:
     """Findings above, the robot with its scale, and samples of the worst moments below."""
     text = unstable.text("Findings", "/report", titled=False)
-    parts: list[tuple[Part, float]] = [(text, height(contents.text))]
+    parts: list[tuple[Part, float]] = [
+        (unstable.drawing("/verdict"), axes.VERDICT),
+        (text, height(contents.text)),
+    ]
     if contents.events:
         events = unstable.events("Click a time to go there", "/events")
         parts.append((events, EVENTS + EVENT * min(contents.events, 4)))
@@ -113,25 +118,17 @@ def height(markdown: str) -> float:
 
 def _rows(panel: Panel, path: str, *, name: str | None = None) -> Part:
     """A panel of rows."""
-    plot = unstable.plot(
-        panel.name,
-        path,
-        ["$origin/**", axes.SPAN],
-        between=(0.0, axes.TOP),
-        fixed=True,
-        titled=False,
-    )
-    return axes.part(panel, plot, name=name)
+    return axes.part(panel, axes.row_plot(path), name=name)
 
 
 def _curve(curve: Curve) -> Part:
-    panel, paths = curve.panel, ["$origin/**", axes.SPAN]
+    panel, paths = curve.panel, axes.ALL
     plot = unstable.plot(panel.name, curve.path, paths, between=curve.between, titled=False)
     return axes.part(panel, plot)
 
 
 def _spectrogram(contents: Contents) -> Part:
-    parts = [_rows(contents.spectrogram, "/spectrogram", name="Spectrogram of the noise")]
+    parts = [_rows(contents.spectrogram, "/spectrogram", name=f"Spectrogram of {contents.joint}")]
     if contents.orders is not None:
         joint, panel = contents.orders
         parts.append(_rows(panel, "/orders", name=f"Orders of {joint}"))
@@ -152,9 +149,9 @@ def _strips(contents: Contents) -> Part:
     """Levels of joints and links, then scores, then each limb's signals."""
     parts = [_rows(panel, f"/strips/{panel.name}", name=name) for name, panel in contents.strips]
     if contents.scores:
-        parts.append(unstable.plot("Scores", "/score", ["$origin/**", axes.SPAN], legend=True))
+        parts.append(unstable.plot("Scores", "/score", axes.ALL, legend=True))
     if contents.links:
-        paths = ["$origin/**", axes.SPAN]
+        paths = axes.ALL
         parts.append(
             unstable.plot("Power of links [dB re 1 pW]", "/power/links", paths, legend=True)
         )

@@ -545,9 +545,8 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> Panel
         return None
     time, level = analysis.joint_levels
     stop = float(run.time[-1]) + 1.0 / run.rate
-    return _log_strips(
-        recording, "joints", analysis, np.append(time, stop), level, run.joint_names, levels.JOINTS
-    )
+    scale, edges = levels.JOINTS.following(level), np.append(time, stop)
+    return _log_strips(recording, "joints", analysis, edges, level, run.joint_names, scale)
 
 
 def log_links(
@@ -562,14 +561,22 @@ def log_links(
         _log_power(recording, path, noise, noise.power[:, index], color)
     for place, (term, power) in enumerate(noise.terms.items()):
         _log_power(recording, f"/power/terms/{term}", noise, power, colors.of_series(3)[place])
-    rgba = levels.LINKS.colours(level, shades=ROBOT_SHADES)
-    colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
-    quiet = levels.LINKS.colours(np.array([-np.inf]))
-    robot.log_colours(recording, tree, time, colours, rest=quiet)
-    axes.log_scale(recording, KEY, levels.LINKS, "dB re\n1 pW")
+    scale = levels.LINKS.following(level)
+    log_robot_levels(recording, tree, noise, scale)
+    axes.log_scale(recording, KEY, scale, "dB re\n1 pW")
     width = float(np.median(np.diff(noise.time))) if len(noise.time) > 1 else levels.STEP
     edges = np.append(time, noise.time[-1] + width / 2)
-    return _log_strips(recording, "links", analysis, edges, level, noise.links, levels.LINKS)
+    return _log_strips(recording, "links", analysis, edges, level, noise.links, scale)
+
+
+def log_robot_levels(
+    recording: rr.RecordingStream, tree: UrdfTree, noise: LinkNoise, scale: Scale
+) -> None:
+    """Colour the links of a robot by their levels; what does not move is as quiet as can be."""
+    time, level = levels.link_levels(noise)
+    rgba = scale.colours(level, shades=ROBOT_SHADES)
+    colours = {link: rgba[:, index] for index, link in enumerate(noise.links)}
+    robot.log_colours(recording, tree, time, colours, rest=scale.colours(np.array([-np.inf])))
 
 
 def _log_strips(
@@ -619,7 +626,7 @@ def log_spectrogram(
 ) -> Panel:
     """Log a spectrogram on a logarithmic axis, as rows of colours."""
     panel = Panel("spectrogram", HEIGHT)
-    log_panel(recording, panel, spectrum, scale, "noise\nspectrum")
+    log_panel(recording, panel, spectrum, scale, "velocity\nspectrum")
     log_gaps(recording, "/spectrogram", analysis.run, (0.0, axes.TOP))
     return panel
 
@@ -628,9 +635,53 @@ def log_panel(
     recording: rr.RecordingStream, panel: Panel, spectrum: Spectrogram, scale: Scale, title: str
 ) -> None:
     """Log a spectrogram with its axis in Hz and its scale."""
+    edges, level = in_levels(spectrum)
+    path = f"/{panel.name}/bands"
+    log_heat(recording, panel, path, spectrum.time, edges, level, scale, title)
+
+
+def in_levels(spectrum: Spectrogram) -> tuple[Array, Array]:
+    """Bands of a logarithmic axis, and their levels.
+
+    Returns:
+        Edges, shape (bands + 1,), and levels in [dB], shape (bands, columns); NaN in gaps.
+    """
     low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
-    log_axis(recording, panel, low, high, Label(0.5, title, -22.0), axes.hertz)
-    _log_bands(recording, panel, spectrum, (low, high), scale, "Hz")
+    edges = np.geomspace(low, max(high, 1.01 * low), BANDS + 1)
+    level = 2 * decibel(in_bands(spectrum.frequency, spectrum.amplitude, edges))
+    return edges, np.where(spectrum.valid, level, np.nan)
+
+
+def log_heat(
+    recording: rr.RecordingStream,
+    panel: Panel,
+    path: str,
+    time: Array,
+    edges: Array,
+    level: Array,
+    scale: Scale,
+    title: str,
+    *,
+    written: Callable[[float], str] = axes.hertz,
+    shades: int = axes.SHADES,
+) -> None:
+    """Log a heat map of bands over time, with its axis and its scale.
+
+    Args:
+        path: Entity path below which the bands lie.
+        time: Middles of the columns, shape (columns,), in [s].
+        edges: Of the bands, shape (bands + 1,).
+        level: Shape (bands, columns), in [dB]; nothing is drawn where it is NaN.
+    """
+    log_axis(recording, panel, float(edges[0]), float(edges[-1]), Label(0.5, title, -22.0), written)
+    rgba = scale.colours(np.nan_to_num(level[::-1], nan=-np.inf), shades=shades)
+    rgba = axes.blanked(rgba, np.asarray(~np.isnan(level).all(axis=0)))
+    half = np.diff(time).min(initial=WINDOW) / 2
+    times = np.append(time - half, time[-1] + half)
+    unit = "Hz" if written is axes.hertz else "periods per turn"
+    names = [f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1].tolist()]
+    axes.log_rows(recording, path, times, rgba, names=names, width=LINE_WIDTH)
+    axes.log_scale(recording, panel, scale)
 
 
 def log_orders(
@@ -646,10 +697,10 @@ def log_orders(
         return None
     joint, spectrum = found
     panel = Panel("orders", HEIGHT)
-    low, high = float(spectrum.frequency[0]), float(spectrum.frequency[-1])
-    title = Label(0.5, "periods\nper turn", -22.0)
-    log_axis(recording, panel, low, high, title, "{:g}".format)
-    _log_bands(recording, panel, spectrum, (low, high), scale, "periods per turn")
+    edges, level = in_levels(spectrum)
+    path, title = "/orders/bands", "periods\nper turn"
+    written = "{:g}".format
+    log_heat(recording, panel, path, spectrum.time, edges, level, scale, title, written=written)
     log_gaps(recording, "/orders", analysis.run, (0.0, axes.TOP))
     return joint, panel
 
@@ -669,25 +720,6 @@ def log_axis(
         for tick in axes.ticks(low, max(high, 1.01 * low), panel)
     ]
     axes.log_left(recording, panel, [title, *marks])
-
-
-def _log_bands(
-    recording: rr.RecordingStream,
-    panel: Panel,
-    spectrum: Spectrogram,
-    ends: tuple[float, float],
-    scale: Scale,
-    unit: str,
-) -> None:
-    edges = np.geomspace(ends[0], max(ends[1], 1.01 * ends[0]), BANDS + 1)
-    level = 2 * decibel(in_bands(spectrum.frequency, spectrum.amplitude, edges))[::-1]
-    rgba = axes.blanked(scale.colours(level, shades=axes.SHADES), spectrum.valid)
-    half = np.diff(spectrum.time).min(initial=WINDOW) / 2
-    times = np.append(spectrum.time - half, spectrum.time[-1] + half)
-    names = [f"{centre:.0f} {unit}" for centre in np.sqrt(edges[:-1] * edges[1:])[::-1]]
-    path = f"/{panel.name}/bands"
-    axes.log_rows(recording, path, times, rgba, names=names, width=LINE_WIDTH)
-    axes.log_scale(recording, panel, scale)
 
 
 def style_bands(recording: rr.RecordingStream, path: str, centres: Sequence[float]) -> None:

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -13,16 +12,13 @@ from rerun.urdf import UrdfTree
 
 from inspector import levels
 from inspector.analysis.analyse import Analysis
+from inspector.analysis.loudest import worst_joint, worst_signal
 from inspector.analysis.moments import worst
 from inspector.recording import axes, framing, panels, robot, unstable
-from inspector.recording import panels as spectrograms
-from inspector.recording import panels as strip_rows
 from inspector.recording.layout import Contents, layout
-from inspector.recording.panels import limbs, log_bars
-from inspector.report.markdown import report
+from inspector.report.markdown import report, spoken
 from inspector.spectrogram import spectrogram
 from noisemodel.files import replacing
-from noisemodel.links import vibrating
 
 APPLICATION = "inspector"
 PATIENCE = 3.0
@@ -90,7 +86,7 @@ def write(
 
     Args:
         sound: The run made audible, a WAV file that starts with the run; none if empty.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; -70 unless given.
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
@@ -110,23 +106,25 @@ def _log(
     run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
     axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
     strips = []
-    if (panel := strip_rows.log_joint_levels(recording, analysis)) is not None:
+    if (panel := panels.log_joint_levels(recording, analysis)) is not None:
         strips.append(("Joints above 10 Hz", panel))
     if tree is not None and links is not None:
         assert run.robot is not None
         robot.log(recording, tree, run, coloured=True)
         urdf = robot.drawn_file(run.robot, folder)
         (seen,) = framing.log_cameras(recording, [(tree, run)], urdf, aspect=ASPECT)
-        strips.append(("Links above 10 Hz", strip_rows.log_links(recording, tree, analysis, links)))
+        strips.append(("Links above 10 Hz", panels.log_links(recording, tree, analysis, links)))
     shown_classes = panels.log_classes(recording, analysis)
     curves = panels.log_curves(recording, analysis)
-    scale = levels.SPECTRUM if floor is None else replace(levels.SPECTRUM, low=floor)
-    fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]
+    joint = worst_joint(analysis)
+    fast = worst_signal(analysis, joint)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
-    log_bars(recording, "/spectrum/now", spectrum)
+    scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
+    panels.log_bars(recording, "/spectrum/now", spectrum)
+    axes.log_verdict(recording, analysis.status, verdict_of(analysis))
     if sound:
         unstable.log_audio(recording, "/sound", sound, axes.TIMELINE, start=float(run.time[0]))
-    limb_plots = panels.log_joints(recording, run, limbs(run.joint_names, tree))
+    limb_plots = panels.log_joints(recording, run, panels.limbs(run.joint_names, tree))
     shown = panels.log_details(recording, analysis, moments)
     text = report(analysis)
     _log_text(recording, analysis, text, {} if tree is None else robot.entities(tree))
@@ -135,8 +133,9 @@ def _log(
         text=text,
         classes=shown_classes,
         curves=curves,
-        spectrogram=spectrograms.log_spectrogram(recording, analysis, spectrum, scale),
-        orders=spectrograms.log_orders(recording, analysis, scale),
+        joint=run.joint_names[joint],
+        spectrogram=panels.log_spectrogram(recording, analysis, spectrum, scale),
+        orders=panels.log_orders(recording, analysis, scale),
         strips=strips,
         joints=limb_plots,
         details=shown,
@@ -149,6 +148,14 @@ def _log(
         rate=run.rate,
         loop=(failures[0].start, failures[0].stop) if failures else None,
     )
+
+
+def verdict_of(analysis: Analysis) -> str:
+    """Whether a run passes, in a line, and what was found."""
+    kinds = spoken(analysis.headline).partition(": ")[2]
+    words = {"findings": "FAIL", "ok": "PASS", "cannot-tell": "CANNOT TELL"}
+    found = "" if analysis.status == "cannot-tell" else kinds or "no finding"
+    return f"{words[analysis.status]}   {found}".rstrip()
 
 
 def _log_text(

@@ -66,7 +66,7 @@ def write(
         path: The file to write, by convention ``*.html``.
         audit: What the log can show, in lines.
         overwrite: Whether a file that exists may be replaced.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; -70 unless given.
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
 
     Raises:
         InspectorError: If matplotlib is not installed.
@@ -206,7 +206,7 @@ def add_text(parent: ET.Element, tag: str, text: str, kind: str = "") -> None:
 def _described(analysis: Analysis) -> str:
     """What the picture shows, for readers without it."""
     rows = ["classes", "noise", "its level above 10 Hz", "probability of a failure"]
-    rows += ["spectrogram of the noise", "levels of joints"]
+    rows += ["spectrogram of the worst joint", "levels of joints"]
     rows += ["levels of links"] if analysis.links is not None else []
     return f"Over {analysis.run.duration:.2f} s: {', '.join(rows)}; the tables have the findings"
 

@@ -60,7 +60,7 @@ def report(analysis: Analysis) -> str:
 def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "") -> str:
     """Class, time, score, novelty and localisation of an event, in a line of Markdown."""
     stage, joints, band, links = localised(analysis, event, quote="`")
-    named = {"joints": joints, "links": links, "": band, "first in": stage}
+    named = {"joints": joints, "loudest links": links, "": band, "first in": stage}
     where = "; ".join(f"{name} {part}".strip() for name, part in named.items() if part)
     sure = _sure(analysis, event) if isinstance(event, Event) else ""
     when = f"{interval(event.start, event.stop)}{sure}"
@@ -68,10 +68,12 @@ def sentence(analysis: Analysis, event: Event | Block, *, bold: str = "") -> str
 
 
 def brief(analysis: Analysis, event: Event | Block) -> str:
-    """Class, time, first joint and first link of an event, in a few words."""
-    _, joints, _, links = localised(analysis, event)
-    first = [part.partition(",")[0] for part in (joints, links) if part]
-    return ", ".join([f"{spoken(event.label)} {interval(event.start, event.stop)}", *first])
+    """Class, time and first joint of an event, in a few words."""
+    _, joints, _, _ = localised(analysis, event)
+    first = joints.partition(",")[0]
+    return ", ".join(
+        filter(None, [f"{spoken(event.label)} {interval(event.start, event.stop)}", first])
+    )
 
 
 def _annotation(analysis: Analysis, block: Block) -> str:

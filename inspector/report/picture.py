@@ -3,21 +3,19 @@
 import io
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from inspector import colors, levels
 from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import chosen
+from inspector.analysis.loudest import chosen, worst_joint, worst_signal
 from inspector.analysis.moments import gaps
 from inspector.levels import Scale
 from inspector.orders import orders
 from inspector.report.markdown import classes_of, spoken
 from inspector.spectrogram import Spectrogram, spectrogram
 from inspector.thinning import extremes
-from noisemodel.links import vibrating
 from noisemodel.noise import decibel
 from noisemodel.types import Array
 
@@ -41,7 +39,7 @@ def picture(analysis: Analysis, *, floor: float | None = None) -> bytes:
 
     Args:
         analysis: A run with what was found in it.
-        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; -70 unless given.
+        floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
 
     Returns:
         A PNG file.
@@ -49,7 +47,6 @@ def picture(analysis: Analysis, *, floor: float | None = None) -> bytes:
     from matplotlib.figure import Figure
 
     run, links = analysis.run, analysis.links
-    scale = levels.SPECTRUM if floor is None else replace(levels.SPECTRUM, low=floor)
     names, ordered = classes_of(analysis), orders(analysis)
     strips = [_strip(analysis, *analysis.joint_levels, run.joint_names)]
     if links is not None:
@@ -77,16 +74,19 @@ def picture(analysis: Analysis, *, floor: float | None = None) -> bytes:
     _level(axes["level"], analysis)
     if "probability" in axes:
         _probability(axes["probability"], analysis)
-    fast = vibrating(analysis.noise[:, None], run.mask, run.rate)[:, 0]
+    worst = worst_joint(analysis)
+    fast = worst_signal(analysis, worst)
     spectrum = spectrogram(fast, run.rate, start=float(run.time[0]), valid=run.mask)
-    _spectrum(figure, axes["spectrogram"], spectrum, scale, "frequency [Hz]")
+    scale = levels.SPECTRUM.following(spectrum.decibel).down_to(floor)
+    title = f"{run.joint_names[worst]}\n[Hz]"
+    _spectrum(figure, axes["spectrogram"], spectrum, scale, title)
     if ordered is not None:
         joint, spectrum = ordered
         _spectrum(figure, axes["orders"], spectrum, scale, f"periods per turn\nof {joint}")
     if "joints" in axes:
-        _strips(figure, axes["joints"], strips[0], levels.JOINTS, "joints")
+        _strips(figure, axes["joints"], strips[0], levels.JOINTS.following(strips[0][1]), "joints")
     if links is not None:
-        _strips(figure, axes["links"], strips[1], levels.LINKS, "links")
+        _strips(figure, axes["links"], strips[1], levels.LINKS.following(strips[1][1]), "links")
     for name, panel in axes.items():
         _gaps(panel, analysis, named=name == "noise")
     panels[-1].set_xlim(run.time[0], run.time[-1])
