@@ -6,7 +6,7 @@ from inspector import levels
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
 from noisemodel.links import vibrating
-from noisemodel.run import pieces
+from noisemodel.runfile import pieces
 from noisemodel.types import Array
 
 SHOWN = 8
