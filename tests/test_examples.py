@@ -76,7 +76,8 @@ def test_an_example_is_short(path):
     assert len(path.read_text().splitlines()) < 25
 
 
-def test_the_readme_quotes_the_mujoco_example():
+def test_the_page_quotes_the_mujoco_example():
     code = (EXAMPLES / "mujoco_loop.py").read_text(encoding="utf-8")
-    quoted = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text("utf-8"), re.DOTALL)
+    page = (ROOT / "docs" / "record.md").read_text("utf-8")
+    quoted = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
     assert code.partition("\n\n")[2] in quoted

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -140,7 +141,7 @@ def test_a_run_too_short_for_a_frame_is_no_bad_input(tmp_path, rate, samples):
     run_of(np.zeros((5000, 2)), 1000.0).save(tmp_path / "standing.npz")
     status, out, err = call("classify", tmp_path / "short.npz", tmp_path / "standing.npz")
     assert (status, err) == (4, "")
-    assert "short.npz: cannot-tell: " in out
+    assert re.search("short.npz +cannot tell", out)
     assert "too short" in out
     status, _, err = call("view", tmp_path / "short.npz", "-o", tmp_path / "report.html")
     assert (status, err) == (0, "")

@@ -226,7 +226,7 @@ def strong(window: Array, rate: float) -> list[tuple[int, float, float]]:
         for signal in power:
             median = np.median(signal[there, around], axis=-1)[which]
             shared = np.minimum(line[rows[own], places[own]], signal[rows[own], places[own]])
-            found = 10.0 * np.log10(shared / np.maximum(median, TINY))
+            found = 10.0 * np.log10(np.maximum(shared, TINY) / np.maximum(median, TINY))
             level = 10.0 * np.log10(np.maximum(shared, TINY)) - FLOOR
             strength[own] = np.maximum(strength[own], np.minimum(found, level))
     kept = np.flatnonzero(strength >= STRONG)
