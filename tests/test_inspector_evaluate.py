@@ -90,25 +90,6 @@ def test_existing_files_are_not_replaced(folder, tmp_path):
     assert json.loads(there.read_text())["runs"] == 6
 
 
-@pytest.mark.parametrize(
-    ("name", "problem"),
-    [("bare.npz", "has no annotated blocks"), ("odd.npz", "label 'rattle' is no class")],
-)
-def test_runs_without_valid_annotations_are_refused(folder, tmp_path, name, problem):
-    run(tmp_path / "odd.npz", 9, label="rattle")
-    time = np.arange(20_000) / 10_000
-    np.savez(tmp_path / "bare.npz", time=time, velocity=np.ones((20_000, 1)))
-    status, _, err = call("evaluate", folder / "model.npz", tmp_path / name)
-    assert (status, err.count("\n")) == (3, 1)
-    assert problem in err
-
-
-def test_a_folder_without_runs_is_refused(folder, tmp_path):
-    status, _, err = call("evaluate", folder / "model.npz", tmp_path)
-    assert (status, err.count("\n")) == (3, 1)
-    assert "no annotated frame in 0 recordings" in err
-
-
 def simulated(path, seed, *, robot=None, rate=10_000, **meta):
     """A run that swings from 1 s on, with what is known of it."""
     run(path, seed)

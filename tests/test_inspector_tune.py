@@ -109,15 +109,6 @@ def test_the_best_points_are_printed_as_a_table(whole):
     assert "untuned        25" in out
 
 
-def test_the_number_of_points_that_share_the_best_is_printed(whole):
-    output, out = whole
-    for name, words in (("balanced_accuracy", "balanced"), ("subset_accuracy", "subset")):
-        values = [point[name] for point in lines(output)[1:]]
-        count = values.count(max(values))
-        verb = "has" if count == 1 else "share"
-        assert f"{count} of 12 points {verb} the best {words} accuracy, {max(values):.1%}" in out
-
-
 def test_json_is_printed_for_programs(data, whole):
     status, out, _ = tune(data, whole[0], "--json", "--rows", 3)
     report = json.loads(out)
@@ -218,15 +209,6 @@ def test_a_killed_search_resumes(data, whole, tmp_path, counted):
     assert lines(output) == lines(whole[0])
 
 
-def test_another_criterion_measures_no_point_again(data, whole, counted):
-    status, out, _ = tune(data, whole[0], "--criterion", "log-loss")
-    points = lines(whole[0])[1:]
-    best = min(points, key=lambda point: point["log_loss"])
-    assert (status, counted) == (0, [])
-    assert f"{best['log_loss']:.4f}" in out.splitlines()[4]
-    assert "the log-loss breaks ties" not in out
-
-
 def test_without_a_validation_set_recordings_are_folded(data, tmp_path):
     output = tmp_path / "tuned.jsonl"
     options = (*OPTIONS, *GRID, "--folds", 2, "-o", output)
@@ -252,14 +234,6 @@ def test_a_validation_set_without_a_recording_is_refused(data, tmp_path):
     assert (status, err) == (3, f"inspector: {tmp_path / 'empty'}: no recording (of part 'all')\n")
 
 
-def test_one_recording_cannot_be_folded(tmp_path):
-    write_log(tmp_path / "one", 0)
-    status, _, err = call("tune", tmp_path / "one", *OPTIONS, *GRID, "-o", tmp_path / "tuned.jsonl")
-    assert status == 3
-    assert "5 folds of 1 groups" in err
-    assert not (tmp_path / "tuned.jsonl").exists()
-
-
 def refused(data, output, *more, grid=GRID, code=3):
     """Call in vain; the complaint, which is one line."""
     status, out, err = tune(data, output, *more, grid=grid)
@@ -282,14 +256,6 @@ def test_results_of_another_grid_are_refused(data, whole, tmp_path, more, reason
     assert reason in refused(data, output, *more)
     assert output.read_bytes() == whole[0].read_bytes()
     assert tune(data, output, *more, "--overwrite")[0] == 0
-
-
-def test_results_of_other_recordings_are_refused(data, whole, tmp_path):
-    write_log(tmp_path / "others", 7)
-    arguments = ("--validation", tmp_path / "others", *OPTIONS, *GRID, "-o", whole[0])
-    status, _, err = call("tune", data / "training", *arguments)
-    assert status == 3
-    assert "holds results of another validation set (walk7 was not in it)" in err
 
 
 def test_results_of_other_annotations_are_refused(data, whole, tmp_path):
@@ -336,19 +302,6 @@ def test_two_processes_do_not_write_one_file(data, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("grid", "reason"),
-    [
-        (("--grid", "C=2:1:0.1"), "grid has no value for regularization"),
-        (("--grid", "stride=401"), "stride of 401 samples is longer than a frame of 400"),
-        (("--grid", "leaves=8"), "leaves does nothing with support vector machines"),
-        (("--grid", "hop=1"), "no setting 'hop' to tune; there are window, stride"),
-    ],
-)
-def test_a_grid_that_cannot_be_searched_is_named(data, tmp_path, grid, reason):
-    assert reason in refused(data, tmp_path / "tuned.jsonl", grid=grid)
-
-
-@pytest.mark.parametrize(
     ("more", "reason"),
     [
         (("--profile", "mfcc"), "no profile 'mfcc' of one rate; there are joints, norms, scalar"),
@@ -357,20 +310,6 @@ def test_a_grid_that_cannot_be_searched_is_named(data, tmp_path, grid, reason):
 )
 def test_a_profile_that_does_not_exist_is_named(data, tmp_path, more, reason):
     assert reason in refused(data, tmp_path / "tuned.jsonl", *more, code=2)
-
-
-def test_gamma_of_a_linear_kernel_is_refused(data, tmp_path):
-    more = ("--profile", "noisytest-linear", "--rate", 10_000)
-    reason = "gamma does nothing with the linear kernel; leave it out of the grid"
-    assert reason in refused(data, tmp_path / "tuned.jsonl", *more, grid=("--grid", "gamma=1"))
-
-
-def test_one_class_is_refused(tmp_path):
-    for number in range(2):
-        write_log(tmp_path / "quiet", number, classes=("ok",))
-    arguments = (*OPTIONS, *GRID, "--folds", 2, "-o", tmp_path / "tuned.jsonl")
-    status, _, err = call("tune", tmp_path / "quiet", *arguments)
-    assert (status, err) == (3, "inspector: all frames are ok; tuning takes two classes\n")
 
 
 def test_recordings_of_the_training_set_do_not_validate(data, tmp_path):

@@ -1,6 +1,5 @@
 import json
 from dataclasses import replace
-from math import nan
 
 import numpy as np
 import pytest
@@ -18,8 +17,8 @@ from predicted_runs import (
 
 import noiseclassifier as nc
 from noiseclassifier.confusion import Evaluation
-from noiseclassifier.evaluation.assessment import measure, number, table
-from noiseclassifier.evaluation.intervals import Estimate, Resampling
+from noiseclassifier.evaluation.assessment import measure, table
+from noiseclassifier.evaluation.intervals import Resampling
 from noiseclassifier.evaluation.matching import Unanswered, are_probabilities, failure_score
 from noiseclassifier.evaluation.measures import Reliability
 from noiseclassifier.labels import Event
@@ -183,43 +182,6 @@ def text_of(assessment):
     return {" ".join(line.split()) for line in str(assessment).splitlines()}
 
 
-def test_numbers_have_three_digits_and_large_ones_no_exponent():
-    words = [number(Estimate(value, nan, nan, 1, 1), "s").split()[0] for value in (0.12345, 1800.0)]
-    assert words == ["0.123", "1800"]
-
-
-def test_it_prints_each_figure_with_its_interval_and_what_is_behind_it():
-    lines = text_of(measure([*many(6), predicted("talos/good-009", GOOD, ["impact"] * 47)]))
-    assert "ok 100.0% [82.4, 100.0] 100.0% [82.4, 100.0] 31 31 19" in lines
-    assert "impact 100.0% [54.1, 100.0] 100.0% [54.1, 100.0] 6 6 6" in lines
-    assert "impact in talos/good-009, 0.00 s to 5.00 s" in lines
-    assert "Calibration error - (the scores are no probabilities)" in lines
-    assert "highaccelerations - - 0 0 0" in lines
-
-
-def test_it_prints_the_papers_measures_under_the_papers_names():
-    lines = text_of(measure(many(6, ["ok"] * 47)))
-    assert any(line.startswith("Failure detection rate 100.0%") for line in lines)
-    assert any("(calling all frames ok: 71.4%)" in line for line in lines)
-
-
-def test_the_reason_for_missing_intervals_is_printed():
-    text = str(measure(many(2)))
-    assert "Measures of fewer than 5 groups have none." in text
-    assert "Balanced accuracy       100.0%\n" in text
-
-
-def test_several_robots_have_a_row_each():
-    one, other = (
-        many(6),
-        [predicted(f"go2/blow-{seed:03d}", IMPACT, ["ok"] * 47) for seed in range(6)],
-    )
-    assert "By robot" not in str(measure(one))
-    lines = text_of(measure([*one, *other]))
-    assert "go2 6 0.00667 0 0.0% 0 0.0% 0.0% 0.0% -" in lines
-    assert any(line.startswith("talos 18 ") for line in lines)
-
-
 def test_lines_are_short_and_lists_too():
     text = str(measure(many(40, ["ok"] * 47)))
     assert max(map(len, text.splitlines())) <= 120
@@ -260,19 +222,6 @@ def test_the_calibration_error_is_how_far_confidence_is_from_truth(confidence, r
     assert bins["frames"].sum() == 60 * len(frames())
     assert bins["confidence"][full] == pytest.approx(confidence)
     assert bins["right"][full] == pytest.approx(right, abs=0.02)
-
-
-def test_two_bins_with_errors_of_opposite_sign_do_not_cancel():
-    random = np.random.default_rng(0)
-    recordings = [confident(f"a{number}", 0.99, 0.79, random) for number in range(40)]
-    recordings += [confident(f"b{number}", 0.65, 0.85, random) for number in range(40)]
-    error = Reliability.of(recordings).error(Resampling.of([r.name for r in recordings]))
-    assert error.value == pytest.approx(0.2, abs=0.02)
-
-
-def test_a_confidence_of_one_has_a_bin():
-    table = Reliability.of([confident("a", 1.0, 1.0, np.random.default_rng(0))])
-    assert table.table()["frames"].tolist() == [0.0] * 9 + [len(frames())]
 
 
 def test_votes_have_no_calibration():

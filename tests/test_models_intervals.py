@@ -17,12 +17,6 @@ def test_bounds_of_rare_events_are_those_of_the_tables():
     assert garwood(10) == pytest.approx((4.7954, 18.3904), abs=1e-4)
 
 
-def test_no_event_at_all_has_an_upper_bound_above_zero():
-    rate = each_its_own(1000).rate(np.zeros(1000), np.full(1000, 2.0 / 1000))
-    assert (rate.value, rate.low) == (0.0, 0.0)
-    assert rate.high == pytest.approx(3.6889 / 2.0, abs=1e-4)
-
-
 def test_clustered_events_have_wider_intervals_than_single_ones():
     hours, alone, crowd = np.full(50, 0.1), np.zeros(50), np.zeros(50)
     alone[:20] = 1
@@ -47,13 +41,6 @@ def test_runs_without_a_mistake_have_the_bound_of_their_number():
         assert (nothing.low, nothing.high) == (0.0, pytest.approx(1.0 - 0.025 ** (1 / runs)))
 
 
-def test_a_mistake_never_raises_the_lower_bound():
-    part = np.full(30, 100.0)
-    perfect = each_its_own(30).share(part, np.full(30, 100.0))
-    part[0] = 99.0
-    assert each_its_own(30).share(part, np.full(30, 100.0)).low <= perfect.low
-
-
 def test_intervals_shrink_with_the_root_of_the_number_of_groups():
     widths = []
     for runs in (20, 80, 320):
@@ -62,14 +49,6 @@ def test_intervals_shrink_with_the_root_of_the_number_of_groups():
         widths.append(share.high - share.low)
     assert widths[0] / widths[1] == pytest.approx(2.0, rel=0.15)
     assert widths[1] / widths[2] == pytest.approx(2.0, rel=0.15)
-
-
-def test_more_runs_of_the_same_groups_narrow_no_interval():
-    part, whole = np.tile([2.0, 9.0, 5.0, 7.0, 1.0, 10.0], 5), np.full(30, 10.0)
-    few = Resampling.of([f"g{number % 6}" for number in range(6)]).share(part[:6], whole[:6])
-    many = Resampling.of([f"g{number % 6}" for number in range(30)]).share(part, whole)
-    assert (many.low, many.high) == pytest.approx((few.low, few.high))
-    assert (few.runs, many.runs, many.groups) == (6, 30, 6)
 
 
 def test_intervals_hold_what_is_true_in_95_of_100_cases_and_those_by_frames_do_not():

@@ -12,7 +12,6 @@ import noiseclassifier as nc
 from noiseclassifier.dataset import Examples
 from noiseclassifier.estimators import ESTIMATORS
 from noiseclassifier.estimators.decision import calibrate, calibrated
-from noiseclassifier.signals import stacked
 
 RATE = 1000.0
 PROFILE = nc.GENERAL.at(RATE)
@@ -76,12 +75,6 @@ def test_classes_are_found_in_other_runs(classifier):
         assert (labels.label[inside] == each.blocks[0].label).mean() > 0.9
 
 
-def test_scores_are_probabilities(classifier):
-    scores = classifier.classify(RECORDINGS[13].signal, RATE).scores
-    assert (scores >= 0).all()
-    np.testing.assert_allclose(scores.sum(axis=1), 1.0, rtol=1e-12)
-
-
 def test_a_single_frame_has_the_decision_values_that_it_has_among_others(classifier):
     features = np.random.default_rng(5).normal(size=(70, len(classifier.mean)))
     together = classifier.decide(features)
@@ -139,21 +132,6 @@ def test_calibration_finds_the_scale_of_overconfident_logits():
     np.testing.assert_allclose(calibrated(2.5 * log_true, calibration), log_true, atol=0.2)
 
 
-def test_a_lower_alarm_threshold_predicts_more_failure_frames(classifier):
-    decisions = classifier.decision(
-        nc.frame(
-            stacked(RECORDINGS[13].signal, classifier.profile.signals),
-            length=PROFILE.length,
-            hop=PROFILE.hop,
-        )
-    )
-    failures = [
-        (replace(classifier.estimator, alarm=alarm).choose(decisions) > 0).sum()
-        for alarm in (0.01, 0.5, 0.99)
-    ]
-    assert failures == sorted(failures, reverse=True)
-
-
 def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classifier):
     shares = {"impact": 0.1, "oscillations": 0.4}
     estimator = replace(classifier.estimator, frequency=np.array([0.5, *shares.values()]))
@@ -163,31 +141,12 @@ def test_of_two_failures_the_one_that_exceeds_its_frequency_more_is_named(classi
     assert named == ["impact", "oscillations", "ok"]
 
 
-def test_estimators_keep_the_frequency_of_each_class(classifier):
-    examples = Examples.read(RECORDINGS[:12], PROFILE)
-    shares = [(examples.labels == name).mean() for name in classifier.classes]
-    np.testing.assert_allclose(classifier.estimator.frequency, shares)
-
-
 def test_a_frame_louder_than_all_of_the_training_set_is_unknown(classifier):
     loud = 1e6 * np.random.default_rng(4).random(round(2 * RATE))
     labels = classifier.classify(alike(loud), RATE)
     assert set(labels.label) == {"unknown"}
     assert [(event.label, event.novel) for event in labels.events()] == [("unknown", True)]
     assert replace(labels, unknown_is_finding=False).events() == ()
-
-
-@pytest.mark.parametrize("level", [0.0, 0.3])
-def test_silence_and_uniform_motion_are_no_failure(classifier, level):
-    steady = np.full(round(2 * RATE), level)
-    followed = {"error_joints": np.zeros((JOINTS, len(steady)))}
-    labels = classifier.classify(alike(steady) | followed, RATE)
-    assert set(labels.label) == {"ok"}
-
-
-def test_training_frames_are_not_unknown(classifier):
-    labels = np.concatenate([classifier.classify(r.signal, RATE).label for r in RECORDINGS[12:]])
-    assert "unknown" not in labels
 
 
 @pytest.mark.parametrize("chunk", [1, 37, 400, 999, 5000])
@@ -206,24 +165,6 @@ def test_a_stream_has_the_same_labels(classifier, chunk):
     }
     for name, each in together.items():
         np.testing.assert_array_equal(each, getattr(batch, name))
-
-
-def test_a_missing_signal_is_named(classifier):
-    signals = RECORDINGS[0].signal
-    with pytest.raises(nc.SignalError, match=r"no signal error.*; there is desired, measured"):
-        classifier.classify({name: signals[name] for name in ("desired", "measured")}, RATE)
-
-
-def test_frames_after_a_gap_are_classified_as_without_it(classifier):
-    signals = RECORDINGS[14].signal
-    parts = [slice(0, 2000), slice(2000, None)]
-    first, rest = ({name: each[..., part] for name, each in signals.items()} for part in parts)
-    stream = nc.Stream(classifier, joints=JOINTS)
-    stream.push(first)
-    stream.skip(12_000)
-    found, alone = stream.push(rest), classifier.classify(rest, RATE)
-    np.testing.assert_allclose(found.start - 14.0, alone.start, atol=1e-9)
-    np.testing.assert_array_equal(found.label, alone.label)
 
 
 def test_a_stream_of_other_joints_is_refused():

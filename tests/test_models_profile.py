@@ -251,45 +251,6 @@ def test_settings_that_cannot_be_are_refused(change, text):
         replace(nc.Profile.paper(), **change)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"length": 1024},  # as long as the window
-        {"alarm": 0.999},
-        {"leaves": 2},
-        {"leaves": 16},
-        {"rate": 48_000},
-        {"bands": "log", "edges": (0.0, 5000.0)},  # from 0 to half the rate
-        {**LOG, "relative": True, "reference": False},
-        {**LOG, **QUICK, "quick_stride": 1},
-        {**LOG, "signals": ("measured", "measured_joints", "effort_joints")},
-        {**LOG, "signals": ("measured", "effort_joints")},
-        {"classes": ("ok", "impact")},
-        dict.fromkeys(("hop", "stride", "networks", "units", "epochs", "rounds"), 1),
-        dict.fromkeys(("floor", "regularization", "gamma", "learning_rate", "alarm"), 1e-09),
-        dict.fromkeys(("open_end", "widen_extra", "quick_window"), 0),
-        dict.fromkeys(("least_deviation", "decay", "penalty"), 0.0),
-    ],
-)
-def test_settings_at_their_limits_are_taken(change):
-    profile = replace(nc.Profile.paper(), **change)
-    assert {name: getattr(profile, name) for name in change} == change
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("rate", "length", "hop", "window", "stride", "floor", "regularization", "gamma"),
-        *("networks", "units", "epochs", "rounds", "learning_rate", "alarm"),
-    ],
-)
-def test_what_has_to_be_above_0_is_neither_0_nor_less(name):
-    kind = type(getattr(nc.Profile.paper(), name))
-    for value in (kind(0), kind(-1)):
-        with pytest.raises(nc.ProfileError, match=f"^{name} is {value!r}, expected more than"):
-            replace(nc.Profile.paper(), **{name: value})
-
-
 def test_settings_that_are_unknown_or_missing_are_named():
     settings = nc.Profile.paper().as_dict()
     with pytest.raises(nc.ProfileError, match="setting 'colour' is unknown"):

@@ -142,19 +142,6 @@ def test_what_does_not_fit_is_refused(estimator, width, error, reason):
         estimator.transform(noise) if hasattr(estimator, "profile_") else estimator.fit(noise)
 
 
-def test_frames_of_another_length_than_a_profile_has_are_refused():
-    with pytest.raises(nc.SignalError, match=r"expected \(frames, 4000\) for profile 'paper'"):
-        NoiseFeatures(nc.Profile.paper()).fit_transform(np.ones((3, 400)))
-
-
-@pytest.mark.parametrize("shape", [(59,), (61,), (60, 1), (30,)])
-def test_groups_of_another_shape_are_refused(shape):
-    noise, labels, _ = frames()
-    text = f"groups of shape {shape}, expected (60,)"
-    with pytest.raises(ValueError, match=f"^{re.escape(text)}$"):
-        NoiseClassifier().fit(noise, labels, np.full(shape, "run"))
-
-
 @pytest.mark.parametrize(("length", "bins"), [(2, 2), (19, 10), (60, 31), (99, 50)])
 def test_a_frame_shorter_than_a_window_has_the_bins_of_its_own_transform(length, bins):
     noise = np.random.default_rng(0).normal(size=(4, length))
@@ -164,20 +151,6 @@ def test_a_frame_shorter_than_a_window_has_the_bins_of_its_own_transform(length,
     assert (found.edges[0], found.edges[-1]) == (0.0, 500.0)
     np.testing.assert_allclose(np.diff(found.edges), 500.0 / bins)
     assert NoiseFeatures(rate=RATE).fit_transform(noise).shape[0] == 4
-
-
-def test_a_frame_as_long_as_a_window_has_the_bands_of_the_profile():
-    found = NoiseFeatures(rate=RATE).fit(np.ones((1, 100))).profile_
-    assert found == replace(nc.SCALAR.at(RATE), length=100)
-
-
-def test_many_rows_have_the_features_of_each():
-    noise = np.random.default_rng(0).normal(size=(nc.sklearn.CHUNK + 3, 100))
-    transformer = NoiseFeatures(rate=RATE).fit(noise)
-    found = transformer.transform(noise)
-    last = transformer.transform(noise[nc.sklearn.CHUNK - 1 :])
-    np.testing.assert_array_equal(found[nc.sklearn.CHUNK - 1 :], last)
-    assert len(found) == len(noise)
 
 
 def test_the_class_of_a_frame_is_that_of_the_highest_score():

@@ -69,22 +69,11 @@ def test_an_oscillation_about_a_steady_motion_sounds_the_same():
     np.testing.assert_allclose(middle(still.signal), middle(moving.signal), atol=1e-8)
 
 
-def test_a_single_joint_is_not_changed():
-    velocity = 0.01 * tone(440)
-    sound = sonify(run_of(velocity))
-    np.testing.assert_allclose(middle(sound.signal), middle(velocity), atol=1e-7)
-
-
 def test_powers_of_joints_in_antiphase_add():
     velocity = 0.01 * tone(300)
     alone = sonify(run_of(velocity))
     against = sonify(run_of(velocity, -velocity))
     assert rms(against.signal) == pytest.approx(np.sqrt(2) * rms(alone.signal), rel=1e-6)
-
-
-def test_powers_of_joints_at_different_frequencies_add():
-    both = sonify(run_of(0.03 * tone(200), 0.04 * tone(1500)))
-    assert rms(both.signal) == pytest.approx(0.05 / np.sqrt(2), rel=0.01)
 
 
 def test_the_power_of_a_sound_is_that_of_the_noise_estimate():
@@ -102,11 +91,6 @@ def test_twice_the_noise_is_6_db_more_at_equal_gain():
     assert levels[1] - levels[0] == pytest.approx(20 * np.log10(2), abs=0.01)
 
 
-def test_a_gain_scales_the_samples():
-    sound = sonify(run_of(0.01 * tone(440)))
-    assert rms(read(sound.file(20.0))[0]) == pytest.approx(0.1 / np.sqrt(2), rel=5e-3)
-
-
 def test_standstill_is_silent_and_reported_so():
     sound = sonify(run_of(np.zeros(20_000), np.zeros(20_000)))
     assert sound.silent
@@ -114,11 +98,6 @@ def test_standstill_is_silent_and_reported_so():
     assert not read(sound.file(60.0))[0].any()
     assert "silent: nothing reaches 1e-06 rad/s" in sound.description(0.0)
     assert str(sound).startswith("simplified noise: silent")
-
-
-def test_slow_motion_is_silent_also_at_the_ends_of_the_log():
-    sound = sonify(run_of(np.cos(2 * np.pi * 0.5 * times()), times()))
-    assert sound.peak < 1e-4
 
 
 def test_the_chosen_gain_does_not_clip_and_uses_the_full_scale():
@@ -217,11 +196,6 @@ def test_the_power_of_a_links_sound_is_that_of_the_extended_noise(arm, kind):
         assert rms(sound.signal) == pytest.approx(power, rel=0.01)
     whole = np.sqrt(np.sum(expected**2))
     assert rms(sonify(arm, Settings(kind=kind)).signal) == pytest.approx(whole, rel=0.01)
-
-
-def test_a_link_sounds_at_the_frequency_of_the_joints_that_move_it(arm):
-    gain = -20 * np.log10(sonify(arm, Settings(link="link1")).peak) - 1
-    assert pitch(sonify(arm, Settings(link="link1")).file(gain))[0] == pytest.approx(150, abs=0.5)
 
 
 @pytest.mark.parametrize(
