@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from simulated import simulated
 
-from noiseclassifier import scenarios
 from noiseclassifier.scenarios.arm import bodies
 from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.domains import DISTRIBUTION, Logger
@@ -39,12 +39,12 @@ PLAIN = Logger(
 
 @pytest.fixture(scope="module")
 def twin():
-    return scenarios.simulate("panda", GOOD, STANDS, duration=SECONDS, wide=True)
+    return simulated("panda", GOOD, STANDS, duration=SECONDS, wide=True)
 
 
 @pytest.fixture(scope="module")
 def pushed():
-    return scenarios.simulate("panda", "push", STANDS, duration=SECONDS, wide=True)
+    return simulated("panda", "push", STANDS, duration=SECONDS, wide=True)
 
 
 def real_panda():
@@ -111,8 +111,8 @@ def test_efforts_are_those_that_the_drives_measure_at_the_rate_of_the_run(twin):
 
 @pytest.mark.slow
 def test_a_blow_from_outside_is_not_among_the_torques_of_the_drives():
-    blow = scenarios.simulate("panda", "blow", STANDS, duration=3.0, wide=True)
-    twin = scenarios.simulate("panda", GOOD, STANDS, duration=3.0, wide=True)
+    blow = simulated("panda", "blow", STANDS, duration=3.0, wide=True)
+    twin = simulated("panda", GOOD, STANDS, duration=3.0, wide=True)
     (event,) = blow.meta["events"]
     size = event["facts"]["share"] * np.array(blow.meta["effort_limit"])
     begun = (blow.time > event["start"]) & (blow.time < event["start"] + 1e-3)

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pinocchio
 import pytest
+from simulated import simulated
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios.dataset import (
@@ -46,12 +47,12 @@ def drawn(seed=1, **changes):
 
 @pytest.fixture(scope="module")
 def good():
-    return simulate("ur5", GOOD, 10_000, duration=SECONDS)
+    return simulated("ur5", GOOD, 10_000, duration=SECONDS, wide=True)
 
 
 @pytest.fixture(scope="module")
 def tone():
-    return simulate("ur5", "tone", 10_001, duration=SECONDS)
+    return simulated("ur5", "tone", 10_001, duration=SECONDS, wide=True)
 
 
 def test_there_are_enough_robots_of_each_family_and_targets_of_each():
@@ -96,7 +97,7 @@ def test_a_data_set_is_continued_with_other_versions_of_the_software(tmp_path):
 
 
 def test_a_run_equals_its_twin_until_its_fault_begins(tone):
-    twin = simulate("ur5", GOOD, 10_001, duration=SECONDS)
+    twin = simulated("ur5", GOOD, 10_001, duration=SECONDS, wide=True)
     start = tone.meta["events"][0]["start"]
     before = tone.time < start - 0.02  # the low-pass of what is kept is not causal
     np.testing.assert_allclose(tone.velocity[before], twin.velocity[before], atol=1e-4)
@@ -104,11 +105,11 @@ def test_a_run_equals_its_twin_until_its_fault_begins(tone):
 
 
 def test_a_fault_of_a_whole_run_is_there_from_its_first_sample():
-    run = simulate("panda", "throughout-gains", 10_000, duration=2.0)
+    run = simulated("panda", "throughout-gains", 10_000, duration=2.0, wide=True)
     (event,) = run.meta["events"]
     assert (event["start"], event["stop"]) == (0.0, 2.0)
     assert run.meta["recipe"] == "domains 3"
-    twin = simulate("panda", GOOD, 10_000, duration=2.0)
+    twin = simulated("panda", GOOD, 10_000, duration=2.0, wide=True)
     assert twin.meta["recipe"] == "domains 2"
     first = round(0.2 * run.rate)
     assert np.abs(run.velocity - twin.velocity)[:first].max() > 1e-3

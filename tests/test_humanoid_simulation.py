@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from simulated import simulated
 
-from noiseclassifier import scenarios
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.humanoid import SETTLING, bodies, plan, scene, standing
@@ -97,12 +97,12 @@ def test_mujoco_and_pinocchio_agree_on_soles_and_centre_of_mass_along_a_walk(rob
 
 @pytest.fixture(scope="module")
 def straight():
-    return scenarios.simulate("talos", "straight", SEED, duration=SHORT)
+    return simulated("talos", "straight", SEED, duration=SHORT)
 
 
 @pytest.fixture(scope="module")
 def obstacle(straight):
-    return scenarios.simulate("talos", "obstacle-full", SEED, duration=SHORT)
+    return simulated("talos", "obstacle-full", SEED, duration=SHORT)
 
 
 def test_a_healthy_walk_is_ok_all_the_time(straight):
@@ -164,26 +164,26 @@ def test_planned_velocities_are_those_that_drives_follow_where_nothing_disturbs(
 @pytest.mark.parametrize("robot", ["talos", "g1"])
 @pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
 def test_humanoids_walk_every_way_without_an_event(robot, way):
-    run = scenarios.simulate(robot, way, 2)
+    run = simulated(robot, way, 2)
     assert [block.label for block in run.blocks] == ["ok"]
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("side", ["full", "heel", "toe", "left", "right"])
 def test_obstacles_under_any_part_of_a_sole_are_impacts(side):
-    run = scenarios.simulate("talos", f"obstacle-{side}", 2)
+    run = simulated("talos", f"obstacle-{side}", 2)
     assert "impact" in {block.label for block in run.blocks}
 
 
 @pytest.mark.slow
 def test_too_high_gains_end_in_oscillations():
-    run = scenarios.simulate("talos", "limit-cycle", 2)
+    run = simulated("talos", "limit-cycle", 2)
     assert "oscillations" in {block.label for block in run.blocks}
 
 
 @pytest.mark.slow
 def test_a_partial_contact_at_the_edge_of_a_platform_is_labelled():
-    run = scenarios.simulate("talos", "platform", 2)
+    run = simulated("talos", "platform", 2)
     assert {"ok", "highaccelerations"} <= {block.label for block in run.blocks}
     assert run.base_pose[-1, 2] == pytest.approx(run.base_pose[0, 2] - 0.06, abs=0.02)
 

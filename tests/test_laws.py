@@ -16,13 +16,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from simulated import simulated
 
 import noisemodel as nm
 from inspector.analysis.analyse import analyse
 from inspector.analysis.status import Status, Unknown
 from inspector.assets import demo_run
 from inspector.library import load_library, signals_of
-from noiseclassifier import scenarios
 from noiseclassifier.faults import KINDS, fault
 from noiseclassifier.scenarios.logs import LEVELS
 
@@ -45,7 +45,7 @@ def good_run(robot, rate):
     Models raise false alarms in some trots (docs/measured.md); the law is about the rest.
     """
     for seed in range(9001, 9031):
-        run = scenarios.simulate(robot, "straight", seed)
+        run = simulated(robot, "straight", seed)
         run = run.cut(float(run.time[0]) + 1.0, float(run.time[0]) + 1.0 + SECONDS)
         run = nm.decimated(run, rate) if rate < run.rate else run
         if analyse(run, LIBRARY).status is Status.OK:

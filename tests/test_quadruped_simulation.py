@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
+from simulated import simulated
 
-from noiseclassifier import scenarios
 from noiseclassifier.scenarios.faults import NO_DEFECT, Faults, Imperfections
 from noiseclassifier.scenarios.labels import annotate
 from noiseclassifier.scenarios.motions import Trot
@@ -189,7 +189,7 @@ def test_a_robot_that_lies_or_leans_has_fallen():
 @pytest.mark.parametrize("robot", ["go2", "solo12", "anymal"])
 @pytest.mark.parametrize("way", ["straight", "curve", "directions", "spot"])
 def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
-    run = scenarios.simulate(robot, way, 1)
+    run = simulated(robot, way, 1)
     (block,) = run.blocks
     assert (block.start, block.label) == (0.0, "ok")
     assert block.stop == pytest.approx(run.meta["duration"])
@@ -201,5 +201,5 @@ def test_a_healthy_quadruped_is_ok_all_the_time(robot, way):
 def test_a_scenario_has_its_failure_on_every_quadruped(robot, name):
     if (robot, name) == ("anymal", "decalibrated"):
         pytest.skip("every step of ANYmal differs from its twin's then, impacts do not stand out")
-    run = scenarios.simulate(robot, name, 1)
+    run = simulated(robot, name, 1)
     assert FAILURE[name] in {block.label for block in run.blocks}

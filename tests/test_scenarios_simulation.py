@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from simulated import simulated
 
 from noiseclassifier import scenarios
 from noiseclassifier.scenarios import simulation
@@ -33,7 +34,7 @@ FAILURE = {
 @pytest.fixture(scope="module")
 def runs() -> dict[tuple[str, int], Run]:
     return {
-        (name, seed): scenarios.simulate("panda", name, seed, duration=SHORT)
+        (name, seed): simulated("panda", name, seed, duration=SHORT)
         for seed, names in zip(SEEDS, (("straight", *FAILURE), ("straight",)), strict=True)
         for name in names
     }
@@ -71,9 +72,9 @@ def test_full_runs_of_every_arm_contain_their_failure_too(robot):
         # A limit cycle grows from rounding, which differs between processors: not in every seed is
         # it felt, and in which it is depends on the machine.
         seeds = (1, 2, 3) if name == "limit-cycle" else (1,)
-        assert any(failure in labels(scenarios.simulate(robot, name, seed)) for seed in seeds), name
+        assert any(failure in labels(simulated(robot, name, seed)) for seed in seeds), name
     for name in HEALTHY:
-        assert labels(scenarios.simulate(robot, name, 1)) == {"ok"}, name
+        assert labels(simulated(robot, name, 1)) == {"ok"}, name
 
 
 def test_runs_of_a_seed_are_the_same_until_the_defect_acts(runs):
