@@ -24,7 +24,7 @@ from inspector.localisation.links import fault_links
 from inspector.localisation.localise import Localisation, localise
 from noiseclassifier.scenarios import ROBOTS, ScenarioError, SimulationError, simulate
 from noiseclassifier.scenarios.robots import limbs
-from noisemodel.links import LinkNoise, link_noise
+from noisemodel.extended import LinkNoise, link_noise
 
 SCENARIOS = (
     "obstacle-full",

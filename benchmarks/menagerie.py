@@ -23,7 +23,7 @@ from rerun.chunk import RrdReader
 import noisemodel as nm
 from inspector.errors import InspectorError
 from inspector.recording import robot as scene
-from noisemodel.catalog import menagerie_names
+from noisemodel.robot import menagerie_names
 from noisemodel.surface import triangles
 from noisemodel.types import Array
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from inspector import colors
-from noisemodel.links import LinkNoise, vibrating_pieces
+from noisemodel.extended import LinkNoise, vibrating_pieces
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array, Mask, Real
 

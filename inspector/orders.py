@@ -9,7 +9,7 @@ import numpy as np
 from inspector.analysis.analyse import Analysis
 from inspector.localisation.order import SLOWEST
 from inspector.spectrogram import Spectrogram, amplitudes, in_bands
-from noisemodel.links import vibrating
+from noisemodel.extended import vibrating
 from noisemodel.runfile import pieces
 from noisemodel.types import Array
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from noisemodel import RobotError, Run, UnknownJointError, UnknownRobotError
-from noisemodel.limits import Limits, joint_limits
+from noisemodel.robot import Limits, joint_limits
 from noisemodel.runfile import pieces
 from noisemodel.types import Mask, Real
 

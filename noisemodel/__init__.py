@@ -5,10 +5,7 @@ base's own axes, linear, then angular, as Pinocchio has it. Source of the noise 
 and D. Rixen, "Learning the Noise of Failure: Intelligent System Tests for Robots", Sec. II-A.
 """
 
-from noisemodel.catalog import ROBOTS
-from noisemodel.compare import compare
-from noisemodel.comparison import Comparison, RobotComparison
-from noisemodel.comparisons import Comparisons, LeftOut
+from noisemodel.compare import Comparison, Comparisons, LeftOut, RobotComparison, compare
 from noisemodel.errors import (
     ClusterError,
     CornerError,
@@ -26,15 +23,11 @@ from noisemodel.errors import (
     UnknownMotionError,
     UnknownRobotError,
 )
-from noisemodel.extended import extended, extended_chunks
-from noisemodel.kinematics import link_twists
-from noisemodel.noise import Noise
-from noisemodel.norms import by_joint, norms
+from noisemodel.extended import KINDS, extended, extended_chunks, surface_speed
+from noisemodel.noise import Noise, by_joint, norms, simplified
 from noisemodel.recorder import Recorder
-from noisemodel.robot import Robot
+from noisemodel.robot import ROBOTS, Robot, link_twists
 from noisemodel.run import Block, Run, decimated, resample
-from noisemodel.simplified import simplified
-from noisemodel.speed import KINDS, surface_speed
 from noisemodel.surface import Surface
 
 __all__ = [

@@ -1,18 +1,250 @@
 """The extended noise estimate: the sound power of every link, by its surface and its speed."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from types import MappingProxyType
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from noisemodel.dipole import Dipole
-from noisemodel.errors import NoiseModelError
-from noisemodel.kinematics import CHUNK
-from noisemodel.noise import DENSITY, SOUND_SPEED, Noise, check_positive, sound_power
-from noisemodel.robot import Robot
-from noisemodel.speed import check_kind, check_motion, chunk_speeds
-from noisemodel.surface import Surface, check_surface
-from noisemodel.types import Array, Real
+from noisemodel.errors import CornerError, MotionError, NoiseModelError, UnknownKindError
+from noisemodel.noise import CHUNK, DENSITY, SOUND_SPEED, Noise, check_positive, sound_power
+from noisemodel.robot import Joint, Robot, chunk_twists, link_twists
+from noisemodel.run import Run, stretches
+from noisemodel.runfile import AT_ONCE, pieces
+from noisemodel.surface import (
+    LinkSurface,
+    Surface,
+    check_surface,
+    point_speeds,
+    turning_speed,
+)
+from noisemodel.types import Array, Mask, Real
+
+Index: TypeAlias = NDArray[np.intp]
+
+Weighing: TypeAlias = Callable[[int, Array], Array]
+"""Takes a link and signals of its motion that are linear in velocities, and returns as many."""
+
+QUADRATIC = ("rms", "normal")
+"""The kinds whose square is a quadratic form of a link's twist."""
+
+BLOCK_OF_POINTS = 256
+"""Samples of all points of a link that fit into the cache."""
+BIN = 0.01
+"""Shortest bin, in [s]."""
+BINS = 4000
+"""Most bins that a run is divided into."""
+BLOCK = 2**16
+"""Samples whose running mean is taken at once."""
+FAST = 10.0
+"""Motion below this frequency moves the robot and does not vibrate, in [Hz]."""
+
+
+# Mean speeds of a link's surface: the paper's equation and its alternatives.
+
+
+def surface_speed(robot: Robot, surface: Surface, q: Real, v: Real, kind: str = "paper") -> Array:
+    """Mean speed of the surface of every link.
+
+    Args:
+        robot: The robot.
+        surface: Its surface.
+        q: Configurations as Pinocchio has them, shape (samples, nq).
+        v: Velocities as Pinocchio has them, shape (samples, nv).
+        kind: "paper", the sum of the paper's terms "A", "B" and "C", or one of these; "mean",
+            the exact mean that the sum is an upper bound of; "rms", the root of the mean-square
+            speed; "normal", that of the mean-square speed normal to the surface.
+
+    Returns:
+        Shape (samples, links), in [m/s]; 0 for links without geometry.
+
+    Raises:
+        UnknownKindError: If there is no such kind.
+        GeometryError: If the surface is that of another robot.
+        MotionError: If ``q`` or ``v`` are of another shape or not finite.
+    """
+    check_kind(kind)
+    check_surface(surface, robot)
+    check_motion(robot, q, v)
+    speeds = np.empty((len(surface.links), len(q)))
+    for start in range(0, len(q), CHUNK):
+        part = slice(start, start + CHUNK)
+        speeds[:, part] = chunk_speeds(robot, surface, q[part], v[part], kind)
+    return speeds.T
+
+
+def chunk_speeds(
+    robot: Robot,
+    surface: Surface,
+    q: Real,
+    v: Real,
+    kind: str,
+    weighing: Weighing | None = None,
+) -> Array:
+    """Compute the mean speeds of all links in a few thousand samples."""
+    twists = np.empty((len(robot.joints) + 1, 6, len(q)))
+    chunk_twists(robot.joints, q, v, out=twists)
+    velocities = np.ascontiguousarray(v.T, dtype=np.float64)
+    speeds = np.zeros((len(surface.links), len(q)))
+    for place, (link, index) in enumerate(zip(surface.links, surface.joint, strict=True)):
+        if link.area:
+            joint, twist = robot.joints[index - 1], twists[index]
+            velocity = velocities[joint.first_v : joint.first_v + joint.nv]
+            if weighing is not None:
+                weighed = weighing(place, np.vstack((twist, velocity)))
+                twist, velocity = weighed[:6], weighed[6:]
+            speeds[place] = KINDS[kind](link, joint, twist, velocity)
+    return speeds
+
+
+# Each of these takes the surface of a link, its joint, its twist, shape (6, samples), and the
+# velocity of its joint, shape (nv, samples), and returns a mean speed, shape (samples,).
+
+
+def _paper(link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
+    own = joint.own_twist(velocity)
+    carried = twist - own
+    return _length(carried[:3]) + _turning(link, carried) + _driven(link, own)
+
+
+def _a(_link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
+    return _length((twist - joint.own_twist(velocity))[:3])  # A = |v_O|, Sec. II-A
+
+
+def _b(link: LinkSurface, joint: Joint, twist: Array, velocity: Array) -> Array:
+    return _turning(link, twist - joint.own_twist(velocity))  # B = <|w_parent x r|>
+
+
+def _c(link: LinkSurface, joint: Joint, _twist: Array, velocity: Array) -> Array:
+    return _driven(link, joint.own_twist(velocity))
+
+
+def _mean(link: LinkSurface, _joint: Joint, twist: Array, _velocity: Array) -> Array:
+    weights, points = link.points.weights, link.points.points
+    return np.concatenate(
+        [
+            weights @ point_speeds(points, twist[:, start : start + BLOCK_OF_POINTS])
+            for start in range(0, twist.shape[1], BLOCK_OF_POINTS)
+        ]
+    )
+
+
+def _rms(link: LinkSurface, _joint: Joint, twist: Array, _velocity: Array) -> Array:
+    return _root(link.mean_square, twist)
+
+
+def _normal(link: LinkSurface, _joint: Joint, twist: Array, _velocity: Array) -> Array:
+    return _root(link.mean_square_normal, twist)
+
+
+KINDS: Mapping[str, Callable[[LinkSurface, Joint, Array, Array], Array]] = MappingProxyType(
+    {
+        "paper": _paper,
+        "A": _a,
+        "B": _b,
+        "C": _c,
+        "mean": _mean,
+        "rms": _rms,
+        "normal": _normal,
+    }
+)
+"""The kinds of mean speed, and how each is computed."""
+
+
+def _driven(link: LinkSurface, own: Array) -> Array:
+    """C = |v_rel| + <|w_rel x r|>; for a joint with one axis the latter is |qdot| G."""
+    turning = _turning(link, own) if np.isnan(link.lever) else _length(own[3:]) * link.lever
+    return _length(own[:3]) + turning
+
+
+def _turning(link: LinkSurface, twist: Array) -> Array:
+    return turning_speed(link.turning, link.rounding, twist[3:])
+
+
+def _length(vectors: Array) -> Array:
+    length: Array = np.sqrt(np.einsum("is,is->s", vectors, vectors))
+    return length
+
+
+def _root(form: Array, twist: Array) -> Array:
+    squares = np.einsum("is,is->s", form @ twist, twist)
+    root: Array = np.sqrt(np.maximum(squares, 0.0))  # rounding, where nothing moves outwards
+    return root
+
+
+def check_kind(kind: str) -> None:
+    """Refuse an unknown kind."""
+    if kind not in KINDS:
+        raise UnknownKindError(kind, tuple(KINDS))
+
+
+def check_motion(robot: Robot, q: Real, v: Real, *, names: tuple[str, str] = ("q", "v")) -> None:
+    """Refuse a motion that is not this robot's, or not finite."""
+    for name, array, width in zip(names, (q, v), (robot.nq, robot.nv), strict=True):
+        if array.shape != (len(q), width):
+            raise MotionError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
+        finite = np.isfinite(array)
+        if not finite.all():
+            row, column = np.argwhere(~finite)[0]
+            raise MotionError(
+                f"{name}: {array[row, column]} in row {row}, column {column}; cut gaps out"
+            )
+
+
+def corner_frequencies(surface: Surface, *, sound_speed: float) -> Array:
+    """Find the frequency above which each link radiates fully."""
+    radius = np.sqrt(surface.area / (4.0 * np.pi))
+    with np.errstate(divide="ignore"):
+        corners: Array = np.sqrt(2.0) * sound_speed / (2.0 * np.pi * radius)
+    return corners
+
+
+class Dipole:
+    """The radiation of small bodies that oscillate: the lower the frequency, the less.
+
+    A sphere of radius a that oscillates at the frequency f radiates with the efficiency
+    x^4 / (4 + x^4), x = 2 pi f a / c. That is the squared magnitude of a Butterworth high-pass of
+    order 2 with its corner at f_c = sqrt(2) c / (2 pi a), so it acts on motions in time. A link
+    counts as the sphere of its area, a = sqrt(S / 4 pi); its frame hardly turns during 1 / f_c.
+    The filter of every link keeps its state from one chunk to the next.
+
+    Before its first sample the robot counts as having moved as it does then.
+
+    Args:
+        surface: The surface of a robot.
+        rate: Sample rate, in [Hz].
+        sound_speed: In [m/s].
+
+    Raises:
+        CornerError: If the corner of a link is not below half the rate.
+    """
+
+    def __init__(self, surface: Surface, *, rate: float, sound_speed: float) -> None:
+        from scipy.signal import butter
+
+        corners = corner_frequencies(surface, sound_speed=sound_speed)
+        sources = np.flatnonzero(surface.area)
+        small = [link for link in sources if corners[link] >= 0.5 * rate]
+        if small:
+            raise CornerError([surface.names[i] for i in small], corners[small].tolist(), rate)
+        self._filters = {
+            int(link): butter(2, corners[link], "highpass", fs=rate, output="sos")
+            for link in sources
+        }
+        self._states: dict[int, Array] = {}
+
+    def __call__(self, link: int, motion: Array) -> Array:
+        """Filter the next chunk of a link's motion."""
+        from scipy.signal import sosfilt, sosfilt_zi
+
+        sections = self._filters[link]
+        if link not in self._states:
+            self._states[link] = sosfilt_zi(sections)[:, None, :] * motion[:, :1]
+        radiating, self._states[link] = sosfilt(sections, motion, zi=self._states[link])
+        return radiating
 
 
 def extended(
@@ -95,31 +327,8 @@ def extended_chunks(
 ) -> Iterator[Noise]:
     """Estimate the sound power that each link radiates chunk by chunk, in little memory.
 
-    Chunks put together are what ``extended`` returns, however long they are.
-
-    Args:
-        robot: See ``extended``, as for all but the last.
-        surface: See ``extended``.
-        q: See ``extended``.
-        v: See ``extended``.
-        kind: See ``extended``.
-        density: See ``extended``.
-        sound_speed: See ``extended``.
-        efficiency: See ``extended``.
-        rate: See ``extended``.
-        q_desired: See ``extended``.
-        v_desired: See ``extended``.
-        chunk: Samples in each chunk but the last.
-
-    Returns:
-        The noise of one chunk after the other; each is computed when it is taken.
-
-    Raises:
-        UnknownKindError: If the kind does not exist.
-        GeometryError: If the surface is that of another robot.
-        CornerError: If a link is too small for "dipole" at this rate.
-        MotionError: If ``q`` or ``v`` are of another shape than the robot's, or not finite.
-        NoiseModelError: If a number is not positive, or lengths differ.
+    Chunks of so many samples, put together, are what ``extended`` returns, whatever their length;
+    each is computed when it is taken. All else is as in ``extended``.
     """
     check_kind(kind)
     check_surface(surface, robot)
@@ -202,3 +411,338 @@ def _efficiencies(efficiency: float | Sequence[float] | Real | str, surface: Sur
     if not ((each > 0.0) & (each < np.inf)).all():
         raise NoiseModelError(f"efficiency is {each.min():g}, expected positive numbers")
     return np.broadcast_to(each, len(surface.links))
+
+
+# The noise of a run, link by link, in bins of time.
+
+
+@dataclass(frozen=True, eq=False)
+class LinkNoise:
+    """Sound power of each link.
+
+    Attributes:
+        kind: How the mean speed of a surface was taken.
+        links: Names of the links, shape (links,).
+        movers: Names of the joints that move each link, shape (links,).
+        time: Centres of the bins, shape (bins,), in [s].
+        power: Mean power in each bin, shape (bins, links), in [W].
+        vibration: That of the measured motion above 10 Hz alone, normal to the surface,
+            shape (bins, links), in [W].
+        terms: Total power by each of the paper's terms A, B and C, shape (bins,), in [W]; empty
+            unless they are requested.
+        remarks: What is missing or assumed, a sentence each.
+    """
+
+    kind: str
+    links: tuple[str, ...]
+    movers: tuple[frozenset[str], ...]
+    time: Array
+    power: Array
+    vibration: Array
+    terms: dict[str, Array]
+    remarks: tuple[str, ...]
+
+    @property
+    def total(self) -> Array:
+        """Power of the whole robot, shape (bins,), in [W]."""
+        return np.asarray(self.power.sum(axis=1))
+
+    @property
+    def loudest(self) -> list[int]:
+        """Indices of the links, the one that vibrates with the largest peak first."""
+        return [int(i) for i in np.argsort(-self.vibration.max(axis=0), kind="stable")]
+
+
+def link_noise(
+    run: Run, kind: str = "normal", *, geometry: str = "auto", terms: bool = False
+) -> LinkNoise:
+    """Compute the extended noise of a run.
+
+    Args:
+        run: A run of a robot that is known, with positions.
+        kind: "paper", "A", "B", "C", "mean", "rms" or "normal", as ``noisemodel.extended`` has
+            them.
+        geometry: "visual", "collision", "hull" or "auto".
+        terms: Whether to add up the paper's terms A, B and C, one by one.
+
+    Returns:
+        The noise; measured and desired motion add up.
+
+    Raises:
+        RobotError: If the robot cannot be read, or lacks one of the run's joints.
+        GeometryError: If its surface cannot be read.
+    """
+    assert run.robot is not None
+    floating = True if run.base_pose is not None else None
+    robot = Robot.load(run.robot, floating_base=floating)
+    surface = Surface.of(robot, geometry)
+    bins = _edges(run)
+    middles = _middles(run, bins)
+
+    q, wanted = robot.configuration(middles)[0], robot.desired(middles)
+    motion, wanted_motion = run.motion, run.velocity_desired
+
+    def fast_part(first: int, stop: int) -> Array:
+        return _vibrating_part(motion, run.mask, run.rate, first, stop)
+
+    fast = _moments(robot, run, fast_part, bins)
+    motions, desired = [("normal", fast)], []
+    if kind in QUADRATIC:
+        motions.append((kind, _moments(robot, run, lambda a, b: motion[a:b], bins)))
+        if wanted_motion is not None:
+            by_part = lambda a, b: wanted_motion[a:b]  # noqa: E731
+            desired = [(kind, _moments(robot, run, by_part, bins, desired=True))]
+    if run.position_desired is None:  # desired velocities at measured positions: one pose for all
+        motions, desired = [*motions, *desired], []
+    vibration, *power = by_moments(robot, surface, q, motions)
+    if desired and wanted is not None:
+        power += by_moments(robot, surface, wanted[0], desired)
+    if kind not in QUADRATIC:
+        power = [by_samples(robot, surface, run, kind, bins)]
+    return LinkNoise(
+        kind=kind,
+        links=surface.names,
+        movers=tuple(_movers(robot, joint) for joint in surface.joint.tolist()),
+        time=run.time[bins[:-1]] + np.diff(bins) / 2 / run.rate,
+        power=np.sum(power, axis=0),
+        vibration=vibration,
+        terms={
+            term: by_samples(robot, surface, run, term, bins).sum(axis=1)
+            for term in ("ABC" if terms else "")
+        },
+        remarks=tuple(_remarks(run, robot, surface)),
+    )
+
+
+def vibrating(velocity: Real, valid: Mask, rate: float) -> Array:
+    """The fast part of a motion: without its running mean over a tenth of a second.
+
+    Args:
+        velocity: Shape (samples, nv).
+        valid: False in gaps, shape (samples,); no mean reaches over one.
+        rate: Samples per second, in [Hz].
+
+    Returns:
+        What vibrates at 10 Hz and above, and little of what is slower, shape (samples, nv).
+    """
+    fast = np.zeros(velocity.shape[::-1])
+    half = _half(rate)
+    for stretch in stretches(valid, len(velocity)):
+        length = stretch.stop - stretch.start
+        for begin in range(0, length, BLOCK):
+            centre = np.arange(begin, min(begin + BLOCK, length))
+            # Towards the ends the mean is taken over less, so that it stays in the middle.
+            reach = np.minimum(np.minimum(centre, length - 1 - centre), half)
+            low, high = max(0, begin - half), min(begin + BLOCK + half, length)
+            first, last = centre - reach - low, centre + reach + 1 - low
+            count = (last - first).astype(np.float64)
+            sums = np.zeros(high - low + 1)
+            inside = velocity[stretch.start + low : stretch.start + high]
+            around = np.ascontiguousarray(inside.T, dtype=np.float64)
+            rows = slice(stretch.start + begin, stretch.start + begin + len(centre))
+            for part, found in zip(around, fast[:, rows], strict=True):  # each stays in the cache
+                np.cumsum(part, out=sums[1:])
+                found[:] = part[begin - low :][: len(centre)] - (sums[last] - sums[first]) / count
+    return fast.T
+
+
+def vibrating_pieces(
+    velocity: Real, valid: Mask, rate: float, multiple: int = 1
+) -> Iterator[tuple[slice, Array]]:
+    """The fast part of a motion, see `vibrating`, piece by piece."""
+    for rows in pieces(velocity, multiple):
+        yield rows, _vibrating_part(velocity, valid, rate, rows.start, rows.stop)
+
+
+def _vibrating_part(velocity: Real, valid: Mask, rate: float, first: int, stop: int) -> Array:
+    half = _half(rate)
+    around = slice(max(0, first - half), stop + half)
+    found = vibrating(velocity[around], valid[around], rate)
+    return found[first - around.start :][: stop - first]
+
+
+def _half(rate: float) -> int:
+    """Samples on each side of the middle of the running mean."""
+    return max(1, round(rate / FAST / 2))
+
+
+def _edges(run: Run) -> Index:
+    """First sample of each bin, and the end; there are two bins or more."""
+    samples = len(run.time)
+    size = max(1, min(round(BIN * run.rate), samples // 2), -(-samples // BINS))
+    return np.append(np.arange(0, samples, size), samples)
+
+
+def _middles(run: Run, bins: Index) -> Run:
+    """Take one sample of each bin: the middle one of those that are valid."""
+    samples = (bins[:-1] + bins[1:]) // 2
+    for index in np.flatnonzero(~run.mask[samples]):
+        valid = bins[index] + np.flatnonzero(run.mask[bins[index] : bins[index + 1]])
+        if len(valid):
+            samples[index] = valid[len(valid) // 2]
+
+    def at(signal: Real | None) -> Real | None:
+        return None if signal is None else signal[samples]
+
+    return Run(
+        time=np.arange(len(samples)) * int(bins[1]) / run.rate,
+        velocity=run.velocity[samples],
+        joint_names=run.joint_names,
+        position=at(run.position),
+        velocity_desired=at(run.velocity_desired),
+        position_desired=at(run.position_desired),
+        desired_joint_names=run.desired_joint_names,
+        valid=run.mask[samples],
+        base_pose=at(run.base_pose),
+        robot=run.robot,
+    )
+
+
+def _moments(
+    robot: Robot,
+    run: Run,
+    motion: Callable[[int, int], Real],
+    bins: Index,
+    *,
+    desired: bool = False,
+) -> Array:
+    """Mean products of a run's velocities, in Pinocchio's order, shape (bins, nv, nv)."""
+    first = {joint.name: joint.first_v for joint in robot.joints}
+    names = run.desired_joint_names if desired else run.joint_names
+    entries, chosen = [first[name] for name in names], slice(None)
+    if not desired and run.base_velocity is not None:
+        if robot.floating_base:
+            entries = [*range(6), *entries]
+        else:
+            chosen = slice(6, None)
+    size, width = int(bins[1]), len(entries) or 1
+    many = size * max(1, AT_ONCE // (8 * size * width))
+    # A bin that is shorter than the others is taken with those before it.
+    starts = [start for start in range(0, len(run.time), many) if len(run.time) - start >= size]
+    parts = pairwise([*starts, len(run.time)])
+    products = np.concatenate(
+        [
+            second_moments(motion(*part)[:, chosen], run.mask[slice(*part)], size=size)
+            for part in parts
+        ]
+    )
+    moments = np.zeros((robot.nv, robot.nv, len(bins) - 1))  # in memory as `by_moments` reads it
+    moments[np.array(entries)[:, None], entries] = products.transpose(1, 2, 0)
+    return moments.transpose(2, 0, 1)
+
+
+def _movers(robot: Robot, carrier: int) -> frozenset[str]:
+    names = set[str]()
+    while carrier:  # 0 is the universe
+        joint = robot.joints[carrier - 1]
+        names.add(joint.name)
+        carrier = joint.parent
+    return frozenset(names)
+
+
+def _remarks(run: Run, robot: Robot, surface: Surface) -> Iterator[str]:
+    missing = [name for name in robot.joint_names if name not in run.joint_names]
+    if missing:
+        yield f"Not in the log, assumed stationary: {', '.join(missing)}."
+    if surface.without_geometry:
+        yield f"Links without geometry make no noise: {', '.join(surface.without_geometry)}."
+    if robot.floating_base and run.base_velocity is None:
+        yield "The run has no base velocity: its base is assumed stationary."
+
+
+def by_samples(robot: Robot, surface: Surface, run: Run, kind: str, bins: Index) -> Array:
+    """Average the power of each link over bins, of any kind; gaps do not count."""
+    size = int(bins[1])
+    q_desired, v_desired = robot.desired(run) or (None, None)
+    chunks = extended_chunks(
+        robot,
+        surface,
+        *robot.configuration(run),
+        kind,
+        q_desired=q_desired,
+        v_desired=v_desired,
+        chunk=size * max(1, CHUNK // size),
+    )
+    means, start = [], 0
+    for chunk in chunks:
+        counted = run.mask[start : start + len(chunk.power), None]
+        firsts = np.arange(0, len(counted), size)
+        energy = np.add.reduceat(chunk.power * counted, firsts, axis=0)
+        means.append(energy / np.maximum(np.add.reduceat(counted.astype(float), firsts), 1.0))
+        start += len(counted)
+    return np.concatenate(means)
+
+
+def by_moments(
+    robot: Robot, surface: Surface, q: Array, motions: Sequence[tuple[str, Array]]
+) -> list[Array]:
+    """Average powers that are quadratic in velocities, from second moments instead of samples.
+
+    Within a bin of some ten milliseconds the robot hardly moves. With a link's Jacobian J as it
+    is in the middle of the bin, < nu' M nu > = < v' J' M J v > = sum_jk (J' M J)_jk < v_j v_k >.
+
+    Args:
+        robot: The robot.
+        surface: Its surface.
+        q: Configuration in the middle of each bin, shape (bins, nq).
+        motions: The motions that take place there: one of ``QUADRATIC``, and mean products of
+            velocities over each bin, shape (bins, nv, nv).
+
+    Returns:
+        For each motion, shape (bins, links), in [W].
+    """
+    jacobians = _jacobians(robot, q)
+    # Bins lie next to each other in memory: all of them are worked on at once.
+    products = [np.ascontiguousarray(moments.transpose(1, 2, 0)) for _, moments in motions]
+    power = [np.zeros((len(q), len(surface.links))) for _ in motions]
+    for place, (link, joint) in enumerate(zip(surface.links, surface.joint, strict=True)):
+        if not link.area:
+            continue
+        entries, jacobian = jacobians(int(joint))
+        forms = {"normal": link.mean_square_normal, "rms": link.mean_square}
+        projected = {
+            kind: _projected(forms[kind], jacobian) for kind in {kind for kind, _ in motions}
+        }
+        for total, (kind, _), product in zip(power, motions, products, strict=True):
+            square = np.einsum("jkb,jkb->b", projected[kind], product[entries[:, None], entries])
+            # Rounding may make a square negative.
+            total[:, place] = sound_power(np.maximum(square, 0.0), link.area)
+    return power
+
+
+def _projected(form: Array, jacobian: Array) -> Array:
+    """J' M J, shape (entries, entries, bins)."""
+    pushed = (form @ jacobian.reshape(6, -1)).reshape(jacobian.shape)
+    return np.asarray(np.einsum("ajb,akb->jkb", pushed, jacobian))
+
+
+def second_moments(velocity: Real, valid: Mask, *, size: int) -> Array:
+    """Average the products of velocities over each bin; the last bin may be shorter."""
+    if not valid.all():
+        velocity = np.where(valid[:, None], velocity, 0.0)
+    parts = np.lib.stride_tricks.sliding_window_view(velocity, size, axis=0)[::size]
+    rest = velocity[None, len(parts) * size :].transpose(0, 2, 1)
+    products = [part @ part.transpose(0, 2, 1) for part in (parts, rest) if part.size]
+    counts = np.add.reduceat(valid.astype(float), np.arange(0, len(valid), size))
+    return np.asarray(np.concatenate(products) / np.maximum(counts, 1.0)[:, None, None])
+
+
+def _jacobians(robot: Robot, q: Array) -> Callable[[int], tuple[Index, Array]]:
+    """Move the joints one after the other, those on different branches at once."""
+    chains: dict[int, list[int]] = {0: []}
+    for index, joint in enumerate(robot.joints, start=1):
+        chains[index] = [*chains[joint.parent], *range(joint.first_v, joint.first_v + joint.nv)]
+    # Each entry's turn is its place in the chain from the root: none in a chain share one.
+    turn = np.zeros(robot.nv, dtype=np.intp)
+    for chain in chains.values():
+        turn[chain] = np.arange(len(chain))
+    unit = (turn == np.arange(turn.max(initial=0) + 1)[:, None]).astype(np.float64)
+    v = np.repeat(unit, len(q), axis=0)
+    twists = link_twists(robot, np.tile(q, (len(unit), 1)), v)
+    twists = twists.transpose(1, 2, 0).reshape(-1, 6, len(unit), len(q))
+
+    def jacobian(joint: int) -> tuple[Index, Array]:
+        entries = np.array(chains[joint], dtype=np.intp)
+        return entries, twists[joint].take(turn[entries], axis=1)
+
+    return jacobian

@@ -5,26 +5,44 @@ a Pinocchio model one by one. Pinocchio's own reader of MJCF (``pinocchio.buildM
 4.1) gives the same joints where it can, and a test holds this module to it; but it leaves out
 included files, bodies without a name and all trees but the first, and merges the joints of a body
 into one, all without an error. Meshes are not opened here: they are read as a URDF's are.
+
+A few bytes of MJCF can ask MuJoCo for any memory and time, or crash it. So it compiles in a process
+of its own, within limits, in a folder of its own; what is left here is to look at the files that it
+may open.
 """
 
+import json
 import os
 import re
+import subprocess
+import sys
+import tempfile
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel import shapes
 from noisemodel.errors import RobotError
 from noisemodel.files import beyond, limit, parsed_xml
-from noisemodel.linkshapes import LinkShape
-from noisemodel.meshpath import HINT
 from noisemodel.types import Array
-from noisemodel.urdf import MAX_BYTES, Mimic
+from noisemodel.urdf import (
+    HINT,
+    MAX_BYTES,
+    LinkShape,
+    Mimic,
+    box,
+    capsule,
+    cylinder,
+    sphere,
+)
+
+Meshes: TypeAlias = dict[int, tuple[str, Array, Array]]
+"""By index of a geom that is a mesh of a file: the mesh's address relative to the model's folder,
+and from the file's numbers to the geom's axes a matrix, shape (3, 3), and a shift, shape (3,)."""
 
 SUFFIXES = (".xml", ".mjcf")
 
@@ -35,13 +53,13 @@ UNCOLOURED = (0.5, 0.5, 0.5, 1.0)
 """MuJoCo's colour of a geom that names none: its material's is taken then."""
 
 MAX_INCLUDED = 200
-"""Most files that one MJCF may consist of, each counted as often as it is named."""
+"""Most files that one MJCF may consist of."""
 
-MAX_COPIES = 10_000
-"""Most copies that ``<replicate>`` and the like may make of an element."""
+MEMORY, SECONDS, PATIENCE = 2 * 2**30, 10, 60.0
+"""Memory of the process that compiles, in [byte], its processor time and its time, in [s]."""
 
-MAX_CELLS = 10_000_000
-"""Most cells of a height field."""
+MAX_COMPILED = 2**28
+"""Most bytes of a compiled model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,9 +104,6 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
         floating_base: Whether the base moves freely; None as in the file, where a free joint that
             comes first says so.
 
-    Returns:
-        Its joints and its geometry.
-
     Raises:
         RobotError: If MuJoCo is not installed or cannot read the file, a file that it includes is
             missing or lies elsewhere, or a joint is a ball joint.
@@ -98,30 +113,24 @@ def read(path: Path, roots: Sequence[Path], floating_base: bool | None = None) -
         str(path.absolute()).encode()
     except UnicodeEncodeError as error:
         raise RobotError(f"{path}: its path is not UTF-8, as MuJoCo needs it") from error
-    try:
-        import mujoco
-    except ImportError as error:
-        raise RobotError(
-            f"{path}: an MJCF needs MuJoCo; `pip install 'noise-inspector[sim]'`"
-        ) from error
-    try:
-        # An absolute path: files that an included file names get its folder before their names.
-        spec = mujoco.MjSpec.from_file(str(path.absolute()))
-        spec.memory = -1  # nothing is simulated
-        spec.compiler.fusestatic = spec.compiler.discardvisual = False
-        meshes = _without_files(spec, path, folders)
-        with warnings.catch_warnings(action="ignore"):  # such as attributes that are deprecated
-            compiled = spec.compile()
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        reason = " ".join(str(error).split()).removeprefix("Error: ")
-        raise RobotError(f"{path}: MuJoCo cannot read the MJCF ({reason})") from error
+    compiled, meshes = _compiled(path, folders)
     if compiled.njnt > limit("joints"):
         raise RobotError(f"{path}: {compiled.njnt} joints; {beyond('joints')}")
-    drawn = [
-        (geom, shape)
-        for geom in range(compiled.ngeom)
-        if (shape := _shape(compiled, geom, meshes.get(geom))) is not None
-    ]
+    if compiled.nbody + compiled.ngeom > limit("bodies"):
+        count = compiled.nbody + compiled.ngeom
+        raise RobotError(f"{path}: {count} bodies and geoms; {beyond('bodies')}")
+    for name in ("qpos0", "body_pos", "body_quat", "jnt_pos", "jnt_axis", "geom_pos", "geom_size"):
+        if not np.isfinite(getattr(compiled, name)).all():
+            raise RobotError(f"{path}: {name} of the compiled model is not finite")
+    drawn, triangles = [], 0
+    for geom in range(compiled.ngeom):
+        if (shape := _shape(compiled, geom, meshes.get(geom))) is not None:
+            drawn.append((geom, shape))
+            triangles += 0 if isinstance(shape.body, str) else len(shape.body)
+            if triangles > limit("triangles"):
+                raise RobotError(
+                    f"{path}: its shapes have too many triangles, {beyond('triangles')}"
+                )
     visual = _visual(compiled)
     model, floating = _model(path, compiled, floating_base)
     return Mjcf(
@@ -140,20 +149,15 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
         The folders of the file and of those that it includes or attaches.
     """
     waiting, known = [path], {path.resolve()}
-    parts: dict[Path, _Part] = {}
     folders, below, named = [path.parent], {""}, set()
     while waiting:
         part = waiting.pop()
         root = _parsed(part)
         if part == path and root.tag != "mujoco":
             raise RobotError(f"{path}: not an MJCF, its root is <{root.tag}>, expected <mujoco>")
-        if _copies(root) > MAX_COPIES:
-            raise RobotError(f"{part}: replicates an element more than {MAX_COPIES} times")
-        _check_sizes(part, root)
-        parts[part.resolve()] = own = _Part(root)
-        for compiler in root.iter("compiler"):
-            below |= {compiler.get("assetdir", ""), compiler.get("meshdir", "")}
         for element in root.iter():
+            if element.tag == "compiler":
+                below |= {element.get("assetdir", ""), element.get("meshdir", "")}
             if element.tag not in ("texture", "skin"):  # which are not read
                 named |= {file for name, file in element.items() if name.startswith("file")}
             if element.tag in ("include", "model"):
@@ -162,19 +166,19 @@ def _check(path: Path, roots: Sequence[Path]) -> list[Path]:
                 if not found:
                     raise RobotError(f"{part}: includes {file!r}, which is missing")
                 _inside(path, file, found[0], roots)
-                own.files[element] = found[0].resolve()
                 if found[0].resolve() not in known:
                     known.add(found[0].resolve())
                     waiting.append(found[0])
                     folders.append(found[0].parent)
         if len(known) > MAX_INCLUDED:
             raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
-    _check_count(path, parts)
     folders = list(dict.fromkeys(folders))
     for file in sorted(named):
-        for folder in (folder / each for folder in folders for each in below):
-            if (folder / file).exists():
-                _inside(path, file, folder / file, roots)
+        for place in (folder / each / file for folder in folders for each in below):
+            if place.exists():
+                _inside(path, file, place, roots)
+                if not place.is_file():  # a pipe may have no end
+                    raise RobotError(f"{path}: names {file!r}, which is no regular file")
     return folders
 
 
@@ -195,101 +199,84 @@ def _parsed(path: Path) -> ET.Element:
         raise RobotError(f"{path}: {error}") from error
 
 
-@dataclass
-class _Part:
-    """One of the files of an MJCF; ``files`` are those that its includes and models name."""
-
-    root: ET.Element
-    files: dict[ET.Element, Path] = field(default_factory=dict)
-
-
-def _copies(root: ET.Element) -> int:
-    """How often the most replicated element of a file is there."""
-    return max(copies for _, copies in _elements(root))
-
-
-def _elements(root: ET.Element) -> Iterator[tuple[ET.Element, int]]:
-    """Elements of a file, and how often each is there."""
-    waiting = [(root, 1)]
-    while waiting:
-        element, copies = waiting.pop()
-        if element.tag in ("replicate", "composite", "flexcomp"):
-            for count in re.findall(r"\d+", element.get("count", ""))[:3]:
-                copies *= min(max(int(count[:9]), 1), MAX_COPIES + 1)
-        yield element, copies
-        waiting += [(child, copies) for child in element]
-
-
-def _check_sizes(part: Path, root: ET.Element) -> None:
-    """Refuse sizes that MuJoCo would take gigabytes for."""
-    for element in root.iter():
-        if element.tag == "size":
-            for name, text in element.items():
-                if name.startswith("nuser") and len(text.strip()) > 5:
-                    raise RobotError(f"{part}: <{element.tag} {name}={text[:40]!r}> is too large")
-        cells = [element.get(name, "1")[:9] for name in ("nrow", "ncol")]
-        if all(map(str.isdecimal, cells)) and int(cells[0]) * int(cells[1]) > MAX_CELLS:
-            raise RobotError(f"{part}: a height field of more than {MAX_CELLS} cells")
-
-
-def _check_count(path: Path, parts: Mapping[Path, _Part]) -> None:
-    """Refuse what is copied or attached to more bodies or joints than a robot has."""
-
-    def counts(part: Path) -> tuple[int, int, int]:
-        bodies, joints, files = 0, 0, 1
-        included, models = {}, {}
-        # MuJoCo reads all models, attached or not, and crashes on those that contain themselves.
-        for element, file in parts[part].files.items():
-            found = counts(file)
-            files += found[2]
-            if files > MAX_INCLUDED:
-                raise RobotError(f"{path}: includes more than {MAX_INCLUDED} files")
-            if element.tag == "include":
-                included[element] = found
-            else:
-                models[_model_name(element, parts[file])] = found
-        for element, copies in _elements(parts[part].root):
-            bodies += copies * (element.tag in ("body", "geom", "composite", "flexcomp"))
-            joints += copies * (element.tag in ("joint", "freejoint") and not element.get("joint"))
-            more = included.get(element)
-            if element.tag == "attach":
-                more = models.get(element.get("model", ""))
-            if more is not None:
-                bodies, joints = bodies + copies * more[0], joints + copies * more[1]
-            if bodies > limit("bodies"):
-                raise RobotError(
-                    f"{path}: more than {limit('bodies')} bodies and geoms; {beyond('bodies')}"
-                )
-        return bodies, joints, files
-
-    try:
-        _, joints, _ = counts(path.resolve())
-    except RecursionError as error:
-        raise RobotError(f"{path}: its models contain each other") from error
-    if joints > 10 * limit("joints"):  # those of defaults, sensors and equalities are counted too
-        raise RobotError(f"{path}: more than {limit('joints')} joints; {beyond('joints')}")
-
-
-def _model_name(element: ET.Element, part: _Part) -> str:
-    return element.get("name") or part.root.get("model") or ""
-
-
 def _inside(path: Path, named: str, file: Path, roots: Sequence[Path]) -> None:
     if not any(file.resolve().is_relative_to(root.resolve()) for root in roots):
         allowed = ", ".join(map(str, roots))
         raise RobotError(f"{path}: names {named!r}, which lies outside of {allowed}; {HINT}")
 
 
-def _without_files(
-    spec: Any, path: Path, folders: Sequence[Path]
-) -> dict[int, tuple[str, Array, Array]]:
-    """Take meshes and textures out of a spec, so that compiling it opens no file.
+def _compiled(path: Path, folders: Sequence[Path]) -> tuple[Any, Meshes]:
+    """Compile an MJCF in a process of its own: a ``mujoco.MjModel``, and the meshes of files."""
+    try:
+        import mujoco
+    except ImportError as error:
+        raise RobotError(
+            f"{path}: an MJCF needs MuJoCo; `pip install 'noise-inspector[sim]'`"
+        ) from error
+    # An absolute path: files that an included file names get its folder before their names.
+    names = [str(each.absolute()) for each in (path, *folders)]
+    code = f"from noisemodel import mjcf; mjcf.compile_here({json.dumps(names)})"
+    search = os.pathsep.join(str(Path(each).absolute()) for each in sys.path)
+    with tempfile.TemporaryDirectory(prefix="noise-inspector-") as folder:
+        try:
+            done = subprocess.run(
+                [sys.executable, "-c", code],
+                cwd=folder,
+                env=os.environ | {"PYTHONPATH": search, "OPENBLAS_NUM_THREADS": "1"},
+                capture_output=True,
+                timeout=PATIENCE,
+                check=False,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise RobotError(f"{path}: MuJoCo needs more than {PATIENCE:.0f} s for it") from error
+        if done.returncode == 1 and (reason := done.stdout.decode(errors="replace").strip()):
+            raise RobotError(f"{path}: MuJoCo cannot read the MJCF ({reason})")
+        if done.returncode:
+            raise RobotError(
+                f"{path}: MuJoCo crashes on it, or needs {MEMORY // 2**30} GB of memory or"
+                f" {SECONDS} s of processor time"
+            )
+        if (size := (Path(folder) / "model.mjb").stat().st_size) > MAX_COMPILED:
+            raise RobotError(f"{path}: {size} bytes when compiled, expected {MAX_COMPILED} at most")
+        meshes = json.loads((Path(folder) / "meshes.json").read_text())
+        compiled = mujoco.MjModel.from_binary_path(str(Path(folder) / "model.mjb"))
+    return compiled, {
+        int(geom): (address, np.array(matrix), np.array(shift))
+        for geom, (address, matrix, shift) in meshes.items()
+    }
+
+
+def compile_here(names: Sequence[str]) -> None:
+    """What the process of `_compiled` does: limit itself, compile, write the result beside it.
+
+    Args:
+        names: The MJCF, and the folders of its files.
+    """
+    import resource
+
+    import mujoco
+
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    path, *folders = map(Path, names)
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        spec.memory = -1  # nothing is simulated
+        spec.compiler.fusestatic = spec.compiler.discardvisual = False
+        meshes = _without_files(spec, path, folders)
+        with warnings.catch_warnings(action="ignore"):  # such as attributes that are deprecated
+            compiled = spec.compile()
+    except (ValueError, RuntimeError, mujoco.FatalError) as error:
+        print(" ".join(str(error).split()).removeprefix("Error: "))
+        sys.exit(1)
+    Path("meshes.json").write_text(json.dumps(meshes))
+    mujoco.mj_saveModel(compiled, "model.mjb")
+
+
+def _without_files(spec: Any, path: Path, folders: Sequence[Path]) -> dict[int, Any]:
+    """Take meshes and textures out of a spec, so that compiling it opens no file; see `Meshes`.
 
     The poses of geoms are compiled all the same: a sphere takes the place of a mesh.
-
-    Returns:
-        By index of a geom that was a mesh: the mesh's address relative to the model's folder, and
-        from the file's numbers to the geom's axes a matrix, shape (3, 3), and a shift, shape (3,).
     """
     from mujoco import mjtGeom
 
@@ -299,7 +286,8 @@ def _without_files(
     for element in (*spec.textures, *spec.skins):
         spec.delete(element)
     by_name = {mesh.name or Path(mesh.file).stem: mesh for mesh in spec.meshes if mesh.file}
-    meshes, fitted = {}, set()
+    meshes: dict[int, Any] = {}
+    fitted = set()
     for index, geom in enumerate(spec.geoms):
         name, mesh = geom.meshname, by_name.get(geom.meshname)
         if mesh is None:
@@ -309,7 +297,8 @@ def _without_files(
             continue
         # MuJoCo takes refpos off, turns by refquat backwards, then scales.
         matrix = np.diag(mesh.scale) @ _rotation(mesh.refquat).T
-        meshes[index] = (_address(spec, mesh, path, folders), matrix, -matrix @ mesh.refpos)
+        address = _address(spec, mesh, path, folders)
+        meshes[index] = (address, matrix.tolist(), (-matrix @ mesh.refpos).tolist())
         geom.type, geom.meshname, geom.size = mjtGeom.mjGEOM_SPHERE, "", (1.0, 0.0, 0.0)
     for name, mesh in by_name.items():
         if name not in fitted:
@@ -323,7 +312,7 @@ def _address(spec: Any, mesh: Any, path: Path, folders: Sequence[Path]) -> str:
     file = Path(mesh.file).name if spec.strippath else mesh.file
     places = [folder / mesh.compiler.meshdir / file for folder in folders]
     found = next((place for place in places if place.is_file()), places[0])
-    return os.path.relpath(found.absolute(), path.absolute().parent)
+    return os.path.relpath(found, path.parent)
 
 
 def _rotation(quaternion: Array) -> Array:
@@ -339,11 +328,7 @@ def _rotation(quaternion: Array) -> Array:
 
 
 def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, bool]:
-    """Add the bodies and joints of a compiled MJCF to a Pinocchio model, in their order.
-
-    Returns:
-        The model, and whether its base floats.
-    """
+    """Add bodies and joints to a Pinocchio model, in their order; and whether its base floats."""
     import pinocchio as pin
     from mujoco import mjtJoint
 
@@ -373,23 +358,7 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
                     joint = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), title)
                     place = pin.SE3.Identity()
                 continue
-            axis, origin = compiled.jnt_axis[index], compiled.jnt_pos[index]
-            zero = float(compiled.qpos0[compiled.jnt_qposadr[index]])  # where the file has it
-            if kind == mjtJoint.mjJNT_HINGE:
-                back = pin.SE3(pin.AngleAxis(-zero, axis).toRotationMatrix(), np.zeros(3))
-            else:
-                back = pin.SE3(np.eye(3), -zero * axis)
-            limits = compiled.jnt_range[index] if compiled.jnt_limited[index] else (-np.inf, np.inf)
-            joint = model.addJoint(
-                joint,
-                _joint(kind == mjtJoint.mjJNT_HINGE, axis),
-                place * pin.SE3(np.eye(3), origin) * back,
-                title,
-                np.array([np.inf]),
-                np.array([np.inf]),
-                *(np.array([float(limit)]) for limit in limits),
-            )
-            place = pin.SE3(np.eye(3), -origin)
+            joint, place = _add_joint(model, joint, place, compiled, index, title)
             if index < first + count - 1:  # the next joint of the body moves against this one
                 frame = pin.Frame(f"{name}:{title}", joint, place, pin.FrameType.BODY)
                 model.addFrame(frame)
@@ -398,14 +367,38 @@ def _model(path: Path, compiled: Any, floating_base: bool | None) -> tuple[Any, 
     return model, floating
 
 
-def _joint(turns: bool, axis: Array) -> Any:
-    """A joint of Pinocchio that turns about an axis, or slides along it."""
+def _add_joint(
+    model: Any, parent: int, place: Any, compiled: Any, index: int, title: str
+) -> tuple[int, Any]:
+    """Add a joint that turns or slides: its index, and the pose of its body there."""
     import pinocchio as pin
+    from mujoco import mjtJoint
 
+    turns = compiled.jnt_type[index] == mjtJoint.mjJNT_HINGE
+    axis, origin = compiled.jnt_axis[index], compiled.jnt_pos[index]
+    zero = float(compiled.qpos0[compiled.jnt_qposadr[index]])  # where the file has it
+    if turns:
+        back = pin.SE3(pin.AngleAxis(-zero, axis).toRotationMatrix(), np.zeros(3))
+    else:
+        back = pin.SE3(np.eye(3), -zero * axis)
     if np.count_nonzero(axis) == 1 and axis.max() == 1.0:
         kinds = ("RX", "RY", "RZ") if turns else ("PX", "PY", "PZ")
-        return getattr(pin, f"JointModel{kinds[int(axis.argmax())]}")()
-    return (pin.JointModelRevoluteUnaligned if turns else pin.JointModelPrismaticUnaligned)(axis)
+        kind = getattr(pin, f"JointModel{kinds[int(axis.argmax())]}")()
+    else:
+        kind = (pin.JointModelRevoluteUnaligned if turns else pin.JointModelPrismaticUnaligned)(
+            axis
+        )
+    limits = compiled.jnt_range[index] if compiled.jnt_limited[index] else (-np.inf, np.inf)
+    joint = model.addJoint(
+        parent,
+        kind,
+        place * pin.SE3(np.eye(3), origin) * back,
+        title,
+        np.array([np.inf]),
+        np.array([np.inf]),
+        *(np.array([float(each)]) for each in limits),
+    )
+    return joint, pin.SE3(np.eye(3), -origin)
 
 
 def _body_name(compiled: Any, body: int) -> str:
@@ -447,15 +440,15 @@ def _shape(compiled: Any, geom: int, mesh: tuple[str, Array, Array] | None) -> L
     elif kind == mjtGeom.mjGEOM_MESH:  # written in the file itself
         drawn = _mesh(compiled, int(compiled.geom_dataid[geom]))
     elif kind == mjtGeom.mjGEOM_SPHERE:
-        drawn = shapes.sphere(x)
+        drawn = sphere(x)
     elif kind == mjtGeom.mjGEOM_ELLIPSOID:
-        drawn = shapes.sphere(1.0) * (x, y, z)
+        drawn = sphere(1.0) * (x, y, z)
     elif kind == mjtGeom.mjGEOM_CAPSULE:
-        drawn = shapes.capsule(x, 2 * y)
+        drawn = capsule(x, 2 * y)
     elif kind == mjtGeom.mjGEOM_CYLINDER:
-        drawn = shapes.cylinder(x, 2 * y)
+        drawn = cylinder(x, 2 * y)
     elif kind == mjtGeom.mjGEOM_BOX:
-        drawn = shapes.box(2 * x, 2 * y, 2 * z)
+        drawn = box(2 * x, 2 * y, 2 * z)
     if body == 0 or drawn is None:
         return None
     turn = _rotation(compiled.geom_quat[geom])

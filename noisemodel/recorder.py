@@ -9,9 +9,8 @@ from typing import Any, Self, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from noisemodel.catalog import ROBOTS
 from noisemodel.errors import RunError, UnknownJointError, hint
-from noisemodel.robot import Robot
+from noisemodel.robot import ROBOTS, Robot
 from noisemodel.run import (
     LONGEST,
     SHORTEST,

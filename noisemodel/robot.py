@@ -1,26 +1,36 @@
-"""The robot: read once by Pinocchio, then a table of joints."""
+"""The robot: read once by Pinocchio, then a table of joints, and the twists of its links."""
 
 import os
 import re
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, distribution
+from math import inf, isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Self
+from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from noisemodel import catalog, mjcf, urdf
-from noisemodel.errors import RobotError, RunError, UnknownJointError, UnknownRobotError
-from noisemodel.joints import Joint, table_of
+from noisemodel import mjcf, urdf
+from noisemodel.errors import (
+    NoiseModelError,
+    RobotError,
+    RunError,
+    UnknownJointError,
+    UnknownRobotError,
+)
 from noisemodel.mjcf import Mjcf
 from noisemodel.run import Run, is_robot_file
 from noisemodel.types import Array, Real
 from noisemodel.urdf import Mimic
 
-ROOT = "root_joint"
-"""Pinocchio's name for the joint that makes a base float."""
+MENAGERIE = "menagerie/"
+"""What the names of MuJoCo Menagerie's robots begin with: menagerie/unitree_go2."""
 
 PACKAGE_ROOT = "NOISE_PACKAGE_ROOT"
 """Environment variable with a folder that meshes may lie in besides the robot's own."""
@@ -30,6 +40,242 @@ PACKAGE = re.compile(rb"package:///?([^/\"'<>\s]+)/")
 
 BESIDE = ("meshes", "visual", "collision", "assets")
 """Folders beside that of a URDF or an MJCF that belong to it where no package says so."""
+
+KINDS = {
+    r"R[XYZ]|RevoluteUnaligned": "revolute",
+    r"RUB[XYZ]|RevoluteUnboundedUnaligned": "continuous",
+    r"P[XYZ]|PrismaticUnaligned": "prismatic",
+    "FreeFlyer": "floating",
+    "Planar": "planar",
+}
+"""Pinocchio's joint types by what they do; a URDF has no others."""
+
+SINGLE = ("revolute", "continuous", "prismatic")
+"""The types of joints that a run can name."""
+
+CHUNK = 4096
+"""Samples that are worked on at once: few enough for the cache, with little overhead of Python."""
+
+
+@dataclass(frozen=True)
+class Listed:
+    """A robot of the list.
+
+    Attributes:
+        urdf: Path of its URDF, below the robots' folder of example-robot-data.
+        floating_base: Whether it moves freely in space.
+    """
+
+    urdf: str
+    floating_base: bool = False
+
+
+FLOATING = {
+    "a1": "a1_description/urdf/a1.urdf",
+    "alexander": "alexander_description/urdf/alexander_v1.lowerBodyOnly.urdf",
+    "anymal": "anymal_b_simple_description/robots/anymal.urdf",
+    "anymal_c": "anymal_c_simple_description/urdf/anymal.urdf",
+    "anymal_kinova": "anymal_b_simple_description/robots/anymal-kinova.urdf",
+    "b1": "b1_description/urdf/b1.urdf",
+    "b1_z1": "b1_description/urdf/b1-z1.urdf",
+    "bolt": "bolt_description/robots/bolt.urdf",
+    "borinot": "borinot_description/urdf/borinot_flying_arm_2.urdf",
+    "centauro": "centauro_description/urdf/centauro.urdf",
+    "g1": "g1_description/urdf/g1_29dof_rev_1_0.urdf",
+    "g1_with_hands": "g1_description/urdf/g1_29dof_with_hand_rev_1_0.urdf",
+    "go1": "go1_description/urdf/go1.urdf",
+    "go2": "go2_description/urdf/go2.urdf",
+    "hector": "hector_description/robots/quadrotor_base.urdf",
+    "hextilt": "hextilt_description/urdf/hextilt_flying_arm_5.urdf",
+    "human": "human_description/robots/human.urdf",
+    "hyq": "hyq_description/robots/hyq_no_sensors.urdf",
+    "icub": "icub_description/robots/icub.urdf",
+    "icub_reduced": "icub_description/robots/icub_reduced.urdf",
+    "iris": "iris_description/robots/iris_simple.urdf",
+    "iris_rotors": "iris_description/robots/iris.urdf",
+    "laikago": "laikago_description/urdf/laikago.urdf",
+    "pr2": "pr2_description/urdf/pr2.urdf",
+    "quadruped": "quadruped_description/urdf/quadruped.urdf",
+    "romeo": "romeo_description/urdf/romeo.urdf",
+    "romeo_laas_small": "romeo_description/urdf/romeo_laas_small.urdf",
+    "romeo_small": "romeo_description/urdf/romeo_small.urdf",
+    "simple_humanoid": "simple_humanoid_description/urdf/simple_humanoid.urdf",
+    "simple_humanoid_classical": "simple_humanoid_description/urdf/simple_humanoid_classical.urdf",
+    "solo8": "solo_description/robots/solo.urdf",
+    "solo12": "solo_description/robots/solo12.urdf",
+    "talos": "talos_data/robots/talos_reduced.urdf",
+    "talos_box": "talos_data/robots/talos_reduced_box.urdf",
+    "talos_corrected": "talos_data/robots/talos_reduced_corrected.urdf",
+    "talos_full": "talos_data/robots/talos_full_v2.urdf",
+    "talos_full_box": "talos_data/robots/talos_full_v2_box.urdf",
+}
+FIXED = {
+    "alex_nub_hands": "alex_description/urdf/alex_nub_hands.urdf",
+    "alex_psyonic_hands": "alex_description/urdf/alex_psyonic_hands.urdf",
+    "alex_sake_hands": "alex_description/urdf/alex_sake_hands.urdf",
+    "allegro_left_hand": "allegro_hand_description/urdf/allegro_left_hand.urdf",
+    "allegro_right_hand": "allegro_hand_description/urdf/allegro_right_hand.urdf",
+    "asr_twodof": "asr_twodof_description/urdf/TwoDofs.urdf",
+    "baxter": "baxter_description/urdf/baxter.urdf",
+    "double_pendulum": "double_pendulum_description/urdf/double_pendulum.urdf",
+    "double_pendulum_continuous": (
+        "double_pendulum_description/urdf/double_pendulum_continuous.urdf"
+    ),
+    "double_pendulum_simple": "double_pendulum_description/urdf/double_pendulum_simple.urdf",
+    "finger_edu": "finger_edu_description/robots/finger_edu.urdf",
+    "kinova": "kinova_description/robots/kinova.urdf",
+    "panda": "panda_description/urdf/panda.urdf",
+    "panda_collision": "panda_description/urdf/panda_collision.urdf",
+    "so100": "so_arm_description/urdf/so100.urdf",
+    "so101": "so_arm_description/urdf/so101.urdf",
+    "talos_arm": "talos_data/robots/talos_left_arm.urdf",
+    "tiago": "tiago_description/robots/tiago.urdf",
+    "tiago_dual": "tiago_description/robots/tiago_dual.urdf",
+    "tiago_no_hand": "tiago_description/robots/tiago_no_hand.urdf",
+    "tiago_pro": "tiago_pro_description/robots/tiago_pro.urdf",
+    "ur3": "ur_description/urdf/ur3_robot.urdf",
+    "ur3_empty": "ur_description/urdf/ur3.urdf",
+    "ur3_gripper": "ur_description/urdf/ur3_gripper.urdf",
+    "ur3_limited": "ur_description/urdf/ur3_joint_limited_robot.urdf",
+    "ur5": "ur_description/urdf/ur5_robot.urdf",
+    "ur5_gripper": "ur_description/urdf/ur5_gripper.urdf",
+    "ur5_limited": "ur_description/urdf/ur5_joint_limited_robot.urdf",
+    "ur10": "ur_description/urdf/ur10_robot.urdf",
+    "ur10_limited": "ur_description/urdf/ur10_joint_limited_robot.urdf",
+    "xarm7": "xarm_description/urdf/xarm7.urdf",
+    "z1": "z1_description/urdf/z1.urdf",
+}
+ROBOTS: Mapping[str, Listed] = MappingProxyType(
+    dict(
+        sorted(
+            [(name, Listed(urdf, floating_base=True)) for name, urdf in FLOATING.items()]
+            + [(name, Listed(urdf)) for name, urdf in FIXED.items()]
+        )
+    )
+)
+"""Name to URDF and floating base (the wheel of example-robot-data has data, no Python module)."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """How one joint moves its link.
+
+    Attributes:
+        name: Its name.
+        kind: "revolute", "continuous", "prismatic", "floating" or "planar".
+        parent: Index of the joint that carries it; 0 is the universe.
+        first_q: Index of its first entry in the configuration.
+        first_v: Index of its first entry in the velocity.
+        axis: Index of the coordinate axis that it moves about or along, after ``turn``.
+        turn: Rotation from the joint's axes to axes of which one is the joint's own, or None
+            where that is so already, shape (3, 3).
+        shift: Twist of the parent to twist of the resting joint, in those axes, shape (6, 6).
+        multiplier: Ratio to the joint that ``first_q`` belongs to (mimic joints).
+        offset: Added to the position (mimic joints), in [rad] or [m].
+    """
+
+    name: str
+    kind: str
+    parent: int
+    first_q: int
+    first_v: int
+    axis: int
+    turn: Array | None
+    shift: Array
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def nq(self) -> int:
+        """Entries in the configuration."""
+        return {"floating": 7, "planar": 4, "continuous": 2}.get(self.kind, 1)
+
+    @property
+    def nv(self) -> int:
+        """Entries in the velocity."""
+        return {"floating": 6, "planar": 3}.get(self.kind, 1)
+
+    @property
+    def moves(self) -> slice | list[int]:
+        """The entries of the twist that its velocity adds to."""
+        if self.kind == "planar":
+            return [0, 1, 5]
+        first = {"floating": 0, "prismatic": self.axis}.get(self.kind, 3 + self.axis)
+        return slice(first, first + self.nv)  # adds in place, which a list does not
+
+    @property
+    def subspace(self) -> Array:
+        """The matrix S, shape (6, nv): the link's twist, in the joint's axes, at unit velocities.
+
+        (v_rel, w_rel) = S qdot is the motion that a joint adds to its link.
+        """
+        own = np.zeros((6, self.nv))
+        own[self.moves] = np.eye(self.nv)
+        if self.turn is not None:
+            own = np.vstack((self.turn.T @ own[:3], self.turn.T @ own[3:]))
+        return self.multiplier * own
+
+    def own_twist(self, velocity: Array) -> Array:
+        """The part of the link's twist that the joint makes, shape (6, samples).
+
+        ``velocity`` is that of the leader for a joint that follows one, shape (nv, samples).
+        """
+        own: Array = self.subspace @ velocity
+        return own
+
+    @property
+    def turning_axis(self) -> Array | None:
+        """The axis that the link turns about, of length 1 or 0 where the joint only slides.
+
+        None where it turns about any axis.
+        """
+        if self.kind == "floating":
+            return None
+        axis = self.subspace[3:, -1]
+        return axis / max(float(np.linalg.norm(axis)), np.finfo(np.float64).tiny)
+
+
+def table_of(model: Any) -> tuple[Joint, ...]:
+    """Read the joints of a Pinocchio model, the universe left out."""
+    return tuple(_joint(model, index) for index in range(1, model.njoints))
+
+
+def _joint(model: Any, index: int) -> Joint:
+    joint, placement = model.joints[index], model.jointPlacements[index]
+    kind = joint.shortname().removeprefix("JointModel")
+    matches = [word for pattern, word in KINDS.items() if re.fullmatch(pattern, kind)]
+    if not matches:
+        raise RobotError(f"joint {model.names[index]!r} is of type {kind}, which is not supported")
+    turn = None
+    if kind.endswith("Unaligned"):
+        subspace = np.ravel(joint.createData().S)  # the joint's twist at unit velocity
+        turn = _axes_with_z(subspace[:3] + subspace[3:])
+    rotation = placement.rotation.T if turn is None else turn @ placement.rotation.T
+    return Joint(
+        name=str(model.names[index]),
+        kind=matches[0],
+        parent=int(model.parents[index]),
+        first_q=int(joint.idx_q),
+        first_v=int(joint.idx_v),
+        axis="XYZ".find(kind[-1]) if kind[-1] in "XYZ" else 2,
+        turn=turn,
+        shift=_shift(rotation, placement.translation),
+    )
+
+
+def _shift(rotation: Array, translation: Array) -> Array:
+    """Twist at the parent's origin to twist at the joint's: v' = R (v + w x t), w' = R w."""
+    x, y, z = translation
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.block([[rotation, -rotation @ cross], [np.zeros((3, 3)), rotation]])
+
+
+def _axes_with_z(axis: Array) -> Array:
+    """Rotate to axes whose z is ``axis``."""
+    z = axis / np.linalg.norm(axis)
+    x = np.cross(np.eye(3)[np.argmin(np.abs(z))], z)
+    x /= np.linalg.norm(x)
+    return np.stack((x, np.cross(z, x), z))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,25 +333,26 @@ class Robot:
             UnknownRobotError: If there is neither such a name nor such a file.
             RobotError: If the URDF or MJCF cannot be read, or ``package_root`` is no folder.
         """
-        listed = catalog.ROBOTS.get(str(name))
+        listed = ROBOTS.get(str(name))
         path = locate(name)
         roots = package_roots(name if listed else path, package_root)
-        description: urdf.Urdf | Mjcf
+        description: Mjcf | None = None
         if mjcf.is_mjcf(path):
             description = mjcf.read(path, roots, floating_base)
             model, floating_base = description.model, description.floating_base
+            mimics = description.mimics
         else:
             if floating_base is None:
                 floating_base = listed is not None and listed.floating_base
-            description = urdf.read(path)
+            mimics = urdf.mimics(path, urdf.checked(path))
             model = _model(path, floating_base)
         table = table_of(model)
-        mimics = description.mimics if mimic else {}
+        mimics = mimics if mimic else {}
         if mimic:
             table = _coupled(table, mimics, path)
         independent = [joint for joint in table if joint.name not in mimics]
         return cls(
-            name=str(name) if catalog.is_name(str(name)) else path.stem,
+            name=str(name) if is_name(str(name)) else path.stem,
             path=path,
             package_roots=roots,
             model=model,
@@ -114,7 +361,7 @@ class Robot:
             nv=sum(joint.nv for joint in independent),
             floating_base=floating_base,
             mimics=mimics,
-            mjcf=description if isinstance(description, Mjcf) else None,
+            mjcf=description,
         )
 
     @property
@@ -219,24 +466,19 @@ class Robot:
 
 
 def locate(name: str | Path) -> Path:
-    """Find the URDF or MJCF of a robot that is given by its name or its path.
-
-    Raises:
-        UnknownRobotError: If there is neither such a name nor such a file.
-        RobotError: If a robot of MuJoCo Menagerie cannot be had.
-    """
-    if str(name) in catalog.ROBOTS:
-        return catalog.urdf_path(str(name))
+    """Find the URDF or MJCF of a robot that is given by its name or its path."""
+    if str(name) in ROBOTS:
+        return urdf_path(str(name))
     path = Path(name)
     with suppress(OSError, ValueError):  # no name that a file can have
         if path.is_file():
             return path
-    if catalog.is_name(str(name)):
-        return catalog.menagerie_path(str(name))
+    if is_name(str(name)):
+        return menagerie_path(str(name))
     if is_robot_file(str(name)):
         kind = "URDF" if path.suffix.lower() == ".urdf" else "MJCF"
         raise RobotError(f"{path}: there is no such {kind} file")
-    raise UnknownRobotError(str(name), catalog.ROBOTS)
+    raise UnknownRobotError(str(name), ROBOTS)
 
 
 def package_roots(name: str | Path, package_root: str | Path | None = None) -> tuple[Path, ...]:
@@ -259,11 +501,11 @@ def package_roots(name: str | Path, package_root: str | Path | None = None) -> t
     further = () if not named else (Path(named).resolve(),)
     if further and not further[0].is_dir():
         raise RobotError(f"package root {named}: there is no such folder")
-    if str(name) in catalog.ROBOTS:
-        return (*further, *catalog.package_roots())
+    if str(name) in ROBOTS:
+        return (*further, *listed_folders())
     path = Path(name).resolve()
     with suppress(RobotError):
-        listed = catalog.package_roots()
+        listed = listed_folders()
         if path.is_relative_to(listed[-1].resolve()):
             return (*further, *listed)
     return (*further, *_own_roots(path))
@@ -357,11 +599,7 @@ def _leader(name: str, mimics: Mapping[str, Mimic], path: Path) -> tuple[str, fl
 
 @contextmanager
 def kept_stderr() -> Iterator[Callable[[], str]]:
-    """Keep what the process writes to file descriptor 2 while the block runs.
-
-    Yields:
-        A function that returns what was written so far.
-    """
+    """Keep what the process writes to file descriptor 2 while the block runs."""
     with tempfile.TemporaryFile() as kept:
         terminal = os.dup(2)
         os.dup2(kept.fileno(), 2)
@@ -370,3 +608,259 @@ def kept_stderr() -> Iterator[Callable[[], str]]:
         finally:
             os.dup2(terminal, 2)
             os.close(terminal)
+
+
+def listed_folders() -> tuple[Path, ...]:
+    """Folders that the listed robots' ``package://`` addresses are searched in."""
+    try:
+        share = Path(str(distribution("example-robot-data").locate_file("cmeel.prefix/share")))
+    except PackageNotFoundError as error:
+        raise RobotError(
+            "the listed robots need example-robot-data; `pip install example-robot-data`"
+        ) from error
+    data = share / "example-robot-data"
+    return share, data, data / "robots"
+
+
+def urdf_path(name: str) -> Path:
+    """Find the URDF of a listed robot."""
+    return listed_folders()[-1] / ROBOTS[name].urdf
+
+
+def is_name(name: str) -> bool:
+    """Whether a text is a listed robot, or names one of MuJoCo Menagerie."""
+    return name in ROBOTS or (name.startswith(MENAGERIE) and not is_robot_file(name))
+
+
+def menagerie_names() -> dict[str, str]:
+    """The robots of MuJoCo Menagerie, each with what it is; none without the package."""
+    try:
+        import mujoco_menagerie
+    except ImportError:
+        return {}
+    return {MENAGERIE + robot.name: robot.category for robot in mujoco_menagerie.robots()}
+
+
+def menagerie_path(name: str) -> Path:
+    """Find the MJCF of a robot of MuJoCo Menagerie; the package downloads it at its first use."""
+    try:
+        import mujoco_menagerie
+    except ImportError as error:
+        raise RobotError(
+            f"{name}: the robots of MuJoCo Menagerie need its package;"
+            " `pip install 'noise-inspector[menagerie]'`"
+        ) from error
+    folder, _, entry = name.removeprefix(MENAGERIE).partition("/")
+    if MENAGERIE + folder not in menagerie_names():
+        raise UnknownRobotError(name, menagerie_names())
+    robot = mujoco_menagerie.get(folder)
+    try:
+        return Path(robot.xml(entry or robot.default_model))
+    except mujoco_menagerie.DownloadError as error:
+        raise RobotError(
+            f"{name}: cannot be downloaded ({' '.join(str(error).split())});"
+            " MENAGERIE_ROOT=path names a checkout to use instead"
+        ) from error
+    except (mujoco_menagerie.MenagerieError, OSError) as error:
+        raise RobotError(f"{name}: {' '.join(str(error).split())}") from error
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The limits of one joint; infinite where the robot states none.
+
+    Attributes:
+        lower: Lowest position, in [rad] or [m].
+        upper: Highest position, in [rad] or [m].
+        velocity: Highest speed, in [rad/s] or [m/s].
+        turns: Whether it turns; a prismatic joint slides.
+    """
+
+    lower: float = -inf
+    upper: float = inf
+    velocity: float = inf
+    turns: bool = True
+
+    @property
+    def centre(self) -> float:
+        """Middle of the range, 0 without one, in [rad] or [m]."""
+        return (self.lower + self.upper) / 2 if isfinite(self.upper - self.lower) else 0.0
+
+
+def joint_limits(name: str | Path) -> Mapping[str, Limits]:
+    """Limits of the joints that a run can name, by name, in the order of the robot's file."""
+    path = locate(name)
+    modified = path.stat().st_mtime_ns if path.is_file() else 0
+    return _of_file(str(name), path, modified)
+
+
+@lru_cache(maxsize=32)
+def _of_file(name: str, path: Path, modified: int) -> Mapping[str, Limits]:
+    if path.suffix.lower() == ".urdf":
+        joints = urdf.checked(path).findall("joint")
+        found = {
+            joint.get("name", ""): _of_element(joint)
+            for joint in joints
+            if joint.get("type") in SINGLE
+        }
+    else:
+        found = limits_of(Robot.load(name))
+    return MappingProxyType(found)
+
+
+def _of_element(joint: ET.Element) -> Limits:
+    limit = joint.find("limit")
+    known = {} if limit is None else limit.attrib
+    endless = joint.get("type") == "continuous"
+    return _limits(
+        -inf if endless else _number(known.get("lower"), 0.0),
+        inf if endless else _number(known.get("upper"), 0.0),
+        _number(known.get("velocity"), inf),
+        turns=joint.get("type") != "prismatic",
+    )
+
+
+def limits_of(robot: Robot) -> dict[str, Limits]:
+    """Limits of a robot's joints as Pinocchio has read them, by name."""
+    model, found = robot.model, {}
+    for joint in robot.joints:
+        if joint.kind in SINGLE:
+            endless = joint.kind == "continuous"
+            index = model.getJointId(joint.name)  # followers have places of their own there
+            first_q, first_v = model.idx_qs[index], model.idx_vs[index]
+            found[joint.name] = _limits(
+                -inf if endless else float(model.lowerPositionLimit[first_q]),
+                inf if endless else float(model.upperPositionLimit[first_q]),
+                float(model.velocityLimit[first_v]),
+                turns=joint.kind != "prismatic",
+            )
+    return found
+
+
+def _limits(lower: float, upper: float, velocity: float, *, turns: bool) -> Limits:
+    """Limits without those that are none: an empty range, or no speed at all."""
+    if not lower < upper or max(abs(lower), abs(upper)) > 1e6:
+        lower, upper = -inf, inf
+    return Limits(lower, upper, velocity if 0 < velocity < 1e6 else inf, turns)
+
+
+def _number(text: str | None, default: float) -> float:
+    try:
+        value = default if text is None else float(text)
+    except ValueError:
+        return default
+    return value if isfinite(value) else default
+
+
+# Twists of all links, all samples at once.
+
+
+def link_twists(robot: Robot, q: Real, v: Real) -> Array:
+    """Compute the twist of every link, in every sample.
+
+    Args:
+        robot: The robot.
+        q: Configurations as Pinocchio has them, shape (samples, nq).
+        v: Velocities as Pinocchio has them, shape (samples, nv).
+
+    Returns:
+        Linear, then angular velocity of each joint's frame in its own axes, the universe first,
+        as Pinocchio's ``data.v``, shape (samples, njoints, 6), in [m/s] and [rad/s]. In memory
+        the samples lie next to each other.
+
+    Raises:
+        NoiseModelError: If ``q`` is not (samples, nq) or ``v`` not (samples, nv).
+    """
+    for name, array, width in (("q", q, robot.nq), ("v", v, robot.nv)):
+        if array.shape != (len(q), width):
+            raise NoiseModelError(f"{name} has shape {array.shape}, expected ({len(q)}, {width})")
+    twists = np.empty((len(robot.joints) + 1, 6, len(q)))
+    for start in range(0, len(q), CHUNK):
+        part = slice(start, start + CHUNK)
+        chunk_twists(robot.joints, q[part], v[part], out=twists[:, :, part])
+    return twists.transpose(2, 0, 1)
+
+
+def chunk_twists(joints: Sequence[Joint], q: Real, v: Real, *, out: Array) -> None:
+    """Compute the link twists of a few thousand samples.
+
+    Args:
+        joints: The joints, parents first.
+        q: Configurations, shape (samples, nq).
+        v: Velocities, shape (samples, nv).
+        out: Takes the twists in each joint's axes, shape (njoints, 6, samples),
+            in [m/s] and [rad/s].
+    """
+    positions, velocities = (np.ascontiguousarray(a.T, dtype=np.float64) for a in (q, v))
+    out[0] = 0.0  # the universe rests
+    for index, joint in enumerate(joints, start=1):
+        position = positions[joint.first_q : joint.first_q + joint.nq]
+        velocity = velocities[joint.first_v : joint.first_v + joint.nv]
+        if joint.multiplier != 1.0 or joint.offset != 0.0:
+            position = joint.multiplier * position + joint.offset
+            velocity = joint.multiplier * velocity
+        twist = out[index]
+        if joint.parent:
+            np.matmul(joint.shift, out[joint.parent], out=twist)
+            CARRY[joint.kind](joint.axis, twist, position)
+        else:
+            twist[:] = 0.0
+        twist[joint.moves] += velocity
+        if joint.turn is not None:
+            twist[:3] = joint.turn.T @ twist[:3]
+            twist[3:] = joint.turn.T @ twist[3:]
+
+
+# Each of these takes the twist that the parent carries from the resting joint to the joint as it
+# stands. They work in place: copies of these arrays would cost as much as the sums.
+
+
+def _revolute(axis: int, twist: Array, position: Array) -> None:
+    tangent = np.tan(0.5 * position[0])  # one tangent takes less time than a sine and a cosine
+    double = 2.0 / (1.0 + tangent * tangent)
+    _turn(axis, twist, double - 1.0, double * tangent)
+
+
+def _continuous(axis: int, twist: Array, position: Array) -> None:
+    _turn(axis, twist, *(position / np.hypot(*position)))
+
+
+def _prismatic(axis: int, twist: Array, position: Array) -> None:
+    left, right = (axis + 1) % 3, (axis + 2) % 3
+    twist[left] += twist[3 + right] * position[0]  # v' = v + w x (axis q)
+    twist[right] -= twist[3 + left] * position[0]
+
+
+def _planar(axis: int, twist: Array, position: Array) -> None:
+    x, y, cosine, sine = position
+    twist[0] -= twist[5] * y  # v' = v + w x (x, y, 0)
+    twist[1] += twist[5] * x
+    twist[2] += twist[3] * y - twist[4] * x
+    _turn(axis, twist, cosine, sine)
+
+
+def _floating(_axis: int, twist: Array, position: Array) -> None:
+    origin, vector, scalar = position[:3], position[3:6], position[6]
+    twist[:3] += np.cross(twist[3:], origin, axis=0)
+    for part in (twist[:3], twist[3:]):  # R(q)^T part
+        across = 2 * np.cross(part, vector, axis=0)
+        part += scalar * across + np.cross(across, vector, axis=0)
+
+
+def _turn(axis: int, twist: Array, cosine: Array, sine: Array) -> None:
+    """See a twist from axes that are turned about one of them."""
+    left, right = twist[(axis + 1) % 3 :: 3], twist[(axis + 2) % 3 :: 3]
+    ahead, back = sine * right, sine * left
+    left *= cosine
+    left += ahead
+    right *= cosine
+    right -= back
+
+
+CARRY = {
+    "revolute": _revolute,
+    "continuous": _continuous,
+    "prismatic": _prismatic,
+    "planar": _planar,
+    "floating": _floating,
+}

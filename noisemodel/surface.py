@@ -11,13 +11,12 @@ from typing import Any, Literal, Self, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from noisemodel import linkshapes, meshes, meshpath
+from noisemodel import meshes
 from noisemodel.errors import GeometryError, MeshError, MissingMeshError
-from noisemodel.files import cached
-from noisemodel.linkshapes import LinkShape
+from noisemodel.files import beyond, cached, limit
 from noisemodel.robot import Robot
-from noisemodel.subspace import turning_axis
 from noisemodel.types import Array, Indices
+from noisemodel.urdf import LinkShape, find_mesh, shapes_in
 
 Missing = Literal["error", "skip"]
 
@@ -108,6 +107,7 @@ def triangles(
     surfaces = [np.empty((0, 3, 3))] * len(names)
     kinds = ["none"] * len(names)
     absent: list[str] = []
+    count = 0
     for use in GEOMETRIES[geometry]:
         if "none" not in kinds:
             break
@@ -124,6 +124,7 @@ def triangles(
                 absent.append(error.mesh)
             else:
                 pieces[joint].append(surface)
+                count = _counted(robot, count, surface)
         for joint, parts in pieces.items():
             surfaces[joint - 1] = np.concatenate(parts)
             kinds[joint - 1] = "hull" if geometry == "hull" else use
@@ -143,7 +144,7 @@ def shapes_of(robot: Robot, use: str) -> Sequence[LinkShape]:
         GeometryError: If a shape of the URDF is wrong.
     """
     if robot.mjcf is None:
-        return linkshapes.read(robot.path, use)
+        return shapes_in(robot.path, use)
     return robot.mjcf.visual if use == "visual" else robot.mjcf.collision
 
 
@@ -167,18 +168,29 @@ def pieces(robot: Robot) -> Iterator[tuple[int, LinkShape, Array]]:
     places, _ = _links(robot)
     mesh = _reader(robot, hull=False)
     drawn: set[int] = set()
+    count = 0
     for use in GEOMETRIES["auto"]:
         parts = [(*places[shape.link], shape) for shape in shapes_of(robot, use)]
         parts = [part for part in parts if part[0] not in drawn]
         for joint, rotation, translation, shape in parts:
-            yield joint, shape, _placed(shape, mesh, rotation, translation)
+            surface = _placed(shape, mesh, rotation, translation)
+            count = _counted(robot, count, surface)
+            yield joint, shape, surface
         drawn |= {part[0] for part in parts}
 
 
 def _reader(robot: Robot, *, hull: bool) -> Callable[[str], Array]:
     """Reads meshes by their addresses, each once: left and right often share one."""
     read = meshes.hull if hull else meshes.read
-    return cache(lambda address: read(meshpath.find(address, robot.path, robot.package_roots)))
+    return cache(lambda address: read(find_mesh(address, robot.path, robot.package_roots)))
+
+
+def _counted(robot: Robot, count: int, surface: Array) -> int:
+    """Count the triangles of a robot; a mesh counts as often as it is drawn."""
+    count += len(surface)
+    if count > limit("triangles"):
+        raise GeometryError(f"{robot.path}: too many triangles, {beyond('triangles')}")
+    return count
 
 
 def _links(robot: Robot) -> tuple[dict[str, tuple[int, Array, Array]], tuple[str, ...]]:
@@ -551,7 +563,7 @@ class Surface:
     @classmethod
     def of_triangles(cls, robot: Robot, drawn: LinkTriangles) -> Self:
         """Integrate over triangles that have been read."""
-        axes = [turning_axis(robot.joints[index - 1]) for index in drawn.joint]
+        axes = [robot.joints[index - 1].turning_axis for index in drawn.joint]
         links = map(LinkSurface.of, drawn.triangles, axes)
         return cls(drawn.names, drawn.joint, tuple(links), drawn.missing)
 

@@ -13,7 +13,7 @@ from inspector.cli import main
 from inspector.compare import picture
 from inspector.compare.models import cells, levels, shades, write, write_csv
 from noisemodel import ROBOTS, Comparisons, compare
-from noisemodel.excitation import excitation
+from noisemodel.compare import excitation
 
 KINDS = ("simplified", "paper", "normal")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import noisemodel
-from noisemodel.catalog import urdf_path
+from noisemodel.robot import urdf_path
 
 ROOT = Path(__file__).parents[1]
 NOTES = tomllib.loads((ROOT / "REUSE.toml").read_text(encoding="utf-8"))["annotations"]

@@ -1,3 +1,4 @@
+import sys
 from contextlib import nullcontext
 
 import numpy as np
@@ -14,8 +15,8 @@ from noisemodel import (
     extended,
     simplified,
 )
-from noisemodel.estimates import check_length
-from noisemodel.similarity import (
+from noisemodel.compare import (
+    check_length,
     contrasts,
     correlation,
     envelopes,
@@ -255,7 +256,7 @@ def test_motions_are_estimated_in_chunks_as_whole(tmp_path, monkeypatch):
     robot = chain(tmp_path, "revolute", "prismatic", floating_base=True)
     q, v = motion(robot, samples=200)
     whole = compare(robot, q, v, rate=RATE)
-    monkeypatch.setattr("noisemodel.estimates.CHUNK", 7)
+    monkeypatch.setattr(sys.modules["noisemodel.compare"], "CHUNK", 7)
     chunks = compare(robot, q, v, rate=RATE)
     for name in ("correlation", "distance", "shares", "terms"):
         np.testing.assert_allclose(getattr(chunks, name), getattr(whole, name), rtol=1e-9)

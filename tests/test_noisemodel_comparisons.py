@@ -23,16 +23,12 @@ from noisemodel import (
     UnknownKindError,
     UnknownMotionError,
     compare,
-    estimates,
-    motions,
     parallel,
 )
-from noisemodel.comparison import BANDS, Comparison, RobotComparison
-from noisemodel.comparisons import medians
-from noisemodel.excitation import excitation
-from noisemodel.links import vibrating
-from noisemodel.similarity import log_spectra
+from noisemodel.compare import BANDS, Comparison, RobotComparison, excitation, log_spectra, medians
+from noisemodel.extended import vibrating
 
+comparing = sys.modules["noisemodel.compare"]
 FEW = ("simplified", "C", "paper", "normal")
 THREE = ("simplified", "paper", "normal")
 ARM, SLIDING = ("revolute", "revolute"), ("revolute", "revolute", "prismatic")
@@ -302,20 +298,18 @@ def test_a_surface_that_is_at_hand_is_taken(urdfs):
 
 def test_each_kind_is_evaluated_once(urdfs, monkeypatch):
     """A, B and C are evaluated for their shares; "paper" is their sum."""
-    calls, evaluate = Counter(), estimates.chunk_speeds
+    calls, evaluate = Counter(), sys.modules["noisemodel.compare"].chunk_speeds
 
     def counted(robot, surface, q, v, kind):
         calls[kind] += len(q)
         return evaluate(robot, surface, q, v, kind)
 
-    monkeypatch.setattr("noisemodel.estimates.chunk_speeds", counted)
+    monkeypatch.setattr(sys.modules["noisemodel.compare"], "chunk_speeds", counted)
     samples = len(alone(urdfs[0], ("simplified", "C", "paper", "mean", "normal")).time)
     assert calls == dict.fromkeys(("A", "B", "C", "mean", "normal"), samples)
 
 
 def test_a_robot_that_kills_its_worker_is_left_out(tmp_path, monkeypatch):
-    comparing = sys.modules["noisemodel.compare"]
-
     def die(name, *others):
         return workers.die() if name == "ur5" else compare_one(name, *others)
 
@@ -736,11 +730,13 @@ def test_of_equal_stretches_the_first_is_compared_with_the_blocks_that_lie_in_it
         Block(edges[1], 2.2, "jerk"),
     )
     signals = {"velocity": run.velocity * valid[:, None], "position": run.position * valid[:, None]}
-    moving = motions._measured(run, dataclasses.replace(run, valid=valid, blocks=blocks, **signals))
+    moving = comparing._measured(
+        run, dataclasses.replace(run, valid=valid, blocks=blocks, **signals)
+    )
     assert (len(moving.time), moving.time[0], moving.time[-1]) == (8000, *edges)
     assert [event.label for event in moving.events] == ["jerk", "fall"]
     assert moving.remarks == ("The run has gaps: compared from 0.00 s on.",)
-    whole = motions._longest(dataclasses.replace(run, blocks=(Block(*edges, "fall"),)))
+    whole = comparing._longest(dataclasses.replace(run, blocks=(Block(*edges, "fall"),)))
     assert len(whole.blocks) == 1
 
 

@@ -3,7 +3,7 @@ import pytest
 from chains import BAR, chain
 
 from noisemodel import KINDS, CornerError, NoiseModelError, Surface, extended, extended_chunks
-from noisemodel.dipole import corner_frequencies
+from noisemodel.extended import corner_frequencies
 
 RATE = 20_000.0
 SPHERE = '<visual><geometry><sphere radius="0.1"/></geometry></visual>'

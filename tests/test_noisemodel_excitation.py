@@ -1,10 +1,13 @@
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from chains import chain
 
 from noisemodel import NoiseModelError, Robot
-from noisemodel.excitation import RATE, SHAKES, ends, excitation, limits
-from noisemodel.links import vibrating
+from noisemodel.compare import RATE, SHAKES, ends, excitation
+from noisemodel.extended import vibrating
+from noisemodel.robot import limits_of
 
 ODD = (
     "panda",  # prismatic, mimic
@@ -20,6 +23,16 @@ ODD = (
 @pytest.fixture(scope="module", params=ODD)
 def robot(request):
     return Robot.load(request.param, mimic=True)
+
+
+def limits(robot):
+    found = limits_of(robot)
+    each = [found[name] for name in robot.joint_names]
+    return SimpleNamespace(
+        centre=np.array([one.centre for one in each]),
+        range=np.array([one.upper - one.lower for one in each]),
+        speed=np.array([one.velocity for one in each]),
+    )
 
 
 def test_positions_stay_within_the_limits(robot):

@@ -4,7 +4,7 @@ from math import inf
 
 import pytest
 
-from noisemodel.limits import Limits, joint_limits
+from noisemodel.robot import Limits, joint_limits
 
 
 def limits(folder, attributes, kind="revolute"):

@@ -1,10 +1,11 @@
+import sys
+
 import numpy as np
 import pytest
 from chains import BAR, chain, motion
 
 from noisemodel import Robot, Run, Surface, extended
-from noisemodel.linkpower import by_moments, by_samples, second_moments
-from noisemodel.links import link_noise
+from noisemodel.extended import by_moments, by_samples, link_noise, second_moments
 
 SIZE = 20
 
@@ -110,7 +111,7 @@ def test_a_bin_that_begins_in_a_gap_takes_the_pose_of_its_valid_part(solo, kind,
 
 @pytest.mark.parametrize("chunk", [4, 25, 1000])
 def test_power_of_samples_is_averaged_in_bins_whatever_the_chunks(tmp_path, monkeypatch, chunk):
-    monkeypatch.setattr("noisemodel.linkpower.CHUNK", chunk)
+    monkeypatch.setattr(sys.modules["noisemodel.extended"], "CHUNK", chunk)
     robot = chain(tmp_path, "revolute", "prismatic")
     q, v = motion(robot, samples=95)
     valid = np.ones(95, dtype=bool)

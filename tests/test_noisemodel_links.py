@@ -5,7 +5,7 @@ import pytest
 from chains import BAR, chain
 
 from noisemodel import Robot, Run, Surface, extended
-from noisemodel.links import link_noise, vibrating
+from noisemodel.extended import link_noise, vibrating
 
 
 def arm_run(rattling=None, *, rate=1000.0, seconds=4.0, **changes):

@@ -5,10 +5,11 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from noisemodel import MeshError, catalog, meshes, shapes
+from noisemodel import MeshError, meshes, urdf
+from noisemodel.robot import listed_folders
 
 TRIANGLE = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], dtype=float)
-BRICK = shapes.box(1, 2, 3)
+BRICK = urdf.box(1, 2, 3)
 
 
 @pytest.fixture(autouse=True)
@@ -418,7 +419,7 @@ def test_damaged_files_are_errors_or_meshes_and_nothing_else(tmp_path, damage):
 
 @pytest.mark.slow
 def test_every_stl_and_obj_of_the_listed_robots_is_as_trimesh_reads_it():
-    files = [*catalog.package_roots()[-1].rglob("*.*")]
+    files = [*listed_folders()[-1].rglob("*.*")]
     count = 0
     for file in files:
         if file.suffix.lower() in (".stl", ".obj"):
@@ -436,7 +437,7 @@ def test_every_stl_and_obj_of_the_listed_robots_is_as_trimesh_reads_it():
 def test_every_dae_of_the_listed_robots_fills_the_box_that_pinocchio_finds():
     import coal  # its boxes are right, its triangles are not
 
-    files = [f for f in catalog.package_roots()[-1].rglob("*.*") if f.suffix.lower() == ".dae"]
+    files = [f for f in listed_folders()[-1].rglob("*.*") if f.suffix.lower() == ".dae"]
     for file in files:
         mesh = coal.MeshLoader().load(str(file), np.ones(3))
         mesh.computeLocalAABB()

@@ -1,5 +1,6 @@
 import dataclasses
 import os
+from importlib.metadata import PackageNotFoundError
 
 import numpy as np
 import pinocchio as pin
@@ -14,7 +15,6 @@ from noisemodel import (
     RunError,
     UnknownJointError,
     UnknownRobotError,
-    catalog,
     link_twists,
 )
 from noisemodel.robot import package_roots
@@ -230,9 +230,9 @@ def test_a_urdf_that_is_not_there_is_named(tmp_path):
 
 def test_a_missing_example_robot_data_is_an_error_with_what_to_install(monkeypatch):
     def gone(name):
-        raise catalog.PackageNotFoundError(name)
+        raise PackageNotFoundError(name)
 
-    monkeypatch.setattr(catalog, "distribution", gone)
+    monkeypatch.setattr("noisemodel.robot.distribution", gone)
     with pytest.raises(RobotError, match="pip install example-robot-data"):
         Robot.load("talos")
 

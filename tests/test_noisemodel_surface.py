@@ -13,8 +13,8 @@ from noisemodel import (
     MissingMeshError,
     Robot,
     Surface,
-    shapes,
     surface_speed,
+    urdf,
 )
 from noisemodel.surface import (
     LinkSurface,
@@ -111,7 +111,7 @@ def test_what_is_fixed_to_a_link_belongs_to_it(tmp_path):
     assert np.allclose(areas(links), [44.0, 0.0], rtol=1e-15)
     # The tool's axes are turned about z by a quarter and lie at z = 5.
     tool = {(-0.5 + y, x, 5 + z) for x in (-0.5, 0.5) for y in (-1, 1) for z in (-1.5, 1.5)}
-    assert corners(links.triangles[0]) == tool | corners(shapes.box(1, 2, 3))
+    assert corners(links.triangles[0]) == tool | corners(urdf.box(1, 2, 3))
 
 
 def test_a_link_without_geometry_is_listed_and_has_no_triangles(tmp_path):
@@ -148,13 +148,13 @@ def test_a_mesh_is_drawn_as_it_is_and_not_as_its_hull(tmp_path):
     ],
 )
 def test_scales_stretch_and_mirror_a_mesh(tmp_path, scale, expected):
-    name = mesh_of(shapes.box(1, 2, 3), tmp_path)
+    name = mesh_of(urdf.box(1, 2, 3), tmp_path)
     links = triangles(robot(tmp_path, arm=visual(MESH.format(name, f'scale="{scale}"'))))
     assert np.isclose(area(links.triangles[0]), expected, rtol=1e-14)
 
 
 def test_a_mesh_in_parts_has_the_area_of_the_whole(tmp_path):
-    ball = shapes.sphere(0.3)
+    ball = urdf.sphere(0.3)
     names = [mesh_of(part, tmp_path, f"{i}.obj") for i, part in enumerate(np.split(ball, 4))]
     pieces = "".join(visual(MESH.format(name, "")) for name in names)
     whole = visual(MESH.format(mesh_of(ball, tmp_path), ""))
@@ -164,13 +164,13 @@ def test_a_mesh_in_parts_has_the_area_of_the_whole(tmp_path):
 
 
 def test_visual_collision_hull_and_auto_take_their_own_geometry(tmp_path):
-    open_box = mesh_of(shapes.box(1, 2, 3)[:10], tmp_path)  # without its upper side
+    open_box = mesh_of(urdf.box(1, 2, 3)[:10], tmp_path)  # without its upper side
     built = robot(
         tmp_path,
         arm=visual(MESH.format(open_box, "")) + collision(BOX.replace("1 2 3", "1 1 1")),
         slide=collision('<geometry><sphere radius="1"/></geometry>'),
     )
-    ball = area(shapes.sphere(1))
+    ball = area(urdf.sphere(1))
     for geometry, expected, kind in (
         ("visual", [20.0, 0.0], ("visual", "none")),
         ("collision", [6.0, ball], ("collision", "collision")),
@@ -184,10 +184,10 @@ def test_visual_collision_hull_and_auto_take_their_own_geometry(tmp_path):
 
 def test_shapes_lie_around_the_origin_with_the_documented_number_of_triangles():
     for drawn, half, count in (
-        (shapes.box(1, 2, 3), (0.5, 1, 1.5), 12),
-        (shapes.cylinder(0.3, 0.7), (0.3, 0.3, 0.35), 4 * 64),
-        (shapes.capsule(0.3, 0.7), (0.3, 0.3, 0.65), 64 * 64),
-        (shapes.sphere(0.3), (0.3, 0.3, 0.3), 5120),
+        (urdf.box(1, 2, 3), (0.5, 1, 1.5), 12),
+        (urdf.cylinder(0.3, 0.7), (0.3, 0.3, 0.35), 4 * 64),
+        (urdf.capsule(0.3, 0.7), (0.3, 0.3, 0.65), 64 * 64),
+        (urdf.sphere(0.3), (0.3, 0.3, 0.3), 5120),
     ):
         assert drawn.shape == (count, 3, 3)
         np.testing.assert_allclose(drawn.max(axis=(0, 1)), half, rtol=1e-12)
@@ -198,7 +198,7 @@ def test_shapes_lie_around_the_origin_with_the_documented_number_of_triangles():
 def test_a_capsule_of_a_urdf_is_drawn(tmp_path):
     capsule = visual('<geometry><capsule radius="0.3" length="0.7"/></geometry>')
     drawn = triangles(robot(tmp_path, arm=capsule)).triangles[0]
-    np.testing.assert_array_equal(drawn, shapes.capsule(0.3, 0.7))
+    np.testing.assert_array_equal(drawn, urdf.capsule(0.3, 0.7))
 
 
 @pytest.mark.parametrize(
@@ -253,18 +253,18 @@ def test_what_is_fixed_to_the_world_is_a_piece_and_collision_fills_in(tmp_path):
 
 
 def test_round_shapes_are_too_small_by_the_documented_error():
-    side = area(shapes.cylinder(1, 2)) - area(shapes.cylinder(1, 1))
-    ends = area(shapes.cylinder(1, 1)) - side
-    ball = area(shapes.capsule(1, 1)) - side
+    side = area(urdf.cylinder(1, 2)) - area(urdf.cylinder(1, 1))
+    ends = area(urdf.cylinder(1, 1)) - side
+    ball = area(urdf.capsule(1, 1)) - side
     found = [side / (2 * np.pi), ends / (2 * np.pi), ball / (4 * np.pi)]
-    found.append(area(shapes.sphere(1)) / (4 * np.pi))
+    found.append(area(urdf.sphere(1)) / (4 * np.pi))
     assert np.allclose(found, [0.9996, 0.9984, 0.9980, 0.9988], rtol=0, atol=5e-5)
 
 
 @pytest.mark.parametrize("name", ["box", "cylinder", "capsule", "sphere"])
 def test_shapes_are_closed(name):
     sizes = {"box": (1, 2, 3), "sphere": (1,)}.get(name, (1, 2))
-    drawn = np.round(getattr(shapes, name)(*sizes), 9) + 0.0
+    drawn = np.round(getattr(urdf, name)(*sizes), 9) + 0.0
     edges = [
         frozenset((tuple(triangle[i]), tuple(triangle[i - 1])))
         for triangle in drawn
@@ -400,7 +400,7 @@ def test_a_mesh_without_a_surface_is_named(tmp_path, content, scale, message):
 def test_no_mesh_is_read_outside_of_the_robots_folders(tmp_path):
     inner = tmp_path / "a" / "b" / "c"
     inner.mkdir(parents=True)
-    mesh_of(shapes.box(1, 2, 3), tmp_path)
+    mesh_of(urdf.box(1, 2, 3), tmp_path)
     for address in ("../../../part.obj", "part.obj/../../../../../part.obj"):
         built = robot(inner, arm=visual(MESH.format(address, "")))
         with pytest.raises(MeshError, match=r"(lies outside of|not found in)"):
@@ -411,7 +411,7 @@ def test_no_mesh_is_read_outside_of_the_robots_folders(tmp_path):
 
 
 def test_a_mesh_may_be_addressed_in_every_way_that_urdfs_do(tmp_path):
-    name = mesh_of(shapes.box(1, 2, 3), tmp_path)
+    name = mesh_of(urdf.box(1, 2, 3), tmp_path)
     for address in (f"package:///{name}", f"package://{name}", name, f"file://{tmp_path}/{name}"):
         geometry = f'<geometry><mesh filename="{address}"/></geometry>'
         links = triangles(robot(tmp_path, arm=visual(geometry)))
@@ -419,11 +419,11 @@ def test_a_mesh_may_be_addressed_in_every_way_that_urdfs_do(tmp_path):
 
 
 SHAPES = {
-    "box": shapes.box(0.3, 0.2, 0.5),
-    "sphere": shapes.sphere(0.2),
-    "rod": shapes.cylinder(0.01, 1.0) + np.array([0.0, 0.0, 0.5]),
-    "sheet": shapes.box(1.0, 1.0, 1e-9),
-    "two parts": np.concatenate((shapes.sphere(0.1), shapes.box(0.1, 0.1, 0.4) + np.eye(3)[0])),
+    "box": urdf.box(0.3, 0.2, 0.5),
+    "sphere": urdf.sphere(0.2),
+    "rod": urdf.cylinder(0.01, 1.0) + np.array([0.0, 0.0, 0.5]),
+    "sheet": urdf.box(1.0, 1.0, 1e-9),
+    "two parts": np.concatenate((urdf.sphere(0.1), urdf.box(0.1, 0.1, 0.4) + np.eye(3)[0])),
 }
 
 
@@ -440,7 +440,7 @@ def twists(surface, count=200):
 
 
 def test_surface_of_a_box():
-    exact = moments(shapes.box(1.0, 2.0, 3.0) + np.array([5.0, 6.0, 7.0]))
+    exact = moments(urdf.box(1.0, 2.0, 3.0) + np.array([5.0, 6.0, 7.0]))
     assert exact.area == pytest.approx(22.0, rel=1e-15)
     assert np.allclose(exact.centroid, [5.0, 6.0, 7.0], rtol=1e-15)
 
@@ -543,7 +543,7 @@ def test_the_table_gives_the_mean_speed_about_any_axis(name):
 
 @pytest.mark.parametrize("size", [(0.3, 0.2, 0.5), (1.0, 4e-3, 2e-3), (1.0, 1.0, 1e-9)])
 def test_points_grow_with_the_surface(size):
-    surface = shapes.box(*size) + np.array([0.1, 0.2, 0.3])
+    surface = urdf.box(*size) + np.array([0.1, 0.2, 0.3])
     once = fine(surface)
     for factor in (64.0, 2.0**-10):
         larger = fine(factor * surface)
@@ -553,7 +553,7 @@ def test_points_grow_with_the_surface(size):
 
 
 def test_no_more_points_are_placed_than_the_most(monkeypatch):
-    box, sheet = shapes.box(0.3, 0.2, 0.5), shapes.box(1.0, 0.3, 1e-3)
+    box, sheet = urdf.box(0.3, 0.2, 0.5), urdf.box(1.0, 0.3, 1e-3)
     for most in range(200, 3000, 50):
         monkeypatch.setattr("noisemodel.surface.MOST", most)
         assert len(fine(box).points) <= most
@@ -609,7 +609,7 @@ CASES = {
 
 def test_lever_of_a_bar_is_its_mean_distance_from_the_axis():
     """A thin bar from 0 to 1 m along x: half a metre about z, next to nothing about itself."""
-    bar = shapes.box(1.0, 1e-4, 1e-4) + np.array([0.5, 0, 0])
+    bar = urdf.box(1.0, 1e-4, 1e-4) + np.array([0.5, 0, 0])
     assert LinkSurface.of(bar, np.array([0.0, 0, 1])).lever == pytest.approx(0.5, rel=1e-3)
     assert LinkSurface.of(bar, np.array([1.0, 0, 0])).lever < 1e-4
     assert LinkSurface.of(bar, np.zeros(3)).lever == 0.0

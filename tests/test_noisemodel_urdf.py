@@ -1,7 +1,7 @@
 import pytest
 
 from noisemodel import Robot, RobotError
-from noisemodel.urdf import Mimic, read
+from noisemodel.urdf import Mimic, checked, mimics
 
 LINKS = '<link name="base"/><link name="tip"/>'
 JOINT = """
@@ -27,10 +27,10 @@ def test_a_urdf_gives_its_name_and_mimic_joints(tmp_path):
     path.write_text(
         GOOD.replace("<axis", '<mimic joint="wrist" multiplier="-2" offset="0.5"/><axis')
     )
-    assert read(path).name == "arm"
-    assert read(path).mimics == {"elbow": Mimic("wrist", multiplier=-2.0, offset=0.5)}
+    assert checked(path).get("name") == "arm"
+    assert mimics(path, checked(path)) == {"elbow": Mimic("wrist", multiplier=-2.0, offset=0.5)}
     path.write_text(GOOD.replace("<axis", '<mimic joint="wrist"/><axis'))
-    assert read(path).mimics == {"elbow": Mimic("wrist", multiplier=1.0, offset=0.0)}
+    assert mimics(path, checked(path)) == {"elbow": Mimic("wrist", multiplier=1.0, offset=0.0)}
 
 
 def test_fixed_joints_may_have_an_axis_of_length_0(tmp_path):
@@ -81,10 +81,10 @@ def test_the_limit_of_joints_is_how_many_there_may_be(tmp_path, monkeypatch):
     monkeypatch.setenv("NOISE_LIMIT_JOINTS", "3")
     path = tmp_path / "arm.urdf"
     path.write_text(chain(3))
-    assert read(path).name == "chain"
+    assert checked(path).get("name") == "chain"
     path.write_text(chain(4))
     with pytest.raises(RobotError, match="4 joints; the limit is 3 .--limit joints=N raises it"):
-        read(path)
+        checked(path)
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_numbers_and_trees_that_pinocchio_takes_though_they_are_wrong(tmp_path, 
     path = tmp_path / "arm.urdf"
     path.write_text(text)
     with pytest.raises(RobotError, match=message):
-        read(path)
+        checked(path)
 
 
 def test_joints_that_mimic_each_other_are_named(tmp_path):
@@ -113,9 +113,9 @@ def test_joints_that_mimic_each_other_are_named(tmp_path):
         )
     path.write_text(text)
     with pytest.raises(RobotError, match="joint 'j0' mimics itself"):
-        read(path)
+        checked(path)
     path.write_text(text.replace('<mimic joint="j0"/>', ""))
-    assert {name: each.joint for name, each in read(path).mimics.items()} == {
+    assert {name: each.joint for name, each in mimics(path, checked(path)).items()} == {
         "j0": "j1",
         "j1": "j2",
     }

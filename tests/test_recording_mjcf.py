@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from inspector.cli import app
 from inspector.recording import robot as scene
 from noisemodel import Robot
-from noisemodel.excitation import excitation
+from noisemodel.compare import excitation
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from commandline import call
 
 import noisemodel as nm
 from inspector.wrongrobot import WrongRobotError, check_joints, limit_warnings
-from noisemodel.limits import Limits, joint_limits, of_model
+from noisemodel.robot import Limits, joint_limits, limits_of
 
 PANDA = tuple(f"panda_joint{number}" for number in range(1, 8))
 
@@ -26,7 +26,7 @@ def panda(names=PANDA, factor=1.0, robot="panda", seconds=3.0):
 
 @pytest.mark.parametrize("name", ["panda", "talos", "go2", "tiago", "double_pendulum_continuous"])
 def test_limits_are_those_that_pinocchio_reads(name):
-    assert dict(joint_limits(name)) == of_model(nm.Robot.load(name))
+    assert dict(joint_limits(name)) == limits_of(nm.Robot.load(name))
 
 
 def test_a_joint_without_a_limit_has_none(tmp_path):

@@ -8,7 +8,7 @@ import numpy as np
 
 from benchmarks.elsewhere.faults import Control
 from benchmarks.elsewhere.recorded import Recorded
-from noisemodel.catalog import urdf_path
+from noisemodel.robot import urdf_path
 
 
 @dataclass(frozen=True)

@@ -36,14 +36,14 @@ from noiseclassifier.lasting import HOP as LASTING_HOP
 from noiseclassifier.lasting import MARGIN as LASTING_MARGIN
 from noiseclassifier.lasting import WINDOW as LASTING_WINDOW
 from noiseclassifier.lasting import joined
-from noisemodel.catalog import is_name
+from noisemodel.robot import is_name
 from noisemodel.run import is_robot_file
 from noisemodel.types import Array
 
 if TYPE_CHECKING:
     from inspector.localisation.localise import Localisation
     from inspector.localisation.order import Order
-    from noisemodel.links import LinkNoise
+    from noisemodel.extended import LinkNoise
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -350,7 +350,7 @@ def with_links(analysis: Analysis, kind: str, *, terms: bool = False) -> Analysi
         RobotError: If the robot cannot be read, or lacks one of the run's joints.
         InspectorError: If the robot's shape cannot be had.
     """
-    from noisemodel.links import link_noise
+    from noisemodel.extended import link_noise
 
     run = analysis.run
     found = replace(analysis, missing=tuple(_missing(run)))

@@ -5,7 +5,7 @@ import numpy as np
 from inspector import levels
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.moments import worst
-from noisemodel.links import vibrating
+from noisemodel.extended import vibrating
 from noisemodel.runfile import pieces
 from noisemodel.types import Array
 

@@ -10,7 +10,7 @@ def robots() -> None:
     listed if mujoco-menagerie is installed, which downloads each at its first use.
     """
     from noisemodel import ROBOTS
-    from noisemodel.catalog import menagerie_names
+    from noisemodel.robot import menagerie_names
 
     for name, robot in ROBOTS.items():
         base = "floating" if robot.floating_base else "fixed"

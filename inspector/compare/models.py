@@ -22,8 +22,8 @@ from inspector.recording.unstable import Part
 from inspector.spectrogram import spectrogram
 from inspector.text import cell
 from noisemodel import Comparisons, RobotComparison
+from noisemodel.extended import vibrating
 from noisemodel.files import refuse_existing, replacing
-from noisemodel.links import vibrating
 from noisemodel.noise import decibel
 from noisemodel.types import Array
 

@@ -9,8 +9,7 @@ import numpy as np
 
 from inspector.errors import InspectorError
 from noisemodel import Comparisons, RobotComparison
-from noisemodel.comparison import TERMS
-from noisemodel.comparisons import medians
+from noisemodel.compare import TERMS, medians
 from noisemodel.files import replacing
 from noisemodel.types import Array
 

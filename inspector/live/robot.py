@@ -16,10 +16,9 @@ from inspector.levels import LINKS
 from inspector.recording import axes, framing
 from inspector.recording import robot as scene
 from inspector.recording.camera import Camera, fitted
-from noisemodel.limits import Limits, joint_limits
-from noisemodel.linkpower import by_moments, second_moments
-from noisemodel.links import FAST, vibrating
+from noisemodel.extended import FAST, by_moments, second_moments, vibrating
 from noisemodel.noise import REFERENCE_POWER, decibel
+from noisemodel.robot import Limits, joint_limits
 from noisemodel.types import Array
 
 STEP = 0.2

@@ -32,7 +32,7 @@ from inspector.live.sink import Sink
 from inspector.wrongrobot import LONG, LimitWatch, check_joints
 from noiseclassifier import Event, merged
 from noisemodel.files import beyond, limit
-from noisemodel.limits import joint_limits
+from noisemodel.robot import joint_limits
 from noisemodel.types import Array, Mask
 
 POSES = 40

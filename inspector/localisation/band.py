@@ -7,7 +7,7 @@ import numpy as np
 from inspector.localisation.quiet import quiet_stretches
 from noiseclassifier import Event
 from noisemodel import Block, Run
-from noisemodel.links import FAST
+from noisemodel.extended import FAST
 from noisemodel.types import Array, Real
 
 SHORTEST, LONGEST = 0.1, 0.4

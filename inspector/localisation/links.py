@@ -8,7 +8,7 @@ import numpy as np
 from inspector.localisation.stage import Localisation
 from noiseclassifier import Event
 from noisemodel import Block
-from noisemodel.links import LinkNoise
+from noisemodel.extended import LinkNoise
 from noisemodel.types import Array
 
 Failure: TypeAlias = Event | Block

@@ -29,7 +29,7 @@ from inspector.wrongrobot import WrongRobotError
 from noiseclassifier.jsontext import from_toml, text_of, toml_shown
 from noisemodel import Robot, RobotError
 from noisemodel.files import replacing
-from noisemodel.limits import joint_limits
+from noisemodel.robot import joint_limits
 from noisemodel.types import Array, Mask, Real
 
 FORMAT = "noise-mapping/1"

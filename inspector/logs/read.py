@@ -27,7 +27,7 @@ from inspector.wrongrobot import check_joints, limit_warnings, named
 from noiseclassifier.jsontext import from_json
 from noisemodel import NoiseModelError, OutputError, Robot, RobotError, Run, RunFileError, runfile
 from noisemodel.files import also_reading, refuse_existing, replacing
-from noisemodel.limits import joint_limits
+from noisemodel.robot import joint_limits
 from noisemodel.run import NotUniformError
 
 MAGIC = {

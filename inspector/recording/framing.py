@@ -15,10 +15,11 @@ from rerun.urdf import UrdfJoint, UrdfTree
 
 from inspector.recording import axes, robot
 from inspector.recording.camera import Camera, fitted
-from noisemodel import linkshapes, meshes
+from noisemodel import meshes
 from noisemodel.errors import MeshError
 from noisemodel.run import Run
 from noisemodel.types import Array
+from noisemodel.urdf import shapes_in
 
 ON_FLOOR = np.array([1.0, 1.0, 0.0])
 """The camera follows a base along the floor, not up and down."""
@@ -133,7 +134,7 @@ def outermost(urdf: Path) -> dict[str, Array]:
         its origin.
     """
     found: dict[str, list[Array]] = {}
-    for shape in linkshapes.read(urdf, "visual"):
+    for shape in shapes_in(urdf, "visual"):
         body = shape.body
         if isinstance(body, str):
             try:

@@ -27,7 +27,7 @@ from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands
 from inspector.thinning import extremes
 from noiseclassifier import Event, Labels
 from noisemodel import Block, Run
-from noisemodel.links import LinkNoise, vibrating
+from noisemodel.extended import LinkNoise, vibrating
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array, Real
 

@@ -14,13 +14,14 @@ from rerun.urdf import UrdfJoint, UrdfTree
 import noisemodel
 from inspector.errors import InspectorError
 from inspector.recording import axes, unstable
-from noisemodel import meshes, meshpath, robot, urdf
+from noisemodel import meshes, robot, urdf
 from noisemodel.errors import UnknownJointError
 from noisemodel.mjcf import is_mjcf
 from noisemodel.robot import Robot
 from noisemodel.run import Run
 from noisemodel.surface import link_names, pieces
 from noisemodel.types import Array
+from noisemodel.urdf import find_mesh
 
 FRAMES_PER_SECOND = 50.0
 MAX_FRAMES = 2000
@@ -46,7 +47,7 @@ def load(name: str, folder: Path, joint_names: Sequence[str] = (), *, side: str 
     if is_mjcf(path):
         text = drawable_mjcf(Robot.load(path), folder)
     else:
-        urdf.read(path)
+        urdf.checked(path)
         text = drawable(path, robot.package_roots(name), folder)
     copy.write_text(text, encoding="utf-8")
     tree = UrdfTree.from_file_path(
@@ -375,7 +376,7 @@ def _unlike(known: Sequence[str], name: str) -> str:
 
 def _checked(address: str, urdf: Path, roots: Sequence[Path], folder: Path) -> Path:
     try:
-        path = meshpath.find(address, urdf, roots)
+        path = find_mesh(address, urdf, roots)
         if path.suffix.lower() not in DRAWN:
             known = ", ".join(sorted(DRAWN))
             raise MeshError(address, f"of kind {path.suffix!r}, expected {known}")

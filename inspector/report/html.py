@@ -14,8 +14,8 @@ from inspector.analysis.analyse import Analysis
 from inspector.errors import InspectorError
 from inspector.report.markdown import LOCALISATION, localised, matched, note, spoken
 from inspector.sound import clip, worst_time
+from noisemodel.extended import vibrating_pieces
 from noisemodel.files import replacing
-from noisemodel.links import vibrating_pieces
 from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.types import Array
 

@@ -15,7 +15,7 @@ from noiseclassifier.scenarios.faults import Imperfections
 from noiseclassifier.scenarios.motions import TICK, Ball, Box, Effector, Rod, Sole
 from noiseclassifier.scenarios.robots import Drivetrain
 from noisemodel import Robot, RobotError
-from noisemodel.joints import Joint, table_of
+from noisemodel.robot import Joint, table_of
 from noisemodel.types import Array
 
 
