@@ -120,17 +120,6 @@ def log_of(
 ) -> Log:
     """Log of the arrays of one episode.
 
-    Args:
-        path: The file.
-        arrays: Numbers by name, samples along the first axis.
-        options: How to read them.
-        episode: Name of the episode, empty for a file without.
-        rate: The rate that the format defines, if any, in [Hz].
-        numbers: Single numbers by name, among them perhaps the rate or the step.
-        joints: Names of the joints by the ending of their signals, "" or "_desired".
-        controller: What takes the actions, if the file says so.
-        not_read: Names of further arrays, of which nothing is known.
-
     Raises:
         LogError: If none of them is known to hold motion, their lengths differ, or there are no
             stamps and no rate.
@@ -196,12 +185,7 @@ def _is_array(name: str, each: NDArray[Any]) -> bool:
 
 
 def gathered(log: Log, options: ReadOptions) -> Log:
-    """Log of a table with the columns of MuJoCo's state as arrays; itself if it has none.
-
-    Args:
-        log: A log with a field for each column, of one clock.
-        options: How to read it; columns that they map stay columns.
-    """
+    """Log of a table with the columns of MuJoCo's state as arrays; itself if it has none."""
     mapped = {entry.source for entry in options.entries}
     groups: dict[str, dict[int, Field]] = {}
     for each in log.fields:
@@ -274,10 +258,6 @@ def single_numbers(items: Mapping[str, Any]) -> dict[str, float]:
 
 def followed(command: Real, position: Real) -> int:
     """Number of leading columns of a command that are targets of the positions beside them.
-
-    Args:
-        command: Shape (samples, commands).
-        position: Shape (samples, joints).
 
     Returns:
         0 if they are not targets of half of the joints, or if no joint moves.

@@ -60,13 +60,6 @@ def unit_of(
 ) -> str:
     """Unit of stamps: by their column's name, the epoch, the log's rate, or their median step.
 
-    Args:
-        path: The log, for errors.
-        steps: Differences of the stamps, shape (samples - 1,).
-        rate: The log's rate, if known, in [Hz].
-        name: Name of their column, which may end with a unit.
-        first: The first stamp.
-
     Returns:
         A key of ``UNITS``, or ``SAMPLES`` of whole numbers that grow by one, but for some holes.
 
@@ -118,12 +111,6 @@ def is_counter(steps: NDArray[Any], first: float) -> bool:
 def stamps_of(path: Path, name: str, values: NDArray[Any], rate: float | None) -> Stamps:
     """Stamps from an array of numbers.
 
-    Args:
-        path: The log, for errors.
-        name: Their name in the log.
-        values: Seconds, whole nanoseconds or NumPy datetimes, shape (samples,).
-        rate: The log's rate, if known, in [Hz].
-
     Raises:
         LogError: If they are not finite, or in an unknown unit.
     """
@@ -174,14 +161,6 @@ def counted_stamps(
 ) -> Stamps:
     """Stamps in seconds of samples that are only counted: at a rate that is known or found.
 
-    Args:
-        path: The log, for errors.
-        stamps: Their unit is ``SAMPLES``.
-        options: The rate, if it is given; it may not contradict the values unless forced.
-        position: Shape (samples, joints); None if there is none.
-        velocity: Of the same joints, shape (samples, joints).
-        stated: Name and value of a number in the log that states the rate, in [Hz].
-
     Raises:
         LogError: If the rate is not known, or contradicts positions and velocities.
     """
@@ -217,10 +196,6 @@ def counted_stamps(
 
 def rate_of(position: Real, velocity: Real) -> float | None:
     """Sample rate at which velocities are the steps of positions, in [Hz].
-
-    Args:
-        position: Shape (samples, joints).
-        velocity: Shape (samples, joints).
 
     Returns:
         The common rate nearby, or else the rate to three digits; None if they do not fit.
@@ -310,10 +285,6 @@ def ordered(path: Path, tracks: Sequence[Track]) -> tuple[tuple[Track, ...], dic
 def common_time(tracks: Sequence[Track], main: Track) -> tuple[Array, Mask]:
     """Uniform time base of a run, over the time that all tracks cover.
 
-    Args:
-        tracks: All tracks, on one clock.
-        main: The track whose rate the run has; its time starts at 0.
-
     Returns:
         Time, shape (instants,), in [s], and whether each instant is outside of all gaps; no
         instants if the tracks do not overlap.
@@ -345,12 +316,6 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
     Samples at an instant are taken as they are. Others, and all of a track whose samples are not
     uniform, are interpolated monotonically (PCHIP), without overshoot.
 
-    Args:
-        instants: The time base, shape (instants,), in [s].
-        valid: False in gaps, shape (instants,).
-        track: The track.
-        slack: Largest difference of coinciding times, in [s].
-
     Returns:
         Values, 0 in gaps, shape (instants, columns).
     """
@@ -378,10 +343,6 @@ def resampled(instants: Array, valid: Mask, track: Track, slack: float) -> Real:
 
 def interpolated(pose: Array, interpolate: Callable[[Array], Array]) -> Array:
     """Interpolated poses, whose quaternions take the shorter way and have norm 1.
-
-    Args:
-        pose: x, y, z and quaternion x, y, z, w, shape (samples, 7).
-        interpolate: Interpolates columns.
 
     Returns:
         Poses at the instants that ``interpolate`` gives, shape (instants, 7).
@@ -516,13 +477,6 @@ def synchronise(
 ) -> tuple[tuple[Track, ...], str, Offset | None]:
     """Tracks on the clock of the measured motion, whose time starts at 0.
 
-    Args:
-        path: The log of the desired motion, for errors.
-        tracks: All tracks, measured and desired.
-        main: One whose stamps the run's time is made of.
-        rate: The rate of the main stamps, if known, in [Hz].
-        offset: Offset added to desired stamps, in [s]; estimated unless given.
-
     Returns:
         The tracks, a sentence on the desired motion's clock if it has one of its own, and the
         offset that was applied to it, if any.
@@ -592,12 +546,7 @@ def _shifted(
 
 
 def estimate(measured: Mapping[str, Track], desired: Mapping[str, Track]) -> Offset | None:
-    """Offset of the desired clock to the measured one; None if no joint moves in both.
-
-    Args:
-        measured: The measured tracks by signal, "position" or "velocity".
-        desired: The desired tracks by the same.
-    """
+    """Offset of the desired clock to the measured one; None if no joint moves in both."""
     pair = _common_tracks(measured, desired)
     if pair is None:
         return None

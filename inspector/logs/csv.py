@@ -300,13 +300,6 @@ def numbers_in(
 
     Cells are converted as one array: beginning a hundred small columns costs as much again.
 
-    Args:
-        lines: The lines.
-        width: Cells of a line.
-        delimiter: Mark between them.
-        wanted: Places of the cells that are numbers.
-        text: Place of a cell that is returned as text.
-
     Returns:
         Numbers, shape (lines, wanted), and the text of each line; None if a line is too short or
         too long, or a cell is empty, quoted, padded or no number.
@@ -502,9 +495,6 @@ def suggested(table: Array) -> tuple[list[str], str]:
 
     The first is time if it rises evenly. Columns are velocities if they are the slopes of as many
     columns before them; without such, all are positions.
-
-    Args:
-        table: Shape (samples, columns).
     """
     width = table.shape[1]
     steps = np.diff(table[:, 0])

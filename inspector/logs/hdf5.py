@@ -100,8 +100,14 @@ def _episodes(path: Path, file: Any) -> tuple[str, tuple[str, ...]]:
     """
     for home in (EPISODES, "/"):
         if isinstance(group := _own(path, file.get(home), file), h5py.Group):
-            names = [name for name, each in group.items() if isinstance(each, h5py.Group)]
-            found = [name for name in names if home == EPISODES or NUMBERED.fullmatch(name)]
+            groups = {
+                h5py.h5o.get_info(each.id).addr: name  # of many links to one group the last
+                for name, each in group.items()
+                if isinstance(each, h5py.Group)
+            }
+            found = [
+                name for name in groups.values() if home == EPISODES or NUMBERED.fullmatch(name)
+            ]
             if found and not _is_matlab(path):
                 by_number = lambda name: [int(n) for n in re.findall(r"\d+", name)]  # noqa: E731
                 return home, tuple(sorted(found, key=by_number))
@@ -193,9 +199,6 @@ def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tu
     """Numeric datasets of up to two dimensions, or three of joint states, by name in the group.
 
     A dataset that many links name is one: h5py visits it once, by one of its names.
-
-    Returns:
-        Those that are read, and the names of large ones that nothing is known of.
     """
     mapped = {entry.part()[0] for entry in options.entries}
     found: list[tuple[str, Any]] = []

@@ -47,10 +47,6 @@ UNKNOWN = (
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a data set, or of one of its files.
 
-    Args:
-        path: The data set's folder, or a Parquet file within it.
-        options: How to read it.
-
     Raises:
         LogError: If its info file or its data cannot be read.
     """

@@ -202,9 +202,6 @@ def parse_mapping(entries: Iterable[str]) -> tuple[Entry, ...]:
             Signals of the base may name a convention of ``CONVENTIONS``:
             ``base_pose.wxyz=root_pose``.
 
-    Returns:
-        The entries.
-
     Raises:
         OptionError: If an entry is not of that form, or a column or target is named twice.
     """
@@ -242,11 +239,6 @@ def read_options(
     mapping: Sequence[str] = (), *, saved: str | Path | None = None, **options: Any
 ) -> ReadOptions:
     """Options of reading a log, combined with a saved mapping.
-
-    Args:
-        mapping: Signals of columns and arrays, as ``parse_mapping`` has it.
-        saved: A saved mapping; the other arguments take precedence.
-        **options: The other attributes of ``ReadOptions``; None for what is not specified.
 
     Raises:
         InspectorError: If one of them is not valid.
@@ -317,9 +309,6 @@ def tracks_of(
     log: Log, options: ReadOptions, robot: Robot | None
 ) -> tuple[tuple[Track, ...], tuple[str, ...], tuple[str, ...]]:
     """Tracks of a log; the mapping takes precedence over the names of columns.
-
-    Returns:
-        The tracks, the names of what is not read, and what was decided, a sentence each.
 
     Raises:
         LogError: If two columns hold the same signal, none is known to hold motion, or a mapping

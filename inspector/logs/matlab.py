@@ -60,13 +60,7 @@ def open_log(path: Path, options: ReadOptions) -> LogReader:
 def log_of_variables(
     path: Path, variables: Mapping[str, NDArray[Any]], options: ReadOptions
 ) -> Log:
-    """Log of variables, whose samples are along either axis, as those of MATLAB.
-
-    Args:
-        path: The file.
-        variables: Numbers of up to two dimensions by name, fields of structs after a slash.
-        options: How to read them.
-    """
+    """Log of variables, whose samples are along either axis, as those of MATLAB."""
     flat = {name: each.ravel() if 1 in each.shape else each for name, each in variables.items()}
     named = {_plain(name): each for name, each in flat.items() if each.dtype.kind in "iuf"}
     time = options.time or time_column([name for name, each in named.items() if each.ndim == 1])

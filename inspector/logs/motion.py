@@ -298,14 +298,6 @@ def in_radians(
 ) -> tuple[Track, ...]:
     """Tracks with angles in radians, and which of their columns are angles.
 
-    Args:
-        path: The log, for errors.
-        tracks: Its tracks.
-        robot: The robot, if known: it has the types and the ranges of the joints.
-        units: "radians", "degrees", "normalised", or empty if not specified.
-        normalised_grippers: Whether grippers are normalised even if the other joints are in
-            degrees. They are left out if no robot gives their range.
-
     Raises:
         LogError: If no unit is specified and a value is too large for radians, or if the unit is
             normalised and the range of a joint is not known.
@@ -497,9 +489,6 @@ def without_held_targets(tracks: Sequence[Track]) -> tuple[tuple[Track, ...], tu
     velocity would be a pulse at each target, which no joint was ever told to follow. Positions
     with a logged desired velocity are left as they are, and so are those of a log that holds its
     measured values as long. What follows the last target is cut off.
-
-    Returns:
-        The tracks, and what was decided, a sentence each.
     """
     logged = {joint for t in tracks if t.signal == "velocity_desired" for joint in t.joints}
     measured = max((_hold(t) for t in tracks if t.signal in ("position", "velocity")), default=1.0)
@@ -569,12 +558,6 @@ def run_of(logs: list[Log], options: ReadOptions, robot: Robot | None, name: str
     uniform are resampled to the specified rate, or to the nearest round one; ``valid`` is False
     in gaps. The run is cut to the time that all signals cover. Missing velocities are
     differentiated from positions.
-
-    Args:
-        logs: The logs; the list is emptied, so that a long log is not held twice.
-        options: How to read them.
-        robot: The robot, if known.
-        name: Name of the run.
 
     Raises:
         LogError: If no run can be made of the logs.
@@ -816,11 +799,7 @@ ENOUGH = 5
 
 
 def contradictions(run: Run) -> Iterator[str]:
-    """Clauses on velocities that are not the slopes of their positions.
-
-    Args:
-        run: A run; velocities that were differentiated at import are not compared.
-    """
+    """Clauses on velocities that are not the slopes of their positions."""
     differentiated = run.meta.get("differentiated")
     by_import = isinstance(differentiated, Mapping) and "velocity" in differentiated
     ways = None if run.position is None or by_import else _ways(run)

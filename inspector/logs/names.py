@@ -300,15 +300,7 @@ def factor_of(column: str) -> float:
 
 
 def column_signal(column: str, naming: Naming | None = None) -> Meaning | None:
-    """Signal and joint of a column, by its name; None for an unknown name.
-
-    Args:
-        column: Its name.
-        naming: What the names of the log's other columns tell.
-
-    Returns:
-        The signal, and the joint's name or number.
-    """
+    """Signal and joint of a column, by its name; None for an unknown name."""
     naming = naming or Naming()
     if column in naming.bare:
         return naming.bare[column]

@@ -56,10 +56,6 @@ SUFFIXES = frozenset(
 def open_log(path: Path, options: ReadOptions) -> LogReader:
     """Reader of a log, chosen by its first bytes, or by the files in a folder.
 
-    Args:
-        path: A file, or the folder of a bag or a data set.
-        options: How to read it.
-
     Raises:
         LogError: If there is no such file, it cannot be read, or a library that reads such logs is
             not installed.
@@ -439,14 +435,6 @@ def sources(
 
     Hidden files are left out. What cannot be read is listed too: `open_source` says why.
 
-    Args:
-        paths: Files, and folders.
-        reading: How to read them.
-
-    Returns:
-        The runs, each once, in the order of the paths, those of a folder by name; and the files of
-        folders that are not taken for logs.
-
     Raises:
         InspectorError: If a folder holds no log, or a desired log is named for several.
     """
@@ -470,9 +458,6 @@ def sources(
 
 def logs_in(path: Path) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     """List the logs of a folder and of the folders in it, and its other files.
-
-    Args:
-        path: A folder; a file, a bag or a data set is one log.
 
     Raises:
         LogError: If the folder holds no log, or a folder in it cannot be listed.
@@ -633,18 +618,6 @@ def import_logs(
     """Write a run file for each run of some logs.
 
     In a folder, those that an interrupted call of the same logs and options has written are kept.
-
-    Args:
-        logs: The logs, and folders of them.
-        output: A run file; for several logs or episodes a folder, which is created.
-        options: How to read the logs.
-        desired: A log with the desired motion, for a single log.
-        episodes: Which episodes to read, all unless given.
-        overwrite: Whether files that exist may be replaced.
-        progress: Wraps what is read, to show how much is done.
-
-    Yields:
-        The result of each; a log that cannot be read does not stop the others.
 
     Raises:
         InspectorError: If the output does not fit the logs, or a single log cannot be read.

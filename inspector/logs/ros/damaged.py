@@ -86,10 +86,6 @@ def begin(path: Path) -> None:
 def unpack(method: str, data: bytes) -> bytes:
     """Unpack a chunk.
 
-    Args:
-        method: "bz2", "lz4" or "zstd"; others are not compressed.
-        data: The chunk.
-
     Raises:
         ArchiveError: If the bag unpacks to more than `noisemodel.runfile.check_unpacked` allows.
     """
@@ -140,10 +136,6 @@ METHODS: dict[str, Callable[[BinaryIO], Any]] = {"bz2": bz2.open, "lz4": _lz4, "
 
 def open_bag(path: Path, problem: str) -> Bag:
     """Bag with the intact records of one that rosbags cannot open, or not read to its end.
-
-    Args:
-        path: A file of a bag, or the folder of a ROS 2 bag.
-        problem: Why it cannot be read by its index.
 
     Raises:
         LogError: If no topic can be read.
