@@ -12,10 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commandline import call
 from samplelogs import Talk, joint_states, write_bag, write_lerobot
 
 from inspector import read_log
 from inspector.errors import InspectorError
+from inspector.logs.mapping import read_options
 from inspector.logs.motion import contradictions
 
 DEG = 180 / np.pi
@@ -421,6 +423,124 @@ def test_a_log_is_read_right_as_it_is_or_by_the_first_hint(tmp_path, kind):
     told = " ".join(contradictions(run))
     assert kind.told in told
     assert bool(told) == bool(kind.told), told
+
+
+def written(tmp_path, header, *columns):
+    return csv(tmp_path / "log.csv", header, *columns)
+
+
+@pytest.mark.parametrize(
+    ("header", "mapping", "message"),
+    [
+        (
+            "t,a_cmd,b_cmd",
+            "velocity.{joint}={joint}_meas",
+            "fits no column; columns are a_cmd",
+        ),
+        ("t,q1,q2", "velocity.{joint}=q", "a pattern has {joint} once on either side"),
+    ],
+)
+def test_a_pattern_that_does_not_fit_is_one_line(tmp_path, header, mapping, message):
+    path = written(tmp_path, header, T6, Q6[:, :2])
+    with pytest.raises(InspectorError, match=message) as caught:
+        read_log(path, mapping=[mapping])
+    assert "\n" not in str(caught.value)
+
+
+def test_a_pattern_maps_all_columns_of_its_form_and_is_saved(tmp_path):
+    path = written(tmp_path, "t,a_x,b_x,a_y,b_y,note_1", T6, Q6[:, :2], V6[:, :2], Q6[:, 0])
+    patterns = ["position.{joint}={joint}_x", "velocity.{joint}={joint}_y"]
+    run = read_log(path, mapping=patterns).run
+    assert run.joint_names == ("a", "b")
+    assert np.array_equal(run.velocity, V6[:, :2])
+    options = read_options(patterns)
+    options.save(tmp_path / "map.toml")
+    assert read_options(saved=tmp_path / "map.toml") == options
+
+
+def test_two_patterns_for_one_column_take_the_more_specific(tmp_path):
+    path = written(tmp_path, "t,a,b,a_cmd,b_cmd", T6, Q6[:, :2], Q6[:, :2])
+    patterns = ["position.{joint}={joint}", "position_desired.{joint}={joint}_cmd"]
+    run = read_log(path, mapping=patterns).run
+    assert run.joint_names == run.desired_joint_names == ("a", "b")
+
+
+def test_names_that_two_rules_claim_are_named_with_the_option_to_type(tmp_path):
+    path = written(tmp_path, "t,q1,position_1", T6, Q6[:, :2])
+    with pytest.raises(InspectorError, match="'q1' and 'position_1' both hold .*; choose with --m"):
+        read_log(path)
+
+
+def test_units_may_differ_by_column(tmp_path):
+    path = written(tmp_path, "t,j1 [deg],j2 [rad]", T6, DEG * Q6[:, 0], Q6[:, 1])
+    assert np.allclose(read_log(path).run.position, Q6[:, :2], rtol=1e-12)
+
+
+def test_a_counter_with_holes_has_gaps(tmp_path):
+    kept = np.delete(np.arange(SAMPLES), slice(200, 300))
+    path = written(
+        tmp_path, f"step,{names('q#', 6)},{names('dq#', 6)}", 7 + kept, Q6[kept], V6[kept]
+    )
+    run = read_log(path, mapping=["time=step"]).run
+    assert run.rate == 125.0
+    assert np.array_equal(np.flatnonzero(~run.mask), np.arange(200, 300))
+
+
+def test_a_rate_that_does_not_fit_is_refused_unless_forced(tmp_path):
+    path = rtde(tmp_path)
+    with pytest.raises(InspectorError, match="fit a rate of 50 Hz, not 240 Hz: type --rate 50"):
+        read_log(path, rate=240)
+    imported = read_log(path, rate=240, force=True)
+    assert imported.run.rate == 240
+    assert "times the slopes of their positions" in " ".join(contradictions(imported.run))
+
+
+def test_velocities_without_relation_to_positions_are_told_by_import_and_audit(tmp_path):
+    path = written(tmp_path, f"t,{names('q#', 2)},{names('dq#', 2)}", T6, Q6[:, :2], V6[:, 4:])
+    expected = "velocities of all joints have no relation to the slopes of their positions"
+    _, out, _ = call("import", path, "-o", tmp_path / "run.npz")
+    assert expected in out
+    assert expected in call("audit", path)[1]
+
+
+def test_a_robot_that_stands_still_is_not_frozen(tmp_path):
+    position, velocity = Q6.copy(), V6.copy()
+    position[400:], velocity[400:] = position[400], 0.0
+    path = written(tmp_path, f"t,{names('q#', 6)},{names('dq#', 6)}", T6, position, velocity)
+    assert read_log(path).run.mask.all()
+
+
+def test_a_frozen_log_has_a_gap_that_is_told(tmp_path):
+    path = ur5(tmp_path, frozen=True)
+    imported = read_log(path, columns=QD.split(","))
+    assert np.array_equal(np.flatnonzero(~imported.run.mask), np.arange(801, SAMPLES))
+    assert any("399 samples from 6.4 s on repeat one" in each for each in imported.remarks)
+
+
+def test_a_mat_file_with_objects_alone_says_how_to_save_numbers(tmp_path):
+    from scipy.io import savemat
+
+    savemat(tmp_path / "a.mat", {"ts": np.array([[1.0]])})
+    data = bytearray((tmp_path / "a.mat").read_bytes())
+    data[144] = 17  # the class of an object of MATLAB's
+    (tmp_path / "a.mat").write_bytes(data)
+    with pytest.raises(InspectorError, match=r"holds MATLAB objects \(ts\).*t = ts.Time; q"):
+        read_log(tmp_path / "a.mat")
+
+
+@pytest.mark.parametrize("day", ["9999-01-01", "1600-01-01"])
+def test_dates_that_no_clock_has_are_one_line(tmp_path, day):
+    path = tmp_path / "log.csv"
+    path.write_text(f"time,q1\n{day} 00:00:00.0,1\n{day} 00:00:00.1,2\n")
+    with pytest.raises(InspectorError, match="is no date before 2200"):
+        read_log(path)
+
+
+def test_dates_may_have_time_zones(tmp_path):
+    rows = [f"2023-11-14T23:13:20.{n:03d}+01:00,{n / 100}" for n in range(0, 500, 10)]
+    (tmp_path / "log.csv").write_text("time,q1\n" + "\n".join(rows) + "\n")
+    run = read_log(tmp_path / "log.csv").run
+    assert (run.rate, run.meta["start"]) == (100.0, "1700000000")
 
 
 def row(kind, folder):

@@ -254,3 +254,19 @@ def test_a_csv_named_log_is_not_taken_for_noisytests(tmp_path):
     status, _, err = call("classify", log(tmp_path, name="robot.log"))
     assert status == 0, err
     assert READ in err
+
+
+def test_names_and_folders_that_are_too_long_are_one_line(tmp_path, monkeypatch):
+    for command in (["classify"], ["audit"], ["import", "-o", "run.npz"]):
+        status, _, err = call(command[0], tmp_path / ("a" * 300), *command[1:])
+        assert (status, err.count("\n")) == (3, 1)
+        assert "cannot be read (File name too long)" in err
+    monkeypatch.chdir(tmp_path)
+    for _ in range(1500):
+        Path("d").mkdir()
+        monkeypatch.chdir("d")
+    with pytest.raises(LogError, match="a folder without logs"):
+        sources([tmp_path / "d"])
+    for _ in range(1500):  # which pytest cannot remove
+        monkeypatch.chdir("..")
+        Path("d").rmdir()

@@ -3,6 +3,7 @@
 import os
 import re
 import sqlite3
+import struct
 import tracemalloc
 from contextlib import closing, suppress
 
@@ -140,3 +141,49 @@ def test_a_bag_whose_metadata_is_gigabytes_is_read_without_it(tmp_path):
     assert len(read_log(folder).run.time) == len(TIMES)
     assert tracemalloc.get_traced_memory()[1] < 200e6
     tracemalloc.stop()
+
+
+DEFINITIONS = {
+    "empty messages without end": "std_msgs/Empty[] bombs\nfloat64[] position",
+    "nested arrays": "float64[1000000000] position",
+    "50,000 fields": "\n".join(f"float64 a{n}" for n in range(50_000)),
+}
+
+
+@pytest.mark.parametrize("text", DEFINITIONS.values(), ids=DEFINITIONS)
+@pytest.mark.parametrize(
+    "kind", ["sensor_msgs/msg/JointState", "control_msgs/msg/JointTrajectoryControllerState"]
+)
+def test_a_definition_in_a_bag_is_not_run(tmp_path, kind, text):
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start("ros2")
+        schema = writer.register_schema(kind, "ros2msg", text.encode())
+        topic = writer.register_channel("/joint_states", "cdr", schema)
+        for at in range(3):
+            writer.add_message(topic, at, b"\0\1\0\0" + b"\xff" * 4000, at)
+        writer.finish()
+    tracemalloc.start()
+    with pytest.raises(LogError) as caught:
+        read_log(path)
+    assert tracemalloc.get_traced_memory()[1] < 100e6
+    tracemalloc.stop()
+    assert "\n" not in str(caught.value)
+
+
+def test_a_chunk_that_is_listed_many_times_is_read_once(tmp_path):
+    folder = write_bag(tmp_path / "bag", TALK, {"/joint_states": states(TALK)}, storage="mcap")
+    path = next(folder.glob("*.mcap"))
+    data = path.read_bytes()
+    start, _ = struct.unpack("<QQ", data[-28:-12])  # of the summary, from the footer
+    summary, records, place = data[start:], b"", 0
+    while summary[place] != 2:  # until the footer
+        size = struct.unpack_from("<Q", summary, place + 1)[0]
+        record = summary[place : place + 9 + size]
+        records += record * (5000 if summary[place] == 8 else 1)  # the index of a chunk
+        place += 9 + size
+    footer = b"\x02" + struct.pack("<QQQI", 20, start, 0, 0)
+    path.write_bytes(data[:start] + records + footer + data[-8:])
+    run = read_log(path).run
+    assert np.array_equal(run.position, numbers())

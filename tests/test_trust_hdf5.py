@@ -157,3 +157,19 @@ def test_an_environment_whose_text_is_gone_is_damaged(tmp_path):
     path.write_bytes(path.read_bytes().replace(b"GCOL", b"GONE"))
     with pytest.raises(LogError, match="damaged: env_args cannot be read$"):
         read_log(path)
+
+
+def test_many_links_to_one_dataset_are_one(tmp_path):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        file["time"] = np.arange(1000) / 100
+        file["qvel"] = np.ones((1000, 7))
+        group = file.create_group("data/demo_0")
+        group["time"], group["qvel"] = file["time"], file["qvel"]
+        for number in range(1, 400):
+            file[f"data/demo_{number}"] = group
+            group[f"obs_{number}"] = file["qvel"]
+    (line, *rest) = listing(path, ReadOptions())[1:]
+    assert line.strip().startswith("1 episode")
+    assert len(rest) == 2
+    assert read_log(path).run.velocity.shape == (1000, 7)

@@ -183,3 +183,11 @@ def test_a_pipe_among_the_files_of_a_data_set_is_one_line(tmp_path):
     os.mkfifo(folder / "data" / "more.parquet")
     with pytest.raises(LogError, match=r"more\.parquet: is no regular file"):
         read_log(folder)
+
+
+def test_lists_of_more_numbers_than_joints_are_counted_before_they_are_unpacked(tmp_path):
+    path = tmp_path / "a.parquet"
+    wide = pa.FixedSizeListArray.from_arrays(pa.array(np.zeros(400_000)), 200_000)
+    pq.write_table(pa.table({"time": [0.0, 0.01], "position": wide}), path)
+    with pytest.raises(LogError, match=r"lists of 20000\d numbers in a row, .*columns"):
+        read_log(path)

@@ -166,7 +166,8 @@ def counted_stamps(
     """
     found = None
     if position is not None and velocity is not None and position.shape == velocity.shape:
-        found = rate_of(position, velocity)
+        holes = np.concatenate(([False], np.diff(stamps.time) != 1))
+        found = rate_of(np.where(holes[:, None], np.nan, position), velocity)
     count = len(stamps.time)
     what = f"{stamps.name!r} counts samples" if stamps.name else "there are no stamps"
     name, number = stated

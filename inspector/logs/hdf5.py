@@ -6,7 +6,7 @@ MATLAB's files of version 7.3 are HDF5 too: structs are groups, and arrays are t
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from math import inf, prod
 from pathlib import Path
 from typing import Any
@@ -198,27 +198,48 @@ def _values(path: Path, datasets: Sequence[tuple[str, Any]]) -> Iterator[tuple[s
 def _wanted(group: Any, options: ReadOptions) -> tuple[list[tuple[str, Any]], tuple[str, ...]]:
     """Numeric datasets of up to two dimensions, or three of joint states, by name in the group.
 
-    A dataset that many links name is one: h5py visits it once, by one of its names.
+    Besides, the names of large ones that nothing is known of.
     """
     mapped = {entry.part()[0] for entry in options.entries}
     found: list[tuple[str, Any]] = []
     left_out: list[str] = []
 
-    def visit(name: str, each: Any) -> None:
-        if not isinstance(each, h5py.Dataset) or each.dtype.kind not in "iufb":
-            return
-        if name.startswith(REFERENCES) or each.attrs.get("MATLAB_class") == b"char":
-            return
+    for name, each in _datasets(group, mapped):
+        if each.dtype.kind not in "iufb" or each.attrs.get("MATLAB_class") == b"char":
+            continue
         last = name.rpartition("/")[2].lower()
         if 1 <= each.ndim <= 2 or (each.ndim == 3 and last in JOINT_STATES) or each.size == 1:
-            known = meaning(name) not in ("", COPY) or STATES.fullmatch(name)
-            if known or name in mapped or last in NAMES or each.nbytes <= SMALL:
+            if _is_known(name, mapped) or each.nbytes <= SMALL:
                 found.append((name, each))
             else:
                 left_out.append(name)
-
-    group.visititems(visit)
     return found, tuple(left_out)
+
+
+def _is_known(name: str, mapped: Collection[str]) -> bool:
+    known = meaning(name) not in ("", COPY) or STATES.fullmatch(name) is not None
+    return known or name in mapped or name.rpartition("/")[2].lower() in NAMES
+
+
+def _datasets(group: Any, mapped: Collection[str]) -> list[tuple[str, Any]]:
+    """Datasets in a group, each once, by a name that is known if one of its links has such."""
+    found: dict[int, tuple[str, Any]] = {}
+    seen, waiting = set[int](), [("", group)]
+    while waiting:
+        place, each = waiting.pop()
+        for name in sorted(each):
+            if name == REFERENCES or not isinstance(each.get(name, getlink=True), h5py.HardLink):
+                continue
+            inside, path = each[name], f"{place}{name}"
+            address = h5py.h5o.get_info(inside.id).addr
+            if isinstance(inside, h5py.Dataset):
+                before = found.setdefault(address, (path, inside))[0]
+                if _is_known(path, mapped) and not _is_known(before, mapped):
+                    found[address] = (path, inside)
+            elif isinstance(inside, h5py.Group) and address not in seen:
+                seen.add(address)
+                waiting.append((f"{path}/", inside))
+    return sorted(found.values(), key=lambda each: each[0])
 
 
 def _rate(env_args: str) -> float | None:
