@@ -411,3 +411,19 @@ def test_classifying_imports_neither_scikit_learn_nor_scipy_signal_nor_rerun():
     modules = imported_by("classify", demo_run())
     assert "noiseclassifier" in modules
     assert not modules & {"sklearn", "scipy.signal", "rerun", "pinocchio", "mujoco"}
+
+
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (("--min-score", "1.5"), "1.5: all scores are probabilities, at most 1"),
+        (("--min-score", "0"), "0: all scores are above 0 anyway"),
+        (("--min-score", "0.8", "--unknown", "ignore"), "0.8: all scores are above 0.83 anyway"),
+    ],
+)
+def test_a_score_that_can_never_matter_is_refused(inspector, options, problem):
+    status, _, err = inspector("classify", demo_run(), *options)
+    assert status == 2
+    assert problem in " ".join(err.replace("│", " ").split())
+    assert inspector("classify", demo_run(), "--min-score", "0.99")[0] == 0
+    assert inspector("classify", demo_run(), "--min-score", "0.9")[0] == 1

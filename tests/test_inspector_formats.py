@@ -392,6 +392,19 @@ def test_markdown_is_a_table_with_the_worst_first_and_one_picture():
     )
 
 
+def test_markdown_draws_the_worst_run_as_text_where_no_picture_shows():
+    long = replace(LOUD, duration=6.0, events=(BLOW, RATTLE, replace(BLOW, start=5.5, stop=6.1)))
+    lines = markdown([long]).splitlines()
+    assert lines[-5:] == [
+        "`loud.npz` over time:",
+        "```",
+        f"impact        |{'.' * 10}{'#' * 6}{'.' * 39}{'#' * 5}| 6.0 s",
+        f"oscillations  |{'.' * 20}{'#' * 11}{'.' * 29}| 6.0 s",
+        "```",
+    ]
+    assert "over time:" not in markdown([replace(long, picture=Path("a"), picture_url="https://x")])
+
+
 def test_markdown_fits_into_a_comment():
     many = [replace(LOUD, path=Path(f"{'deep/' * 20}{place}.npz")) for place in range(2000)]
     written = markdown(many + [replace(EXPECTED, path=each.path) for each in many])

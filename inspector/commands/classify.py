@@ -140,6 +140,7 @@ def classify(
         *_labels(found, labels_to, labels_format, overwrite=overwrite),
         *_page(report, overwrite=overwrite),
     ]
+    _check_score(min_score, library, unknown)
     gate = Gate(_classes(fail_on_class or [], library), min_score, min_duration)
 
     where, draw = jobs_or_dask(jobs, dask), _drawing(report)
@@ -190,6 +191,20 @@ def _classes(given: "Sequence[str]", library: "Library") -> tuple[str, ...]:
                 param_hint="'--fail-on-class'",
             )
     return tuple(names)
+
+
+def _check_score(least: float | None, library: "Library", unknown: Unknown) -> None:
+    """Refuse a score that no finding has, or that all findings have."""
+    from noiseclassifier import General
+
+    models = library.values()
+    settings = [each.recipe if isinstance(each, General) else each.profile for each in models]
+    if least is None or any(each.estimator == "svm" for each in settings):
+        return  # whose scores have any size
+    alarm = min(each.alarm for each in settings) if unknown is Unknown.IGNORE else 0.0
+    if least > 1.0 or least <= alarm:
+        told = "are probabilities, at most 1" if least > 1.0 else f"are above {alarm:g} anyway"
+        raise typer.BadParameter(f"{least:g}: all scores {told}", param_hint="'--min-score'")
 
 
 def _labels(

@@ -48,6 +48,7 @@ class Case:
         quiet: Whether there is nothing to say of it, so that tables leave it out.
         picture: A picture of it, if there is one.
         picture_url: Where that will be published; empty if that is not known.
+        timeline: It over time as text, for where there is no picture; may be empty.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Case:
     quiet: bool = False
     picture: Path | None = None
     picture_url: str = ""
+    timeline: str = ""
 
     @property
     def told(self) -> str:
@@ -193,6 +195,9 @@ def markdown(job: Job, *, head: str, notes: str, marker: str = MARKER) -> str:
         told = f"Picture of {_code(worst.name)}: {_code(worst.picture)}."
         drawn = f"![{_cell(worst.name)} over time]({worst.picture_url})"
         tail += [drawn if worst.picture_url else told]
+    sketched = next((case for case in ranked if case.timeline), None)
+    if sketched is not None and (worst is None or not worst.picture_url):
+        tail += ["", f"{_code(sketched.name)} over time:", "```", sketched.timeline, "```"]
     rows = [f"| {_code(case.name)} | {case.words} | {_cell(case.told)} |" for case in shown]
     left = [f"- {_code(case.name)}: {_cell(note)}" for case in ranked for note in case.notes]
     if rows:

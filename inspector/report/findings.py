@@ -160,6 +160,22 @@ def _alike(one: tuple[Verdict, Event], other: tuple[Verdict, Event]) -> bool:
     )
 
 
+def timeline(verdict: Verdict, width: int = 60) -> str:
+    """The findings that fail a run over time as text, a line for each class."""
+    if not verdict.duration:
+        return ""
+    lines = []
+    for label in dict.fromkeys(event.label for event in verdict.failing):
+        marks = ["."] * width
+        for event in verdict.failing:
+            if event.label == label:
+                times = (event.start - verdict.begin, event.stop - verdict.begin)
+                first, last = (int(width * time / verdict.duration) for time in times)
+                marks[max(first, 0) : last + 1] = "#" * (min(last + 1, width) - max(first, 0))
+        lines.append((label, f"|{''.join(marks)}| {verdict.duration:.1f} s"))
+    return "\n".join(table(lines, gap="  "))
+
+
 def table(rows: Sequence[Sequence[str]], gap: str = "   ") -> list[str]:
     """Lines of cells, each column as wide as its widest cell.
 

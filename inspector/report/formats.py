@@ -23,6 +23,7 @@ from inspector.report.findings import (
     row,
     sentence,
     table,
+    timeline,
 )
 from inspector.text import counted
 from inspector.verdict import Verdict, counts, exit_status
@@ -253,6 +254,7 @@ def _folded(verdicts: Sequence[Verdict]) -> Job:
                 name=group.name,
                 sentences=tuple(group.sentences),
                 notes=tuple(group.notes),
+                timeline=timeline(group.worst),
                 picture=drawn.picture,
                 picture_url=drawn.picture_url,
             )

@@ -47,7 +47,8 @@ class Event:
     stop: float
     """When its last frame stops, in [s]."""
     score: float
-    """The highest score of the class in one of its frames; of `unknown`, that of any failure."""
+    """The highest probability of any failure in one of its frames, which the alarm threshold is of
+    too; of a model without one, the highest score of the class."""
     novel: bool = False
     """Whether one of its frames is out of distribution."""
 
@@ -161,17 +162,18 @@ class Labels:
         return tuple(self._event(self._name(frames), frames) for frames in self.stretches)
 
     def _event(self, label: str, frames: Index) -> Event:
-        known = label in self.classes
-        columns = [
-            place
-            for place, name in enumerate(self.classes)
-            if (name == label if known else name != "ok")
-        ]
+        scores = self.scores[frames]
+        if self.above_threshold is not None:  # of any failure, as the alarm threshold
+            score = 1.0 - float(scores[:, 0].min())
+        elif label in self.classes:
+            score = float(scores[:, self.classes.index(label)].max())
+        else:
+            score = float(scores[:, 1:].max())
         return Event(
             label,
             float(self.start[frames[0]]),
             float(self.stop[frames[-1]]),
-            float(self.scores[frames][:, columns].max()),
+            score,
             self.novel is not None and bool(self.novel[frames].any()),
         )
 
