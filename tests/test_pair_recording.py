@@ -11,11 +11,11 @@ from recordings import BAND, LABELS, LINE, MOTION, ROW, STRIP, check_columns, en
 from rerun.chunk import RrdReader
 
 from inspector.cli import main
-from inspector.compare import recording
 from inspector.compare.pair import compare
 from inspector.compare.recording import write
 from inspector.levels import LINKS as LINK_SCALE
 from inspector.levels import link_levels
+from inspector.recording import panels
 from noiseclassifier import Event, Labels
 from noisemodel import Block, OutputError, Run
 
@@ -112,8 +112,8 @@ def test_every_entity_has_its_columns_and_there_is_no_other(whole):
 def test_both_noises_lie_over_each_other_in_two_colours(whole):
     path, pair = whole
     for name, side, color in (
-        ("before", pair.before, recording.BEFORE),
-        ("after", pair.after, recording.AFTER),
+        ("before", pair.before, panels.BEFORE),
+        ("after", pair.after, panels.AFTER),
     ):
         time, noise = scalars(path, f"/noise/{name}")
         scale = side.noise[5] / noise[5, 0]
@@ -138,7 +138,7 @@ def test_twice_the_motion_is_6_db_in_all_that_is_drawn(whole):
     for row in rows:
         _, shades = read(path, row, "SeriesLines:colors")
         drawn = {shade[0].to_bytes(4, "big") for shade in shades}
-        assert bytes(recording.CHANGE.colours(np.array(20 * np.log10(2)), shades=25)) in drawn
+        assert bytes(panels.CHANGE.colours(np.array(20 * np.log10(2)), shades=25)) in drawn
 
 
 def test_a_links_power_before_and_after_is_that_of_its_vibration(whole):
@@ -209,7 +209,7 @@ def test_both_spectrograms_have_one_scale_and_the_difference_its_own(whole):
     assert max(sum(row[0].to_bytes(4, "big")[:3]) for row in after) > max(
         sum(row[0].to_bytes(4, "big")[:3]) for row in before
     )
-    shade = recording.CHANGE.colours(np.array(20 * np.log10(2)), shades=25)
+    shade = panels.CHANGE.colours(np.array(20 * np.log10(2)), shades=25)
     named = {
         read(path, row, "SeriesLines:names")[1][0][0]: row
         for row in entities(path)
@@ -253,10 +253,10 @@ def test_both_robots_are_seen_from_one_place(whole):
 
 def test_colours_distinguish_louder_from_quieter_and_grow_with_the_change():
     levels = np.array([-12.0, 0.0, 3.0, 40.0])
-    quieter, same, louder, much = recording.CHANGE.colours(levels, shades=25)[:, :3]
-    assert tuple(quieter) == recording.BEFORE
-    assert tuple(same) == recording.SAME
-    assert tuple(much) == recording.AFTER
+    quieter, same, louder, much = panels.CHANGE.colours(levels, shades=25)[:, :3]
+    assert tuple(quieter) == panels.BEFORE
+    assert tuple(same) == panels.SAME
+    assert tuple(much) == panels.AFTER
     assert same[0] < louder[0] < much[0]
 
 
@@ -312,7 +312,7 @@ def test_a_run_beside_itself_changes_nothing_that_is_drawn(tmp_path):
         found = [entity for entity in entities(path) if entity.startswith(f"{rows}/")]
         assert len(found) == count
         rgba = read(path, f"{rows}/**", "SeriesLines:colors")[1]
-        assert {row[0] for row in rgba} == {int.from_bytes([*recording.SAME, 255], "big")}
+        assert {row[0] for row in rgba} == {int.from_bytes([*panels.SAME, 255], "big")}
     assert [e for e in entities(path) if e.startswith("/level/change/")] == [
         "/level/change/unchanged"
     ]

@@ -23,10 +23,12 @@ from inspector import colors
 from inspector.analysis.analyse import Analysis, Status, analyse_file
 from inspector.errors import InspectorError
 from inspector.levels import velocity_levels
-from inspector.recording import axes, layout
+from inspector.recording import axes, layout, panels
 from inspector.recording.layout import height
 from inspector.recording.panels import HEIGHT, NOISE_POINTS, scaled
 from inspector.recording.run import linked, write
+from inspector.reference.judging import Scenario, compare
+from inspector.reference.levels import levels as levels_of
 from noiseclassifier import Event, Labels
 from noisemodel import Block, OutputError, RobotError, Run, UnknownJointError
 
@@ -338,6 +340,27 @@ def test_a_tone_is_brightest_at_its_tick(tmp_path):
     panel = axes.Panel("spectrogram", HEIGHT)
     assert y == pytest.approx(panel.y(place), abs=0.02)
     assert labels[1:] == ["10 Hz", "30 Hz", "100 Hz", "300 Hz", "1 kHz", "3 kHz"]
+
+
+def test_where_a_run_is_louder_than_its_reference_has_a_row_for_each_joint(tmp_path):
+    run = panda_run(robot=None, blocks=())
+    during = (run.time >= 1.0) & (run.time < 1.5)
+    velocity = run.velocity.copy()
+    velocity[during, 2] += 0.1 * np.sin(2 * np.pi * 35.0 * run.time[during])
+    good = Scenario("a", (levels_of(run, name="a"),))
+    beside = compare(levels_of(dataclasses.replace(run, velocity=velocity), name="a"), [good])
+    write(inspected(run, tmp_path), tmp_path / "o", beside=beside)
+    _, (names,) = read(tmp_path / "o", "/axis/over/left", "Points2D:labels")
+    assert names == list(run.joint_names)
+    for row, name in enumerate(names):
+        time, shown = shades(tmp_path / "o", f"/strips/over/{row:02d}")
+        louder = {tuple(shade) for shade in shown} - {panels.SAME}
+        assert bool(louder) == (name == run.joint_names[2])
+        if louder:
+            assert panels.AFTER in louder
+            loud = time[(shown == panels.AFTER).all(axis=1)]
+            assert 0.9 < loud.min() < 1.2
+            assert 1.3 < loud.max() < 1.7
 
 
 def test_a_chatter_of_35_hz_is_at_35_hz_in_the_spectrogram_of_its_joint(tmp_path):

@@ -1,7 +1,9 @@
 """`inspector view`: a run, or several side by side, in the viewer or as a file."""
 
 import hashlib
+from collections.abc import Callable
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated
@@ -19,8 +21,10 @@ from inspector.commands.options import (
 )
 
 if TYPE_CHECKING:
+    from inspector.analysis.analyse import Analysis
     from inspector.library import Library
     from inspector.logs.read import Opened, Reading
+    from inspector.reference.judging import Comparison
 
 SUFFIXES = ("", ".rrd", ".png", ".html")
 """Of what is written; without a suffix a recording."""
@@ -69,6 +73,10 @@ def view(
         Aligned | None,
         typer.Option("--align", help="Align two runs by motion (auto), or several by start."),
     ] = None,
+    reference: Annotated[
+        Path | None,
+        typer.Option("--reference", help="Show where one run is louder than these good ones."),
+    ] = None,
     overwrite: Overwrite = False,
 ) -> None:
     """Show a run, or several side by side.
@@ -92,6 +100,8 @@ def view(
         from inspector.recording import viewer as browser
 
         browser.free_port(port)
+    if reference and (len(paths) > 1 or (output and output.suffix.lower() == ".html")):
+        raise typer.BadParameter("--reference takes one run, and -o FILE.rrd or FILE.png")
     target = output or viewer.scratch_path(_together(paths))
     overwrite = overwrite or output is None
     refuse_existing(target, overwrite=overwrite)
@@ -99,7 +109,18 @@ def view(
     if output and output.suffix.lower() in (".png", ".html"):
         write = _picture if output.suffix.lower() == ".png" else _page
         links = "" if no_robot else kind
-        write(paths[0], output, reading, library, links, floor, at, size, overwrite=overwrite)
+        write(
+            paths[0],
+            output,
+            reading,
+            library,
+            links,
+            floor,
+            at,
+            size,
+            reference,
+            overwrite=overwrite,
+        )
         return
     seconds, unread = None, False
     if len(paths) == 1:
@@ -108,8 +129,9 @@ def view(
         found, unread = _read(paths, reading)
     if len(found) == 1:
         links = "" if no_robot else kind
+        beside = partial(_beside, found[0], reference, reading)
         seconds = _one(
-            found[0], target, library, links, terms=terms, floor=floor, overwrite=overwrite
+            found[0], target, library, links, beside, terms=terms, floor=floor, overwrite=overwrite
         )
     elif len(paths) == 2:
         both, how = (found[0], found[1]), align or Aligned.AUTO
@@ -160,6 +182,7 @@ def _picture(
     floor: float | None,
     at: float | None,
     size: str,
+    reference: Path | None,
     *,
     overwrite: bool,
 ) -> None:
@@ -183,7 +206,8 @@ def _picture(
             found = analyse_file(source, library, links=bool(kind), kind=kind)
             recording = Path(folder) / "run.rrd"
             seconds = worst_time(found) if at is None else at
-            write(found, recording, floor=floor)
+            beside = _beside(source, reference, reading, found)
+            write(found, recording, floor=floor, beside=beside)
         complaints = screenshot.shoot(recording, output, seconds, size=points, overwrite=overwrite)
     typer.echo(f"{output}: {run} at {seconds:.2f} s")
     for complaint in complaints:
@@ -258,6 +282,21 @@ def _read(paths: list[Path], reading: "Reading") -> tuple[list["Opened"], bool]:
     return found, len(found) < len(paths)
 
 
+def _beside(
+    run: "Opened", reference: Path | None, reading: "Reading", found: "Analysis"
+) -> "Comparison | None":
+    """A run beside its reference; None without one."""
+    if reference is None:
+        return None
+    from inspector.reference.judging import compare
+    from inspector.reference.levels import levels
+    from inspector.reference.store import Reference, scenario_of
+
+    path = run.source.shown
+    own = levels(found.run, name=scenario_of(found.run, path), file=str(path))
+    return compare(own, Reference.load(reference, reading).scenarios)
+
+
 def _several(
     runs: list["Opened"], target: Path, library: "Library", *, from_start: bool, overwrite: bool
 ) -> None:
@@ -275,6 +314,7 @@ def _one(
     target: Path,
     library: "Library",
     kind: str,
+    compared: Callable[["Analysis"], "Comparison | None"],
     *,
     terms: bool,
     floor: float | None,
@@ -287,10 +327,15 @@ def _one(
     from inspector.sound import of_recording, worst_time
 
     found = analyse_file(run, library, links=bool(kind), kind=kind, terms=terms)
-    write(found, target, overwrite=overwrite, sound=of_recording(found), floor=floor)
+    beside, sound = compared(found), of_recording(found)
+    write(found, target, overwrite=overwrite, sound=sound, floor=floor, beside=beside)
     typer.echo(f"{run.source.shown}: {found.headline}")
     for event in found.findings:
         typer.echo(f"  {sentence(found, event)}")
+    if beside is not None:
+        typer.echo(f"  beside the reference: {beside}")
+        for each in (*beside.exceedances, *beside.remarks):
+            typer.echo(f"  {each}")
     for remark in found.remarks:
         typer.echo(f"  {remark}")
     return worst_time(found)

@@ -8,14 +8,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from rerun.blueprint import Blueprint
 from rerun.urdf import UrdfTree
 
 from inspector import colors
 from inspector.analysis.analyse import Analysis
 from inspector.analysis.loudest import worst_joint
-from inspector.colors import Color
 from inspector.compare.changes import (
     NEW,
     Change,
@@ -31,15 +29,19 @@ from inspector.compare.changes import (
 )
 from inspector.compare.pair import Pair
 from inspector.errors import InspectorError
-from inspector.levels import LINKS, SPECTRUM, Scale, link_levels
+from inspector.levels import LINKS, SPECTRUM, link_levels
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import TIMELINE, Label, Panel
 from inspector.recording.camera import Camera
 from inspector.recording.framing import log_cameras
 from inspector.recording.layout import limb_tabs
 from inspector.recording.panels import (
+    AFTER,
+    BEFORE,
+    CHANGE,
     HIGH_DB,
     LOW_DB,
+    SHADES,
     Plot,
     Signal,
     found_stretches,
@@ -60,31 +62,7 @@ from noisemodel.noise import REFERENCE_POWER, decibel
 from noisemodel.run import part
 from noisemodel.types import Array
 
-BEFORE: Color = (86, 180, 233)
-AFTER: Color = (240, 160, 30)
-SAME: Color = (62, 68, 80)
 SIDE_COLORS = {"before": BEFORE, "after": AFTER}
-SHADES = 25
-"""An odd number, so that no change has a shade of its own."""
-
-
-def diverging(place: Array) -> NDArray[np.uint8]:
-    """Colour changes: blue at 0, grey at 0.5, orange at 1.
-
-    Args:
-        place: Any shape.
-
-    Returns:
-        Red, green, blue and opacity, shape (…, 4).
-    """
-    scale = np.array([BEFORE, SAME, AFTER], dtype=np.float64)
-    channels = [np.interp(place, (0.0, 0.5, 1.0), scale[:, channel]) for channel in range(3)]
-    return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
-
-
-CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
-"""Of levels; what is beyond is as blue or as orange as can be."""
-
 
 NOISE_POINTS = 60_000
 """Of each run's noise."""

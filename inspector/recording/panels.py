@@ -11,17 +11,20 @@ from typing import TypeAlias
 
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from rerun.components import MarkerShapeLike
 from rerun.urdf import UrdfTree
 
 from inspector import colors, levels
 from inspector.analysis.analyse import Analysis
-from inspector.analysis.loudest import chosen
+from inspector.analysis.loudest import SHOWN, chosen
 from inspector.analysis.moments import Moment, gaps
 from inspector.levels import Scale
 from inspector.orders import orders
 from inspector.recording import axes, robot, unstable
 from inspector.recording.axes import Label, Panel, at
+from inspector.reference.judging import Comparison
+from inspector.reference.levels import HOP
 from inspector.report.markdown import brief, classes_of, finding_of, spoken
 from inspector.spectrogram import RANGE_DB, WINDOW, Spectrogram, in_bands
 from inspector.thinning import extremes
@@ -547,6 +550,48 @@ def log_joint_levels(recording: rr.RecordingStream, analysis: Analysis) -> Panel
     stop = float(run.time[-1]) + 1.0 / run.rate
     scale, edges = levels.JOINTS.following(level), np.append(time, stop)
     return _log_strips(recording, "joints", analysis, edges, level, run.joint_names, scale)
+
+
+BEFORE, AFTER, SAME = (86, 180, 233), (240, 160, 30), (62, 68, 80)
+"""Blue is before and quieter, orange is after and louder; what did not change is grey."""
+SHADES = 25
+"""An odd number, so that no change has a shade of its own."""
+
+
+def diverging(place: Array) -> NDArray[np.uint8]:
+    """Colour changes: blue at 0, grey at 0.5, orange at 1.
+
+    Args:
+        place: Any shape.
+
+    Returns:
+        Red, green, blue and opacity, shape (…, 4).
+    """
+    scale = np.array([BEFORE, SAME, AFTER], dtype=np.float64)
+    channels = [np.interp(place, (0.0, 0.5, 1.0), scale[:, channel]) for channel in range(3)]
+    return np.stack([*channels, np.full(np.shape(place), 255.0)], axis=-1).astype(np.uint8)
+
+
+CHANGE = Scale(-12.0, 12.0, "dB", step=6.0, palette=diverging)
+"""Of levels; what is beyond is as blue or as orange as can be."""
+
+
+def log_over(recording: rr.RecordingStream, beside: Comparison) -> Panel:
+    """Log by how much each joint is louder than its reference: the eight that are most."""
+    over = beside.by_joint
+    peaks = np.nan_to_num(over, nan=-np.inf).max(axis=0)
+    which = np.sort(np.argsort(-peaks, kind="stable")[:SHOWN])
+    own, shown = [beside.joints[index] for index in which], over[:, which].T
+    panel = Panel("over", STRIP_ROW * len(own) + axes.AXIS)
+    rgba = CHANGE.colours(np.nan_to_num(shown, nan=0.0), shades=SHADES)
+    rgba[np.isnan(shown)] = axes.EMPTY
+    edges = np.append(beside.time - HOP / 2, beside.time[-1] + HOP / 2)
+    names = [f"{each}, over the reference [dB]" for each in own]
+    path = "/strips/over"
+    axes.log_rows(recording, path, edges, rgba, names=names, width=STRIP_WIDTH, lines=STROKES)
+    axes.log_left(recording, panel, axes.row_labels(own))
+    axes.log_scale(recording, panel, CHANGE)
+    return panel
 
 
 def log_links(

@@ -16,6 +16,7 @@ from inspector.analysis.loudest import worst_joint, worst_signal
 from inspector.analysis.moments import worst
 from inspector.recording import axes, framing, panels, robot, unstable
 from inspector.recording.layout import Contents, layout
+from inspector.reference.judging import Comparison
 from inspector.report.markdown import report, spoken
 from inspector.spectrogram import spectrogram
 from noisemodel.files import replacing
@@ -79,6 +80,7 @@ def write(
     overwrite: bool = False,
     sound: bytes = b"",
     floor: float | None = None,
+    beside: Comparison | None = None,
 ) -> None:
     """Write the recording of an inspected run, whole or not at all.
 
@@ -86,12 +88,13 @@ def write(
 
     Args:
         sound: The run made audible, a WAV file that starts with the run; none if empty.
+        beside: The run beside its reference; None without one.
         floor: Level of the darkest colour of spectrograms, in [dB re 1 rad/s]; by the run if None.
     """
     identity = analysis.sha256
     with TemporaryDirectory() as folder, writing(path, identity, overwrite=overwrite) as recording:
         tree = robot.of_run(analysis.run, Path(folder)) if analysis.links is not None else None
-        contents = _log(recording, analysis, tree, Path(folder), sound, floor)
+        contents = _log(recording, analysis, tree, Path(folder), sound, floor, beside)
         recording.send_blueprint(layout(contents))  # takes the place of an older run's layout
 
 
@@ -102,10 +105,13 @@ def _log(
     folder: Path,
     sound: bytes,
     floor: float | None,
+    beside: Comparison | None,
 ) -> Contents:
     run, links, moments, seen = analysis.run, analysis.links, worst(analysis), None
     axes.log_span(recording, float(run.time[0]), float(run.time[-1]))
     strips = []
+    if beside is not None and len(beside.time) and beside.joints:
+        strips.append(("Over the reference", panels.log_over(recording, beside)))
     if (panel := panels.log_joint_levels(recording, analysis)) is not None:
         strips.append(("Joints above 10 Hz", panel))
     if tree is not None and links is not None:
