@@ -8,7 +8,8 @@ import subprocess
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import date
 from functools import cache
 from io import BytesIO
 from pathlib import Path
@@ -29,7 +30,9 @@ from inspector.library import load_library
 from inspector.live import input as feeding
 from inspector.logs.mapping import ReadOptions, parse_mapping
 from inspector.logs.read import listing, read_logs
-from inspector.reference.store import Reference
+from inspector.reference.judging import Expected
+from inspector.reference.levels import levels
+from inspector.reference.store import Reference, of_runs, save
 from noiseclassifier import noisytest
 from noiseclassifier.scenarios import ScenarioError
 from noiseclassifier.scenarios.dataset import Folder, Task
@@ -78,19 +81,6 @@ DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="
 </visual_scene></library_visual_scenes><scene><instance_visual_scene url="#vs"/></scene></COLLADA>
 """
 LABELS = ((0.0, 0.5, "ok"), (0.6, 0.9, "impact"))
-STORE = """format = "noise-reference/1"
-[[scenario]]
-name = "pick"
-joints = ["a"]
-levels = "pick.npz"
-sha256 = "0"
-[[scenario.repetition]]
-rate_hz = 1000.0
-duration_s = 1.0
-[[scenario.waive]]
-until = 2099-01-31
-reason = "later"
-"""
 
 
 @dataclass(frozen=True)
@@ -413,6 +403,16 @@ SIMULATE = ("simulate", "dataset", "--robots", "panda", "--seeds", "1", "--scena
 SIMULATE += ("--duration", "3")
 LIVE = ("live", "--rate", "100", "--save", "{folder}/out.rrd")
 
+
+def _accepted(folder: Path) -> Path:
+    """A store of references with a scenario."""
+    run = nm.Run(time=TIME, position=POSITION, velocity=VELOCITY, joint_names=JOINTS)
+    waived = Expected(reason="later", until=date(2099, 1, 31))
+    (pick,) = of_runs([levels(run, name="pick", file="pick-1.npz")])
+    save(Reference(folder, (replace(pick, waived=(waived,)),)), folder)
+    return folder / "reference.toml"
+
+
 READERS: Mapping[str, Reader] = MappingProxyType(
     {
         "run": Reader("arrays", _run_file, _read_run, CLASSIFY),
@@ -438,7 +438,7 @@ READERS: Mapping[str, Reader] = MappingProxyType(
         ),
         "reference.toml": Reader(
             "text",
-            _written("reference.toml", STORE),
+            _accepted,
             Reference.load,
             ("classify", "{folder}/run.npz", "--reference", "{}"),
         ),

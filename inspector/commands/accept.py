@@ -41,6 +41,7 @@ def accept(
     from fnmatch import fnmatchcase
 
     from inspector import assets
+    from inspector.analysis.status import Status
     from inspector.errors import InspectorError
     from inspector.library import load_library
     from inspector.logs.read import sources
@@ -80,6 +81,9 @@ def accept(
     classified = classify_files(found, library, reading=ctx.obj, jobs=jobs)
     verdicts = list(progress(classified, "accept", total=len(found)))
     say_assumed({str(verdict.path): verdict.assumed for verdict in verdicts})
+    for each in verdicts:
+        if each.status in (Status.BAD_INPUT, Status.INTERNAL_ERROR):
+            raise InspectorError(f"{each.path}: {each.message}; nothing is accepted")
     after, changes = accept_into(
         store,
         levels,
