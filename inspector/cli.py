@@ -1,5 +1,6 @@
 """The command line: the commands in panels, each imported when used; errors as one line."""
 
+import errno
 import io
 import os
 import sys
@@ -157,6 +158,10 @@ UNSET = OUTPUTS | {"overwrite", "write", "ctx", "localise", "in_ci", "help"}
 """Names of parameters that no file of settings sets."""
 SHARED = {"model", "jobs"}
 """Settings of all commands, besides those on reading logs."""
+
+
+UNUSABLE = (errno.ENAMETOOLONG, errno.EACCES, errno.EPERM, errno.ENOSPC, errno.EROFS, errno.EIO)
+"""Errors of the system about a path that a user typed, or of a disk: no bugs."""
 
 
 class LogCommand(TyperCommand):
@@ -339,6 +344,7 @@ def main() -> None:
     # Matrices are small here: more threads mostly wait, and waiting takes processor time.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Of a file that it cannot write, rerun tells in several lines; we do in one.
+    os.environ["MPLBACKEND"] = "agg"  # pictures are files: whatever is set may not be installed
     os.environ.setdefault("RUST_LOG", "warn,re_log_encoding=off,re_sdk=off")
     output = _standard_output()
     for stream in (sys.stdout, sys.stderr):  # names of files need not be text in their encoding
@@ -411,6 +417,10 @@ def _failed(error: Exception) -> int:
     if isinstance(error, OptionError):  # needs none of the imports below
         typer.echo(f"inspector: {printable(str(error))}", err=True)
         return 2
+    if isinstance(error, OSError) and error.filename and error.errno in UNUSABLE:
+        name = Path(os.fsdecode(error.filename))
+        typer.echo(f"inspector: {printable(str(name))}: {error.strerror}", err=True)
+        return OUTPUT_LOST if error.errno in (errno.ENOSPC, errno.EROFS) else 3
     if isinstance(error, ValueError):
         import noiseclassifier as nc
         import noisemodel

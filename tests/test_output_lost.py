@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 import pytest
+from commandline import call
 
 from inspector.assets import demo_run
 
@@ -168,3 +169,42 @@ def test_workers_end_with_the_process_that_waits_for_them(tmp_path, stop):
     while any(alive(each) for each in workers) and time.monotonic() < until:
         time.sleep(0.1)
     assert not [each for each in workers if alive(each)]
+
+
+LONG = "a" * 300
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("classify", LONG),
+        ("classify", demo_run(), "--resume", LONG),
+        ("classify", demo_run(), "--write", f"json={LONG}"),
+        ("classify", demo_run(), "--report", LONG),
+        ("view", demo_run(), "-o", f"{LONG}.html"),
+        ("merge", LONG),
+        ("history", LONG),
+        ("import", LONG, "-o", "a.npz"),
+    ],
+)
+def test_a_name_that_is_too_long_is_one_line(tmp_path, monkeypatch, arguments):
+    monkeypatch.chdir(tmp_path)
+    status, _, err = call(*arguments)
+    assert status in (3, 5)
+    assert err.count("\n") == 1
+    assert err.startswith("inspector: ")
+    assert LONG in err
+
+
+def test_a_home_that_cannot_be_written_is_one_line(monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", "/proc/nothing")
+    status, _, err = call("view", demo_run())
+    assert (status, err.count("\n")) == (5, 1)
+    assert err.endswith("; name the recording with -o FILE.rrd\n")
+
+
+def test_a_backend_of_matplotlib_that_does_not_exist_does_not_matter(tmp_path):
+    env = os.environ | {"MPLBACKEND": "x", "PYTHONPATH": f"{ROOT}{os.pathsep}{ROOT / 'models'}"}
+    command = [sys.executable, "-m", "inspector", "view", demo_run(), "-o", tmp_path / "a.html"]
+    done = subprocess.run(command, env=env, check=False, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")

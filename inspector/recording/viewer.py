@@ -25,6 +25,7 @@ from typing import IO
 from urllib.parse import quote
 
 from inspector.errors import InspectorError
+from noisemodel import OutputError
 
 SETTLE = 2.0
 """Time within which a viewer that listens and cannot open its window ends, in [s]."""
@@ -119,7 +120,11 @@ def scratch_path(run: Path) -> Path:
     """
     cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = cache / "noise-inspector" / "recordings"
-    folder.mkdir(parents=True, exist_ok=True)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        why = f"{folder}: cannot be made a folder ({error.strerror})"
+        raise OutputError(f"{why}; name the recording with -o FILE.rrd") from error
     _make_room(folder)
     key = hashlib.sha256(str(run.resolve()).encode()).hexdigest()[:8]
     return folder / f"{run.stem}-{key}.rrd"
