@@ -1,18 +1,13 @@
-"""Speed-up of two processes over one, and memory of workers over a batch.
+"""Speed-up of two processes over one, over a batch of runs.
 
     python -m benchmarks.batch [--runs 200] [--rate 1000] [--joints 7] [--seconds 10] [--repeats 5]
-    python -m benchmarks.batch --memory --runs 1000 --rate 10000 --joints 32 [--jobs 2]
 
 The batch is a folder of links to eight files of simulated motion: position, velocity and desired
 velocity of joints that follow slow sines, with noise and a few impacts.
 
-Speed: `inspector classify FOLDER` with one process, with two, and as two commands at the same time
+`inspector classify FOLDER` with one process, with two, and as two commands at the same time
 with half of the runs each, which is what two cores can do at best. They take turns after a warm-up.
 Given are medians of wall and CPU time, and the median of the ratios of the turns.
-
-Memory: of each worker, every 0.2 s, by /proc. RSS counts what a worker has in memory, USS what it
-alone has (what was forked and not changed is its parent's too), PSS shares that among those who
-have it. Given are the peaks, and the median USS in each quarter of the batch: a leak grows.
 """
 
 import argparse
@@ -122,50 +117,6 @@ def speed(places: tuple[Path, ...], repeats: int) -> None:
         print(f"| {way} | {wall:.2f} | {cpu:.2f} | {ratio:.2f} |")
 
 
-def memory(folder: Path, jobs: int, runs: int) -> None:
-    """Print the memory of each worker of a batch."""
-    samples: dict[int, list[tuple[float, float, float]]] = {}
-    peaks: dict[int, float] = {}
-    begun = time.perf_counter()
-    with command(folder, jobs) as process:
-        while process.poll() is None:
-            time.sleep(EVERY)
-            for worker in children(process.pid) if jobs > 1 else [process.pid]:
-                try:
-                    shares = fields(worker, "smaps_rollup")
-                    peaks[worker] = fields(worker, "status")["VmHWM"]
-                except (OSError, KeyError):  # it has just ended
-                    continue
-                own = shares["Private_Clean"] + shares["Private_Dirty"]
-                samples.setdefault(worker, []).append((shares["Rss"], shares["Pss"], own))
-        if process.returncode not in (0, 1):
-            raise SystemExit(f"inspector classify failed (exit {process.returncode})")
-    wall = time.perf_counter() - begun
-    print(f"{runs} runs in {wall:.0f} s, {jobs} at once; memory of each worker in [MB]\n")
-    print("| worker | peak RSS | peak PSS | peak USS | USS by quarter of the batch |")
-    print("|---|---|---|---|---|")
-    for number, (worker, rows) in enumerate(samples.items(), start=1):
-        _, pss, uss = (max(each) for each in zip(*rows, strict=True))
-        quarters = [median(row[2] for row in part) for part in np.array_split(rows, 4) if len(part)]
-        trend = " ".join(f"{each:.0f}" for each in quarters)
-        print(f"| {number} | {peaks[worker]:.0f} | {pss:.0f} | {uss:.0f} | {trend} |")
-
-
-def children(process: int) -> list[int]:
-    """Processes that a process has started."""
-    try:  # any thread may have started them
-        tasks = [each.read_text() for each in Path(f"/proc/{process}/task").glob("*/children")]
-    except OSError:  # it has just ended
-        return []
-    return [int(each) for task in tasks for each in task.split()]
-
-
-def fields(process: int, name: str) -> dict[str, float]:
-    """Sizes in a file of /proc, in [MB]; its kB are 1024 bytes."""
-    rows = (line.split() for line in Path(f"/proc/{process}/{name}").read_text().splitlines())
-    return {row[0].rstrip(":"): int(row[1]) * 1024e-6 for row in rows if row[-1] == "kB"}
-
-
 def main() -> None:
     """Make the batch, measure and print."""
     arguments = argparse.ArgumentParser(
@@ -176,18 +127,13 @@ def main() -> None:
     arguments.add_argument("--joints", type=int, default=7)
     arguments.add_argument("--seconds", type=float, default=10.0, help="of each run")
     arguments.add_argument("--repeats", type=int, default=5)
-    arguments.add_argument("--jobs", type=int, default=2, help="whose memory is measured")
-    arguments.add_argument("--memory", action="store_true", help="measure memory, not speed")
     arguments.add_argument("--output", type=Path, default=ROOT / "build" / "batch")
     given = arguments.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     size = {"rate": given.rate, "joints": given.joints, "seconds": given.seconds}
     with tempfile.TemporaryDirectory(dir=given.output) as links:
         places = make(given.output, Path(links), runs=given.runs, **size)
-        if given.memory:
-            memory(places[0], given.jobs, given.runs)
-        else:
-            speed(places, given.repeats)
+        speed(places, given.repeats)
 
 
 if __name__ == "__main__":

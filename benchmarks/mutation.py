@@ -53,7 +53,7 @@ ARITHMETIC = {"Add", "Sub", "Mul", "Div", "FloorDiv", "Mod", "Pow"}
 IDENTITY = {"Is", "IsNot"}
 MEMORY = 12 << 30  # address space of a child, in [byte]
 LEFT_OUT = (
-    *("scenarios", "domains", "humanoid", "quadruped", "rockets", "leftout", "wheel"),
+    *("scenarios", "domains", "humanoid", "quadruped", "wheel"),
     *("*viewer", "*screenshot", "*picture", "*notebook"),
 )
 """Tests of simulators and of the wheel, which take a third of the time; and of viewers, which hang

@@ -22,6 +22,7 @@ from noiseclassifier.scenarios.motions import RATE, STEP, times
 from noiseclassifier.scenarios.robots import ROBOTS
 from noiseclassifier.scenarios.simulation import recorded
 from noiseclassifier.scenarios.table import SCENARIOS
+from noiseclassifier.scenarios.world import reduced_model
 from noisemodel import Run, decimated
 
 WAYS, GOOD = ("straight", "curve"), 6
@@ -47,7 +48,7 @@ def trial(robot, way, repetition, defect, seed, duration=5.0):
     same = Imperfections.draw(
         np.random.default_rng((seed, 2)),
         joints,
-        bodies=family.bodies(simulated),
+        bodies=reduced_model(simulated).njoints - 1,
         payload=simulated.payload,
         force=simulated.force_noise,
     )

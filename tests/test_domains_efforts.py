@@ -8,7 +8,6 @@ import pinocchio as pin
 import pytest
 from simulated import simulated
 
-from noiseclassifier.scenarios.arm import bodies
 from noiseclassifier.scenarios.dataset import Folder, Task
 from noiseclassifier.scenarios.domains import DISTRIBUTION, Logger
 from noiseclassifier.scenarios.errors import DatasetError
@@ -50,7 +49,9 @@ def pushed():
 def real_panda():
     """The Panda of the seed with its real masses, and the Coulomb friction of its joints."""
     drawn = _setup(Start("panda", STANDS, distribution=DISTRIBUTION))
-    imperfections = _imperfections(drawn, len(drawn.robot.drives.joints), bodies(drawn.robot))
+    imperfections = _imperfections(
+        drawn, len(drawn.robot.drives.joints), reduced_model(drawn.robot).njoints - 1
+    )
     tool = drawn.robot.tool
     model = real_model(reduced_model(drawn.robot), tool.frame, np.array(tool.point), imperfections)
     friction = np.array(drawn.robot.drives.friction) * imperfections.friction

@@ -84,7 +84,7 @@ def test_a_fault_below_the_sensor_s_noise_loses_its_label(domains):
 def test_without_the_simulators_one_line_says_what_to_install(tmp_path):
     code = (
         "import sys; sys.argv[1:] = ['out']; from benchmarks.elsewhere import __main__ as script;"
-        " script.installed = lambda: {'drake', 'dm-control'}; script.main()"
+        " script.installed = lambda: {'drake'}; script.main()"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False

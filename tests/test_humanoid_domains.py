@@ -10,7 +10,7 @@ import noisemodel
 from noiseclassifier.scenarios.domains import HUMANOID_LIMITS, WALKS, humanoid_motion
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import ON_DRIVES, Faults, Imperfections
-from noiseclassifier.scenarios.humanoid import bodies, plan, scene, standing
+from noiseclassifier.scenarios.humanoid import plan, scene, standing
 from noiseclassifier.scenarios.humanoid_plan import stopping
 from noiseclassifier.scenarios.labels import unplanned
 from noiseclassifier.scenarios.loop import record
@@ -41,7 +41,11 @@ def simulated(robot, wanted, seed=1, duration=4.0, stiffness=1.0, damping=1.0, d
     way, joints = planned(robot, wanted, seed, duration), len(robot.drives.joints)
     rng = np.random.default_rng(seed)
     like = Imperfections.draw(
-        rng, joints, bodies=bodies(robot), payload=robot.payload, force=robot.force_noise
+        rng,
+        joints,
+        bodies=reduced_model(robot).njoints - 1,
+        payload=robot.payload,
+        force=robot.force_noise,
     )
     like = replace(like, torque_delay=like.torque_delay + round(delay * STEPS / TICK))
     scenery = scene(robot, way, Faults(), like)

@@ -10,7 +10,7 @@ from simulated import simulated
 
 from noiseclassifier.scenarios.drives import Drives
 from noiseclassifier.scenarios.faults import Faults, Imperfections
-from noiseclassifier.scenarios.humanoid import SETTLING, bodies, plan, scene, standing
+from noiseclassifier.scenarios.humanoid import SETTLING, plan, scene, standing
 from noiseclassifier.scenarios.humanoid_plan import footsteps, walk
 from noiseclassifier.scenarios.loop import record
 from noiseclassifier.scenarios.motions import STEPS, TICK, Walk
@@ -27,7 +27,11 @@ HUMANOIDS = pytest.mark.parametrize("robot", [TALOS, G1], ids=lambda robot: robo
 def imperfect(robot, seed=3):
     rng = np.random.default_rng(seed)
     return Imperfections.draw(
-        rng, 12, bodies=bodies(robot), payload=robot.payload, force=robot.force_noise
+        rng,
+        12,
+        bodies=reduced_model(robot).njoints - 1,
+        payload=robot.payload,
+        force=robot.force_noise,
     )
 
 

@@ -88,7 +88,7 @@ def main() -> None:
 
 def installed() -> set[str]:
     """The simulators that are there."""
-    modules = {"pybullet": "pybullet", "drake": "pydrake", "dm-control": "dm_control"}
+    modules = {"pybullet": "pybullet", "drake": "pydrake"}
     return {package for package, module in modules.items() if find_spec(module)}
 
 

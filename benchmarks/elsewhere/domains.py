@@ -12,7 +12,6 @@ import numpy as np
 from benchmarks.elsewhere import (
     bulletarm,
     bulletlegs,
-    dmarm,
     drakearm,
     faults,
     references,
@@ -126,17 +125,6 @@ def _drake_arm(arm: drakearm.DrakeArm) -> Callable[..., Scene]:
     return scene
 
 
-def _jaco(rng: np.random.Generator, seed: int, duration: float, rate: float) -> Scene:
-    kind = references.KINDS[(seed + 2) % len(references.KINDS)]
-    reference = references.draw(
-        rng, kind, np.array(dmarm.HOME), reach=0.3, duration=duration, rate=rate, fastest=0.5
-    )
-    servos = dmarm.Servos.draw(rng)
-    sizes = Sizes(force=(50.0, 200.0), ball=None, delay=(0.04, 0.1), gain=(15.0, 30.0))
-    return Scene(reference, servos, "loop around dm_control's velocity servos", sizes, (4, 5, 6),
-                 lambda control: dmarm.simulate(servos, control, rate))  # fmt: skip
-
-
 PANDA = bulletarm.BulletArm(
     "franka_panda/panda.urdf",
     tuple(f"panda_joint{number}" for number in range(1, 8)),
@@ -216,7 +204,6 @@ DOMAINS: Mapping[str, Domain] = MappingProxyType(
             Domain("pybullet-laikago", "pybullet", "laikago", _LEGS, 500.0, _bullet_legs(LAIKAGO)),
             Domain("drake-ur5", "drake", "ur5", UR5.joints, 500.0, _drake_arm(UR5)),
             Domain("drake-kinova", "drake", "kinova", KINOVA.joints, 500.0, _drake_arm(KINOVA)),
-            Domain("dm-control-jaco", "dm-control", None, dmarm.JOINTS, 500.0, _jaco),
         )
     }
 )

@@ -20,7 +20,6 @@ from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.loop import Control, Reference, Scene, forces
 from noiseclassifier.scenarios.motions import (
-    STEP,
     TICK,
     Box,
     Contact,
@@ -36,11 +35,9 @@ from noiseclassifier.scenarios.motions import (
 )
 from noiseclassifier.scenarios.robots import Arm
 from noiseclassifier.scenarios.world import (
-    Physics,
     box_changes,
-    build,
     configuration,
-    real_model,
+    real_world,
     reduced_model,
 )
 from noisemodel import Robot
@@ -342,8 +339,10 @@ def plan(
 def scene(arm: Arm, plan: Plan | ReachPlan, faults: Faults, imperfections: Imperfections) -> Scene:
     """Scene of one run."""
     model, rest = reduced_model(arm), np.array(arm.rest)
-    boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
-    world = _world(arm, model, boxes, imperfections)
+    boxes = faults.boxes_on(plan)
+    world = real_world(
+        arm, boxes, imperfections, frame=arm.tool.frame, point=_tip(arm), contact=arm.contact
+    )
     return Scene(
         model=world,
         start=rest - faults.offsets(len(rest)),  # the encoders read the rest position
@@ -411,21 +410,3 @@ def _shifted(plan: Plan, faults: Faults) -> Plan:
 
 def _tip(arm: Arm) -> Array:
     return np.array(arm.tool.point)
-
-
-def _world(arm: Arm, model: Any, boxes: tuple[Any, ...], imperfections: Imperfections) -> Any:
-    """MuJoCo model of the real robot, its table and the objects on it."""
-    physics = Physics(
-        timestep=STEP,
-        armature=np.array(arm.drives.armature),
-        damping=np.array(arm.drives.viscous) * imperfections.viscous,
-        friction=np.array(arm.drives.friction) * imperfections.friction,
-        contact=arm.contact,
-    )
-    real = real_model(model, arm.tool.frame, _tip(arm), imperfections)
-    return build(real, physics, effectors=(arm.tool,), boxes=boxes)
-
-
-def bodies(arm: Arm) -> int:
-    """Number of moving bodies of an arm."""
-    return int(reduced_model(arm).njoints) - 1

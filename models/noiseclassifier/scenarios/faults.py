@@ -95,6 +95,10 @@ class Faults:
     events: tuple[Event, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
 
+    def boxes_on(self, plan: Plan) -> tuple[Box, ...]:
+        """The ground of a plan, or what it has become, and what lies on it."""
+        return (*(plan.ground if self.ground is None else self.ground), *self.boxes)
+
     def offsets(self, joints: int) -> Array:
         """Offsets of a number of encoders, shape (joints,), in [rad]."""
         return np.array([self.decalibration.get(joint, 0.0) for joint in range(joints)])

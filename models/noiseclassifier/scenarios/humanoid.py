@@ -12,15 +12,13 @@ import pinocchio as pin
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.humanoid_plan import Plan, footsteps, gesture, stand, stopping, walk
 from noiseclassifier.scenarios.loop import Reference, Scene
-from noiseclassifier.scenarios.motions import STEP, TICK, Sole, Stand, Stroll, Walk
+from noiseclassifier.scenarios.motions import TICK, Sole, Stand, Stroll, Walk
 from noiseclassifier.scenarios.robots import LEGS, Gains, Humanoid
 from noiseclassifier.scenarios.world import (
     GRAVITY,
-    Physics,
     WholeBody,
     box_changes,
-    build,
-    real_model,
+    real_world,
     reduced_model,
     sensors_of,
 )
@@ -263,8 +261,8 @@ def plan(
 def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
     """Scene of one run."""
     model = reduced_model(robot)
-    boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
-    world = _world(robot, model, boxes, imperfections)
+    boxes = faults.boxes_on(plan)
+    world = real_world(robot, boxes, imperfections, frame=robot.carrier, point=np.zeros(3))
     where = sensors_of(world)
     strength = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge") * imperfections.force_gain
     shifted = _shifted(plan, faults).after(SETTLING)
@@ -284,11 +282,6 @@ def scene(robot: Humanoid, plan: Plan, faults: Faults, imperfections: Imperfecti
     )
 
 
-def bodies(robot: Humanoid) -> int:
-    """Number of moving bodies of a humanoid."""
-    return int(reduced_model(robot).njoints) - 1
-
-
 def standing(robot: Humanoid, model: Any, plan: Plan) -> WholeBody:
     """The robot, standing as a plan starts."""
     start = pin.neutral(model)
@@ -305,21 +298,6 @@ def _shifted(plan: Plan, faults: Faults) -> Plan:
     if faults.shift is None:
         return plan
     return replace(plan, places=plan.places + faults.shift(plan.time))
-
-
-def _world(
-    robot: Humanoid, model: Any, boxes: tuple[Any, ...], imperfections: Imperfections
-) -> Any:
-    """MuJoCo model of the real robot and the real ground."""
-    drives = robot.drives
-    physics = Physics(
-        timestep=STEP,
-        armature=np.array(drives.armature),
-        damping=np.array(drives.viscous) * imperfections.viscous,
-        friction=np.array(drives.friction) * imperfections.friction,
-    )
-    real = real_model(model, robot.carrier, np.zeros(3), imperfections)
-    return build(real, physics, effectors=robot.effectors, boxes=boxes)
 
 
 def _mujoco_start(configuration: Array, offsets: Array) -> Array:

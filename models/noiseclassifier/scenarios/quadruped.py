@@ -9,16 +9,14 @@ import pinocchio as pin
 
 from noiseclassifier.scenarios.faults import Faults, Imperfections
 from noiseclassifier.scenarios.loop import Reference, Scene
-from noiseclassifier.scenarios.motions import STEP, TICK, Box, Trot
+from noiseclassifier.scenarios.motions import TICK, Trot
 from noiseclassifier.scenarios.quadruped_plan import Plan, Standing, stand, trot, turned
 from noiseclassifier.scenarios.robots import Quadruped
 from noiseclassifier.scenarios.world import (
     GRAVITY,
-    Physics,
     WholeBody,
     box_changes,
-    build,
-    real_model,
+    real_world,
     reduced_model,
     sensors_of,
 )
@@ -260,8 +258,8 @@ def plan(robot: Quadruped, motion: Trot, rng: np.random.Generator, duration: flo
 def scene(robot: Quadruped, plan: Plan, faults: Faults, imperfections: Imperfections) -> Scene:
     """Scene of one run."""
     model, standing = reduced_model(robot), stand(robot)
-    boxes = (*(plan.ground if faults.ground is None else faults.ground), *faults.boxes)
-    world = _world(robot, model, boxes, imperfections)
+    boxes = faults.boxes_on(plan)
+    world = real_world(robot, boxes, imperfections, frame=model.frames[1].name, point=np.zeros(3))
     sensors = sensors_of(world)
     gain = np.pad(faults.gain(plan.time), (SETTLING, 0), "edge") * imperfections.force_gain
     control = TrotControl(
@@ -287,29 +285,10 @@ def scene(robot: Quadruped, plan: Plan, faults: Faults, imperfections: Imperfect
     )
 
 
-def bodies(robot: Quadruped) -> int:
-    """Number of moving bodies of a quadruped, with its base."""
-    return int(reduced_model(robot).njoints) - 1
-
-
 def _shifted(plan: Plan, faults: Faults) -> Plan:
     if faults.shift is None:
         return plan
     return replace(plan, feet=plan.feet + faults.shift(plan.time))
-
-
-def _world(
-    robot: Quadruped, model: Any, boxes: tuple[Box, ...], imperfections: Imperfections
-) -> Any:
-    """MuJoCo model of the real robot and the ground."""
-    physics = Physics(
-        timestep=STEP,
-        armature=np.array(robot.drives.armature),
-        damping=np.array(robot.drives.viscous) * imperfections.viscous,
-        friction=np.array(robot.drives.friction) * imperfections.friction,
-    )
-    real = real_model(model, model.frames[1].name, np.zeros(3), imperfections)
-    return build(real, physics, effectors=robot.feet, boxes=boxes)
 
 
 def _start(robot: Quadruped, model: Any, standing: Standing, faults: Faults) -> Array:

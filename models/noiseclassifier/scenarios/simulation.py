@@ -257,12 +257,14 @@ def _refuse_rattling(velocity: Array) -> None:
 
 def _trial(start: Start, defect: Defect, duration: float) -> Trial:
     """One run; as each kind of randomness has its own stream, twins differ in the fault only."""
+    from noiseclassifier.scenarios.world import reduced_model
+
     family = import_module(f"noiseclassifier.scenarios.{start.nominal.family}")
     setup = _setup(start)
     robot = setup.robot
     joints = len(robot.drives.joints)
     plan: Plan = family.plan(robot, setup.motion, setup.planned, duration)
-    imperfections = _imperfections(setup, joints, family.bodies(robot))
+    imperfections = _imperfections(setup, joints, reduced_model(robot).njoints - 1)
     faults = drawn(defect, setup.faulty, plan, robot.drives)
     scene = family.scene(robot, plan, faults, imperfections)
     common: dict[str, Any] = {

@@ -12,7 +12,7 @@ from scipy.linalg import solve_banded
 
 from noiseclassifier.scenarios.errors import ScenarioError
 from noiseclassifier.scenarios.faults import Imperfections
-from noiseclassifier.scenarios.motions import TICK, Ball, Box, Effector, Rod, Sole
+from noiseclassifier.scenarios.motions import STEP, TICK, Ball, Box, Effector, Rod, Sole
 from noiseclassifier.scenarios.robots import Drivetrain
 from noisemodel import Robot, RobotError
 from noisemodel.robot import Joint, table_of
@@ -499,8 +499,6 @@ def pinocchio_base(pose: Array, velocity: Array) -> tuple[Array, Array]:
 
 def real_model(model: Any, frame: str, point: Array, imperfections: Imperfections) -> Any:
     """A robot's model with its real masses, unknown to its controller."""
-    import pinocchio as pin
-
     real = model.copy()
     for index, scale in enumerate(imperfections.mass, start=1):
         given = model.inertias[index]
@@ -512,6 +510,28 @@ def real_model(model: Any, frame: str, point: Array, imperfections: Imperfection
         holder.placement * pin.SE3(np.eye(3), point),
     )
     return real
+
+
+def real_world(
+    robot: Any,
+    boxes: Sequence[Box],
+    imperfections: Imperfections,
+    *,
+    frame: str,
+    point: Array,
+    contact: float = 0.005,
+) -> Any:
+    """MuJoCo model of a real robot, with its load at a point of a frame, and of its world."""
+    drives, model = robot.drives, reduced_model(robot)
+    physics = Physics(
+        timestep=STEP,
+        armature=np.array(drives.armature),
+        damping=np.array(drives.viscous) * imperfections.viscous,
+        friction=np.array(drives.friction) * imperfections.friction,
+        contact=contact,
+    )
+    real = real_model(model, frame, point, imperfections)
+    return build(real, physics, effectors=robot.effectors, boxes=boxes)
 
 
 GRAVITY = 9.81  # in [m/s²]
