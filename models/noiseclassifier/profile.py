@@ -160,6 +160,7 @@ class Profile:
         """Check every setting once."""
         _check_types(self)
         _check_ranges(self)
+        _check_signals(self)
         _check_bands(self)
 
     @classmethod
@@ -297,6 +298,9 @@ def _check_ranges(profile: Profile) -> None:
         raise ProfileError(
             f"window of {longest} samples is longer than a frame of {profile.length}"
         )
+
+
+def _check_signals(profile: Profile) -> None:
     if not profile.signals or len(set(profile.signals)) < len(profile.signals):
         raise ProfileError(
             f"signals are {', '.join(profile.signals) or 'none'}, expected one or more, each once"

@@ -12,7 +12,7 @@ first one is where the walk would have led (C. Lucchese et al., *QuickScorer: A 
 Rank Documents with Additive Ensembles of Regression Trees*, 2015).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -90,19 +90,6 @@ class Trees(Probable):
         rising: Index | None = None,
     ) -> "Trees":
         """Train trees on all frames, and calibrate them by trees that left a part out."""
-        return cls.staged(features, targets, groups, profile, (profile.rounds,), rising)[0]
-
-    @classmethod
-    def staged(
-        cls,
-        features: Array,
-        targets: Index,
-        groups: Words,
-        profile: Profile,
-        rounds: Sequence[int],
-        rising: Index | None = None,
-    ) -> list["Trees"]:
-        """Train trees once for several numbers of rounds."""
         from joblib import Parallel, delayed
 
         parts = _parts(targets, groups)
@@ -112,16 +99,13 @@ class Trees(Probable):
             delayed(cls.uncalibrated)(features, targets, train, profile, rising)
             for train in (everything, *(train for train, _ in parts))
         )
+        trees, *others = fitted
         seen = [of_seen_classes(targets, train, test) for train, test in parts]
-        found = []
-        for count in rounds:
-            trees, *others = (each.first(count) for each in fitted)
-            if sum(map(len, seen)):
-                logits = [one.logits(features[own]) for one, own in zip(others, seen, strict=True)]
-                truth = targets[np.concatenate(seen)]
-                trees = replace(trees, calibration=calibrate(np.concatenate(logits), truth))
-            found.append(trees)
-        return found
+        if not sum(map(len, seen)):
+            return trees
+        logits = [one.logits(features[own]) for one, own in zip(others, seen, strict=True)]
+        truth = targets[np.concatenate(seen)]
+        return replace(trees, calibration=calibrate(np.concatenate(logits), truth))
 
     @classmethod
     def uncalibrated(
@@ -160,13 +144,6 @@ class Trees(Probable):
     ) -> tuple[Array, Array, Array]:
         """Splits, leaves and prior, as `_boosted` gives them."""
         return _boosted(features, targets, train, classes, profile, profile.rounds)
-
-    def first(self, rounds: int) -> "Trees":
-        """Trees of the first rounds of boosting, with the same calibration."""
-        count = rounds * len(self.prior)
-        names = ("feature", "threshold", "missing", "leaf")
-        own = {name: getattr(self, name)[:count] for name in names}
-        return replace(self, left=self.left[:, :count], **own)
 
     def at(self, there: Index) -> "Trees":
         """Trees of frames that lack some of the features."""
